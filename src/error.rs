@@ -1,0 +1,91 @@
+//! Every way a run can fail, as one sentence that names the file, adapter or limit and says what to do.
+
+use std::path::{Path, PathBuf};
+
+/// The library's result.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// A failure, worded for the person at the terminal.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A file could not be opened or read.
+    #[error("cannot read {path}: {source}", path = path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A file was read, but is not what its format says.
+    #[error("{path}: {what}", path = path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it, and where.
+        what: String,
+    },
+    /// An output file could not be written; nothing was left behind.
+    #[error("cannot write {path}: {source}", path = path.display())]
+    Write {
+        /// The file that was asked for.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// An argument that can never work, whatever the files and the machine (exit code 2).
+    #[error("{0}")]
+    Usage(String),
+    /// The inputs together hold nothing to draw.
+    #[error("{0}")]
+    EmptyScene(String),
+    /// No adapter fits what was asked.
+    #[error("{0}")]
+    NoAdapter(String),
+    /// A limit of the adapter would be exceeded.
+    #[error("{adapter}: {limit} is {available}, but {needed} are needed {what}")]
+    Limit {
+        /// The adapter's name.
+        adapter: String,
+        /// The limit as WebGPU names it.
+        limit: &'static str,
+        /// What the adapter offers.
+        available: u64,
+        /// What the render asked for.
+        needed: u64,
+        /// What for, and what to change.
+        what: String,
+    },
+    /// The graphics stack failed: out of memory, lost device, rejected shader.
+    #[error("{adapter}: {what}")]
+    Gpu {
+        /// The adapter's name.
+        adapter: String,
+        /// What it reported.
+        what: String,
+    },
+}
+
+impl Error {
+    /// A file that is not what its format says.
+    pub fn malformed(path: &Path, what: impl Into<String>) -> Self {
+        Self::Malformed { path: path.to_owned(), what: what.into() }
+    }
+
+    /// A file that could not be read.
+    pub fn read(path: &Path, source: std::io::Error) -> Self {
+        Self::Read { path: path.to_owned(), source }
+    }
+
+    /// A file that could not be written.
+    pub fn write(path: &Path, source: std::io::Error) -> Self {
+        Self::Write { path: path.to_owned(), source }
+    }
+
+    /// The exit code the command line gives this failure: 2 for unusable arguments, 1 for a failed run.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Usage(_) => 2,
+            _ => 1,
+        }
+    }
+}

@@ -1,0 +1,30 @@
+//! What one input file holds, before it becomes surfels.
+
+use crate::scene::Colors;
+
+/// Points as a file gives them: f64 world coordinates and whatever attributes exist.
+///
+/// A reader reports what it found and repairs nothing: a non-finite coordinate, a zero normal or a radius that is
+/// not positive stay as they are, and [`crate::surfels::build`] drops or estimates them, and counts them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Points {
+    /// World coordinates.
+    pub positions: Vec<[f64; 3]>,
+    /// One normal each, any length; zero or non-finite means missing.
+    pub normals: Option<Vec<[f32; 3]>>,
+    /// One disk radius each, world units; not positive or not finite means missing.
+    pub radii: Option<Vec<f32>>,
+    /// Colours, never [`Colors::Constant`].
+    pub colors: Option<Colors>,
+    /// The direction that the format, by convention, calls up.
+    pub up: Option<Up>,
+}
+
+/// The world axis that points up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Up {
+    /// Most mesh formats.
+    Y,
+    /// Survey data.
+    Z,
+}

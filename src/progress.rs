@@ -1,0 +1,18 @@
+//! How long work tells how far it is.
+
+/// Told about stages of work that may take seconds. Stages follow each other; `advance` may come from any thread.
+pub trait Progress: Sync {
+    /// A stage begins: `what` it does, and how many `units` it will take (0 if that is not known).
+    fn begin(&self, what: &str, units: u64);
+    /// So many units more are done.
+    fn advance(&self, units: u64);
+    /// The stage is over.
+    fn end(&self);
+}
+
+/// Nobody watches.
+impl Progress for () {
+    fn begin(&self, _what: &str, _units: u64) {}
+    fn advance(&self, _units: u64) {}
+    fn end(&self) {}
+}

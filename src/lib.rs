@@ -1,7 +1,11 @@
 //! x
 pub mod error;
+pub mod frame;
+pub mod gpu;
 pub mod io;
+pub mod passes;
 pub mod progress;
+pub mod render;
 pub mod scene;
 pub mod surfels;
 

@@ -1,5 +1,6 @@
 //! What one input file holds, before it becomes surfels.
 
+pub use crate::scene::Up;
 use crate::scene::Colors;
 
 /// Points as a file gives them: f64 world coordinates and whatever attributes exist.
@@ -20,11 +21,3 @@ pub struct Points {
     pub up: Option<Up>,
 }
 
-/// The world axis that points up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Up {
-    /// Most mesh formats.
-    Y,
-    /// Survey data.
-    Z,
-}

@@ -1,7 +1,18 @@
 //! What is rendered: surfels, camera, lights, options. Knows no GPU and no file.
 
+pub mod camera;
 pub mod color;
+pub mod light;
+pub mod needs;
+pub mod options;
+#[allow(clippy::module_inception)]
+pub mod scene;
 pub mod surfel;
 
+pub use camera::{Camera, Lens, Projection};
 pub use color::Colors;
+pub use light::Light;
+pub use needs::{ColorNeed, SceneNeeds};
+pub use options::{Epsilon, Kernel, Maps, RenderOptions, Shading};
+pub use scene::{Bounds, Scene, Up};
 pub use surfel::Surfel;

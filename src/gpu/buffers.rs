@@ -1,0 +1,127 @@
+//! Device buffers: created against the limits, paged, uploaded and read back in bounded pieces.
+
+use std::marker::PhantomData;
+
+use bytemuck::Pod;
+
+use super::device::Gpu;
+use crate::error::{Error, Result};
+use crate::progress::Progress;
+
+/// Bytes copied per submission, up and down: bounds the staging memory.
+const PIECE: u64 = 32 << 20;
+
+/// A buffer of `T`.
+pub struct Buffer<T> {
+    pub(crate) raw: wgpu::Buffer,
+    /// Elements.
+    pub len: u64,
+    element: PhantomData<T>,
+}
+
+impl<T: Pod> Buffer<T> {
+    /// `len` elements, zero; `what` names them in an error.
+    pub fn storage(gpu: &Gpu, what: &str, len: u64) -> Result<Self> {
+        Self::create(gpu, what, len, wgpu::BufferUsages::STORAGE, gpu.buffer_limit())
+    }
+
+    /// A uniform of one element.
+    pub fn uniform(gpu: &Gpu, what: &str, value: &T) -> Result<Self> {
+        let limit = gpu.limits.max_uniform_buffer_binding_size;
+        let buffer = Self::create(gpu, what, 1, wgpu::BufferUsages::UNIFORM, limit)?;
+        gpu.queue.write_buffer(&buffer.raw, 0, bytemuck::bytes_of(value));
+        Ok(buffer)
+    }
+
+    fn create(gpu: &Gpu, what: &str, len: u64, usage: wgpu::BufferUsages, limit: u64) -> Result<Self> {
+        // An empty binding is not allowed.
+        let len = len.max(1);
+        let size = len.saturating_mul(size_of::<T>() as u64);
+        if size > limit {
+            let storage = usage.contains(wgpu::BufferUsages::STORAGE);
+            return Err(Error::Limit {
+                adapter: gpu.adapter.name.clone(),
+                limit: match storage {
+                    true if gpu.limits.max_buffer_size < gpu.limits.max_storage_buffer_binding_size => {
+                        "max_buffer_size"
+                    }
+                    true => "max_storage_buffer_binding_size",
+                    false => "max_uniform_buffer_binding_size",
+                },
+                available: limit,
+                needed: size,
+                what: format!("for {what}; choose a smaller image or another adapter"),
+            });
+        }
+        let guard = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let raw = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(what),
+            size: size.next_multiple_of(4),
+            usage: usage | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
+            mapped_at_creation: false,
+        });
+        if pollster::block_on(guard.pop()).is_some() {
+            return Err(gpu.error(format!("out of memory for {what} ({size} bytes): use fewer surfels or a smaller image")));
+        }
+        gpu.check()?;
+        Ok(Self { raw, len, element: PhantomData })
+    }
+
+    /// Overwrites the elements from `first` on.
+    pub fn write(&self, gpu: &Gpu, values: &[T], progress: &dyn Progress) -> Result<()> {
+        let per_piece = (PIECE / size_of::<T>() as u64).max(1) as usize;
+        for (piece, values) in values.chunks(per_piece).enumerate() {
+            let offset = (piece * per_piece * size_of::<T>()) as u64;
+            gpu.queue.write_buffer(&self.raw, offset, bytemuck::cast_slice(values));
+            // Submitting and waiting frees the staging memory of this piece.
+            gpu.queue.submit([]);
+            gpu.wait()?;
+            progress.advance(values.len() as u64);
+        }
+        Ok(())
+    }
+
+    /// The first `len` elements.
+    pub fn read(&self, gpu: &Gpu, len: u64) -> Result<Vec<T>> {
+        let bytes = len.min(self.len) * size_of::<T>() as u64;
+        let mut values: Vec<T> = Vec::with_capacity(len as usize);
+        let step = PIECE / size_of::<T>() as u64 * size_of::<T>() as u64;
+        let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("readback"),
+            size: bytes.min(step).next_multiple_of(4).max(4),
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let mut offset = 0;
+        while offset < bytes {
+            let size = (bytes - offset).min(step);
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            encoder.copy_buffer_to_buffer(&self.raw, offset, &staging, 0, size);
+            gpu.queue.submit([encoder.finish()]);
+            let slice = staging.slice(..size);
+            slice.map_async(wgpu::MapMode::Read, |_| {});
+            gpu.wait()?;
+            let view = slice.get_mapped_range().map_err(|e| gpu.error(format!("reading back failed: {e}")))?;
+            // A mapped range need not be aligned for T, so elements are copied bytewise.
+            values.extend(view.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned::<T>));
+            drop(view);
+            staging.unmap();
+            offset += size;
+        }
+        Ok(values)
+    }
+}
+
+/// How many elements of `stride` bytes fit a page, for the largest of the strides that are paged together.
+pub fn page_len(gpu: &Gpu, stride: usize) -> u64 {
+    let invocations = u64::from(gpu.limits.max_compute_workgroups_per_dimension).pow(2)
+        * u64::from(super::layout::WORKGROUP);
+    (gpu.buffer_limit() / stride as u64).min(invocations).min(u64::from(u32::MAX))
+}
+
+impl<T> Buffer<T> {
+    /// A buffer made elsewhere, of `len` elements.
+    pub(crate) fn from_raw(raw: wgpu::Buffer, len: u64) -> Self {
+        Self { raw, len, element: PhantomData }
+    }
+}

@@ -1,0 +1,197 @@
+//! Adapters and the device: the sole owner of wgpu's instance, limits and errors.
+
+use std::sync::{Arc, Mutex};
+
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+
+/// What an adapter is and what of it matters here.
+#[derive(Clone, Debug, Serialize)]
+pub struct AdapterDescription {
+    /// Its name, as `--adapter` matches it.
+    pub name: String,
+    /// vulkan, gl, metal, dx12.
+    pub api: String,
+    /// discrete, integrated, virtual, software or other.
+    pub kind: &'static str,
+    /// Driver name and version.
+    pub driver: String,
+    /// Bytes one binding may see: scenes and images are paged to it.
+    pub max_storage_buffer_binding_size: u64,
+    /// Bytes one buffer may have.
+    pub max_buffer_size: u64,
+    /// Workgroups per dimension of a dispatch.
+    pub max_compute_workgroups_per_dimension: u32,
+    /// Storage buffers one kernel may use.
+    pub max_storage_buffers_per_shader_stage: u32,
+    /// Per-pass GPU times can be measured.
+    pub timestamps: bool,
+    /// u64 atomic min, max and add in storage buffers.
+    pub atomics_u64: bool,
+    /// f32 atomic add in storage buffers.
+    pub atomics_f32: bool,
+    /// Subgroup operations.
+    pub subgroups: bool,
+    /// It has all that rendering needs.
+    pub usable: bool,
+}
+
+impl AdapterDescription {
+    fn of(adapter: &wgpu::Adapter) -> Self {
+        let (info, limits, features) = (adapter.get_info(), adapter.limits(), adapter.features());
+        let kind = match info.device_type {
+            wgpu::DeviceType::DiscreteGpu => "discrete",
+            wgpu::DeviceType::IntegratedGpu => "integrated",
+            wgpu::DeviceType::VirtualGpu => "virtual",
+            wgpu::DeviceType::Cpu => "software",
+            wgpu::DeviceType::Other => "other",
+        };
+        let compute =
+            adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS);
+        Self {
+            name: info.name,
+            api: info.backend.to_str().to_owned(),
+            kind,
+            driver: format!("{} {}", info.driver, info.driver_info).trim().to_owned(),
+            max_storage_buffer_binding_size: limits.max_storage_buffer_binding_size,
+            max_buffer_size: limits.max_buffer_size,
+            max_compute_workgroups_per_dimension: limits.max_compute_workgroups_per_dimension,
+            max_storage_buffers_per_shader_stage: limits.max_storage_buffers_per_shader_stage,
+            timestamps: features.contains(wgpu::Features::TIMESTAMP_QUERY),
+            atomics_u64: features.contains(wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS),
+            atomics_f32: features.contains(wgpu::Features::SHADER_FLOAT32_ATOMIC),
+            subgroups: features.contains(wgpu::Features::SUBGROUP),
+            usable: compute
+                && limits.max_storage_buffers_per_shader_stage >= STORAGE_BUFFERS
+                && limits.max_compute_invocations_per_workgroup >= super::layout::WORKGROUP,
+        }
+    }
+
+    /// The order in which `auto` prefers adapters, best first: real hardware, then software Vulkan, then GL.
+    fn rank(&self) -> u32 {
+        let kind = match self.kind {
+            "discrete" => 0,
+            "integrated" => 1,
+            "virtual" => 2,
+            "software" => 3,
+            _ => 4,
+        };
+        if !self.usable {
+            100
+        } else if self.api == "gl" {
+            // The same hardware is better through Vulkan; GL on hardware still beats software.
+            10 * kind + 5
+        } else {
+            10 * kind
+        }
+    }
+}
+
+/// The most storage buffers a kernel uses (accumulate: splats, depths, sums, colours, the sRGB table).
+const STORAGE_BUFFERS: u32 = 5;
+
+/// What to do about a missing adapter.
+pub const INSTALL_HINT: &str = "install a Vulkan driver (on Debian or Ubuntu without a GPU: \
+    apt-get install mesa-vulkan-drivers libvulkan1) or render with --backend reference";
+
+fn enumerate() -> Vec<(AdapterDescription, wgpu::Adapter)> {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+    let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+    let mut described: Vec<_> = adapters.into_iter().map(|a| (AdapterDescription::of(&a), a)).collect();
+    described.sort_by_key(|(description, _)| description.rank());
+    described
+}
+
+/// All adapters, in the order in which `auto` prefers them.
+pub fn adapters() -> Vec<AdapterDescription> {
+    enumerate().into_iter().map(|(description, _)| description).collect()
+}
+
+/// An open device.
+pub struct Gpu {
+    /// The adapter behind it.
+    pub adapter: AdapterDescription,
+    /// What it can do at most.
+    pub limits: wgpu::Limits,
+    pub(crate) device: wgpu::Device,
+    pub(crate) queue: wgpu::Queue,
+    failure: Arc<Mutex<Option<String>>>,
+}
+
+impl Gpu {
+    /// Opens the best adapter, or the best whose name contains `name` (case-insensitive).
+    pub fn open(name: Option<&str>) -> Result<Self> {
+        let all = enumerate();
+        let known = all.iter().map(|(d, _)| format!("{} ({})", d.name, d.api)).collect::<Vec<_>>().join(", ");
+        let wanted = |d: &AdapterDescription| {
+            name.is_none_or(|name| d.name.to_lowercase().contains(&name.to_lowercase()) || d.api == name)
+        };
+        let Some((adapter, handle)) = all.into_iter().find(|(d, _)| d.usable && wanted(d)) else {
+            return Err(Error::NoAdapter(match (name, known.is_empty()) {
+                (_, true) => format!("no graphics adapter was found: {INSTALL_HINT}"),
+                (Some(name), false) => format!("no usable adapter is called {name:?}; there are: {known}"),
+                (None, false) => format!("no adapter can run compute kernels ({known}): {INSTALL_HINT}"),
+            }));
+        };
+        let limits = handle.limits();
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("epsplat"),
+            required_features: handle.features() & wgpu::Features::TIMESTAMP_QUERY,
+            required_limits: limits.clone(),
+            // Few large buffers: no pooling, so that a scene costs what its buffers cost.
+            memory_hints: wgpu::MemoryHints::MemoryUsage,
+            ..Default::default()
+        };
+        let (device, queue) = pollster::block_on(handle.request_device(&descriptor))
+            .map_err(|e| Error::Gpu { adapter: adapter.name.clone(), what: format!("cannot open the device: {e}") })?;
+        let failure = Arc::new(Mutex::new(None));
+        let slot = Arc::clone(&failure);
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            if let Ok(mut slot) = slot.lock() {
+                slot.get_or_insert_with(|| error.to_string());
+            }
+        }));
+        let slot = Arc::clone(&failure);
+        device.set_device_lost_callback(move |reason, message| {
+            if reason != wgpu::DeviceLostReason::Destroyed
+                && let Ok(mut slot) = slot.lock()
+            {
+                slot.get_or_insert_with(|| format!("the device was lost ({reason:?}): {message}"));
+            }
+        });
+        Ok(Self { adapter, limits, device, queue, failure })
+    }
+
+    /// An error of this device.
+    pub(crate) fn error(&self, what: impl Into<String>) -> Error {
+        Error::Gpu { adapter: self.adapter.name.clone(), what: what.into() }
+    }
+
+    /// Fails if the device reported an error since the last call.
+    pub(crate) fn check(&self) -> Result<()> {
+        let report = self.failure.lock().ok().and_then(|mut slot| slot.take());
+        match report {
+            None => Ok(()),
+            Some(text) => {
+                // wgpu's reports run over many lines; the first and the innermost cause say it.
+                let lines: Vec<_> = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+                let (first, last) = (lines.first().unwrap_or(&""), lines.last().unwrap_or(&""));
+                Err(self.error(if first == last { (*first).to_owned() } else { format!("{first}: {last}") }))
+            }
+        }
+    }
+
+    /// Waits until the device has done all that was submitted.
+    pub(crate) fn wait(&self) -> Result<()> {
+        self.device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .map_err(|e| self.error(format!("waiting for the device failed: {e}")))?;
+        self.check()
+    }
+
+    /// Bytes that one buffer and one binding of it may have.
+    pub fn buffer_limit(&self) -> u64 {
+        self.limits.max_storage_buffer_binding_size.min(self.limits.max_buffer_size)
+    }
+}

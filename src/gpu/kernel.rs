@@ -1,0 +1,308 @@
+//! WGSL: named files are joined into one module per set of needs, bindings are found by name, overrides set by name.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+use super::device::Gpu;
+use super::layout::{SUM_WORDS, WORKGROUP};
+use crate::error::{Error, Result};
+use crate::scene::{ColorNeed, Kernel, Projection, RenderOptions, SceneNeeds};
+
+macro_rules! wgsl {
+    ($($name:literal),* $(,)?) => {
+        &[$(($name, include_str!(concat!("../../wgsl/", $name)))),*]
+    };
+}
+
+/// Every file of `wgsl/`.
+pub const FILES: &[(&str, &str)] = wgsl![
+    "accumulate.wgsl",
+    "accumulator_fixed.wgsl",
+    "camera_orthographic.wgsl",
+    "camera_pinhole.wgsl",
+    "color_constant.wgsl",
+    "color_linear.wgsl",
+    "color_srgb8.wgsl",
+    "color_sums.wgsl",
+    "count.wgsl",
+    "count_absent.wgsl",
+    "depth.wgsl",
+    "depth_absent.wgsl",
+    "double.wgsl",
+    "epsilon.wgsl",
+    "footprint.wgsl",
+    "kernel_ellipse.wgsl",
+    "layout.wgsl",
+    "normal.wgsl",
+    "normal_absent.wgsl",
+    "normal_map.wgsl",
+    "normal_map_absent.wgsl",
+    "project.wgsl",
+    "resolve.wgsl",
+    "shade_lambert.wgsl",
+    "shade_unlit.wgsl",
+    "visibility.wgsl",
+    "weight_map.wgsl",
+    "weight_map_absent.wgsl",
+];
+
+/// The kernels' texts. The built-in ones, of which a researcher (or a test that must fail) may replace parts.
+#[derive(Clone, Debug)]
+pub struct Sources(BTreeMap<&'static str, Cow<'static, str>>);
+
+impl Default for Sources {
+    fn default() -> Self {
+        Self(FILES.iter().map(|&(name, text)| (name, Cow::Borrowed(text))).collect())
+    }
+}
+
+impl Sources {
+    /// Replaces the one place in `file` that reads `from`; an error if there is not exactly one.
+    pub fn replace(mut self, file: &str, from: &str, to: &str) -> Result<Self> {
+        let text = self.0.get_mut(file).ok_or_else(|| Error::Usage(format!("there is no kernel file {file}")))?;
+        if text.matches(from).count() != 1 {
+            return Err(Error::Usage(format!("{file} must hold {from:?} once, to be replaced")));
+        }
+        *text = Cow::Owned(text.replacen(from, to, 1));
+        Ok(self)
+    }
+
+    /// The module for `needs`: WGSL's module scope is free of order, so joining is concatenation.
+    pub fn join(&self, needs: &SceneNeeds) -> String {
+        files(needs).iter().map(|name| self.0.get(name).map_or("", |text| text)).collect::<Vec<_>>().join("\n")
+    }
+}
+
+/// The files that a render with `needs` is made of.
+pub fn files(needs: &SceneNeeds) -> Vec<&'static str> {
+    let pick = |needed, file, absent| if needed { file } else { absent };
+    let mut files = vec![
+        "layout.wgsl",
+        "double.wgsl",
+        match needs.projection {
+            Projection::Pinhole => "camera_pinhole.wgsl",
+            Projection::Orthographic => "camera_orthographic.wgsl",
+        },
+        "project.wgsl",
+        "footprint.wgsl",
+        "visibility.wgsl",
+        "accumulate.wgsl",
+        "epsilon.wgsl",
+        "kernel_ellipse.wgsl",
+        "accumulator_fixed.wgsl",
+        "resolve.wgsl",
+        pick(needs.normal, "normal.wgsl", "normal_absent.wgsl"),
+        pick(needs.normal_map, "normal_map.wgsl", "normal_map_absent.wgsl"),
+        pick(needs.depth, "depth.wgsl", "depth_absent.wgsl"),
+        pick(needs.weight_map, "weight_map.wgsl", "weight_map_absent.wgsl"),
+        pick(needs.count, "count.wgsl", "count_absent.wgsl"),
+        pick(needs.lambert, "shade_lambert.wgsl", "shade_unlit.wgsl"),
+    ];
+    match needs.color {
+        ColorNeed::Constant => files.push("color_constant.wgsl"),
+        ColorNeed::Srgb8 => files.extend(["color_srgb8.wgsl", "color_sums.wgsl"]),
+        ColorNeed::Linear => files.extend(["color_linear.wgsl", "color_sums.wgsl"]),
+    }
+    files
+}
+
+/// Where a pixel's words lie, in the sums and in the image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PixelLayout {
+    /// Words of a pixel in the sums; the weight's come first.
+    pub sum_words: u32,
+    color_word: u32,
+    normal_word: u32,
+    depth_word: u32,
+    count_word: u32,
+    /// Words of a pixel in the image; the colour's four come first.
+    pub image_words: u32,
+    /// Word of the normal map's x in the image.
+    pub normal_image: u32,
+    /// Word of the depth in the image.
+    pub depth_image: u32,
+    /// Word of the weight in the image.
+    pub weight_image: u32,
+    /// Word of the count in the image.
+    pub count_image: u32,
+}
+
+impl PixelLayout {
+    /// What is not needed takes no room.
+    pub fn of(needs: &SceneNeeds) -> Self {
+        let mut next = 0;
+        let mut take = |words: u32| {
+            next += words;
+            next - words
+        };
+        let channels = color_channels(needs);
+        take(SUM_WORDS);
+        let color_word = take(channels * SUM_WORDS);
+        let normal_word = take(if needs.normal { 3 * SUM_WORDS } else { 0 });
+        let depth_word = take(if needs.depth { SUM_WORDS } else { 0 });
+        let count_word = take(u32::from(needs.count));
+        let sum_words = take(0);
+        next = 0;
+        let mut take = |words: u32| {
+            next += words;
+            next - words
+        };
+        take(4);
+        let normal_image = take(if needs.normal_map { 3 } else { 0 });
+        let depth_image = take(u32::from(needs.depth));
+        let weight_image = take(u32::from(needs.weight_map));
+        let count_image = take(u32::from(needs.count));
+        let image_words = take(0);
+        Self {
+            sum_words,
+            color_word,
+            normal_word,
+            depth_word,
+            count_word,
+            image_words,
+            normal_image,
+            depth_image,
+            weight_image,
+            count_image,
+        }
+    }
+}
+
+fn color_channels(needs: &SceneNeeds) -> u32 {
+    match needs.color {
+        ColorNeed::Constant => 0,
+        _ => 3 + u32::from(needs.alpha),
+    }
+}
+
+/// The overridable constants of a render, by name.
+pub fn overrides(needs: &SceneNeeds, options: &RenderOptions) -> Vec<(&'static str, f64)> {
+    let layout = PixelLayout::of(needs);
+    let Kernel::Ellipse { a, n } = options.kernel;
+    vec![
+        ("PIXEL_WORDS", layout.sum_words.into()),
+        ("COLOR_WORD", layout.color_word.into()),
+        ("COLOR_CHANNELS", color_channels(needs).into()),
+        ("NORMAL_WORD", layout.normal_word.into()),
+        ("DEPTH_WORD", layout.depth_word.into()),
+        ("COUNT_WORD", layout.count_word.into()),
+        ("IMAGE_WORDS", layout.image_words.into()),
+        ("NORMAL_IMAGE", layout.normal_image.into()),
+        ("DEPTH_IMAGE", layout.depth_image.into()),
+        ("WEIGHT_IMAGE", layout.weight_image.into()),
+        ("COUNT_IMAGE", layout.count_image.into()),
+        ("KERNEL_A", a),
+        ("KERNEL_N", n),
+    ]
+}
+
+/// Bindings of a module's kernels, by entry point: the names of the variables each uses and their numbers.
+pub type Bindings = BTreeMap<String, Vec<(String, u32)>>;
+
+/// Parses and validates a module; the names of its overrides and the bindings of its entry points.
+pub fn reflect(text: &str) -> std::result::Result<(naga::Module, Bindings, Vec<String>), String> {
+    let module = naga::front::wgsl::parse_str(text).map_err(|e| e.emit_to_string(text))?;
+    let info = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::all())
+        .validate(&module)
+        .map_err(|e| e.emit_to_string(text))?;
+    let mut bindings = Bindings::new();
+    for (index, entry) in module.entry_points.iter().enumerate() {
+        let uses = info.get_entry_point(index);
+        let used = module.global_variables.iter().filter(|(handle, _)| !uses[*handle].is_empty());
+        let named = used.filter_map(|(_, variable)| {
+            Some((variable.name.clone()?, variable.binding.as_ref()?.binding))
+        });
+        bindings.insert(entry.name.clone(), named.collect());
+    }
+    let overrides = module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect();
+    Ok((module, bindings, overrides))
+}
+
+/// The compiled kernels of a render.
+pub struct Program {
+    pipelines: BTreeMap<String, wgpu::ComputePipeline>,
+    bindings: Bindings,
+}
+
+/// The stages' entry points, in order.
+pub const STAGES: [&str; 5] = ["project", "clear", "visibility", "accumulate", "resolve"];
+
+impl Program {
+    /// Compiles the kernels for `needs`.
+    pub fn compile(gpu: &Gpu, sources: &Sources, needs: &SceneNeeds, options: &RenderOptions) -> Result<Self> {
+        let text = sources.join(needs);
+        let (_, bindings, declared) = reflect(&text).map_err(|e| gpu.error(format!("a kernel is not valid WGSL: {e}")))?;
+        let constants: Vec<_> = overrides(needs, options)
+            .into_iter()
+            .filter(|(name, _)| declared.iter().any(|d| d == name))
+            .collect();
+        let guard = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some("epsplat"),
+            source: wgpu::ShaderSource::Wgsl(text.into()),
+        });
+        let mut pipelines = BTreeMap::new();
+        for stage in STAGES {
+            let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(stage),
+                layout: None,
+                module: &module,
+                entry_point: Some(stage),
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    constants: &constants,
+                    // Nothing here is read before it is written, and workgroup memory starts at zero by WGSL.
+                    ..Default::default()
+                },
+                cache: None,
+            });
+            pipelines.insert(stage.to_owned(), pipeline);
+        }
+        if let Some(error) = pollster::block_on(guard.pop()) {
+            return Err(gpu.error(format!("the driver refused a kernel: {error}")));
+        }
+        Ok(Self { pipelines, bindings })
+    }
+
+    /// Binds `buffers` by name for `stage`: each of the stage's variables must be among them, others are ignored.
+    pub(crate) fn bind<'a>(
+        &self,
+        gpu: &Gpu,
+        stage: &str,
+        buffers: &[(&str, &'a wgpu::Buffer)],
+    ) -> Result<(&wgpu::ComputePipeline, wgpu::BindGroup)> {
+        let (Some(pipeline), Some(variables)) = (self.pipelines.get(stage), self.bindings.get(stage)) else {
+            return Err(gpu.error(format!("there is no kernel {stage}")));
+        };
+        let mut entries = Vec::with_capacity(variables.len());
+        for (name, binding) in variables {
+            let (_, buffer) = buffers
+                .iter()
+                .find(|(given, _)| given == name)
+                .ok_or_else(|| gpu.error(format!("the kernel {stage} needs a buffer {name}")))?;
+            entries.push(wgpu::BindGroupEntry { binding: *binding, resource: buffer.as_entire_binding() });
+        }
+        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(stage),
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &entries,
+        });
+        Ok((pipeline, group))
+    }
+}
+
+/// The 2-D grid of workgroups for `invocations`, within the adapter's limit per dimension.
+pub fn grid(gpu: &Gpu, invocations: u64) -> Result<(u32, u32)> {
+    let limit = u64::from(gpu.limits.max_compute_workgroups_per_dimension);
+    let groups = invocations.div_ceil(u64::from(WORKGROUP));
+    let rows = groups.div_ceil(limit).max(1);
+    if rows > limit {
+        return Err(Error::Limit {
+            adapter: gpu.adapter.name.clone(),
+            limit: "max_compute_workgroups_per_dimension",
+            available: limit,
+            needed: rows,
+            what: format!("in two dimensions for {invocations} invocations"),
+        });
+    }
+    Ok((groups.div_ceil(rows) as u32, rows as u32))
+}

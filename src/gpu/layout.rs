@@ -1,0 +1,159 @@
+//! Every struct and constant that host and device share, and nothing else. `wgsl/layout.wgsl` states the layout; the
+//! test in `tests/layout.rs` compares it with this mirror field by field.
+
+use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
+
+use crate::scene::light::MAX_LIGHTS;
+use crate::scene::{Bounds, Camera, Light, RenderOptions, Scene};
+
+/// Invocations of a workgroup, in every kernel.
+pub const WORKGROUP: u32 = 64;
+
+/// Words (u32) of one fixed-point sum: low and high.
+pub const SUM_WORDS: u32 = 2;
+
+/// Units of a weight sum: 2^24.
+pub const ONE: u32 = 1 << 24;
+
+/// The camera, options and ranges of one render, as the kernels see them. See the WGSL for the meaning of each field.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct View {
+    pub rotation: [[f32; 4]; 3],
+    pub rotation_low: [[f32; 4]; 3],
+    pub eye: [f32; 4],
+    pub eye_low: [f32; 4],
+    pub intrinsics: [f32; 4],
+    pub intrinsics_low: [f32; 4],
+    pub color_low: [f32; 4],
+    pub color_span: [f32; 4],
+    pub color_scale: [f32; 4],
+    pub background: [f32; 4],
+    pub lights: [[f32; 4]; MAX_LIGHTS],
+    pub light_count: u32,
+    pub width: u32,
+    pub height: u32,
+    pub zero: u32,
+    pub unit: f32,
+    pub near: f32,
+    pub epsilon_relative: f32,
+    pub epsilon_absolute: f32,
+    pub world: f32,
+    pub padding_0: u32,
+    pub padding_1: u32,
+    pub padding_2: u32,
+}
+
+/// The rows of the image that the per-pixel buffers hold at a time.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct Band {
+    /// Row of the image that is row 0 of the buffers.
+    pub first_row: u32,
+    /// Rows held.
+    pub rows: u32,
+    /// Always 0.
+    pub padding_0: u32,
+    /// Always 0.
+    pub padding_1: u32,
+}
+
+/// A projected surfel; see the WGSL.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Splat {
+    pub anchor_x: i32,
+    pub anchor_y: i32,
+    pub bounds_first: u32,
+    pub bounds_last: u32,
+    pub a: [f32; 3],
+    pub b: [f32; 3],
+    pub c: [f32; 3],
+    pub normal: [f32; 3],
+}
+
+/// x as the nearest f32 and the nearest f32 to what that leaves.
+fn split(x: f64) -> (f32, f32) {
+    let high = x as f32;
+    (high, (x - f64::from(high)) as f32)
+}
+
+fn split_all<const N: usize>(values: [f64; N]) -> ([f32; 4], [f32; 4]) {
+    let (mut high, mut low) = ([0.0; 4], [0.0; 4]);
+    for (k, value) in values.into_iter().enumerate() {
+        (high[k], low[k]) = split(value);
+    }
+    (high, low)
+}
+
+/// The power of two that brings the scene's extent and its distance from the camera to at most one.
+pub fn device_unit(bounds: &Bounds, eye: DVec3) -> f64 {
+    let reach = [bounds.min, bounds.max]
+        .into_iter()
+        .flat_map(|corner| [corner.abs().max_element(), (corner - eye).abs().max_element()])
+        .fold(0.0, f64::max);
+    if reach > 0.0 && reach.is_finite() { (-reach.log2().ceil()).clamp(-126.0, 126.0).exp2() } else { 1.0 }
+}
+
+impl View {
+    /// The view of `scene` by `camera`; `color_range` is [`Scene::color_range`].
+    pub fn new(
+        scene: &Scene,
+        bounds: &Bounds,
+        (low, high): &([f32; 4], [f32; 4]),
+        camera: &Camera,
+        options: &RenderOptions,
+    ) -> Self {
+        let eye_relative = camera.eye - scene.origin;
+        let unit = device_unit(bounds, eye_relative);
+        let (eye, eye_low) = split_all((eye_relative * unit).to_array());
+        let (mut rotation, mut rotation_low) = ([[0.0; 4]; 3], [[0.0; 4]; 3]);
+        for row in 0..3 {
+            (rotation[row], rotation_low[row]) = split_all(camera.rotation.row(row).to_array());
+        }
+        // Pinhole intrinsics have no length; an orthographic scale is pixels per length.
+        let per_unit = match camera.projection {
+            crate::scene::Projection::Pinhole => 1.0,
+            crate::scene::Projection::Orthographic => 1.0 / unit,
+        };
+        let (intrinsics, intrinsics_low) =
+            split_all([camera.fx * per_unit, camera.fy * per_unit, camera.cx, camera.cy]);
+        let span: [f32; 4] = std::array::from_fn(|k| high[k] - low[k]);
+        let mut lights = [[0.0; 4]; MAX_LIGHTS];
+        for (slot, light) in lights.iter_mut().zip(&options.lights) {
+            *slot = match *light {
+                Light::Headlight { intensity } => [0.0, 0.0, 0.0, intensity],
+                Light::Directional { toward, intensity } => toward.extend(intensity).to_array(),
+            };
+        }
+        let (relative, absolute) = options.epsilon.parts();
+        Self {
+            rotation,
+            rotation_low,
+            eye,
+            eye_low,
+            intrinsics,
+            intrinsics_low,
+            color_low: *low,
+            color_span: span,
+            color_scale: span.map(|s| if s > 0.0 { 1.0 / s } else { 0.0 }),
+            background: options.background,
+            lights,
+            light_count: options.lights.len().min(MAX_LIGHTS) as u32,
+            width: camera.width,
+            height: camera.height,
+            zero: 0,
+            unit: unit as f32,
+            near: (camera.near * unit) as f32,
+            epsilon_relative: relative as f32,
+            epsilon_absolute: (absolute * unit) as f32,
+            world: (1.0 / unit) as f32,
+            padding_0: 0,
+            padding_1: 0,
+            padding_2: 0,
+        }
+    }
+}

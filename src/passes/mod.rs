@@ -1,0 +1,50 @@
+//! The stages, a file each: the equation with its source, the f64 twin (`reference`) and the GPU's recording
+//! (`record`). The types make the order: a stage takes what the one before it made.
+//!
+//! | stage | takes | makes |
+//! |---|---|---|
+//! | [`upload`] | [`Scene`](crate::scene::Scene) | [`upload::SurfelBuffer`] |
+//! | [`project`] | surfels | [`project::SplatBuffer`] |
+//! | [`visibility`] | splats | [`visibility::VisibilityBuffer`] |
+//! | [`accumulate`] | splats, nearest depths | [`accumulate::AttributeBuffer`] |
+//! | [`resolve`] | sums | [`Frame`](crate::frame::Frame) |
+//!
+//! [`footprint`] is evaluated inside visibility and accumulate.
+
+pub mod accumulate;
+pub mod footprint;
+pub mod project;
+pub mod resolve;
+pub mod upload;
+pub mod visibility;
+
+use crate::gpu::Gpu;
+use crate::gpu::buffers::Buffer;
+use crate::gpu::kernel::{PixelLayout, Program};
+use crate::gpu::layout::{Band, View};
+use crate::gpu::timing::Timing;
+
+/// What every stage's recording needs.
+pub struct Recorder<'a> {
+    /// The device.
+    pub gpu: &'a Gpu,
+    /// Its kernels for this render.
+    pub program: &'a Program,
+    /// The view uniform.
+    pub view: Buffer<View>,
+    /// Words per pixel.
+    pub pixel: PixelLayout,
+    /// Time per pass.
+    pub timing: Timing,
+}
+
+/// The rows of the image in work, and their uniform.
+pub struct Rows {
+    /// First row.
+    pub first: u32,
+    /// How many.
+    pub count: u32,
+    /// Pixels in them.
+    pub pixels: u64,
+    pub(crate) uniform: Buffer<Band>,
+}

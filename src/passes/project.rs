@@ -1,0 +1,278 @@
+//! Stage 1: every surfel becomes a splat, once.
+//!
+//! **Homography.** For the ray through a pixel, d = K^-1 (x, y, 1), the disk's point satisfies
+//! `(a, b, c) = [s t p]^-1 d`, and `u = a/c`, `v = b/c`, `z = 1/c` (Botsch et al. 2005, section 4). The rows of that
+//! matrix are `t x p`, `p x s` and `s x t`, over `p . (s x t)`. It is stored relative to the pixel that holds the
+//! splat's own centre: about the image's origin, a splat of two pixels at column 1000 would lose nine bits of its
+//! shape to cancellation. The kernel finds that centre in doubled f32 precision (`wgsl/double.wgsl`), so u and v err by
+//! a few units of 2^-24 over the cosine of the angle between view ray and normal.
+//!
+//! **Bounds.** The lines x = k tangent to the disk's outline solve a quadratic in k; a disk that crosses the near depth
+//! is bounded by its part in front. Bounds only save work: [`footprint`](super::footprint) decides.
+
+use glam::{DVec2, DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::upload::SurfelBuffer;
+use super::{Recorder, Rows};
+use crate::error::Result;
+use crate::gpu::buffers::Buffer;
+use crate::gpu::kernel::grid;
+use crate::gpu::layout;
+use crate::scene::{Camera, Projection, Scene, Surfel};
+
+/// A projected surfel in f64: the twin of [`layout::Splat`], in world units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Splat {
+    /// Which surfel it was.
+    pub surfel: u32,
+    /// The pixel that the rows are relative to.
+    pub anchor: [i64; 2],
+    /// First pixel (x, y) that the splat may touch.
+    pub first: [u32; 2],
+    /// Last pixel.
+    pub last: [u32; 2],
+    /// `a . (dx, dy, 1)` is u/z (pinhole) or u (orthographic).
+    pub a: DVec3,
+    /// The same for v.
+    pub b: DVec3,
+    /// 1/z (pinhole) or z (orthographic).
+    pub c: DVec3,
+    /// World space, unit, toward the viewer.
+    pub normal: DVec3,
+}
+
+/// A disk's homography and the extent of its image.
+struct Projected {
+    anchor: [i64; 2],
+    a: DVec3,
+    b: DVec3,
+    c: DVec3,
+    low: DVec2,
+    high: DVec2,
+}
+
+/// Past this the centre is so far outside the image that it is no use as an anchor (exact in f32 too).
+const FARTHEST_ANCHOR: f64 = 4_194_304.0;
+
+/// The twin of `wgsl/project.wgsl` for one surfel; `None` if no pixel can be touched.
+pub fn reference(index: u32, surfel: &Surfel, origin: DVec3, camera: &Camera) -> Option<Splat> {
+    let vector = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
+    let relative = vector(surfel.center) - (camera.eye - origin);
+    let (s_world, t_world) = (vector(surfel.s), vector(surfel.t));
+    let (p, s, t) = (camera.rotation * relative, camera.rotation * s_world, camera.rotation * t_world);
+    let away = match camera.projection {
+        Projection::Pinhole => p.dot(s.cross(t)),
+        Projection::Orthographic => s.x * t.y - s.y * t.x,
+    };
+    if p.z + slope(s, t) < camera.near || away == 0.0 {
+        return None;
+    }
+    let projected = match camera.projection {
+        Projection::Pinhole => pinhole(camera, p, s, t, away),
+        Projection::Orthographic => orthographic(camera, p, s, t, away),
+    };
+    let margin = 0.01 + 1e-5 * (projected.low.abs() + projected.high.abs());
+    let size = DVec2::new(camera.width.into(), camera.height.into());
+    let first = (projected.low - margin - 0.5).ceil().max(DVec2::ZERO);
+    let last = (projected.high + margin - 0.5).floor().min(size - 1.0);
+    if !(first.x <= last.x && first.y <= last.y) {
+        return None;
+    }
+    let normal = s_world.cross(t_world);
+    let normal = (normal / normal.abs().max_element()).normalize();
+    Some(Splat {
+        surfel: index,
+        anchor: projected.anchor,
+        first: [first.x as u32, first.y as u32],
+        last: [last.x as u32, last.y as u32],
+        a: projected.a,
+        b: projected.b,
+        c: projected.c,
+        normal: if away > 0.0 { -normal } else { normal },
+    })
+}
+
+/// All splats of a scene that may touch a pixel, in the order of the surfels.
+pub fn reference_all(scene: &Scene, camera: &Camera) -> Vec<Splat> {
+    let surfels = scene.surfels.par_iter().enumerate();
+    surfels.filter_map(|(index, surfel)| reference(index as u32, surfel, scene.origin, camera)).collect()
+}
+
+/// Half the disk's extent in depth.
+fn slope(s: DVec3, t: DVec3) -> f64 {
+    s.z.hypot(t.z)
+}
+
+fn pinhole(camera: &Camera, p: DVec3, s: DVec3, t: DVec3, away: f64) -> Projected {
+    let focal = DVec2::new(camera.fx, camera.fy);
+    let principal = DVec2::new(camera.cx, camera.cy);
+    let (a, b, c) = (t.cross(p) / away, p.cross(s) / away, s.cross(t) / away);
+    // d = ((x - cx)/fx, (y - cy)/fy, 1): columns of the homography per pixel.
+    let per_pixel = |row: DVec3| row.truncate() / focal;
+    let (a_xy, b_xy, c_xy) = (per_pixel(a), per_pixel(b), per_pixel(c));
+    let slope = slope(s, t);
+    let image = focal * p.truncate() / p.z + principal;
+    if p.z - slope >= camera.near && image.abs().max_element() < FARTHEST_ANCHOR {
+        let pixel = image.floor();
+        let offset = image - pixel - 0.5;
+        let across = tangents([s.x, s.z], [t.x, t.z], [p.x, p.z]) * camera.fx;
+        let down = tangents([s.y, s.z], [t.y, t.z], [p.y, p.z]) * camera.fy;
+        return Projected {
+            anchor: [pixel.x as i64, pixel.y as i64],
+            a: a_xy.extend(-a_xy.dot(offset)),
+            b: b_xy.extend(-b_xy.dot(offset)),
+            c: c_xy.extend(1.0 / p.z - c_xy.dot(offset)),
+            low: image + DVec2::new(across.x, down.x),
+            high: image + DVec2::new(across.y, down.y),
+        };
+    }
+    let anchor = [i64::from(camera.width / 2), i64::from(camera.height / 2)];
+    let center = DVec2::new(anchor[0] as f64, anchor[1] as f64) + 0.5;
+    let d = ((center - principal) / focal).extend(1.0);
+    let ends = chord(s, t, p.z, slope, camera.near);
+    let across = clipped_extent([s.x, s.z], [t.x, t.z], [p.x, p.z], ends, camera.near) * camera.fx + camera.cx;
+    let down = clipped_extent([s.y, s.z], [t.y, t.z], [p.y, p.z], ends, camera.near) * camera.fy + camera.cy;
+    Projected {
+        anchor,
+        a: a_xy.extend(a.dot(d)),
+        b: b_xy.extend(b.dot(d)),
+        c: c_xy.extend(c.dot(d)),
+        low: DVec2::new(across.x, down.x) - 1.0,
+        high: DVec2::new(across.y, down.y) + 1.0,
+    }
+}
+
+/// X/Z of the tangents to a disk before the camera, relative to its centre's; vectors are (x or y, z).
+fn tangents(s: [f64; 2], t: [f64; 2], p: [f64; 2]) -> DVec2 {
+    let ratio = p[0] / p[1];
+    let (s_x, t_x) = (s[0] - ratio * s[1], t[0] - ratio * t[1]);
+    let e = s_x * s_x + t_x * t_x;
+    let b = s_x * s[1] + t_x * t[1];
+    let d = p[1] * p[1] - s[1] * s[1] - t[1] * t[1];
+    let far = b.abs() + (b * b + d * e).sqrt();
+    let near = if far > 0.0 { e / far } else { 0.0 };
+    if b >= 0.0 { DVec2::new(-far / d, near) } else { DVec2::new(-near, far / d) }
+}
+
+/// The disk coordinates (u, v) of the two ends of the chord at depth `near`.
+fn chord(s: DVec3, t: DVec3, p_z: f64, slope: f64, near: f64) -> [DVec2; 2] {
+    if slope == 0.0 {
+        return [DVec2::ZERO; 2];
+    }
+    let steepest = DVec2::new(s.z, t.z) / slope;
+    let along = ((near - p_z) / slope).clamp(-1.0, 1.0);
+    let half = (1.0 - along * along).max(0.0).sqrt();
+    [along * steepest + half * steepest.perp(), along * steepest - half * steepest.perp()]
+}
+
+/// X/Z extent of the part of a disk at depths of `near` and more.
+fn clipped_extent(s: [f64; 2], t: [f64; 2], p: [f64; 2], ends: [DVec2; 2], near: f64) -> DVec2 {
+    let ends = ends.map(|uv| (p[0] + uv.x * s[0] + uv.y * t[0]) / near);
+    let (mut low, mut high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+    let a = s[1] * s[1] + t[1] * t[1] - p[1] * p[1];
+    let b = s[0] * s[1] + t[0] * t[1] - p[0] * p[1];
+    let c = s[0] * s[0] + t[0] * t[0] - p[0] * p[0];
+    let discriminant = b * b - a * c;
+    if discriminant >= 0.0 {
+        let q = b + if b >= 0.0 { discriminant.sqrt() } else { -discriminant.sqrt() };
+        for k in [q / a, c / q] {
+            let line = [s[0] - k * s[1], t[0] - k * t[1], p[0] - k * p[1]];
+            let depth = p[1] - (line[0] * s[1] + line[1] * t[1]) / line[2];
+            if depth >= 0.5 * near {
+                (low, high) = (low.min(k), high.max(k));
+            }
+        }
+    }
+    DVec2::new(low, high)
+}
+
+fn orthographic(camera: &Camera, p: DVec3, s: DVec3, t: DVec3, away: f64) -> Projected {
+    let focal = DVec2::new(camera.fx, camera.fy);
+    let image = focal * p.truncate() + DVec2::new(camera.cx, camera.cy);
+    let pixel = image.floor();
+    let offset = image - pixel - 0.5;
+    let a = DVec2::new(t.y, -t.x) / (away * focal);
+    let b = DVec2::new(-s.y, s.x) / (away * focal);
+    let c = s.z * a + t.z * b;
+    let extent = focal * DVec2::new(s.x.hypot(t.x), s.y.hypot(t.y));
+    Projected {
+        anchor: [pixel.x as i64, pixel.y as i64],
+        a: a.extend(-a.dot(offset)),
+        b: b.extend(-b.dot(offset)),
+        c: c.extend(p.z - c.dot(offset)),
+        low: image - extent,
+        high: image + extent,
+    }
+}
+
+/// Splats in device memory, page for page as the surfels, whose colours later stages still read.
+pub struct SplatBuffer {
+    /// The surfels they came from.
+    pub surfels: SurfelBuffer,
+    /// A page of splats for each page of surfels.
+    pub pages: Vec<Buffer<layout::Splat>>,
+    drawn: Buffer<u32>,
+}
+
+/// Records the projection of every page.
+pub fn record(recorder: &mut Recorder<'_>, surfels: SurfelBuffer) -> Result<SplatBuffer> {
+    let gpu = recorder.gpu;
+    let drawn = Buffer::storage(gpu, "count of splats", 1)?;
+    let pages =
+        surfels.pages.iter().map(|page| Buffer::storage(gpu, "splats", page.surfels.len)).collect::<Result<Vec<_>>>()?;
+    let program = recorder.program;
+    let view = &recorder.view.raw;
+    recorder.timing.pass(
+        gpu,
+        "project",
+        |_| {},
+        |pass| {
+            for (page, splats) in surfels.pages.iter().zip(&pages) {
+                let buffers =
+                    [("view", view), ("surfels", &page.surfels.raw), ("splats", &splats.raw), ("drawn", &drawn.raw)];
+                let (pipeline, group) = program.bind(gpu, "project", &buffers)?;
+                let (x, y) = grid(gpu, page.surfels.len)?;
+                pass.set_pipeline(pipeline);
+                pass.set_bind_group(0, &group, &[]);
+                pass.dispatch_workgroups(x, y, 1);
+            }
+            Ok(())
+        },
+    )?;
+    Ok(SplatBuffer { surfels, pages, drawn })
+}
+
+impl SplatBuffer {
+    /// How many splats may touch a pixel of the image.
+    pub fn drawn(&self, recorder: &Recorder<'_>) -> Result<u64> {
+        Ok(self.drawn.read(recorder.gpu, 1)?.first().copied().unwrap_or(0).into())
+    }
+
+    /// Records one dispatch of `stage` per page, over its splats.
+    pub(crate) fn dispatch(
+        &self,
+        recorder: &mut Recorder<'_>,
+        stage: &'static str,
+        rows: &Rows,
+        buffers: &[(&str, &wgpu::Buffer)],
+        before: impl FnOnce(&mut wgpu::CommandEncoder),
+    ) -> Result<()> {
+        let (gpu, program) = (recorder.gpu, recorder.program);
+        let view = &recorder.view.raw;
+        recorder.timing.pass(gpu, stage, before, |pass| {
+            for (page, splats) in self.surfels.pages.iter().zip(&self.pages) {
+                let mut bound = vec![("view", view), ("band", &rows.uniform.raw), ("projected", &splats.raw)];
+                bound.extend_from_slice(buffers);
+                bound.extend(page.colors.as_ref().map(|colors| ("colors", colors)));
+                bound.extend(self.surfels.srgb_to_linear.as_ref().map(|table| ("srgb_to_linear", &table.raw)));
+                let (pipeline, group) = program.bind(gpu, stage, &bound)?;
+                let (x, y) = grid(gpu, splats.len)?;
+                pass.set_pipeline(pipeline);
+                pass.set_bind_group(0, &group, &[]);
+                pass.dispatch_workgroups(x, y, 1);
+            }
+            Ok(())
+        })
+    }
+}

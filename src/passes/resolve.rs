@@ -1,0 +1,152 @@
+//! Stage 4: sums become the image: divide by the weight (paper 000, section 5.4), shade, put over the background.
+
+use glam::DVec3;
+
+use super::accumulate::{AttributeBuffer, PixelSums};
+use super::visibility::VisibilityBuffer;
+use super::{Recorder, Rows};
+use crate::error::Result;
+use crate::frame::Frame;
+use crate::gpu::buffers::Buffer;
+use crate::gpu::kernel::grid;
+use crate::scene::{Camera, Light, RenderOptions, SceneNeeds, Shading};
+
+/// The twin: resolves `sums`, which start at row `first_row` of the image, into `frame`, which holds just their rows.
+pub fn reference(sums: &[PixelSums], camera: &Camera, options: &RenderOptions, first_row: u32, frame: &mut Frame) {
+    for (pixel, sum) in sums.iter().enumerate() {
+        let (x, y) = (pixel as u32 % camera.width, pixel as u32 / camera.width + first_row);
+        let background = options.background.map(f64::from);
+        let (mut color, mut depth, mut normal) = (background, f64::INFINITY, DVec3::ZERO);
+        if sum.weight > 0.0 {
+            let mean = sum.color.map(|c| c / sum.weight);
+            let alpha = mean[3];
+            let straight = DVec3::new(mean[0], mean[1], mean[2]) / if alpha > 0.0 { alpha } else { f64::INFINITY };
+            normal = unit_or_zero(DVec3::from_array(sum.normal) / sum.weight);
+            let shaded = match options.shading {
+                Shading::Unlit => straight,
+                Shading::Lambert => straight * irradiance(normal, camera, options, x, y),
+            };
+            color = over([shaded.x, shaded.y, shaded.z, alpha], background);
+            depth = sum.depth / sum.weight;
+        }
+        frame.color[pixel] = color.map(|c| c as f32);
+        let mut set = |map: &mut Option<Vec<f32>>, value: f64| {
+            if let Some(map) = map {
+                map[pixel] = value as f32;
+            }
+        };
+        set(&mut frame.depth, depth);
+        set(&mut frame.weight, sum.weight);
+        set(&mut frame.count, f64::from(sum.count));
+        set(&mut frame.decision, sum.decision);
+        if let Some(map) = &mut frame.normal {
+            map[pixel] = normal.as_vec3().to_array();
+        }
+    }
+}
+
+/// The normalised mean; 0 where opposite normals cancel.
+fn unit_or_zero(mean: DVec3) -> DVec3 {
+    if mean.length_squared() > 1e-12 { mean.normalize() } else { DVec3::ZERO }
+}
+
+/// Sum over the lights of `intensity * max(0, n . toward)` at pixel (x, y).
+fn irradiance(normal: DVec3, camera: &Camera, options: &RenderOptions, x: u32, y: u32) -> f64 {
+    let toward_eye = -camera.ray(f64::from(x) + 0.5, f64::from(y) + 0.5).normalize();
+    let lights = options.lights.iter().map(|light| match *light {
+        Light::Headlight { intensity } => f64::from(intensity) * normal.dot(toward_eye).max(0.0),
+        Light::Directional { toward, intensity } => f64::from(intensity) * normal.dot(toward.as_dvec3()).max(0.0),
+    });
+    lights.sum()
+}
+
+/// Straight alpha over straight alpha.
+fn over(front: [f64; 4], back: [f64; 4]) -> [f64; 4] {
+    let behind = back[3] * (1.0 - front[3]);
+    let alpha = front[3] + behind;
+    if alpha > 0.0 {
+        let blend = |k: usize| (front[k] * front[3] + back[k] * behind) / alpha;
+        [blend(0), blend(1), blend(2), alpha]
+    } else {
+        [0.0; 4]
+    }
+}
+
+/// Resolved pixels of some rows.
+pub struct ImageBuffer {
+    /// [`PixelLayout::image_words`](crate::gpu::kernel::PixelLayout::image_words) a pixel.
+    pub image: Buffer<f32>,
+}
+
+impl ImageBuffer {
+    /// Room for `pixels`.
+    pub fn new(recorder: &Recorder<'_>, pixels: u64) -> Result<Self> {
+        let words = pixels * u64::from(recorder.pixel.image_words);
+        Ok(Self { image: Buffer::storage(recorder.gpu, "image", words)? })
+    }
+}
+
+/// Records the pass over `rows`.
+pub fn record(
+    recorder: &mut Recorder<'_>,
+    rows: &Rows,
+    visible: &VisibilityBuffer,
+    sums: &AttributeBuffer,
+    buffer: &ImageBuffer,
+) -> Result<()> {
+    let (gpu, program) = (recorder.gpu, recorder.program);
+    let view = &recorder.view.raw;
+    recorder.timing.pass(
+        gpu,
+        "resolve",
+        |_| {},
+        |pass| {
+            let buffers = [
+                ("view", view),
+                ("band", &rows.uniform.raw),
+                ("visible", &visible.nearest.raw),
+                ("sums", &sums.sums.raw),
+                ("image", &buffer.image.raw),
+            ];
+            let (pipeline, group) = program.bind(gpu, "resolve", &buffers)?;
+            let (x, y) = grid(gpu, visible.nearest.len)?;
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, &group, &[]);
+            pass.dispatch_workgroups(x, y, 1);
+            Ok(())
+        },
+    )
+}
+
+/// Reads resolved rows back into `frame`.
+pub fn read_back(
+    recorder: &Recorder<'_>,
+    rows: &Rows,
+    needs: &SceneNeeds,
+    buffer: &ImageBuffer,
+    frame: &mut Frame,
+) -> Result<()> {
+    let layout = recorder.pixel;
+    let words = layout.image_words as usize;
+    let values = buffer.image.read(recorder.gpu, rows.pixels * words as u64)?;
+    let start = rows.first as usize * frame.width as usize;
+    for (pixel, value) in values.chunks_exact(words).enumerate() {
+        let pixel = start + pixel;
+        frame.color[pixel] = [value[0], value[1], value[2], value[3]];
+        if let Some(map) = &mut frame.normal {
+            let at = layout.normal_image as usize;
+            map[pixel] = [value[at], value[at + 1], value[at + 2]];
+        }
+        let maps = [
+            (&mut frame.depth, layout.depth_image, needs.depth),
+            (&mut frame.weight, layout.weight_image, needs.weight_map),
+            (&mut frame.count, layout.count_image, needs.count),
+        ];
+        for (map, word, _) in maps.into_iter().filter(|(_, _, needed)| *needed) {
+            if let Some(map) = map {
+                map[pixel] = value[word as usize];
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,63 @@
+//! Stage 0: the scene in device memory, in pages that fit a binding.
+
+use bytemuck::Pod;
+
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::gpu::buffers::{Buffer, page_len};
+use crate::gpu::layout::Splat;
+use crate::progress::Progress;
+use crate::scene::color::SRGB8_TO_LINEAR;
+use crate::scene::{ColorNeed, Colors, Scene, SceneNeeds, Surfel};
+
+/// Surfels and, if they differ in it, their colour.
+pub struct SurfelBuffer {
+    /// Consecutive pages; every kernel sees one at a time.
+    pub pages: Vec<SurfelPage>,
+    /// The table that decodes 8-bit sRGB.
+    pub(crate) srgb_to_linear: Option<Buffer<f32>>,
+}
+
+/// One page of a [`SurfelBuffer`].
+pub struct SurfelPage {
+    /// The disks.
+    pub surfels: Buffer<Surfel>,
+    pub(crate) colors: Option<wgpu::Buffer>,
+}
+
+impl SurfelBuffer {
+    /// Uploads `scene` as far as `needs` asks for it.
+    pub fn upload(gpu: &Gpu, scene: &Scene, needs: &SceneNeeds, progress: &dyn Progress) -> Result<Self> {
+        // The splat's record is the largest of what is paged alike.
+        let len = page_len(gpu, size_of::<Splat>()) as usize;
+        progress.begin("uploading surfels", scene.surfels.len() as u64);
+        let mut pages = Vec::new();
+        for (page, surfels) in scene.surfels.chunks(len).enumerate() {
+            let range = page * len..page * len + surfels.len();
+            let buffer = Buffer::storage(gpu, "surfels", surfels.len() as u64)?;
+            buffer.write(gpu, surfels, progress)?;
+            let colors = match (needs.color, &scene.colors) {
+                (ColorNeed::Srgb8, Colors::Srgb8(codes)) => Some(upload(gpu, &codes[range])?),
+                (ColorNeed::Linear, Colors::Linear(colors)) => Some(upload(gpu, &colors[range])?),
+                _ => None,
+            };
+            pages.push(SurfelPage { surfels: buffer, colors });
+        }
+        let srgb_to_linear = match needs.color {
+            ColorNeed::Srgb8 => {
+                let table = Buffer::storage(gpu, "sRGB table", 256)?;
+                table.write(gpu, &*SRGB8_TO_LINEAR, &())?;
+                Some(table)
+            }
+            _ => None,
+        };
+        progress.end();
+        Ok(Self { pages, srgb_to_linear })
+    }
+}
+
+fn upload<T: Pod>(gpu: &Gpu, values: &[T]) -> Result<wgpu::Buffer> {
+    let buffer = Buffer::storage(gpu, "colours", values.len() as u64)?;
+    buffer.write(gpu, values, &())?;
+    Ok(buffer.raw)
+}

@@ -1,0 +1,72 @@
+//! Stage 2: the nearest depth at every pixel, `min z` over the splats that cover it (paper 000, section 5.3, first
+//! pass; there the tolerance is added to the depths, here to the comparison, which is exact).
+//!
+//! On the device depths are positive f32, whose bits order as u32: an atomic min.
+
+use super::footprint::intersect;
+use super::project::{Splat, SplatBuffer};
+use super::{Recorder, Rows};
+use crate::error::Result;
+use crate::gpu::buffers::Buffer;
+use crate::gpu::kernel::grid;
+use crate::scene::Camera;
+
+/// The twin: nearest depths of the rows `first_row..first_row + rows`, +inf where nothing is.
+pub fn reference<'a>(
+    splats: impl Iterator<Item = &'a Splat>,
+    camera: &Camera,
+    first_row: u32,
+    rows: u32,
+) -> Vec<f64> {
+    let mut nearest = vec![f64::INFINITY; camera.width as usize * rows as usize];
+    for splat in splats {
+        for y in splat.first[1].max(first_row)..=splat.last[1].min(first_row + rows - 1) {
+            let row = (y - first_row) as usize * camera.width as usize;
+            for x in splat.first[0]..=splat.last[0] {
+                if let Some(hit) = intersect(splat, camera, x, y).filter(|i| i.hit(camera)) {
+                    let pixel = &mut nearest[row + x as usize];
+                    *pixel = pixel.min(hit.depth);
+                }
+            }
+        }
+    }
+    nearest
+}
+
+/// The nearest depth of each pixel of some rows, as bits, in device units.
+pub struct VisibilityBuffer {
+    /// One word a pixel.
+    pub nearest: Buffer<u32>,
+}
+
+impl VisibilityBuffer {
+    /// Room for `pixels`.
+    pub fn new(recorder: &Recorder<'_>, pixels: u64) -> Result<Self> {
+        Ok(Self { nearest: Buffer::storage(recorder.gpu, "nearest depths", pixels)? })
+    }
+}
+
+/// Records the pass over `rows`.
+pub fn record(
+    recorder: &mut Recorder<'_>,
+    splats: &SplatBuffer,
+    rows: &Rows,
+    buffer: &VisibilityBuffer,
+) -> Result<()> {
+    let (gpu, program) = (recorder.gpu, recorder.program);
+    let buffers = [("nearest", &buffer.nearest.raw)];
+    recorder.timing.pass(
+        gpu,
+        "visibility",
+        |_| {},
+        |pass| {
+            let (pipeline, group) = program.bind(gpu, "clear", &buffers)?;
+            let (x, y) = grid(gpu, buffer.nearest.len)?;
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, &group, &[]);
+            pass.dispatch_workgroups(x, y, 1);
+            Ok(())
+        },
+    )?;
+    splats.dispatch(recorder, "visibility", rows, &buffers, |_| {})
+}

@@ -1,0 +1,263 @@
+//! The camera: intrinsics in pixels, a rigid pose in world units, and the view chosen when nobody chose one.
+
+use glam::{DMat3, DVec3};
+
+use super::{Bounds, Up};
+use crate::error::{Error, Result};
+
+/// How camera space becomes pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Projection {
+    /// `x = fx X/Z + cx`: focal lengths in pixels.
+    Pinhole,
+    /// `x = fx X + cx`: pixels per world unit.
+    Orthographic,
+}
+
+/// A camera. Camera space is x right, y down, z forward; pixel (i, j) has its centre at (i + 0.5, j + 0.5), origin top
+/// left; depth is camera-space z.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Camera {
+    /// Pinhole or orthographic.
+    pub projection: Projection,
+    /// Image width, pixels.
+    pub width: u32,
+    /// Image height, pixels.
+    pub height: u32,
+    /// Focal length (pinhole, pixels) or scale (orthographic, pixels per world unit) along x.
+    pub fx: f64,
+    /// The same along y.
+    pub fy: f64,
+    /// Principal point, pixels from the left edge; need not be the centre.
+    pub cx: f64,
+    /// Principal point, pixels from the top edge.
+    pub cy: f64,
+    /// Position in world coordinates.
+    pub eye: DVec3,
+    /// World to camera: the rows are the directions right, down and forward.
+    pub rotation: DMat3,
+    /// Smallest depth that is drawn, world units, positive.
+    pub near: f64,
+}
+
+/// The largest image side: bounds of splats are stored in 16 bits.
+pub const MAX_SIDE: u32 = 32_768;
+
+/// The vertical field of view when none is given, degrees.
+pub const DEFAULT_FOV: f64 = 45.0;
+
+/// Image size and intrinsics before a pose is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Lens {
+    /// Vertical field of view in degrees, principal point in the centre.
+    Fov(f64),
+    /// `[fx, fy, cx, cy]` in pixels.
+    Intrinsics([f64; 4]),
+    /// Orthographic: world units from the image's top to its bottom.
+    OrthographicHeight(f64),
+    /// Orthographic `[fx, fy, cx, cy]`: pixels per world unit and pixels.
+    OrthographicScale([f64; 4]),
+}
+
+impl Lens {
+    fn intrinsics(self, width: u32, height: u32) -> Result<(Projection, [f64; 4])> {
+        let (w, h) = (f64::from(width), f64::from(height));
+        let (projection, values) = match self {
+            Self::Fov(degrees) => {
+                if !(degrees > 0.0 && degrees < 180.0) {
+                    return Err(Error::Usage(format!(
+                        "a field of view lies between 0 and 180 degrees, {degrees} does not"
+                    )));
+                }
+                let f = 0.5 * h / (0.5 * degrees.to_radians()).tan();
+                (Projection::Pinhole, [f, f, 0.5 * w, 0.5 * h])
+            }
+            Self::Intrinsics(values) => (Projection::Pinhole, values),
+            Self::OrthographicHeight(world) => {
+                let f = h / world;
+                (Projection::Orthographic, [f, f, 0.5 * w, 0.5 * h])
+            }
+            Self::OrthographicScale(values) => (Projection::Orthographic, values),
+        };
+        let [fx, fy, cx, cy] = values;
+        if !(fx > 0.0 && fy > 0.0 && values.iter().all(|v| v.is_finite())) {
+            return Err(Error::Usage(format!(
+                "the camera's scale must be positive and finite: fx = {fx}, fy = {fy}, cx = {cx}, cy = {cy}"
+            )));
+        }
+        Ok((projection, values))
+    }
+}
+
+/// Rejects image sizes that no backend can hold.
+pub fn check_size(width: u32, height: u32) -> Result<()> {
+    if width == 0 || height == 0 || width > MAX_SIDE || height > MAX_SIDE {
+        return Err(Error::Usage(format!("an image is 1 to {MAX_SIDE} pixels wide and high, {width}x{height} is not")));
+    }
+    Ok(())
+}
+
+impl Camera {
+    /// A camera at `eye` that looks at `target`, both in world coordinates. Without `up` (or with one along the view
+    /// direction and `up` not given by the user) the world axis that serves is taken.
+    pub fn look_at(
+        (width, height): (u32, u32),
+        lens: Lens,
+        eye: DVec3,
+        target: DVec3,
+        up: Option<DVec3>,
+        scene_up: Up,
+        near: f64,
+    ) -> Result<Self> {
+        let forward = target - eye;
+        if !(forward.length() > 0.0 && forward.is_finite() && eye.is_finite()) {
+            return Err(Error::Usage("the camera's eye and target must be finite and apart from each other".into()));
+        }
+        let forward = forward.normalize();
+        let right = match up {
+            Some(up) => {
+                let right = forward.cross(up.normalize_or_zero());
+                if !(right.length() > 1e-6) {
+                    return Err(Error::Usage("the camera's up is zero or points along its view".into()));
+                }
+                right
+            }
+            None => {
+                let right = forward.cross(scene_up.axis());
+                if right.length() > 1e-3 { right } else { forward.cross(scene_up.other()) }
+            }
+        }
+        .normalize();
+        let down = forward.cross(right);
+        Self::posed((width, height), lens, eye, DMat3::from_cols(right, down, forward).transpose(), near)
+    }
+
+    /// A camera with a given world-to-camera rotation.
+    pub fn posed((width, height): (u32, u32), lens: Lens, eye: DVec3, rotation: DMat3, near: f64) -> Result<Self> {
+        check_size(width, height)?;
+        let (projection, [fx, fy, cx, cy]) = lens.intrinsics(width, height)?;
+        let skew = (rotation * rotation.transpose() - DMat3::IDENTITY).to_cols_array();
+        // NaN must fail too, so the comparison is for the good case.
+        if !skew.iter().all(|e| e.abs() < 1e-6) || !(rotation.determinant() > 0.0) || !eye.is_finite() {
+            return Err(Error::Usage(
+                "the camera's pose is not a rigid motion: its rotation must be orthonormal with determinant +1".into(),
+            ));
+        }
+        if !(near > 0.0 && near.is_finite()) {
+            return Err(Error::Usage(format!("the near depth must be positive and finite, {near} is not")));
+        }
+        Ok(Self { projection, width, height, fx, fy, cx, cy, eye, rotation, near })
+    }
+
+    /// The depth below which nothing is drawn when none is given: far enough from zero for f32 reciprocals, and a
+    /// millionth of the scene.
+    pub fn default_near(bounds: &Bounds) -> f64 {
+        let diagonal = (bounds.max - bounds.min).length();
+        if diagonal > 0.0 { diagonal * 1e-6 } else { 1e-6 }
+    }
+
+    /// The pose chosen when nobody chose one: the scene's bounding box fills the image up to a margin of 4 %, seen from
+    /// the front, a little from the right and above (z-up scenes, which tend to be terrain, from a steeper angle).
+    /// `bounds` in world coordinates.
+    pub fn framing((width, height): (u32, u32), lens: Lens, bounds: &Bounds, up: Up) -> Result<(DVec3, DVec3)> {
+        check_size(width, height)?;
+        let (projection, [fx, fy, cx, cy]) = lens.intrinsics(width, height)?;
+        let toward_eye = match up {
+            Up::Y => DVec3::new(0.45, 0.35, 1.0),
+            Up::Z => DVec3::new(0.35, -1.0, 0.9),
+        }
+        .normalize();
+        let center = (bounds.min + bounds.max) * 0.5;
+        let half = (bounds.max - bounds.min) * 0.5;
+        let radius = half.length().max(f64::MIN_POSITIVE);
+        let radius = if radius > 1e-300 { radius } else { 0.5 };
+        let right = (-toward_eye).cross(up.axis()).normalize();
+        let down = (-toward_eye).cross(right);
+        let mut distance = radius * 1.05;
+        if projection == Projection::Pinhole {
+            // The tangents of the half-angles to each image edge, less the margin.
+            let edge = |center: f64, size: f64, f: f64| (0.96 * center.min(size - center) / f).max(1e-3);
+            let (tan_x, tan_y) = (edge(cx, f64::from(width), fx), edge(cy, f64::from(height), fy));
+            for corner in 0..8 {
+                let sign = |bit: u32| if corner >> bit & 1 == 0 { -1.0 } else { 1.0 };
+                let offset = half * DVec3::new(sign(0), sign(1), sign(2));
+                let toward = offset.dot(toward_eye);
+                let needed = (offset.dot(right).abs() / tan_x).max(offset.dot(down).abs() / tan_y);
+                distance = distance.max(toward + needed);
+            }
+        }
+        Ok((center + toward_eye * distance, center))
+    }
+
+    /// The world height of an orthographic view that holds the whole scene.
+    pub fn orthographic_height((width, height): (u32, u32), bounds: &Bounds) -> f64 {
+        let diagonal = (bounds.max - bounds.min).length().max(1e-30);
+        let aspect = f64::from(width) / f64::from(height);
+        diagonal * 1.04 / aspect.min(1.0)
+    }
+
+    /// A world point in camera space.
+    pub fn to_camera(&self, world: DVec3) -> DVec3 {
+        self.rotation * (world - self.eye)
+    }
+
+    /// The unnormalised world direction from the eye through the image point (x, y), pixels: camera-space z is 1.
+    pub fn ray(&self, x: f64, y: f64) -> DVec3 {
+        let camera = match self.projection {
+            Projection::Pinhole => DVec3::new((x - self.cx) / self.fx, (y - self.cy) / self.fy, 1.0),
+            Projection::Orthographic => DVec3::Z,
+        };
+        self.rotation.transpose() * camera
+    }
+
+    /// Pixels of the image.
+    pub fn pixels(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn looking_north_has_east_on_the_right() {
+        let camera =
+            Camera::look_at((100, 100), Lens::Fov(90.0), DVec3::ZERO, DVec3::Y, Some(DVec3::Z), Up::Z, 0.01).unwrap();
+        assert!((camera.to_camera(DVec3::X) - DVec3::X).length() < 1e-15);
+        assert!((camera.to_camera(DVec3::Z) + DVec3::Y).length() < 1e-15);
+        assert!((camera.fx - 50.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn framing_keeps_every_corner_in_the_image() {
+        let bounds = Bounds { min: DVec3::new(-3.0, 2.0, 1.0), max: DVec3::new(9.0, 4.0, 1.5) };
+        for (up, size) in [(Up::Y, (640, 480)), (Up::Z, (100, 900)), (Up::Z, (1024, 64))] {
+            let lens = Lens::Fov(45.0);
+            let (eye, target) = Camera::framing(size, lens, &bounds, up).unwrap();
+            let camera = Camera::look_at(size, lens, eye, target, None, up, 1e-3).unwrap();
+            let mut closest_to_edge = f64::INFINITY;
+            for corner in 0..8 {
+                let pick = |axis: usize| if corner >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
+                let p = camera.to_camera(DVec3::new(pick(0), pick(1), pick(2)));
+                let (x, y) = (camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy);
+                let inside =
+                    x.min(f64::from(size.0) - x) / f64::from(size.0) * 2.0;
+                let inside = inside.min(y.min(f64::from(size.1) - y) / f64::from(size.1) * 2.0);
+                closest_to_edge = closest_to_edge.min(inside);
+            }
+            assert!(closest_to_edge > 0.039 && closest_to_edge < 0.2, "{closest_to_edge}");
+        }
+    }
+
+    #[test]
+    fn unusable_cameras_are_refused() {
+        let look = |up| Camera::look_at((8, 8), Lens::Fov(45.0), DVec3::ZERO, DVec3::Z, up, Up::Z, 0.1);
+        assert!(look(Some(DVec3::Z)).is_err());
+        assert!(look(None).is_ok());
+        assert!(check_size(0, 5).is_err() && check_size(100_000, 100_000).is_err());
+        assert!(Camera::posed((8, 8), Lens::Fov(45.0), DVec3::ZERO, DMat3::IDENTITY * 2.0, 0.1).is_err());
+        assert!(Camera::posed((8, 8), Lens::Fov(181.0), DVec3::ZERO, DMat3::IDENTITY, 0.1).is_err());
+    }
+}

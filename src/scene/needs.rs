@@ -1,0 +1,89 @@
+//! What a scene and its options need, computed once: the only variant key of the kernels.
+
+use super::{Camera, Colors, Projection, RenderOptions, Scene, Shading};
+
+/// Where a surfel's colour comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ColorNeed {
+    /// All surfels share one colour: none is stored, none is accumulated.
+    Constant,
+    /// A word of 8-bit sRGB each.
+    Srgb8,
+    /// Four f32 each.
+    Linear,
+}
+
+/// What exists in this render: it chooses the WGSL files that are joined, and so the bindings, buffers and sums.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct SceneNeeds {
+    /// The camera model.
+    pub projection: Projection,
+    /// The colour source.
+    pub color: ColorNeed,
+    /// Surfels differ in alpha.
+    pub alpha: bool,
+    /// Normals are accumulated: Lambert shading or a normal map.
+    pub normal: bool,
+    /// Depth is accumulated: a depth map.
+    pub depth: bool,
+    /// Fragments are counted.
+    pub count: bool,
+    /// Pixels are lit.
+    pub lambert: bool,
+    /// A normal map is written.
+    pub normal_map: bool,
+    /// A weight map is written.
+    pub weight_map: bool,
+    /// The reference records distances to decisions.
+    pub decision: bool,
+}
+
+impl SceneNeeds {
+    /// The needs of `scene` under `options`; `color_range` is [`Scene::color_range`].
+    pub fn of(scene: &Scene, color_range: &([f32; 4], [f32; 4]), camera: &Camera, options: &RenderOptions) -> Self {
+        let (low, high) = color_range;
+        let color = match scene.colors {
+            _ if low == high => ColorNeed::Constant,
+            Colors::Constant(_) => ColorNeed::Constant,
+            Colors::Srgb8(_) => ColorNeed::Srgb8,
+            Colors::Linear(_) => ColorNeed::Linear,
+        };
+        let lambert = options.shading == Shading::Lambert;
+        Self {
+            projection: camera.projection,
+            color,
+            alpha: low[3] != high[3],
+            normal: lambert || options.maps.normal,
+            depth: options.maps.depth,
+            count: options.maps.count,
+            lambert,
+            normal_map: options.maps.normal,
+            weight_map: options.maps.weight,
+            decision: options.maps.decision,
+        }
+    }
+
+    /// The needs by name, for people and JSON.
+    pub fn names(&self) -> Vec<&'static str> {
+        let projection = match self.projection {
+            Projection::Pinhole => "pinhole",
+            Projection::Orthographic => "orthographic",
+        };
+        let color = match self.color {
+            ColorNeed::Constant => "color-constant",
+            ColorNeed::Srgb8 => "color-srgb8",
+            ColorNeed::Linear => "color-linear",
+        };
+        let flags = [
+            (self.alpha, "alpha"),
+            (self.normal, "normal"),
+            (self.depth, "depth"),
+            (self.count, "count"),
+            (self.lambert, "lambert"),
+            (self.normal_map, "normal-map"),
+            (self.weight_map, "weight-map"),
+            (self.decision, "decision"),
+        ];
+        [projection, color].into_iter().chain(flags.into_iter().filter(|(on, _)| *on).map(|(_, name)| name)).collect()
+    }
+}

@@ -1,0 +1,150 @@
+// The pinhole camera x = fx X/Z + cx: homography and bounds of a disk, and the evaluation at a pixel.
+// Twin: src/passes/project.rs and src/passes/footprint.rs.
+
+// A disk in camera space: centre in doubled precision, half-axes, and s x t . p.
+struct Homography {
+    a: vec3<f32>,
+    b: vec3<f32>,
+    c: vec3<f32>,
+    anchor: vec2<i32>,
+    // First and last pixel centre that the disk can reach, image coordinates.
+    low: vec2<f32>,
+    high: vec2<f32>,
+    // > 0 if s x t points away from the viewer; 0 for a disk seen exactly edge-on, which covers nothing.
+    away: f32,
+}
+
+fn image_of(position: Double, depth: Double, axis: u32) -> Double {
+    let focal = Double(view.intrinsics[axis], view.intrinsics_low[axis]);
+    let principal = Double(view.intrinsics[axis + 2u], view.intrinsics_low[axis + 2u]);
+    return sum(product(focal, quotient(position, depth)), principal);
+}
+
+// The extent of a disk wholly before the camera along one image axis, relative to its centre's X/Z.
+// Lines of constant x tangent to the disk: k^2 D + 2 k B - E = 0 with E >= 0 and D > 0 (conic of the disk's boundary).
+fn tangents(s: f32, t: f32, s_z: f32, t_z: f32, p_z: f32) -> vec2<f32> {
+    let e = s * s + t * t;
+    let b = s * s_z + t * t_z;
+    let d = p_z * p_z - s_z * s_z - t_z * t_z;
+    let root = sqrt(b * b + d * e);
+    // Each root in the form that does not cancel; where both vanish the extent is zero.
+    let far = abs(b) + root;
+    let near = select(0.0, e / far, far > 0.0);
+    return select(vec2<f32>(-near, far / d), vec2<f32>(-far / d, near), b >= 0.0);
+}
+
+// The extent along one axis, as X/Z, of the part of a disk at depths of `near` and more, for a disk that crosses that
+// depth: tangents of the conic that touch it there, and the two ends of the chord at `near`.
+fn clipped_extent(s: vec2<f32>, t: vec2<f32>, p: vec2<f32>, end_0: vec2<f32>, end_1: vec2<f32>) -> vec2<f32> {
+    let chord_0 = (p.x + end_0.x * s.x + end_0.y * t.x) / view.near;
+    let chord_1 = (p.x + end_1.x * s.x + end_1.y * t.x) / view.near;
+    // The chord's ends are exact to the rounding of a sum of these magnitudes.
+    let blur = 1e-6 * (abs(p.x) + abs(s.x) + abs(t.x)) / view.near;
+    var extent = vec2<f32>(min(chord_0, chord_1) - blur, max(chord_0, chord_1) + blur);
+    let a = s.y * s.y + t.y * t.y - p.y * p.y;
+    let b = s.x * s.y + t.x * t.y - p.x * p.y;
+    let c = s.x * s.x + t.x * t.x - p.x * p.x;
+    let discriminant = b * b - a * c;
+    if (discriminant >= 0.0) {
+        let q = b + select(-1.0, 1.0, b >= 0.0) * sqrt(discriminant);
+        let roots = vec2<f32>(q / a, c / q);
+        for (var i = 0u; i < 2u; i++) {
+            let k = roots[i];
+            let line = vec3<f32>(s.x - k * s.y, t.x - k * t.y, p.x - k * p.y);
+            let depth = p.y - (line.x * s.y + line.y * t.y) / line.z;
+            // Half of `near` leaves room for rounding; a tangent too many only widens the bounds. NaN fails.
+            if (depth >= 0.5 * view.near) {
+                extent = vec2<f32>(min(extent.x, k), max(extent.y, k));
+            }
+        }
+    }
+    return extent;
+}
+
+fn homography(center: array<Double, 3>, s: vec3<f32>, t: vec3<f32>) -> Homography {
+    let p = vec3<f32>(center[0].high, center[1].high, center[2].high);
+    let slope = sqrt(s.z * s.z + t.z * t.z);
+    let normal = cross(s, t);
+    let away = dot(p, normal);
+    var h: Homography;
+    h.away = away;
+    h.low = vec2<f32>(1.0);
+    h.high = vec2<f32>(0.0);
+    if (p.z + slope < view.near || away == 0.0) {
+        return h;
+    }
+    let focal = view.intrinsics.xy;
+    let scale = vec3<f32>(1.0 / (away * focal), 1.0 / away);
+    let a = cross(t, p) * scale;
+    let b = cross(p, s) * scale;
+    let c = normal * scale;
+    if (p.z - slope >= view.near) {
+        let x = image_of(center[0], center[2], 0u);
+        let y = image_of(center[1], center[2], 1u);
+        let image = vec2<f32>(x.high, y.high);
+        // Past this the anchor's arithmetic is no longer exact, and the image is far away.
+        let reach = abs(image) < vec2<f32>(4194304.0);
+        if (all(reach)) {
+            let pixel = floor(image);
+            // The centre of the splat relative to the centre of its pixel: the digits that make the image stable.
+            let offset = (image - pixel) + vec2<f32>(x.low, y.low) - 0.5;
+            h.anchor = vec2<i32>(pixel);
+            h.a = vec3<f32>(a.xy, -dot(a.xy, offset));
+            h.b = vec3<f32>(b.xy, -dot(b.xy, offset));
+            h.c = vec3<f32>(c.xy, 1.0 / p.z - dot(c.xy, offset));
+            let ratio = p.xy / p.z;
+            let s_x = s.xy - ratio * s.z;
+            let t_x = t.xy - ratio * t.z;
+            let across = tangents(s_x.x, t_x.x, s.z, t.z, p.z) * focal.x;
+            let down = tangents(s_x.y, t_x.y, s.z, t.z, p.z) * focal.y;
+            h.low = image + vec2<f32>(across.x, down.x);
+            h.high = image + vec2<f32>(across.y, down.y);
+            return h;
+        }
+    }
+    // The disk reaches the near depth, or its centre lies far outside the image: no useful centre pixel, so the
+    // homography is anchored in the image and the bounds are those of the part in front.
+    h.anchor = vec2<i32>(vec2<u32>(view.width, view.height) / 2u);
+    let d = vec3<f32>((vec2<f32>(h.anchor) + 0.5 - view.intrinsics.zw) / focal, 1.0);
+    let unscaled = vec3<f32>(focal, 1.0);
+    h.a = vec3<f32>(a.xy, dot(a * unscaled, d));
+    h.b = vec3<f32>(b.xy, dot(b * unscaled, d));
+    h.c = vec3<f32>(c.xy, dot(c * unscaled, d));
+    var end_0 = vec2<f32>(0.0);
+    var end_1 = vec2<f32>(0.0);
+    if (slope > 0.0) {
+        let steepest = vec2<f32>(s.z, t.z) / slope;
+        let along = clamp((view.near - p.z) / slope, -1.0, 1.0);
+        let half = sqrt(max(0.0, 1.0 - along * along));
+        end_0 = along * steepest + half * vec2<f32>(-steepest.y, steepest.x);
+        end_1 = along * steepest - half * vec2<f32>(-steepest.y, steepest.x);
+    }
+    let across = clipped_extent(s.xz, t.xz, p.xz, end_0, end_1) * focal.x + view.intrinsics.z;
+    let down = clipped_extent(s.yz, t.yz, p.yz, end_0, end_1) * focal.y + view.intrinsics.w;
+    h.low = vec2<f32>(across.x, down.x) - 1.0;
+    h.high = vec2<f32>(across.y, down.y) + 1.0;
+    return h;
+}
+
+struct Fragment {
+    // False outside the disk and nearer than `near`.
+    hit: bool,
+    // Camera-space z, device units.
+    depth: f32,
+    // Squared radius on the unit disk.
+    rho2: f32,
+}
+
+// The intersection of the ray through d (relative to the anchor's centre) with the splat's disk, and its weight's rho.
+fn intersect(abc: vec3<f32>) -> Fragment {
+    let reached = dot(abc.xy, abc.xy) <= abc.z * abc.z && abc.z > 0.0;
+    let depth = 1.0 / abc.z;
+    let uv = abc.xy * depth;
+    return Fragment(reached && depth >= view.near, depth, min(dot(uv, uv), 1.0));
+}
+
+// The world direction, of unit length, of the ray through the centre of the pixel.
+fn ray(x: u32, y: u32) -> vec3<f32> {
+    let image = (vec2<f32>(f32(x), f32(y)) + 0.5 - view.intrinsics.zw) / view.intrinsics.xy;
+    return normalize(image.x * view.rotation[0].xyz + image.y * view.rotation[1].xyz + view.rotation[2].xyz);
+}

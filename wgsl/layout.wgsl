@@ -1,0 +1,79 @@
+// Every struct that host and device share, and every binding. src/gpu/layout.rs mirrors the structs and a test compares
+// the two field by field; bindings are looked up by name.
+
+// All lengths on the device are in units of `1 / unit` world units, where `unit` is a power of two chosen so that the
+// scene and the camera's distance are near one: scaling by it is exact, and no product over- or underflows.
+struct View {
+    // World to camera, rows right, down, forward: nine leading parts, then nine trailing parts (see double.wgsl).
+    rotation: array<vec4<f32>, 3>,
+    rotation_low: array<vec4<f32>, 3>,
+    // xyz: the eye relative to the scene's origin.
+    eye: vec4<f32>,
+    eye_low: vec4<f32>,
+    // fx, fy, cx, cy: pinhole in pixels; orthographic fx and fy in pixels per unit.
+    intrinsics: vec4<f32>,
+    intrinsics_low: vec4<f32>,
+    // Premultiplied linear colour: value = low + span * [0, 1].
+    color_low: vec4<f32>,
+    color_span: vec4<f32>,
+    // 1 / span, or 0 where the span is 0.
+    color_scale: vec4<f32>,
+    // Linear, straight alpha.
+    background: vec4<f32>,
+    // xyz: unit vector toward the light in world space, or 0 for the headlight; w: intensity.
+    lights: array<vec4<f32>, 8>,
+    light_count: u32,
+    width: u32,
+    height: u32,
+    // Always 0, which no compiler can know (double.wgsl).
+    zero: u32,
+    unit: f32,
+    near: f32,
+    epsilon_relative: f32,
+    epsilon_absolute: f32,
+    // 1 / unit: device lengths times this are world lengths.
+    world: f32,
+    padding_0: u32,
+    padding_1: u32,
+    padding_2: u32,
+}
+
+// The rows of the image that the visibility and attribute buffers hold.
+struct Band {
+    first_row: u32,
+    rows: u32,
+    padding_0: u32,
+    padding_1: u32,
+}
+
+// An elliptical disk center + u s + v t, world units relative to the scene's origin.
+struct Surfel {
+    center: array<f32, 3>,
+    s: array<f32, 3>,
+    t: array<f32, 3>,
+}
+
+// A projected surfel. At the pixel (x, y), with d = (x - anchor_x, y - anchor_y, 1):
+// (a . d, b . d, c . d) is (u/z, v/z, 1/z) for a pinhole and (u, v, z) for an orthographic camera.
+struct Splat {
+    anchor_x: i32,
+    anchor_y: i32,
+    // First and last pixel, x | y << 16; empty if the first lies past the last.
+    bounds_first: u32,
+    bounds_last: u32,
+    a: array<f32, 3>,
+    b: array<f32, 3>,
+    c: array<f32, 3>,
+    // World space, unit, toward the viewer.
+    normal: array<f32, 3>,
+}
+
+@group(0) @binding(0) var<uniform> view: View;
+@group(0) @binding(1) var<uniform> band: Band;
+
+const WORKGROUP: u32 = 64u;
+
+// The index of this invocation in a 2-D dispatch of 1-D workgroups.
+fn linear_index(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32) -> u32 {
+    return (workgroup.y * workgroups.x + workgroup.x) * WORKGROUP + local;
+}

@@ -1,0 +1,55 @@
+// Stage 4: sums become the image: divide by the weight, shade, put over the background. One invocation a pixel of the
+// band. Twin: src/passes/resolve.rs.
+
+// Words of a pixel in the image; the colour's four come first.
+override IMAGE_WORDS: u32;
+
+@group(0) @binding(10) var<storage, read_write> image: array<f32>;
+
+fn write_color(out: u32, color: vec4<f32>) {
+    for (var k = 0u; k < 4u; k++) {
+        image[out + k] = color[k];
+    }
+}
+
+// Straight alpha over straight alpha.
+fn over(front: vec4<f32>, back: vec4<f32>) -> vec4<f32> {
+    let behind = back.a * (1.0 - front.a);
+    let alpha = front.a + behind;
+    return select(vec4<f32>(0.0), vec4<f32>((front.rgb * front.a + back.rgb * behind) / alpha, alpha), alpha > 0.0);
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn resolve(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let pixel = linear_index(workgroup, workgroups, local);
+    if (pixel >= arrayLength(&visible)) {
+        return;
+    }
+    let x = pixel % view.width;
+    let y = pixel / view.width + band.first_row;
+    let word = pixel * PIXEL_WORDS;
+    let out = pixel * IMAGE_WORDS;
+    let weight = sum_at(word + WEIGHT_WORD);
+    let front = bitcast<f32>(visible[pixel]);
+    if (weight == 0.0) {
+        write_color(out, view.background);
+        write_normal(out, vec3<f32>(0.0));
+        write_no_depth(out, front);
+        write_weight(out, 0.0);
+        write_count(out, word);
+        return;
+    }
+    let premultiplied = resolve_color(word, weight);
+    let alpha = premultiplied.a;
+    let color = select(vec3<f32>(0.0), premultiplied.rgb / alpha, alpha > 0.0);
+    let normal = resolve_normal(word, weight);
+    write_color(out, over(vec4<f32>(shade(color, normal, x, y), alpha), view.background));
+    write_normal(out, normal);
+    write_depth(out, word, weight, front);
+    write_weight(out, weight);
+    write_count(out, word);
+}

@@ -1,0 +1,42 @@
+// Stage 2: the nearest depth at every pixel. One invocation a splat. Twin: src/passes/visibility.rs.
+// Depths are positive, so the bits of an f32 order as u32.
+
+@group(0) @binding(5) var<storage, read> projected: array<Splat>;
+@group(0) @binding(6) var<storage, read_write> nearest: array<atomic<u32>>;
+
+const NOTHING: u32 = 0x7f800000u; // +inf
+
+// Before the splats: one invocation a pixel.
+@compute @workgroup_size(WORKGROUP)
+fn clear(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let pixel = linear_index(workgroup, workgroups, local);
+    if (pixel < arrayLength(&nearest)) {
+        atomicStore(&nearest[pixel], NOTHING);
+    }
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn visibility(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let index = linear_index(workgroup, workgroups, local);
+    if (index >= arrayLength(&projected)) {
+        return;
+    }
+    let splat = projected[index];
+    let pixels = reach(splat);
+    for (var y = pixels.first.y; y <= pixels.last.y; y++) {
+        for (var x = pixels.first.x; x <= pixels.last.x; x++) {
+            let fragment = footprint(splat, x, y);
+            if (fragment.hit) {
+                atomicMin(&nearest[pixel_index(x, y)], bitcast<u32>(fragment.depth));
+            }
+        }
+    }
+}

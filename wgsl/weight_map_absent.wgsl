@@ -1,0 +1,1 @@
+fn write_weight(out: u32, weight: f32) {}

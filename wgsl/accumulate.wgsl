@@ -24,7 +24,7 @@ fn accumulate(
         return;
     }
     let color = color_of(index);
-    let normal = normal_of(splat);
+    let normal = normal_of(index, splat);
     for (var y = pixels.first.y; y <= pixels.last.y; y++) {
         for (var x = pixels.first.x; x <= pixels.last.x; x++) {
             let fragment = footprint(splat, x, y);

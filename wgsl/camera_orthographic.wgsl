@@ -1,23 +1,36 @@
 // The orthographic camera x = fx X + cx. Same interface as camera_pinhole.wgsl.
 // Twin: src/passes/project.rs and src/passes/footprint.rs.
 
-struct Homography {
-    a: vec3<f32>,
-    b: vec3<f32>,
-    c: vec3<f32>,
-    anchor: vec2<i32>,
-    low: vec2<f32>,
-    high: vec2<f32>,
-    away: f32,
-}
-
 fn image_of(position: Double, axis: u32) -> Double {
     let focal = Double(view.intrinsics[axis], view.intrinsics_low[axis]);
     let principal = Double(view.intrinsics[axis + 2u], view.intrinsics_low[axis + 2u]);
     return sum(product(focal, position), principal);
 }
 
-fn homography(center: array<Double, 3>, s: vec3<f32>, t: vec3<f32>) -> Homography {
+// Changes per pixel of the rows of the inverse of [s t], in doubled precision.
+fn precise_rows(s_world: vec3<f32>, t_world: vec3<f32>, offset_x: Double, offset_y: Double) -> Rows {
+    let s = rotate(widen(s_world));
+    let t = rotate(widen(t_world));
+    let away = minor(s[0], t[1], s[1], t[0]);
+    let per_x = quotient(single(1.0), product(away, Double(view.intrinsics.x, view.intrinsics_low.x)));
+    let per_y = quotient(single(1.0), product(away, Double(view.intrinsics.y, view.intrinsics_low.y)));
+    return thin_rows(
+        product(t[1], per_x),
+        product(negative(t[0]), per_y),
+        product(negative(s[1]), per_x),
+        product(s[0], per_y),
+        offset_x,
+        offset_y,
+    );
+}
+
+fn homography(
+    center: array<Double, 3>,
+    s: vec3<f32>,
+    t: vec3<f32>,
+    s_world: vec3<f32>,
+    t_world: vec3<f32>,
+) -> Homography {
     var h: Homography;
     let p_z = center[2].high;
     h.away = s.x * t.y - s.y * t.x;
@@ -39,6 +52,14 @@ fn homography(center: array<Double, 3>, s: vec3<f32>, t: vec3<f32>) -> Homograph
     h.a = vec3<f32>(a, -dot(a, offset));
     h.b = vec3<f32>(b, -dot(b, offset));
     h.c = vec3<f32>(c, p_z - dot(c, offset));
+    if (is_thin(a, b)) {
+        let offset_x = two_sum(image.x - pixel.x - 0.5, x.low);
+        let offset_y = two_sum(image.y - pixel.y - 0.5, y.low);
+        let rows = precise_rows(s_world, t_world, offset_x, offset_y);
+        h.a = rows.a;
+        h.a_low = rows.a_low;
+        h.b = rows.b;
+    }
     let extent = focal * sqrt(s.xy * s.xy + t.xy * t.xy);
     h.low = image - extent;
     h.high = image + extent;

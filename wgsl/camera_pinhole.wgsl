@@ -1,19 +1,6 @@
 // The pinhole camera x = fx X/Z + cx: homography and bounds of a disk, and the evaluation at a pixel.
 // Twin: src/passes/project.rs and src/passes/footprint.rs.
 
-// A disk in camera space: centre in doubled precision, half-axes, and s x t . p.
-struct Homography {
-    a: vec3<f32>,
-    b: vec3<f32>,
-    c: vec3<f32>,
-    anchor: vec2<i32>,
-    // First and last pixel centre that the disk can reach, image coordinates.
-    low: vec2<f32>,
-    high: vec2<f32>,
-    // > 0 if s x t points away from the viewer; 0 for a disk seen exactly edge-on, which covers nothing.
-    away: f32,
-}
-
 fn image_of(position: Double, depth: Double, axis: u32) -> Double {
     let focal = Double(view.intrinsics[axis], view.intrinsics_low[axis]);
     let principal = Double(view.intrinsics[axis + 2u], view.intrinsics_low[axis + 2u]);
@@ -61,7 +48,39 @@ fn clipped_extent(s: vec2<f32>, t: vec2<f32>, p: vec2<f32>, end_0: vec2<f32>, en
     return extent;
 }
 
-fn homography(center: array<Double, 3>, s: vec3<f32>, t: vec3<f32>) -> Homography {
+// Changes per pixel of the rows t x p and p x s over p . (s x t), in doubled precision.
+fn precise_rows(
+    p: array<Double, 3>,
+    s_world: vec3<f32>,
+    t_world: vec3<f32>,
+    offset_x: Double,
+    offset_y: Double,
+) -> Rows {
+    let s = rotate(widen(s_world));
+    let t = rotate(widen(t_world));
+    let a_x = minor(t[1], p[2], t[2], p[1]);
+    let a_y = minor(t[2], p[0], t[0], p[2]);
+    let a_z = minor(t[0], p[1], t[1], p[0]);
+    let away = sum(sum(product(s[0], a_x), product(s[1], a_y)), product(s[2], a_z));
+    let per_x = quotient(single(1.0), product(away, Double(view.intrinsics.x, view.intrinsics_low.x)));
+    let per_y = quotient(single(1.0), product(away, Double(view.intrinsics.y, view.intrinsics_low.y)));
+    return thin_rows(
+        product(a_x, per_x),
+        product(a_y, per_y),
+        product(minor(p[1], s[2], p[2], s[1]), per_x),
+        product(minor(p[2], s[0], p[0], s[2]), per_y),
+        offset_x,
+        offset_y,
+    );
+}
+
+fn homography(
+    center: array<Double, 3>,
+    s: vec3<f32>,
+    t: vec3<f32>,
+    s_world: vec3<f32>,
+    t_world: vec3<f32>,
+) -> Homography {
     let p = vec3<f32>(center[0].high, center[1].high, center[2].high);
     let slope = sqrt(s.z * s.z + t.z * t.z);
     let normal = cross(s, t);
@@ -92,6 +111,14 @@ fn homography(center: array<Double, 3>, s: vec3<f32>, t: vec3<f32>) -> Homograph
             h.a = vec3<f32>(a.xy, -dot(a.xy, offset));
             h.b = vec3<f32>(b.xy, -dot(b.xy, offset));
             h.c = vec3<f32>(c.xy, 1.0 / p.z - dot(c.xy, offset));
+            if (is_thin(a.xy, b.xy)) {
+                let offset_x = two_sum(image.x - pixel.x - 0.5, x.low);
+                let offset_y = two_sum(image.y - pixel.y - 0.5, y.low);
+                let rows = precise_rows(center, s_world, t_world, offset_x, offset_y);
+                h.a = rows.a;
+                h.a_low = rows.a_low;
+                h.b = rows.b;
+            }
             let ratio = p.xy / p.z;
             let s_x = s.xy - ratio * s.z;
             let t_x = t.xy - ratio * t.z;

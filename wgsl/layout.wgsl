@@ -58,15 +58,18 @@ struct Surfel {
 struct Splat {
     anchor_x: i32,
     anchor_y: i32,
-    // First and last pixel, x | y << 16; empty if the first lies past the last.
+    // First and last pixel, x | y << 16; empty if the first lies past the last. Sides have 15 bits: the top bit of
+    // bounds_last is set where s x t points away from the viewer.
     bounds_first: u32,
     bounds_last: u32,
     a: array<f32, 3>,
     b: array<f32, 3>,
     c: array<f32, 3>,
-    // World space, unit, toward the viewer.
-    normal: array<f32, 3>,
+    // Trailing part of a, for thin splats (rows.wgsl); else 0.
+    a_low: array<f32, 3>,
 }
+
+const AWAY: u32 = 0x80000000u;
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<uniform> band: Band;

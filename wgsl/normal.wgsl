@@ -3,8 +3,16 @@
 
 override NORMAL_WORD: u32;
 
-fn normal_of(splat: Splat) -> vec3<f32> {
-    return vec3<f32>(splat.normal[0], splat.normal[1], splat.normal[2]) * 0.5 + 0.5;
+// World space, unit, toward the viewer, mapped to [0, 1].
+fn normal_of(index: u32, splat: Splat) -> vec3<f32> {
+    let surfel = surfels[index];
+    // In device units, so that no product underflows.
+    let s = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * view.unit;
+    let t = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]) * view.unit;
+    let n = cross(s, t);
+    let unit_normal = normalize(n / max(max(abs(n.x), abs(n.y)), abs(n.z)));
+    let normal = select(unit_normal, -unit_normal, (splat.bounds_last & AWAY) != 0u);
+    return normal * 0.5 + 0.5;
 }
 
 fn accumulate_normal(word: u32, weight: u32, normal: vec3<f32>) {

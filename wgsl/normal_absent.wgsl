@@ -1,4 +1,4 @@
-fn normal_of(splat: Splat) -> vec3<f32> {
+fn normal_of(index: u32, splat: Splat) -> vec3<f32> {
     return vec3<f32>(0.0);
 }
 

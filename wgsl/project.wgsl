@@ -6,6 +6,28 @@
 
 var<workgroup> group_drawn: atomic<u32>;
 
+// World to camera.
+fn rotate(world: array<Double, 3>) -> array<Double, 3> {
+    var camera: array<Double, 3>;
+    for (var row = 0u; row < 3u; row++) {
+        let high = view.rotation[row];
+        let low = view.rotation_low[row];
+        camera[row] = sum(
+            sum(product(Double(high.x, low.x), world[0]), product(Double(high.y, low.y), world[1])),
+            product(Double(high.z, low.z), world[2]),
+        );
+    }
+    return camera;
+}
+
+fn rotate_plain(world: vec3<f32>) -> vec3<f32> {
+    return vec3<f32>(
+        dot(view.rotation[0].xyz, world),
+        dot(view.rotation[1].xyz, world),
+        dot(view.rotation[2].xyz, world),
+    );
+}
+
 fn project_surfel(index: u32) -> bool {
     let surfel = surfels[index];
     var relative: array<Double, 3>;
@@ -13,23 +35,13 @@ fn project_surfel(index: u32) -> bool {
         let d = two_sum(surfel.center[i] * view.unit, -view.eye[i]);
         relative[i] = quick_two_sum(d.high, d.low - view.eye_low[i]);
     }
-    // Half-axes need no more than f32; the centre decides where the splat lies to a millionth of its own size.
+    // f32 serves for the half-axes of most splats; thin ones come back for more (rows.wgsl).
     let s_world = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * view.unit;
     let t_world = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]) * view.unit;
-    var center: array<Double, 3>;
-    var s: vec3<f32>;
-    var t: vec3<f32>;
-    for (var row = 0u; row < 3u; row++) {
-        let high = view.rotation[row];
-        let low = view.rotation_low[row];
-        center[row] = sum(
-            sum(product(Double(high.x, low.x), relative[0]), product(Double(high.y, low.y), relative[1])),
-            product(Double(high.z, low.z), relative[2]),
-        );
-        s[row] = dot(high.xyz, s_world);
-        t[row] = dot(high.xyz, t_world);
-    }
-    let h = homography(center, s, t);
+    let center = rotate(relative);
+    let s = rotate_plain(s_world);
+    let t = rotate_plain(t_world);
+    let h = homography(center, s, t, s_world, t_world);
 
     // Bounds are conservative: the margin covers the rounding of the extent, and `intersect` decides.
     let size = vec2<f32>(f32(view.width), f32(view.height));
@@ -42,17 +54,14 @@ fn project_surfel(index: u32) -> bool {
     splat.bounds_first = 0xffffffffu;
     splat.bounds_last = 0u;
     if (visible) {
-        let n = cross(s_world, t_world);
-        let unit_normal = normalize(n / max(max(abs(n.x), abs(n.y)), abs(n.z)));
-        let normal = select(unit_normal, -unit_normal, h.away > 0.0);
         splat.anchor_x = h.anchor.x;
         splat.anchor_y = h.anchor.y;
         splat.bounds_first = u32(first.x) | (u32(first.y) << 16u);
-        splat.bounds_last = u32(last.x) | (u32(last.y) << 16u);
+        splat.bounds_last = u32(last.x) | (u32(last.y) << 16u) | select(0u, AWAY, h.away > 0.0);
         splat.a = array<f32, 3>(h.a.x, h.a.y, h.a.z);
         splat.b = array<f32, 3>(h.b.x, h.b.y, h.b.z);
         splat.c = array<f32, 3>(h.c.x, h.c.y, h.c.z);
-        splat.normal = array<f32, 3>(normal.x, normal.y, normal.z);
+        splat.a_low = array<f32, 3>(h.a_low.x, h.a_low.y, h.a_low.z);
     }
     splats[index] = splat;
     return visible;

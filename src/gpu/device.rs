@@ -88,8 +88,8 @@ impl AdapterDescription {
     }
 }
 
-/// The most storage buffers a kernel uses (accumulate: splats, depths, sums, colours, the sRGB table).
-const STORAGE_BUFFERS: u32 = 5;
+/// The most storage buffers a kernel uses (accumulate: splats, surfels, depths, sums, colours, the sRGB table).
+const STORAGE_BUFFERS: u32 = 6;
 
 /// What to do about a missing adapter.
 pub const INSTALL_HINT: &str = "install a Vulkan driver (on Debian or Ubuntu without a GPU: \

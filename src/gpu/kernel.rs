@@ -39,6 +39,7 @@ pub const FILES: &[(&str, &str)] = wgsl![
     "normal_map_absent.wgsl",
     "project.wgsl",
     "resolve.wgsl",
+    "rows.wgsl",
     "shade_lambert.wgsl",
     "shade_unlit.wgsl",
     "visibility.wgsl",
@@ -79,6 +80,7 @@ pub fn files(needs: &SceneNeeds) -> Vec<&'static str> {
     let mut files = vec![
         "layout.wgsl",
         "double.wgsl",
+        "rows.wgsl",
         match needs.projection {
             Projection::Pinhole => "camera_pinhole.wgsl",
             Projection::Orthographic => "camera_orthographic.wgsl",

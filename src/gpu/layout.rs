@@ -72,7 +72,7 @@ pub struct Splat {
     pub a: [f32; 3],
     pub b: [f32; 3],
     pub c: [f32; 3],
-    pub normal: [f32; 3],
+    pub a_low: [f32; 3],
 }
 
 /// x as the nearest f32 and the nearest f32 to what that leaves.

@@ -262,7 +262,12 @@ impl SplatBuffer {
         let view = &recorder.view.raw;
         recorder.timing.pass(gpu, stage, before, |pass| {
             for (page, splats) in self.surfels.pages.iter().zip(&self.pages) {
-                let mut bound = vec![("view", view), ("band", &rows.uniform.raw), ("projected", &splats.raw)];
+                let mut bound = vec![
+                    ("view", view),
+                    ("band", &rows.uniform.raw),
+                    ("projected", &splats.raw),
+                    ("surfels", &page.surfels.raw),
+                ];
                 bound.extend_from_slice(buffers);
                 bound.extend(page.colors.as_ref().map(|colors| ("colors", colors)));
                 bound.extend(self.surfels.srgb_to_linear.as_ref().map(|table| ("srgb_to_linear", &table.raw)));

@@ -1,0 +1,77 @@
+// The rows of a thin splat: one that the image shows more than eight times as long as wide, because it is seen nearly
+// edge-on or is so shaped. Across its width, u changes by 1 over a small fraction of the length over which the terms of
+// a . (dx, dy, 1) grow and cancel, and f32 keeps 24 bits of those terms only.
+//
+// The unit disk may be turned in itself: it is turned here until row a has all the change across the width and row b
+// none. Row a is then split on a common grid of 12 bits: the leading parts times whole pixels sum exactly, so that 36
+// bits survive the cancellation at the cost of three multiplications.
+
+struct Homography {
+    a: vec3<f32>,
+    b: vec3<f32>,
+    c: vec3<f32>,
+    a_low: vec3<f32>,
+    anchor: vec2<i32>,
+    // First and last point that the disk can reach, image coordinates; empty if low > high.
+    low: vec2<f32>,
+    high: vec2<f32>,
+    // > 0 if s x t points away from the viewer; 0 for a disk seen exactly edge-on, which covers nothing.
+    away: f32,
+}
+
+struct Rows {
+    a: vec3<f32>,
+    a_low: vec3<f32>,
+    b: vec3<f32>,
+}
+
+fn is_thin(a: vec2<f32>, b: vec2<f32>) -> bool {
+    return dot(a, a) + dot(b, b) > 8.0 * abs(a.x * b.y - a.y * b.x);
+}
+
+fn single(x: f32) -> Double {
+    return Double(x, 0.0);
+}
+
+fn negative(x: Double) -> Double {
+    return Double(-x.high, -x.low);
+}
+
+fn difference(a: Double, b: Double) -> Double {
+    return sum(a, negative(b));
+}
+
+fn widen(v: vec3<f32>) -> array<Double, 3> {
+    return array<Double, 3>(single(v.x), single(v.y), single(v.z));
+}
+
+// One component of a cross product: a b' - a' b.
+fn minor(a: Double, b_: Double, a_: Double, b: Double) -> Double {
+    return difference(product(a, b_), product(a_, b));
+}
+
+// Rows from their changes per pixel and the splat's centre, an offset in pixels from the anchor's centre: both rows are
+// 0 at the splat's centre.
+fn thin_rows(a_x: Double, a_y: Double, b_x: Double, b_y: Double, offset_x: Double, offset_y: Double) -> Rows {
+    let a_2 = a_x.high * a_x.high + a_y.high * a_y.high;
+    let b_2 = b_x.high * b_x.high + b_y.high * b_y.high;
+    let angle = 0.5 * atan2(2.0 * (a_x.high * b_x.high + a_y.high * b_y.high), a_2 - b_2);
+    let turn = normalize(vec2<f32>(cos(angle), sin(angle)));
+    let cosine = single(turn.x);
+    let sine = single(turn.y);
+    let wide_x = sum(product(cosine, a_x), product(sine, b_x));
+    let wide_y = sum(product(cosine, a_y), product(sine, b_y));
+    let long_x = difference(product(cosine, b_x), product(sine, a_x));
+    let long_y = difference(product(cosine, b_y), product(sine, a_y));
+    let wide_0 = negative(sum(product(wide_x, offset_x), product(wide_y, offset_y)));
+    let long_0 = negative(sum(product(long_x, offset_x), product(long_y, offset_y)));
+    let a = vec3<f32>(wide_x.high, wide_y.high, wide_0.high);
+    // The power of two at or below the largest, and the grid 2^-11 of it.
+    let largest = max(max(abs(a.x), abs(a.y)), abs(a.z));
+    let grid = bitcast<f32>(bitcast<u32>(largest) & 0x7f800000u) / 2048.0;
+    var rows: Rows;
+    rows.a = floor(a / grid + 0.5) * grid;
+    rows.a_low = (a - rows.a) + vec3<f32>(wide_x.low, wide_y.low, wide_0.low);
+    rows.b = vec3<f32>(long_x.high, long_y.high, long_0.high);
+    return rows;
+}

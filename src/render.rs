@@ -180,12 +180,7 @@ fn bands(gpu: &Gpu, camera: &Camera, pixel: &PixelLayout) -> Result<Vec<Rows>> {
 /// Rows that one thread of the reference works on at a time.
 const REFERENCE_ROWS: u32 = 8;
 
-fn on_reference(
-    scene: &Scene,
-    camera: &Camera,
-    options: &RenderOptions,
-    progress: &dyn Progress,
-) -> (Frame, Report) {
+fn on_reference(scene: &Scene, camera: &Camera, options: &RenderOptions, progress: &dyn Progress) -> (Frame, Report) {
     let needs = SceneNeeds::of(scene, &scene.color_range(), camera, options);
     let start = Instant::now();
     let splats = project::reference_all(scene, camera);
@@ -245,9 +240,8 @@ fn on_reference(
 
 /// The splats of each band of rows, by count, scan, place: `members[starts[b]..starts[b + 1]]` are band b's, in order.
 fn bin(splats: &[project::Splat], bands: usize) -> (Vec<usize>, Vec<u32>) {
-    let range = |splat: &project::Splat| {
-        (splat.first[1] / REFERENCE_ROWS) as usize..=(splat.last[1] / REFERENCE_ROWS) as usize
-    };
+    let range =
+        |splat: &project::Splat| (splat.first[1] / REFERENCE_ROWS) as usize..=(splat.last[1] / REFERENCE_ROWS) as usize;
     let mut starts = vec![0; bands + 1];
     for splat in splats {
         range(splat).for_each(|band| starts[band + 1] += 1);

@@ -2,8 +2,10 @@
 // Twin: src/passes/accumulate.rs, src/passes/resolve.rs.
 
 override NORMAL_WORD: u32;
+// Normals have no consistent side, so each is turned toward the viewer before blending.
+override TURN_NORMALS: bool;
 
-// World space, unit, toward the viewer, mapped to [0, 1].
+// World space, unit, mapped to [0, 1].
 fn normal_of(index: u32, splat: Splat) -> vec3<f32> {
     let surfel = surfels[index];
     // In device units, so that no product underflows.
@@ -11,7 +13,7 @@ fn normal_of(index: u32, splat: Splat) -> vec3<f32> {
     let t = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]) * view.unit;
     let n = cross(s, t);
     let unit_normal = normalize(n / max(max(abs(n.x), abs(n.y)), abs(n.z)));
-    let normal = select(unit_normal, -unit_normal, (splat.bounds_last & AWAY) != 0u);
+    let normal = select(unit_normal, -unit_normal, TURN_NORMALS && (splat.bounds_last & AWAY) != 0u);
     return normal * 0.5 + 0.5;
 }
 

@@ -61,7 +61,9 @@ impl<T: Pod> Buffer<T> {
             mapped_at_creation: false,
         });
         if pollster::block_on(guard.pop()).is_some() {
-            return Err(gpu.error(format!("out of memory for {what} ({size} bytes): use fewer surfels or a smaller image")));
+            return Err(
+                gpu.error(format!("out of memory for {what} ({size} bytes): use fewer surfels or a smaller image"))
+            );
         }
         gpu.check()?;
         Ok(Self { raw, len, element: PhantomData })
@@ -114,8 +116,8 @@ impl<T: Pod> Buffer<T> {
 
 /// How many elements of `stride` bytes fit a page, for the largest of the strides that are paged together.
 pub fn page_len(gpu: &Gpu, stride: usize) -> u64 {
-    let invocations = u64::from(gpu.limits.max_compute_workgroups_per_dimension).pow(2)
-        * u64::from(super::layout::WORKGROUP);
+    let invocations =
+        u64::from(gpu.limits.max_compute_workgroups_per_dimension).pow(2) * u64::from(super::layout::WORKGROUP);
     (gpu.buffer_limit() / stride as u64).min(invocations).min(u64::from(u32::MAX))
 }
 

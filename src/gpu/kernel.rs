@@ -186,6 +186,7 @@ pub fn overrides(needs: &SceneNeeds, options: &RenderOptions) -> Vec<(&'static s
         ("COLOR_WORD", layout.color_word.into()),
         ("COLOR_CHANNELS", color_channels(needs).into()),
         ("NORMAL_WORD", layout.normal_word.into()),
+        ("TURN_NORMALS", u32::from(needs.turn_normals).into()),
         ("DEPTH_WORD", layout.depth_word.into()),
         ("COUNT_WORD", layout.count_word.into()),
         ("IMAGE_WORDS", layout.image_words.into()),
@@ -211,9 +212,7 @@ pub fn reflect(text: &str) -> std::result::Result<(naga::Module, Bindings, Vec<S
     for (index, entry) in module.entry_points.iter().enumerate() {
         let uses = info.get_entry_point(index);
         let used = module.global_variables.iter().filter(|(handle, _)| !uses[*handle].is_empty());
-        let named = used.filter_map(|(_, variable)| {
-            Some((variable.name.clone()?, variable.binding.as_ref()?.binding))
-        });
+        let named = used.filter_map(|(_, variable)| Some((variable.name.clone()?, variable.binding.as_ref()?.binding)));
         bindings.insert(entry.name.clone(), named.collect());
     }
     let overrides = module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect();
@@ -233,11 +232,10 @@ impl Program {
     /// Compiles the kernels for `needs`.
     pub fn compile(gpu: &Gpu, sources: &Sources, needs: &SceneNeeds, options: &RenderOptions) -> Result<Self> {
         let text = sources.join(needs);
-        let (_, bindings, declared) = reflect(&text).map_err(|e| gpu.error(format!("a kernel is not valid WGSL: {e}")))?;
-        let constants: Vec<_> = overrides(needs, options)
-            .into_iter()
-            .filter(|(name, _)| declared.iter().any(|d| d == name))
-            .collect();
+        let (_, bindings, declared) =
+            reflect(&text).map_err(|e| gpu.error(format!("a kernel is not valid WGSL: {e}")))?;
+        let constants: Vec<_> =
+            overrides(needs, options).into_iter().filter(|(name, _)| declared.iter().any(|d| d == name)).collect();
         let guard = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("epsplat"),

@@ -1,7 +1,7 @@
 //! What one input file holds, before it becomes surfels.
 
-pub use crate::scene::Up;
 use crate::scene::Colors;
+pub use crate::scene::Up;
 
 /// Points as a file gives them: f64 world coordinates and whatever attributes exist.
 ///
@@ -20,4 +20,3 @@ pub struct Points {
     /// The direction that the format, by convention, calls up.
     pub up: Option<Up>,
 }
-

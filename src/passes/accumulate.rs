@@ -89,6 +89,7 @@ pub fn reference<'a>(
     for splat in splats {
         let [r, g, b, alpha] = scene.colors.linear(splat.surfel as usize).map(f64::from);
         let color = [r * alpha, g * alpha, b * alpha, alpha];
+        let normal = if splat.away && !scene.oriented { -splat.normal } else { splat.normal };
         for y in splat.first[1].max(first_row)..=splat.last[1].min(first_row + rows - 1) {
             let row = (y - first_row) as usize * width;
             for x in splat.first[0]..=splat.last[0] {
@@ -107,7 +108,7 @@ pub fn reference<'a>(
                 for (total, value) in sum.color.iter_mut().zip(color) {
                     *total += weight * value;
                 }
-                for (total, value) in sum.normal.iter_mut().zip(splat.normal.to_array()) {
+                for (total, value) in sum.normal.iter_mut().zip(normal.to_array()) {
                     *total += weight * value;
                 }
                 sum.depth += weight * at.depth;
@@ -122,7 +123,11 @@ pub fn reference<'a>(
 /// depth and epsilon together, so a fragment that fails one of them clearly is not undecided by the others.
 fn decision(rho: f64, depth: f64, back: f64, near: f64) -> f64 {
     let margins = [1.0 - rho, depth / near - 1.0, if back.is_finite() { back / depth - 1.0 } else { f64::INFINITY }];
-    if margins.iter().any(|m| *m < -NEARBY) { f64::INFINITY } else { margins.map(f64::abs).into_iter().fold(f64::INFINITY, f64::min) }
+    if margins.iter().any(|m| *m < -NEARBY) {
+        f64::INFINITY
+    } else {
+        margins.map(f64::abs).into_iter().fold(f64::INFINITY, f64::min)
+    }
 }
 
 /// The sums of each pixel of some rows.

@@ -25,9 +25,7 @@ pub fn intersect(splat: &Splat, camera: &Camera, x: u32, y: u32) -> Option<Inter
     let at = |row: glam::DVec3| row.x * dx + (row.y * dy + row.z);
     let (a, b, c) = (at(splat.a), at(splat.b), at(splat.c));
     match camera.projection {
-        Projection::Pinhole => {
-            (c > 0.0).then(|| Intersection { depth: 1.0 / c, rho2: (a * a + b * b) / (c * c) })
-        }
+        Projection::Pinhole => (c > 0.0).then(|| Intersection { depth: 1.0 / c, rho2: (a * a + b * b) / (c * c) }),
         Projection::Orthographic => Some(Intersection { depth: c, rho2: a * a + b * b }),
     }
 }

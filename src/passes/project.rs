@@ -38,7 +38,9 @@ pub struct Splat {
     pub b: DVec3,
     /// 1/z (pinhole) or z (orthographic).
     pub c: DVec3,
-    /// World space, unit, toward the viewer.
+    /// The normal points away from the viewer.
+    pub away: bool,
+    /// World space, unit, as the surfel has it.
     pub normal: DVec3,
 }
 
@@ -89,7 +91,8 @@ pub fn reference(index: u32, surfel: &Surfel, origin: DVec3, camera: &Camera) ->
         a: projected.a,
         b: projected.b,
         c: projected.c,
-        normal: if away > 0.0 { -normal } else { normal },
+        away: away > 0.0,
+        normal,
     })
 }
 
@@ -219,8 +222,11 @@ pub struct SplatBuffer {
 pub fn record(recorder: &mut Recorder<'_>, surfels: SurfelBuffer) -> Result<SplatBuffer> {
     let gpu = recorder.gpu;
     let drawn = Buffer::storage(gpu, "count of splats", 1)?;
-    let pages =
-        surfels.pages.iter().map(|page| Buffer::storage(gpu, "splats", page.surfels.len)).collect::<Result<Vec<_>>>()?;
+    let pages = surfels
+        .pages
+        .iter()
+        .map(|page| Buffer::storage(gpu, "splats", page.surfels.len))
+        .collect::<Result<Vec<_>>>()?;
     let program = recorder.program;
     let view = &recorder.view.raw;
     recorder.timing.pass(

@@ -50,11 +50,12 @@ fn unit_or_zero(mean: DVec3) -> DVec3 {
     if mean.length_squared() > 1e-12 { mean.normalize() } else { DVec3::ZERO }
 }
 
-/// Sum over the lights of `intensity * max(0, n . toward)` at pixel (x, y).
+/// Sum of intensity times cosine over the lights at pixel (x, y): the headlight lights both sides, a directional light
+/// the side the normal is on.
 fn irradiance(normal: DVec3, camera: &Camera, options: &RenderOptions, x: u32, y: u32) -> f64 {
     let toward_eye = -camera.ray(f64::from(x) + 0.5, f64::from(y) + 0.5).normalize();
     let lights = options.lights.iter().map(|light| match *light {
-        Light::Headlight { intensity } => f64::from(intensity) * normal.dot(toward_eye).max(0.0),
+        Light::Headlight { intensity } => f64::from(intensity) * normal.dot(toward_eye).abs(),
         Light::Directional { toward, intensity } => f64::from(intensity) * normal.dot(toward.as_dvec3()).max(0.0),
     });
     lights.sum()

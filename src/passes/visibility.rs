@@ -12,12 +12,7 @@ use crate::gpu::kernel::grid;
 use crate::scene::Camera;
 
 /// The twin: nearest depths of the rows `first_row..first_row + rows`, +inf where nothing is.
-pub fn reference<'a>(
-    splats: impl Iterator<Item = &'a Splat>,
-    camera: &Camera,
-    first_row: u32,
-    rows: u32,
-) -> Vec<f64> {
+pub fn reference<'a>(splats: impl Iterator<Item = &'a Splat>, camera: &Camera, first_row: u32, rows: u32) -> Vec<f64> {
     let mut nearest = vec![f64::INFINITY; camera.width as usize * rows as usize];
     for splat in splats {
         for y in splat.first[1].max(first_row)..=splat.last[1].min(first_row + rows - 1) {
@@ -47,12 +42,7 @@ impl VisibilityBuffer {
 }
 
 /// Records the pass over `rows`.
-pub fn record(
-    recorder: &mut Recorder<'_>,
-    splats: &SplatBuffer,
-    rows: &Rows,
-    buffer: &VisibilityBuffer,
-) -> Result<()> {
+pub fn record(recorder: &mut Recorder<'_>, splats: &SplatBuffer, rows: &Rows, buffer: &VisibilityBuffer) -> Result<()> {
     let (gpu, program) = (recorder.gpu, recorder.program);
     let buffers = [("nearest", &buffer.nearest.raw)];
     recorder.timing.pass(

@@ -242,8 +242,7 @@ mod tests {
                 let pick = |axis: usize| if corner >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
                 let p = camera.to_camera(DVec3::new(pick(0), pick(1), pick(2)));
                 let (x, y) = (camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy);
-                let inside =
-                    x.min(f64::from(size.0) - x) / f64::from(size.0) * 2.0;
+                let inside = x.min(f64::from(size.0) - x) / f64::from(size.0) * 2.0;
                 let inside = inside.min(y.min(f64::from(size.1) - y) / f64::from(size.1) * 2.0);
                 closest_to_edge = closest_to_edge.min(inside);
             }

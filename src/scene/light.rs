@@ -6,15 +6,15 @@ use glam::Vec3;
 
 use crate::error::Error;
 
-/// A white light. Its irradiance on a surface with normal n is `intensity * max(0, n . toward)`.
+/// A white light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Light {
-    /// Shines from the eye along each pixel's ray.
+    /// Shines from the eye along each pixel's ray, on whichever side of the surface it meets: `intensity * |n . toward|`.
     Headlight {
         /// Factor on the surface's colour at normal incidence.
         intensity: f32,
     },
-    /// Infinitely far away.
+    /// Infinitely far away; lights the side that the normal is on: `intensity * max(0, n . toward)`.
     Directional {
         /// Unit vector toward the light, world space.
         toward: Vec3,
@@ -60,10 +60,7 @@ mod tests {
     #[test]
     fn lights_are_read_and_refused() {
         assert_eq!("headlight".parse::<Light>().unwrap(), Light::Headlight { intensity: 1.0 });
-        assert_eq!(
-            "0,0,2:0.5".parse::<Light>().unwrap(),
-            Light::Directional { toward: Vec3::Z, intensity: 0.5 }
-        );
+        assert_eq!("0,0,2:0.5".parse::<Light>().unwrap(), Light::Directional { toward: Vec3::Z, intensity: 0.5 });
         for bad in ["", "sun", "0,0,0", "1,2", "1,2,3,4", "headlight:x", "headlight:-1", "nan,0,0"] {
             assert!(bad.parse::<Light>().is_err(), "{bad}");
         }

@@ -24,6 +24,8 @@ pub struct SceneNeeds {
     pub alpha: bool,
     /// Normals are accumulated: Lambert shading or a normal map.
     pub normal: bool,
+    /// Normals have no consistent side and are turned toward the viewer before they are blended.
+    pub turn_normals: bool,
     /// Depth is accumulated: a depth map.
     pub depth: bool,
     /// Fragments are counted.
@@ -54,6 +56,7 @@ impl SceneNeeds {
             color,
             alpha: low[3] != high[3],
             normal: lambert || options.maps.normal,
+            turn_normals: !scene.oriented && (lambert || options.maps.normal),
             depth: options.maps.depth,
             count: options.maps.count,
             lambert,
@@ -77,6 +80,7 @@ impl SceneNeeds {
         let flags = [
             (self.alpha, "alpha"),
             (self.normal, "normal"),
+            (self.turn_normals, "turn-normals"),
             (self.depth, "depth"),
             (self.count, "count"),
             (self.lambert, "lambert"),

@@ -32,7 +32,8 @@ impl FromStr for Epsilon {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self, Error> {
-        let bad = || Error::Usage(format!("an epsilon is rel:E (fraction of depth) or abs:E (world units), not {text:?}"));
+        let bad =
+            || Error::Usage(format!("an epsilon is rel:E (fraction of depth) or abs:E (world units), not {text:?}"));
         let (kind, value) = text.split_once(':').ok_or_else(bad)?;
         let value: f64 = value.parse().map_err(|_| bad())?;
         if !(value.is_finite() && value >= 0.0) {
@@ -70,9 +71,8 @@ impl FromStr for Kernel {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self, Error> {
-        let bad = || {
-            Error::Usage(format!("a kernel is ellipse:A,N with A from 0 to 16 and N from 0.1 to 100, not {text:?}"))
-        };
+        let bad =
+            || Error::Usage(format!("a kernel is ellipse:A,N with A from 0 to 16 and N from 0.1 to 100, not {text:?}"));
         let (a, n) = text.strip_prefix("ellipse:").and_then(|rest| rest.split_once(',')).ok_or_else(bad)?;
         let (a, n): (f64, f64) = (a.trim().parse().map_err(|_| bad())?, n.trim().parse().map_err(|_| bad())?);
         // Beyond exp(-16) a rim weight is under one unit of the 24-bit sums.
@@ -94,7 +94,8 @@ pub enum Shading {
 pub struct Maps {
     /// Camera-space z, world units; +inf where nothing is.
     pub depth: bool,
-    /// Unit normal in world space, turned toward the viewer; 0 where nothing is.
+    /// Unit normal in world space; 0 where nothing is. Normals that were estimated have no side of their own and are
+    /// turned toward the viewer; given ones stay as they are.
     pub normal: bool,
     /// The sum of weights; 0 where nothing is.
     pub weight: bool,

@@ -1,2 +1,9 @@
-//! x
-fn main() {}
+//! The command line: `epsplat render`, `compare`, `generate`, `info` and `adapters`.
+
+mod cli;
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    cli::run()
+}

@@ -67,7 +67,7 @@ impl AdapterDescription {
         }
     }
 
-    /// The order in which `auto` prefers adapters, best first: real hardware, then software Vulkan, then GL.
+    /// The order in which `auto` prefers adapters, best first: hardware, then software, then whatever GL reaches.
     fn rank(&self) -> u32 {
         let kind = match self.kind {
             "discrete" => 0,
@@ -76,14 +76,7 @@ impl AdapterDescription {
             "software" => 3,
             _ => 4,
         };
-        if !self.usable {
-            100
-        } else if self.api == "gl" {
-            // The same hardware is better through Vulkan; GL on hardware still beats software.
-            10 * kind + 5
-        } else {
-            10 * kind
-        }
+        kind + if self.api == "gl" { 10 } else { 0 } + if self.usable { 0 } else { 100 }
     }
 }
 
@@ -94,17 +87,20 @@ const STORAGE_BUFFERS: u32 = 6;
 pub const INSTALL_HINT: &str = "install a Vulkan driver (on Debian or Ubuntu without a GPU: \
     apt-get install mesa-vulkan-drivers libvulkan1) or render with --backend reference";
 
-fn enumerate() -> Vec<(AdapterDescription, wgpu::Adapter)> {
-    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
-    let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+fn enumerate(backends: wgpu::Backends) -> Vec<(AdapterDescription, wgpu::Adapter)> {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
+    descriptor.backends &= backends;
+    let instance = wgpu::Instance::new(descriptor);
+    let adapters = pollster::block_on(instance.enumerate_adapters(backends));
     let mut described: Vec<_> = adapters.into_iter().map(|a| (AdapterDescription::of(&a), a)).collect();
     described.sort_by_key(|(description, _)| description.rank());
     described
 }
 
-/// All adapters, in the order in which `auto` prefers them.
+/// All adapters, in the order in which `auto` prefers them. The environment variable `WGPU_BACKEND` (vulkan, gl, ...)
+/// narrows them down.
 pub fn adapters() -> Vec<AdapterDescription> {
-    enumerate().into_iter().map(|(description, _)| description).collect()
+    enumerate(wgpu::Backends::all()).into_iter().map(|(description, _)| description).collect()
 }
 
 /// An open device.
@@ -121,12 +117,16 @@ pub struct Gpu {
 impl Gpu {
     /// Opens the best adapter, or the best whose name contains `name` (case-insensitive).
     pub fn open(name: Option<&str>) -> Result<Self> {
-        let all = enumerate();
-        let known = all.iter().map(|(d, _)| format!("{} ({})", d.name, d.api)).collect::<Vec<_>>().join(", ");
         let wanted = |d: &AdapterDescription| {
-            name.is_none_or(|name| d.name.to_lowercase().contains(&name.to_lowercase()) || d.api == name)
+            d.usable && name.is_none_or(|name| d.name.to_lowercase().contains(&name.to_lowercase()))
         };
-        let Some((adapter, handle)) = all.into_iter().find(|(d, _)| d.usable && wanted(d)) else {
+        // GL is asked last and only if it must be: its libraries complain on stderr where there is no display.
+        let mut all = enumerate(wgpu::Backends::all() - wgpu::Backends::GL);
+        if !all.iter().any(|(d, _)| wanted(d)) {
+            all.extend(enumerate(wgpu::Backends::GL));
+        }
+        let known = all.iter().map(|(d, _)| format!("{} ({})", d.name, d.api)).collect::<Vec<_>>().join(", ");
+        let Some((adapter, handle)) = all.into_iter().find(|(d, _)| wanted(d)) else {
             return Err(Error::NoAdapter(match (name, known.is_empty()) {
                 (_, true) => format!("no graphics adapter was found: {INSTALL_HINT}"),
                 (Some(name), false) => format!("no usable adapter is called {name:?}; there are: {known}"),

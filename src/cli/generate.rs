@@ -1,0 +1,54 @@
+//! `epsplat generate`: analytic scenes with exact normals, radii and colours.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use epsplat::io::ply;
+use epsplat::surfels::analytic::{Shape, generate};
+use epsplat::{Error, Progress, Result};
+
+use super::note;
+use super::progress::Bars;
+
+/// Write an analytic scene as PLY: surfels with exact normals, radii and colours.
+///
+/// SHAPE is sphere (unit radius), torus (radii 1 and 0.4), plane (a square of side 2, one colour) or checkerboard
+/// (the same with 32x32 squares). Radii are 1.5 times the spacing.
+#[derive(Args)]
+#[command(after_help = "Example:\n  epsplat generate sphere --count 1000000 -o sphere.ply")]
+pub struct Arguments {
+    /// sphere, torus, plane or checkerboard
+    shape: Shape,
+    /// Surfels
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..=4_000_000_000))]
+    count: u64,
+    /// The file: .ply
+    #[arg(short, long)]
+    output: PathBuf,
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let is_ply = arguments.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply"));
+    if !is_ply {
+        return Err(Error::Usage(format!("the output must end in .ply, {} does not", arguments.output.display())));
+    }
+    let bars = Bars::new();
+    bars.begin("writing surfels", arguments.count);
+    let vertices = generate(arguments.shape, arguments.count).enumerate().map(|(index, sample)| {
+        // Once in a while, not once a surfel: the bar is behind a lock.
+        if index % 65_536 == 65_535 {
+            bars.advance(65_536);
+        }
+        ply::Vertex {
+            position: sample.position,
+            normal: sample.normal,
+            radius: sample.radius,
+            color: Some(sample.color),
+        }
+    });
+    let properties = ply::Properties { double_coordinates: false, colors: true };
+    ply::write(&arguments.output, properties, arguments.count, vertices)?;
+    bars.end();
+    note(&format!("{}: {} surfels", arguments.output.display(), arguments.count));
+    Ok(())
+}

@@ -1,0 +1,78 @@
+//! One file per subcommand; no maths.
+
+mod adapters;
+mod compare;
+mod generate;
+mod info;
+mod progress;
+mod render;
+
+use std::io::Write;
+use std::path::Path;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use epsplat::{Error, Result};
+use serde::Serialize;
+
+/// Render surfels and point clouds without a display, with compute kernels only.
+#[derive(Parser)]
+#[command(version, max_term_width = 110, after_help = EXIT_CODES)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXIT_CODES: &str = "Exit codes: 0 done, 1 the run failed, 2 the arguments cannot be used.";
+
+#[derive(Subcommand)]
+enum Command {
+    Render(Box<render::Arguments>),
+    Compare(compare::Arguments),
+    Generate(generate::Arguments),
+    Info(info::Arguments),
+    Adapters(adapters::Arguments),
+}
+
+/// Runs the command line and says how it ended.
+pub fn run() -> ExitCode {
+    let outcome = match Arguments::parse().command {
+        Command::Render(arguments) => render::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
+        Command::Generate(arguments) => generate::run(&arguments),
+        Command::Info(arguments) => info::run(&arguments),
+        Command::Adapters(arguments) => adapters::run(&arguments),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            // Nobody may be listening any more, which is no reason to panic.
+            let _ = writeln!(std::io::stderr(), "error: {error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+/// One line on stderr that is no error.
+fn note(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+/// Text on stdout; a closed pipe ends it quietly.
+fn print(text: &str) -> Result<()> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::write(Path::new("standard output"), e)),
+        _ => Ok(()),
+    }
+}
+
+/// Writes `value` as JSON to the file, or to stdout for `-`.
+fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
+    let mut text = serde_json::to_string_pretty(value).map_err(|e| Error::write(path, e.into()))?;
+    text.push('\n');
+    if path == Path::new("-") {
+        print(&text)
+    } else {
+        epsplat::io::atomic::write_whole(path, |file| file.write_all(text.as_bytes()))
+    }
+}

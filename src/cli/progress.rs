@@ -1,0 +1,42 @@
+//! Progress bars, on a terminal only.
+
+use std::io::IsTerminal;
+use std::sync::{Mutex, PoisonError};
+
+use epsplat::Progress;
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// A bar per stage on stderr, gone when the stage ends; silent if stderr is no terminal.
+pub struct Bars(Option<Mutex<ProgressBar>>);
+
+impl Bars {
+    pub fn new() -> Self {
+        Self(std::io::stderr().is_terminal().then(|| Mutex::new(ProgressBar::hidden())))
+    }
+
+    fn with(&self, f: impl FnOnce(&mut ProgressBar)) {
+        if let Some(bar) = &self.0 {
+            f(&mut bar.lock().unwrap_or_else(PoisonError::into_inner));
+        }
+    }
+}
+
+impl Progress for Bars {
+    fn begin(&self, what: &str, units: u64) {
+        self.with(|bar| {
+            *bar = if units > 0 { ProgressBar::new(units) } else { ProgressBar::new_spinner() };
+            let template = "{msg:24} {bar:40} {percent:>3} %  {eta}";
+            // The template is a constant that parses; the default serves should it ever not.
+            bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
+            bar.set_message(what.to_owned());
+        });
+    }
+
+    fn advance(&self, units: u64) {
+        self.with(|bar| bar.inc(units));
+    }
+
+    fn end(&self) {
+        self.with(|bar| bar.finish_and_clear());
+    }
+}

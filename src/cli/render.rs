@@ -1,0 +1,355 @@
+//! `epsplat render`: files in, a picture and its maps out.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use epsplat::frame::Frame;
+use epsplat::gpu::Gpu;
+use epsplat::io::camera::{self, Pose};
+use epsplat::render::{Backend, Report, render};
+use epsplat::scene::camera::DEFAULT_FOV;
+use epsplat::scene::{Bounds, Camera, Epsilon, Kernel, Lens, Light, Maps, RenderOptions, Scene, Shading};
+use epsplat::{Error, Result, io, surfels};
+use glam::DVec3;
+
+use super::progress::Bars;
+use super::{note, write_json};
+
+/// Render PLY, LAS, LAZ and OBJ files to a PNG or EXR image.
+///
+/// Without a camera the scene is framed from its bounds. Several inputs make one scene.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    epsplat render scan.laz -o scan.png\n  \
+    epsplat render a.ply b.ply -o maps.exr --aov depth,normal --size 1920x1080\n  \
+    epsplat render scan.laz -o top.png --eye 0,0,500 --target 0,0,0 --ortho 300")]
+pub struct Arguments {
+    /// Point clouds or meshes: .ply, .las, .laz, .obj
+    #[arg(required = true)]
+    inputs: Vec<PathBuf>,
+    /// The image: .png (8-bit sRGB) or .exr (linear f32, every map a layer)
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Image size in pixels [default: 1024x1024, or the camera file's]
+    #[arg(long, value_parser = parse_size)]
+    size: Option<(u32, u32)>,
+    /// Who renders
+    #[arg(long, value_enum, default_value_t = BackendName::Auto)]
+    backend: BackendName,
+    /// Part of the adapter's name, as `epsplat adapters` lists them
+    #[arg(long)]
+    adapter: Option<String>,
+    /// Camera position, world coordinates
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
+    eye: Option<DVec3>,
+    /// What the camera looks at [default: the scene's centre]
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true, requires = "eye")]
+    target: Option<DVec3>,
+    /// Which way is up in the image [default: z for LAS and flat clouds, else y]
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true, requires = "eye")]
+    up: Option<DVec3>,
+    /// Vertical field of view [default: 45]
+    #[arg(long, value_name = "DEG", conflicts_with_all = ["ortho", "intrinsics"])]
+    fov: Option<f64>,
+    /// Orthographic view of this height
+    #[arg(long, value_name = "WORLD_HEIGHT", conflicts_with = "intrinsics")]
+    ortho: Option<f64>,
+    /// Focal lengths and principal point in pixels
+    #[arg(long, value_name = "FX,FY,CX,CY", value_parser = parse_intrinsics)]
+    intrinsics: Option<[f64; 4]>,
+    /// A camera file (see the README); takes the place of all other camera arguments but --size
+    #[arg(long, value_name = "CAMERA.json", conflicts_with_all = ["eye", "target", "up", "fov", "ortho", "intrinsics"])]
+    camera: Option<PathBuf>,
+    /// Smallest depth drawn, world units [default: a millionth of the scene]
+    #[arg(long)]
+    near: Option<f64>,
+    /// Depth tolerance: rel:E (fraction of the depth) or abs:E (world units)
+    #[arg(long, default_value = "rel:0.01")]
+    epsilon: Epsilon,
+    /// Blending kernel: ellipse:A,N is exp(-A rho^N)
+    #[arg(long, default_value = "ellipse:6,3")]
+    kernel: Kernel,
+    /// Shading of the blended colour
+    #[arg(long, value_enum, default_value_t = ShadingName::Lambert)]
+    shading: ShadingName,
+    /// A light, instead of the headlight: headlight[:INTENSITY] or the direction toward it, x,y,z[:INTENSITY]
+    #[arg(long = "light", value_name = "LIGHT", allow_hyphen_values = true)]
+    lights: Vec<Light>,
+    /// What lies behind the scene, linear [default: transparent]
+    #[arg(long, value_name = "R,G,B[,A]", value_parser = parse_color)]
+    background: Option<[f32; 4]>,
+    /// Maps beside the colour, in an EXR; decision is the reference's distance to the nearest yes-or-no
+    #[arg(long, value_enum, value_delimiter = ',')]
+    aov: Vec<MapName>,
+    /// Times, counts and adapter as JSON, to a file or - for stdout
+    #[arg(long, value_name = "FILE|-")]
+    json: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum BackendName {
+    /// The best adapter, or the reference where there is none
+    Auto,
+    /// Compute kernels on an adapter
+    Gpu,
+    /// The kernels' f64 twins on the processor
+    Reference,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum ShadingName {
+    /// The colour as it is
+    Unlit,
+    /// Colour times the lights' cosines
+    Lambert,
+}
+
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum MapName {
+    Depth,
+    Normal,
+    Weight,
+    Count,
+    Decision,
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let format = Format::of(&arguments.output)?;
+    let options = options(arguments, format)?;
+    check_folder(&arguments.output)?;
+    // What the arguments alone decide is refused before minutes of reading.
+    let view = View::of(arguments)?;
+    let backend = backend(arguments)?;
+
+    let bars = Bars::new();
+    let inputs = arguments.inputs.iter().map(|path| io::read(path, &bars)).collect::<Result<Vec<_>>>()?;
+    let (scene, preparation) = surfels::build(inputs, &bars)?;
+    for line in preparation.notes() {
+        note(&line);
+    }
+    let camera = view.camera(&scene)?;
+    let (frame, report) = render(&scene, &camera, &options, &backend, &bars)?;
+    format.write(&arguments.output, &frame)?;
+    match &arguments.json {
+        Some(path) => write_json(path, &report),
+        None => {
+            note(&summary(&report, &arguments.output));
+            Ok(())
+        }
+    }
+}
+
+/// One line: what was drawn, and how long each pass took.
+fn summary(report: &Report, output: &Path) -> String {
+    let order = ["project_ms", "visibility_ms", "accumulate_ms", "resolve_ms"];
+    let passes = order.iter().filter_map(|name| {
+        report.passes.get(*name).map(|ms| format!("{} {ms:.1}", name.trim_end_matches("_ms")))
+    });
+    let clock = match (report.backend, report.clock) {
+        ("gpu", "wall") => ", wall time: the adapter has no timestamps",
+        _ => "",
+    };
+    format!(
+        "{}: {} of {} surfels in view, {:.1} ms ({}{clock})",
+        output.display(),
+        report.splats_drawn,
+        report.surfels,
+        report.total_ms,
+        passes.collect::<Vec<_>>().join(", "),
+    )
+}
+
+fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
+    let wanted = |map| arguments.aov.contains(&map);
+    let maps = Maps {
+        depth: wanted(MapName::Depth),
+        normal: wanted(MapName::Normal),
+        weight: wanted(MapName::Weight),
+        count: wanted(MapName::Count),
+        decision: wanted(MapName::Decision),
+    };
+    if maps != Maps::default() && format == Format::Png {
+        return Err(Error::Usage("a PNG holds no maps: give --aov with an .exr output".into()));
+    }
+    if maps.decision && arguments.backend != BackendName::Reference {
+        return Err(Error::Usage("--aov decision is made by --backend reference only".into()));
+    }
+    let default = RenderOptions::default();
+    Ok(RenderOptions {
+        epsilon: arguments.epsilon,
+        kernel: arguments.kernel,
+        shading: match arguments.shading {
+            ShadingName::Unlit => Shading::Unlit,
+            ShadingName::Lambert => Shading::Lambert,
+        },
+        lights: if arguments.lights.is_empty() { default.lights } else { arguments.lights.clone() },
+        background: arguments.background.unwrap_or(default.background),
+        maps,
+    })
+}
+
+fn backend(arguments: &Arguments) -> Result<Backend> {
+    if arguments.backend == BackendName::Reference {
+        if arguments.adapter.is_some() {
+            return Err(Error::Usage("--backend reference uses no adapter: leave --adapter out".into()));
+        }
+        return Ok(Backend::Reference);
+    }
+    match Gpu::open(arguments.adapter.as_deref()) {
+        Ok(gpu) => {
+            note(&format!("rendering on {} ({}, {})", gpu.adapter.name, gpu.adapter.api, gpu.adapter.kind));
+            Ok(Backend::gpu(gpu))
+        }
+        Err(Error::NoAdapter(why)) if arguments.backend == BackendName::Auto && arguments.adapter.is_none() => {
+            note(&format!("rendering with the f64 reference on the processor: {why}"));
+            Ok(Backend::Reference)
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// The camera as far as the arguments decide it.
+struct View {
+    size: (u32, u32),
+    /// None: an orthographic or perspective view is fitted to the scene.
+    lens: Lens,
+    pose: Option<Pose>,
+    near: Option<f64>,
+}
+
+impl View {
+    fn of(arguments: &Arguments) -> Result<Self> {
+        let view = match &arguments.camera {
+            Some(path) => {
+                let file = camera::read(path)?;
+                if let (Some(size), Some(own)) = (arguments.size, file.size)
+                    && size != own
+                {
+                    return Err(Error::Usage(format!(
+                        "--size {}x{} contradicts {}, which says {}x{}",
+                        size.0,
+                        size.1,
+                        path.display(),
+                        own.0,
+                        own.1
+                    )));
+                }
+                let size = arguments.size.or(file.size).unwrap_or(DEFAULT_SIZE);
+                Self { size, lens: file.lens, pose: Some(file.pose), near: arguments.near.or(file.near) }
+            }
+            None => {
+                let lens = match (arguments.intrinsics, arguments.ortho) {
+                    (Some(values), _) => Lens::Intrinsics(values),
+                    (None, Some(height)) => Lens::OrthographicHeight(height),
+                    (None, None) => Lens::Fov(arguments.fov.unwrap_or(DEFAULT_FOV)),
+                };
+                // Without a target the pose waits for the scene; NaN marks that until then.
+                let pose = arguments
+                    .eye
+                    .map(|eye| Pose::LookAt(eye, arguments.target.unwrap_or(DVec3::NAN), arguments.up));
+                Self { size: arguments.size.unwrap_or(DEFAULT_SIZE), lens, pose, near: arguments.near }
+            }
+        };
+        // A camera at an arbitrary place tells whether size, lens and near can be used at all.
+        Camera::look_at(
+            view.size,
+            view.lens,
+            DVec3::ZERO,
+            DVec3::X,
+            None,
+            epsplat::scene::Up::Z,
+            view.near.unwrap_or(1.0),
+        )?;
+        Ok(view)
+    }
+
+    fn camera(&self, scene: &Scene) -> Result<Camera> {
+        let local = scene.bounds();
+        let bounds = Bounds { min: local.min + scene.origin, max: local.max + scene.origin };
+        let near = self.near.unwrap_or_else(|| Camera::default_near(&bounds));
+        match self.pose {
+            Some(Pose::Rigid(rotation, eye)) => Camera::posed(self.size, self.lens, eye, rotation, near),
+            Some(Pose::LookAt(eye, target, up)) => {
+                let target = if target.is_nan() { (bounds.min + bounds.max) * 0.5 } else { target };
+                Camera::look_at(self.size, self.lens, eye, target, up, scene.up, near)
+            }
+            None => {
+                let (eye, target) = Camera::framing(self.size, self.lens, &bounds, scene.up)?;
+                Camera::look_at(self.size, self.lens, eye, target, None, scene.up, near)
+            }
+        }
+    }
+}
+
+const DEFAULT_SIZE: (u32, u32) = (1024, 1024);
+
+/// What the output's name asks for.
+#[derive(Clone, Copy, PartialEq)]
+enum Format {
+    Png,
+    Exr,
+}
+
+impl Format {
+    fn of(path: &Path) -> Result<Self> {
+        match path.extension().and_then(|e| e.to_str()).map(str::to_lowercase).as_deref() {
+            Some("png") => Ok(Self::Png),
+            Some("exr") => Ok(Self::Exr),
+            _ => Err(Error::Usage(format!("the output must end in .png or .exr, {} does not", path.display()))),
+        }
+    }
+
+    fn write(self, path: &Path, frame: &Frame) -> Result<()> {
+        match self {
+            Self::Png => io::png::write(path, frame),
+            Self::Exr => io::exr::write(path, frame),
+        }
+    }
+}
+
+/// An output in a folder that is not there fails now rather than after the render.
+fn check_folder(output: &Path) -> Result<()> {
+    match output.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => {
+            std::fs::metadata(folder).map(|_| ()).map_err(|e| Error::write(output, e))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn parse_size(text: &str) -> Result<(u32, u32), String> {
+    let side = |part: &str| part.parse::<u32>().map_err(|_| format!("{part:?} is not a number of pixels"));
+    let (width, height) = text.split_once('x').ok_or("a size is WIDTHxHEIGHT")?;
+    let (width, height) = (side(width)?, side(height)?);
+    epsplat::scene::camera::check_size(width, height).map_err(|e| e.to_string())?;
+    Ok((width, height))
+}
+
+fn parse_numbers(text: &str) -> Result<Vec<f64>, String> {
+    let number = |part: &str| match part.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err(format!("{part:?} is not a finite number")),
+    };
+    text.split(',').map(number).collect()
+}
+
+fn parse_vector(text: &str) -> Result<DVec3, String> {
+    match parse_numbers(text)?[..] {
+        [x, y, z] => Ok(DVec3::new(x, y, z)),
+        _ => Err("three numbers are needed: X,Y,Z".into()),
+    }
+}
+
+fn parse_intrinsics(text: &str) -> Result<[f64; 4], String> {
+    parse_numbers(text)?.try_into().map_err(|_| "four numbers are needed: FX,FY,CX,CY".into())
+}
+
+fn parse_color(text: &str) -> Result<[f32; 4], String> {
+    let values: Vec<f32> = parse_numbers(text)?.into_iter().map(|v| v as f32).collect();
+    let color = match values[..] {
+        [r, g, b] => [r, g, b, 1.0],
+        [r, g, b, a] => [r, g, b, a],
+        _ => return Err("three or four numbers are needed: R,G,B[,A]".into()),
+    };
+    if color[3] < 0.0 || color[3] > 1.0 { Err("alpha lies between 0 and 1".into()) } else { Ok(color) }
+}

@@ -1,0 +1,51 @@
+//! PNG: 8-bit sRGB with straight alpha.
+
+use std::path::Path;
+
+use image::{ImageEncoder, ImageReader};
+
+use super::atomic::write_whole;
+use crate::error::{Error, Result};
+use crate::frame::Frame;
+use crate::scene::color::{linear_to_srgb, srgb_to_linear};
+
+/// Writes the colour; values are clamped to [0, 1].
+pub fn write(path: &Path, frame: &Frame) -> Result<()> {
+    let byte = |v: f64| (v * 255.0).round() as u8;
+    let bytes: Vec<u8> = frame
+        .color
+        .iter()
+        .flat_map(|&[r, g, b, a]| {
+            let [r, g, b] = [r, g, b].map(|c| byte(linear_to_srgb(c.into())));
+            [r, g, b, byte(f64::from(a).clamp(0.0, 1.0))]
+        })
+        .collect();
+    write_whole(path, |file| {
+        image::codecs::png::PngEncoder::new(file)
+            .write_image(&bytes, frame.width, frame.height, image::ExtendedColorType::Rgba8)
+            .map_err(std::io::Error::other)
+    })
+}
+
+/// Reads the colour back to linear light.
+pub fn read(path: &Path) -> Result<Frame> {
+    let reader = ImageReader::open(path).map_err(|e| Error::read(path, e))?;
+    let mut reader = reader;
+    reader.set_format(image::ImageFormat::Png);
+    let picture = reader.decode().map_err(|e| Error::malformed(path, format!("not a readable PNG: {e}")))?;
+    let picture = picture.into_rgba16();
+    let color = picture.pixels().map(|pixel| {
+        let [r, g, b, a] = pixel.0.map(|v| f64::from(v) / 65535.0);
+        [srgb_to_linear(r) as f32, srgb_to_linear(g) as f32, srgb_to_linear(b) as f32, a as f32]
+    });
+    Ok(Frame {
+        width: picture.width(),
+        height: picture.height(),
+        color: color.collect(),
+        depth: None,
+        normal: None,
+        weight: None,
+        count: None,
+        decision: None,
+    })
+}

@@ -1,0 +1,188 @@
+//! The error of one image against another.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+use crate::frame::Frame;
+
+/// Fragments nearer than this (relative) to a decision may rightly be decided otherwise in f32; their pixels are
+/// excused in [`Comparison::decided`].
+pub const DECISION_MARGIN: f32 = 1e-6;
+
+/// The error of image A against image B. Colours are compared as linear RGBA.
+#[derive(Clone, Debug, Serialize)]
+pub struct Comparison {
+    /// Largest absolute difference of a value.
+    pub max_abs: f64,
+    /// Root of the mean squared difference of all values.
+    pub rmse: f64,
+    /// Peak signal-to-noise ratio for a peak of 1, dB; null if the images are equal.
+    pub psnr_db: Option<f64>,
+    /// Share of pixels that one image covers (alpha > 0) and the other does not.
+    pub coverage_mismatch: f64,
+    /// 99.9th percentile over pixels of the largest absolute difference in the pixel.
+    pub percentile_99_9: f64,
+    /// The maps that both images have, and the colour as one of them.
+    pub maps: Vec<MapError>,
+    /// Only if A or B has a `decision` map: share of pixels that are excused because a fragment lies within
+    /// [`DECISION_MARGIN`] of a decision.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub excused: Option<f64>,
+}
+
+/// The error of one map, relative to the range that B's values span.
+#[derive(Clone, Debug, Serialize)]
+pub struct MapError {
+    /// color, depth, normal, weight or count.
+    pub map: &'static str,
+    /// Largest minus smallest finite value of B.
+    pub range: f64,
+    /// Largest absolute difference over pixels that are finite in both.
+    pub max_abs: f64,
+    /// The same as a fraction of the range.
+    pub max_of_range: f64,
+    /// The same over the pixels that are not excused; only if there is a `decision` map.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_of_range_decided: Option<f64>,
+}
+
+/// Compares `a` with `b`, which must have the same size.
+pub fn compare(a: &Frame, b: &Frame) -> Result<Comparison> {
+    if (a.width, a.height) != (b.width, b.height) {
+        return Err(Error::Usage(format!(
+            "the images differ in size: {}x{} and {}x{}",
+            a.width, a.height, b.width, b.height
+        )));
+    }
+    let pixels = a.color.len();
+    let worst_in_pixel: Vec<f64> =
+        a.color.par_iter().zip(&b.color).map(|(a, b)| largest_difference(a, b)).collect();
+    let squared: f64 = a
+        .color
+        .iter()
+        .zip(&b.color)
+        .flat_map(|(a, b)| a.iter().zip(b))
+        .map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2))
+        .sum();
+    let rmse = (squared / (4 * pixels) as f64).sqrt();
+    let uncovered = a.color.iter().zip(&b.color).filter(|(a, b)| (a[3] > 0.0) != (b[3] > 0.0)).count();
+    let mut sorted = worst_in_pixel;
+    sorted.sort_by(f64::total_cmp);
+    let rank = ((pixels as f64 * 0.999).ceil() as usize).clamp(1, pixels);
+
+    let decision = b.decision.as_ref().or(a.decision.as_ref());
+    let excused: Option<Vec<bool>> = decision.map(|map| map.iter().map(|d| *d < DECISION_MARGIN).collect());
+    let mut maps = vec![map_error("color", &a.color, &b.color, excused.as_deref())];
+    let scalar = |map: &'static str, a: &Option<Vec<f32>>, b: &Option<Vec<f32>>| {
+        let wrap = |values: &Vec<f32>| values.iter().map(|v| [*v]).collect::<Vec<_>>();
+        let (a, b) = (a.as_ref()?, b.as_ref()?);
+        Some(map_error(map, &wrap(a), &wrap(b), excused.as_deref()))
+    };
+    maps.extend(scalar("depth", &a.depth, &b.depth));
+    if let (Some(a), Some(b)) = (&a.normal, &b.normal) {
+        maps.push(map_error("normal", a, b, excused.as_deref()));
+    }
+    maps.extend(scalar("weight", &a.weight, &b.weight));
+    maps.extend(scalar("count", &a.count, &b.count));
+    Ok(Comparison {
+        max_abs: sorted.last().copied().unwrap_or(0.0),
+        rmse,
+        psnr_db: (rmse > 0.0).then(|| -20.0 * rmse.log10()),
+        coverage_mismatch: uncovered as f64 / pixels as f64,
+        percentile_99_9: sorted[rank - 1],
+        maps,
+        excused: excused.map(|excused| excused.iter().filter(|e| **e).count() as f64 / pixels as f64),
+    })
+}
+
+/// NaN in either counts as an infinite difference: it must not pass for equality.
+fn largest_difference<const N: usize>(a: &[f32; N], b: &[f32; N]) -> f64 {
+    let differences = a.iter().zip(b).map(|(a, b)| {
+        let d = if a == b { 0.0 } else { (f64::from(*a) - f64::from(*b)).abs() };
+        if d.is_nan() { f64::INFINITY } else { d }
+    });
+    differences.fold(0.0, f64::max)
+}
+
+fn map_error<const N: usize>(
+    map: &'static str,
+    a: &[[f32; N]],
+    b: &[[f32; N]],
+    excused: Option<&[bool]>,
+) -> MapError {
+    let finite = b.iter().flatten().filter(|v| v.is_finite());
+    let (low, high) = finite.fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    let range = if high > low { f64::from(high) - f64::from(low) } else { 0.0 };
+    let (mut max_abs, mut max_decided) = (0f64, 0f64);
+    for (pixel, (a, b)) in a.iter().zip(b).enumerate() {
+        // Infinite depth marks the background; that the two agree on it is what the coverage says.
+        if a.iter().chain(b).any(|v| v.is_infinite()) {
+            continue;
+        }
+        let difference = largest_difference(a, b);
+        max_abs = max_abs.max(difference);
+        if excused.is_some_and(|excused| !excused[pixel]) {
+            max_decided = max_decided.max(difference);
+        }
+    }
+    let of_range = |error: f64| if error == 0.0 { 0.0 } else { error / range };
+    MapError {
+        map,
+        range,
+        max_abs,
+        max_of_range: of_range(max_abs),
+        max_of_range_decided: excused.map(|_| of_range(max_decided)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn frame(values: &[f32]) -> Frame {
+        Frame {
+            width: values.len() as u32,
+            height: 1,
+            color: values.iter().map(|v| [*v, 0.0, 0.0, 1.0]).collect(),
+            depth: None,
+            normal: None,
+            weight: None,
+            count: None,
+            decision: None,
+        }
+    }
+
+    #[test]
+    fn equal_images_have_no_error_and_known_ones_the_right_one() {
+        let a = frame(&[0.0, 0.5, 1.0, 0.25]);
+        let same = compare(&a, &a).unwrap();
+        assert_eq!((same.max_abs, same.rmse, same.psnr_db), (0.0, 0.0, None));
+        let b = frame(&[0.0, 0.5, 1.0, 0.75]);
+        let c = compare(&a, &b).unwrap();
+        assert_eq!(c.max_abs, 0.5);
+        // One value of sixteen differs by one half.
+        assert!((c.rmse - 0.125).abs() < 1e-12);
+        assert!((c.psnr_db.unwrap() - 18.0618).abs() < 1e-3);
+        assert_eq!(c.percentile_99_9, 0.5);
+    }
+
+    #[test]
+    fn nan_coverage_and_excuses_are_seen() {
+        let a = frame(&[f32::NAN, 0.5]);
+        let mut b = frame(&[0.0, 0.5]);
+        assert_eq!(compare(&a, &b).unwrap().max_abs, f64::INFINITY);
+        b.color[1][3] = 0.0;
+        assert_eq!(compare(&a, &b).unwrap().coverage_mismatch, 0.5);
+        let a = frame(&[0.0, 0.5, 0.5]);
+        let mut b = frame(&[1.0, 0.5, 0.0]);
+        b.decision = Some(vec![1.0, 1.0, 1e-8]);
+        let c = compare(&a, &b).unwrap();
+        assert_eq!(c.excused, Some(1.0 / 3.0));
+        assert_eq!(c.maps[0].max_of_range_decided, Some(1.0));
+        b.decision = Some(vec![1e-8, 1.0, 1.0]);
+        assert_eq!(compare(&a, &b).unwrap().maps[0].max_of_range_decided, Some(0.5));
+        assert!(compare(&a, &frame(&[0.0])).is_err());
+    }
+}

@@ -1,0 +1,246 @@
+//! The command line as its users meet it: good runs, and one sentence with the right exit code for bad ones.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data");
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn file(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
+        std::fs::write(self.path(name), bytes).unwrap();
+        self.path(name)
+    }
+
+    fn names(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(self.0.path()).unwrap();
+        entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect()
+    }
+}
+
+fn epsplat(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_epsplat")).args(arguments).output().unwrap()
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// Runs, and checks the exit code and that stderr ends in one sentence that holds every one of `words`.
+fn fails(arguments: &[&str], code: i32, words: &[&str]) {
+    let output = epsplat(arguments);
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {stderr}");
+    assert!(!stderr.contains("panicked"), "{arguments:?}: {stderr}");
+    let error = stderr.lines().find(|line| line.starts_with("error: ")).expect(&stderr);
+    for word in words {
+        assert!(stderr.contains(word), "{arguments:?}: {word:?} is missing from {error:?}");
+    }
+    if code == 1 {
+        assert_eq!(stderr.lines().filter(|line| line.starts_with("error: ")).count(), 1, "{stderr}");
+    }
+}
+
+fn succeeds(arguments: &[&str]) -> Output {
+    let output = epsplat(arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    output
+}
+
+/// A PLY of `rows` under the given vertex properties.
+fn ply(properties: &str, count: usize, rows: &str) -> String {
+    let properties: String = properties.split(' ').map(|p| format!("property float {p}\n")).collect();
+    format!("ply\nformat ascii 1.0\nelement vertex {count}\n{properties}end_header\n{rows}")
+}
+
+#[test]
+fn a_render_reports_what_it_did() {
+    let folder = Folder::new();
+    let (sphere, image) = (folder.path("s.ply"), folder.path("s.exr"));
+    succeeds(&["generate", "sphere", "--count", "500", "-o", text(&sphere)]);
+    let output = succeeds(&[
+        "render", text(&sphere), "-o", text(&image), "--size", "64x48", "--backend", "reference", "--aov",
+        "depth,normal,weight,count,decision", "--json", "-",
+    ]);
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["backend"], "reference");
+    assert_eq!(report["surfels"], 500);
+    assert_eq!((&report["width"], &report["height"]), (&64.into(), &48.into()));
+    for pass in ["project_ms", "visibility_ms", "accumulate_ms", "resolve_ms"] {
+        assert!(report["passes"][pass].is_number(), "{pass}");
+    }
+    assert!(report["total_ms"].is_number() && report["adapter"].is_string());
+    assert!(report["needs"].as_array().unwrap().contains(&"depth".into()));
+    assert!(report["splats_drawn"].as_u64().unwrap() > 0);
+
+    let output = succeeds(&["compare", text(&image), text(&image), "--json", "-"]);
+    let comparison: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(comparison["max_abs"], 0.0);
+    assert_eq!(comparison["psnr_db"], serde_json::Value::Null);
+    for key in ["rmse", "coverage_mismatch", "percentile_99_9"] {
+        assert_eq!(comparison[key], 0.0, "{key}");
+    }
+    assert_eq!(comparison["maps"].as_array().unwrap().len(), 5);
+}
+
+#[test]
+fn every_command_has_help_with_an_example() {
+    for command in ["render", "compare", "generate", "info", "adapters"] {
+        let help = String::from_utf8(succeeds(&[command, "--help"]).stdout).unwrap();
+        assert!(help.contains(&format!("epsplat {command}")) && help.contains("Example"), "{help}");
+    }
+}
+
+#[test]
+fn without_an_adapter_auto_falls_back_and_gpu_says_what_to_install() {
+    let folder = Folder::new();
+    let cloud = folder.file("c.ply", ply("x y z", 3, "0 0 0\n1 0 0\n0 1 0\n"));
+    let image = folder.path("c.png");
+    // No adapter of another system's API exists here.
+    let foreign = if cfg!(windows) { "metal" } else { "dx12" };
+    let run = |backend: &str| {
+        Command::new(env!("CARGO_BIN_EXE_epsplat"))
+            .args(["render", text(&cloud), "-o", text(&image), "--size", "16x16", "--backend", backend])
+            .env("WGPU_BACKEND", foreign)
+            .output()
+            .unwrap()
+    };
+    let output = run("gpu");
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{stderr}");
+    assert!(stderr.contains("mesa-vulkan-drivers"), "{stderr}");
+    assert!(!image.exists());
+    let output = run("auto");
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{stderr}");
+    assert_eq!(stderr.lines().filter(|line| line.contains("f64 reference")).count(), 1, "{stderr}");
+    assert!(image.exists());
+}
+
+#[test]
+fn unusable_arguments_exit_with_2() {
+    let folder = Folder::new();
+    let cloud = folder.file("c.ply", ply("x y z", 3, "0 0 0\n1 0 0\n0 1 0\n"));
+    let camera = folder.file("c.json", r#"{"width": 8, "height": 8, "eye": [0,0,5], "target": [0,0,0]}"#);
+    let image = folder.path("c.png");
+    let (cloud, camera, image) = (text(&cloud), text(&camera), text(&image));
+    let render = |more: &[&str], words: &[&str]| {
+        fails(&[&["render", cloud, "-o", image, "--backend", "reference"], more].concat(), 2, words);
+    };
+    render(&["--size", "0x0"], &["0x0"]);
+    render(&["--size", "100000x100000"], &["100000x100000", "32768"]);
+    render(&["--size", "big"], &["WIDTHxHEIGHT"]);
+    render(&["--fov", "40", "--ortho", "3"], &["--ortho"]);
+    render(&["--camera", camera, "--eye", "0,0,1"], &["--eye"]);
+    render(&["--camera", camera, "--size", "9x9"], &["contradicts"]);
+    render(&["--target", "0,0,1"], &["--eye"]);
+    render(&["--eye", "1,1,1", "--target", "1,1,1"], &["apart"]);
+    render(&["--eye", "0,0,1", "--target", "0,0,0", "--up", "0,0,1"], &["up"]);
+    render(&["--eye", "0,nan,1"], &["finite"]);
+    render(&["--fov", "180"], &["180"]);
+    render(&["--ortho", "-3"], &["positive"]);
+    render(&["--near", "0"], &["near"]);
+    render(&["--intrinsics", "0,1,2,3"], &["fx"]);
+    render(&["--epsilon", "0.01"], &["rel:E"]);
+    render(&["--kernel", "box"], &["ellipse:A,N"]);
+    render(&["--light", "0,0,0"], &["light"]);
+    render(&["--aov", "depth"], &[".exr"]);
+    render(&["--background", "1,2"], &["R,G,B"]);
+    render(&["--adapter", "x"], &["--adapter"]);
+    render(&["--unknown"], &["--unknown"]);
+    fails(&["render", cloud, "-o", "c.jpg"], 2, &[".png or .exr"]);
+    fails(&["render", "-o", image], 2, &["INPUTS"]);
+    fails(&["render", cloud, "-o", &image.replace("png", "exr"), "--aov", "decision"], 2, &["reference"]);
+    fails(&["generate", "cube", "--count", "5", "-o", "x.ply"], 2, &["sphere"]);
+    fails(&["generate", "sphere", "--count", "0", "-o", "x.ply"], 2, &["0"]);
+    fails(&["generate", "sphere", "--count", "5", "-o", "x.obj"], 2, &[".ply"]);
+    assert!(!Path::new(image).exists());
+}
+
+#[test]
+fn bad_files_exit_with_1_and_leave_nothing_behind() {
+    let folder = Folder::new();
+    let outputs = Folder::new();
+    let image = outputs.path("out.png");
+    let bad = |name: &str, bytes: &[u8], words: &[&str]| {
+        let input = folder.file(name, bytes);
+        let render = ["render", text(&input), "-o", text(&image), "--backend", "reference", "--size", "16x16"];
+        fails(&render, 1, words);
+        fails(&["info", text(&input)], 1, words);
+    };
+    let whole = ply("x y z", 3, "0 0 0\n1 0 0\n0 1 0\n");
+    bad("truncated.ply", &whole.as_bytes()[..whole.len() - 8], &["truncated.ply", "3"]);
+    bad("promises.ply", ply("x y z", 900_000_000, "0 0 0\n").as_bytes(), &["promises.ply", "900000000"]);
+    bad("letters.ply", ply("x y z", 1, "0 zero 0\n").as_bytes(), &["letters.ply", "zero"]);
+    bad("no_z.ply", ply("x y", 1, "0 0\n").as_bytes(), &["no_z.ply", "z"]);
+    bad("empty.ply", b"", &["empty.ply"]);
+    bad("empty.las", b"", &["empty.las"]);
+    bad("empty.obj", b"", &[]);
+    bad("nothing.ply", ply("x y z", 0, "").as_bytes(), &[]);
+    bad("nan.ply", ply("x y z", 2, "nan 0 0\n0 inf 0\n").as_bytes(), &["2"]);
+    bad("picture.jpg", b"\xff\xd8", &["picture.jpg"]);
+    let laz = std::fs::read(format!("{DATA}/autzen.laz")).unwrap();
+    bad("half.laz", &laz[..laz.len() / 2], &["half.laz"]);
+    bad("head.laz", &laz[..300], &["head.laz"]);
+    bad("noise.laz", &[&laz[..400], &[0x5a; 4000][..]].concat(), &["noise.laz"]);
+    let mut promises = laz.clone();
+    // LAS 1.2: the legacy number of points is at byte 107.
+    promises[107..111].copy_from_slice(&200_000u32.to_le_bytes());
+    bad("promises.laz", &promises, &["promises.laz", "200000"]);
+    bad("index.obj", b"v 0 0 0\nf 1 2 3\n", &["index.obj"]);
+
+    let missing = folder.path("missing.ply");
+    fails(&["render", text(&missing), "-o", text(&image)], 1, &["missing.ply"]);
+    let cloud = folder.file("c.ply", whole);
+    let nowhere = outputs.path("no/such/folder/out.png");
+    fails(&["render", text(&cloud), "-o", text(&nowhere), "--backend", "reference"], 1, &["out.png"]);
+    let taken = outputs.path("taken.png");
+    std::fs::create_dir(&taken).unwrap();
+    fails(&["render", text(&cloud), "-o", text(&taken), "--backend", "reference", "--size", "9x9"], 1, &["taken.png"]);
+    let not_an_image = folder.file("not.png", "hello");
+    fails(&["compare", text(&not_an_image), text(&not_an_image)], 1, &["not.png"]);
+    let broken_camera = folder.file("camera.json", "{");
+    fails(&["render", text(&cloud), "-o", text(&image), "--camera", text(&broken_camera)], 1, &["camera.json"]);
+    assert_eq!(outputs.names(), ["taken.png"]);
+}
+
+#[test]
+fn odd_points_are_dropped_or_repaired_and_counted() {
+    let folder = Folder::new();
+    let rows = "0 0 0 0 0 0 1\n1 0 0 0 0 1 0\n0 1 0 0 0 1 -4\n1 1 0 nan 0 0 1\nnan 0 0 0 0 1 1\n0 0 inf 0 0 1 1\n";
+    let cloud = folder.file("odd.ply", ply("x y z nx ny nz radius", 6, rows));
+    let image = folder.path("odd.exr");
+    let output = succeeds(&["render", text(&cloud), "-o", text(&image), "--backend", "reference", "--size", "32x32"]);
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(stderr.contains("2 points"), "{stderr}");
+    let info: serde_json::Value =
+        serde_json::from_slice(&succeeds(&["info", text(&cloud), "--json", "-"]).stdout).unwrap();
+    assert_eq!(info["preparation"]["dropped_non_finite"], 2);
+    assert_eq!(info["preparation"]["estimated_normals"], 2);
+    assert_eq!(info["preparation"]["estimated_radii"], 2);
+}
+
+#[test]
+fn one_point_draws_and_so_do_coincident_and_collinear_ones() {
+    let folder = Folder::new();
+    let image = folder.path("p.exr");
+    let line: String = (0..50).map(|i| format!("{i} 0 0\n")).collect();
+    for (count, rows) in [(1, "5 5 5\n".to_owned()), (40, "1 2 3\n".repeat(40)), (50, line)] {
+        let cloud = folder.file("p.ply", ply("x y z", count, &rows));
+        succeeds(&["render", text(&cloud), "-o", text(&image), "--backend", "reference", "--size", "64x64"]);
+        let frame = epsplat::io::exr::read(&image).unwrap();
+        let covered = frame.color.iter().filter(|c| c[3] > 0.0).count();
+        assert!(covered > 8, "{count} points cover {covered} pixels");
+    }
+}

@@ -1,0 +1,56 @@
+//! The README stays true: every command in it runs.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use std::path::Path;
+use std::process::Command;
+
+/// The lines of the README's ```sh blocks, continuation lines joined.
+fn commands() -> Vec<String> {
+    let readme = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/README.md")).unwrap();
+    let mut commands = Vec::new();
+    for block in readme.split("```sh\n").skip(1) {
+        let block = block.split("```").next().unwrap().replace("\\\n", " ");
+        commands.extend(block.lines().map(str::trim).filter(|l| !l.is_empty() && !l.starts_with('#')).map(str::to_owned));
+    }
+    commands
+}
+
+#[cfg(unix)]
+#[test]
+fn every_command_of_the_readme_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    std::os::unix::fs::symlink(root.join("data"), folder.path().join("data")).unwrap();
+    let commands = commands();
+    assert!(commands.len() >= 8, "the README lost its commands: {commands:?}");
+    let mut ran = 0;
+    for command in &commands {
+        // What installs or runs the tests is run by the tests' own script, so that script must hold it.
+        if command.contains("apt-get") {
+            let script = std::fs::read_to_string(root.join("tests/run")).unwrap();
+            for package in command.split(' ').filter(|word| word.contains("vulkan")) {
+                assert!(script.contains(package), "tests/run does not install {package}");
+            }
+            continue;
+        }
+        if command == "tests/run" {
+            assert!(root.join("tests/run").exists());
+            continue;
+        }
+        let binary = env!("CARGO_BIN_EXE_epsplat");
+        let line = if let Some(rest) = command.strip_prefix("cargo run --release -- ") {
+            format!("{binary} {rest}")
+        } else if let Some(rest) = command.strip_prefix("epsplat ") {
+            format!("{binary} {rest}")
+        } else {
+            panic!("the README has a command that no test runs: {command}");
+        };
+        let output = Command::new("sh").arg("-c").arg(&line).current_dir(folder.path()).output().unwrap();
+        assert!(output.status.success(), "{command}: {}", String::from_utf8_lossy(&output.stderr));
+        ran += 1;
+    }
+    assert!(ran >= 6, "only {ran} commands ran");
+    let autzen = std::fs::metadata(folder.path().join("autzen.png")).expect("the first command writes autzen.png");
+    assert!(autzen.len() > 100_000);
+}

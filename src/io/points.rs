@@ -1,6 +1,7 @@
 //! What one input file holds, before it becomes surfels.
 
 use crate::scene::Colors;
+pub use crate::scene::Up;
 
 /// Points as a file gives them: f64 world coordinates and whatever attributes exist.
 ///
@@ -18,13 +19,4 @@ pub struct Points {
     pub colors: Option<Colors>,
     /// The direction that the format, by convention, calls up.
     pub up: Option<Up>,
-}
-
-/// The world axis that points up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Up {
-    /// Most mesh formats.
-    Y,
-    /// Survey data.
-    Z,
 }

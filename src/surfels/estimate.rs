@@ -6,8 +6,9 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::eigen::Symmetric3;
-use super::neighbours::{DistinctPositions, Neighbour, NeighbourSearch};
-use crate::{Progress, Result};
+use super::neighbours::{Neighbour, NeighbourSearch};
+use super::positions::DistinctPositions;
+use crate::Progress;
 
 /// How many neighbours a plane is fitted to. Fewer follow curvature better, more average noise better; on spheres and
 /// tori of 1e3 to 1e6 points with and without noise of a tenth of the spacing, 12 is within a few percent of the best
@@ -65,11 +66,11 @@ pub(crate) fn estimate(
     wanted: Option<&[bool]>,
     up: DVec3,
     progress: &dyn Progress,
-) -> Result<Estimates> {
+) -> Estimates {
     const CHUNK: usize = 4096;
     let wanted = |index: usize| wanted.is_none_or(|flags| flags.get(index).copied().unwrap_or(false));
     progress.begin("estimating normals and radii", distinct.len() as u64);
-    let search = NeighbourSearch::new(distinct, NORMAL_NEIGHBOURS)?;
+    let search = NeighbourSearch::new(distinct, NORMAL_NEIGHBOURS);
     let mut of_position = vec![Estimate::default(); distinct.len()];
     of_position.par_chunks_mut(CHUNK).enumerate().for_each_init(Vec::new, |neighbours, (chunk, estimates)| {
         let range: Range<usize> = chunk * CHUNK..chunk * CHUNK + estimates.len();
@@ -84,12 +85,12 @@ pub(crate) fn estimate(
         of_position.par_iter().enumerate().filter(|(index, _)| wanted(*index)).map(|(_, e)| of(e)).collect()
     };
     if distinct.len() < 2 {
-        return Ok(Estimates { of_position, median_spacing: None });
+        return Estimates { of_position, median_spacing: None };
     }
     let limit = median(values(|e| e.radius)).unwrap_or(f32::INFINITY) * LARGEST_MEDIAN_RATIO as f32;
     let median_spacing = median(values(|e| e.spacing)).map(f64::from);
     of_position.par_iter_mut().for_each(|e| e.radius = e.radius.min(limit));
-    Ok(Estimates { of_position, median_spacing })
+    Estimates { of_position, median_spacing }
 }
 
 fn estimate_at(distinct: &DistinctPositions, index: u32, neighbours: &[Neighbour], up: DVec3) -> Estimate {

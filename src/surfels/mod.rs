@@ -6,6 +6,7 @@ mod eigen;
 mod estimate;
 mod gather;
 mod neighbours;
+mod positions;
 #[cfg(test)]
 mod tests;
 
@@ -14,7 +15,7 @@ use rayon::prelude::*;
 
 use self::estimate::{Estimate, Estimates, RADIUS_RANGE};
 use self::gather::Gathered;
-use self::neighbours::{DistinctPositions, exponent, power_of_two};
+use self::positions::{DistinctPositions, exponent, power_of_two};
 use crate::io::Points;
 use crate::scene::{Bounds, Scene, Surfel, Up};
 use crate::{Error, Progress, Result};
@@ -81,7 +82,7 @@ pub fn build(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Pre
             wanted
         });
         let Estimates { of_position, median_spacing } =
-            estimate::estimate(&distinct, wanted.as_deref(), up.axis(), progress)?;
+            estimate::estimate(&distinct, wanted.as_deref(), up.axis(), progress);
         preparation.distinct_positions = Some(distinct.len() as u64);
         preparation.median_spacing = median_spacing;
         estimates = Some((distinct, of_position));

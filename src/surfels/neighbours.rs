@@ -1,34 +1,17 @@
-//! The nearest neighbours of points, the same for any order of the points.
+//! The nearest neighbours of positions, the same for any order of the points.
+//!
+//! A tree of boxes over the Morton order: eight consecutive positions make a leaf, eight consecutive boxes a node. It
+//! needs no construction beyond the sort, has no trouble with coincident, collinear or coplanar positions (a flat scan
+//! is not split across its thickness), and its lower bounds hold in floating point: every operation of
+//! [`squared_length`] is monotone, so a box is never rounded to be farther than a position inside it. Ties are decided
+//! by the order of the positions. The result is thus exactly the first `count` by (distance, order).
 
-use std::num::NonZero;
-
-use glam::DVec3;
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use rayon::prelude::*;
 
-use crate::scene::Bounds;
-use crate::{Error, Result};
+use super::positions::DistinctPositions;
 
-/// How many more neighbours are asked for than needed, so that most ties at the last place are seen at once; a
-/// full cubic grid has 12 neighbours at the second distance and is settled with this many.
-const SPARE: usize = 6;
-
-/// Scaled coordinates below 2^-400 become zero, so that the squared distance of two distinct positions is never zero.
-const SMALLEST: f64 = f64::from_bits((1023 - 400) << 52);
-
-/// Relative room for the rounding of squared distances, many times what any order of summing three squares needs.
-const SLACK: f64 = 1e-12;
-
-/// The distinct positions of a cloud, in an order that only depends on the set: along a Morton curve, which also makes
-/// consecutive queries visit the same parts of the search tree.
-pub(crate) struct DistinctPositions {
-    /// Positions relative to the scene's origin, times [`DistinctPositions::scale`].
-    positions: Vec<[f64; 3]>,
-    /// For each point, the index of its position.
-    of_point: Vec<u32>,
-    /// A power of two that brings the scene's extent to about one, so squares neither overflow nor underflow.
-    scale: f64,
-}
+/// Positions in a leaf, and boxes in a node.
+const FAN: usize = 8;
 
 /// A neighbour, and how far it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,156 +22,180 @@ pub(crate) struct Neighbour {
     pub index: u32,
 }
 
-impl DistinctPositions {
-    /// The distinct ones of `points` (world units, finite), which all lie in `bounds`, relative to `origin`.
-    pub fn new(points: &[[f64; 3]], bounds: &Bounds, origin: DVec3) -> Result<Self> {
-        if points.len() > u32::MAX as usize {
-            return Err(Error::Usage(format!(
-                "{} points are more than the {} that normals and radii can be estimated for: split the inputs, or give \
-                 both as attributes",
-                points.len(),
-                u32::MAX
-            )));
-        }
-        let extent = bounds.extent().max_element();
-        let scale = if extent > 0.0 { power_of_two(-exponent(extent)) } else { 1.0 };
-        let low = ((bounds.min - origin) * scale).to_array();
-        let place = |point: &[f64; 3]| -> [f64; 3] {
-            let scaled = (DVec3::from_array(*point) - origin) * scale;
-            scaled.to_array().map(|c| if c.abs() < SMALLEST { 0.0 } else { c })
-        };
-        // The scaled extent is below 2, so 20 bits after the point make 21 in all.
-        let key = |p: &[f64; 3]| {
-            let [x, y, z]: [u64; 3] = std::array::from_fn(|i| spread_bits(((p[i] - low[i]) * 1048576.0) as u64));
-            x | y << 1 | z << 2
-        };
-        let mut order: Vec<(u64, u32)> =
-            points.par_iter().zip(0..points.len() as u32).map(|(point, index)| (key(&place(point)), index)).collect();
-        // Points that compare equal are the same position, so it does not matter that this sort is not stable.
-        order.par_sort_unstable_by(|a, b| {
-            a.0.cmp(&b.0).then_with(|| {
-                let (a, b) = (place(&points[a.1 as usize]), place(&points[b.1 as usize]));
-                a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])).then(a[2].total_cmp(&b[2]))
-            })
-        });
-        let mut positions: Vec<[f64; 3]> = Vec::with_capacity(points.len());
-        let mut of_point = vec![0; points.len()];
-        for &(_, index) in &order {
-            let position = place(&points[index as usize]);
-            if positions.last() != Some(&position) {
-                positions.push(position);
+/// The boxes of [`FAN`] leaves or nodes, coordinate by coordinate, so that eight distances are computed at once. Where
+/// there are fewer, the box is empty and infinitely far.
+#[derive(Clone, Copy)]
+struct Node {
+    low: [[f64; FAN]; 3],
+    high: [[f64; FAN]; 3],
+}
+
+impl Node {
+    const EMPTY: Self = Self { low: [[f64::INFINITY; FAN]; 3], high: [[f64::NEG_INFINITY; FAN]; 3] };
+
+    /// The boxes around groups of positions.
+    fn around<'a>(groups: impl Iterator<Item = &'a [[f64; 3]]>) -> Self {
+        let mut node = Self::EMPTY;
+        for (child, group) in groups.enumerate().take(FAN) {
+            for position in group {
+                for axis in 0..3 {
+                    node.low[axis][child] = smaller(node.low[axis][child], position[axis]);
+                    node.high[axis][child] = larger(node.high[axis][child], position[axis]);
+                }
             }
-            of_point[index as usize] = (positions.len() - 1) as u32;
         }
-        Ok(Self { positions, of_point, scale })
+        node
     }
 
-    /// How many there are.
-    pub fn len(&self) -> usize {
-        self.positions.len()
+    /// The boxes around nodes.
+    fn above(nodes: &[Self]) -> Self {
+        let mut node = Self::EMPTY;
+        for (child, below) in nodes.iter().enumerate().take(FAN) {
+            for axis in 0..3 {
+                node.low[axis][child] = below.low[axis].into_iter().fold(f64::INFINITY, smaller);
+                node.high[axis][child] = below.high[axis].into_iter().fold(f64::NEG_INFINITY, larger);
+            }
+        }
+        node
     }
 
-    /// Position `index`, scaled units.
-    pub fn position(&self, index: u32) -> DVec3 {
-        DVec3::from_array(self.positions[index as usize])
+    /// Squared distances of the boxes from `query`; zero inside.
+    fn squared_distances(&self, query: &[f64; 3]) -> [f64; FAN] {
+        std::array::from_fn(|child| {
+            squared_length(std::array::from_fn(|axis| {
+                let (below, above) = (self.low[axis][child] - query[axis], query[axis] - self.high[axis][child]);
+                larger(larger(below, above), 0.0)
+            }))
+        })
     }
+}
 
-    /// For each point that was given, which position it has.
-    pub fn of_point(&self) -> &[u32] {
-        &self.of_point
-    }
+/// Plain comparisons: nothing here is NaN, and these are one instruction each.
+fn smaller(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
 
-    /// Scaled units per world unit.
-    pub fn scale(&self) -> f64 {
-        self.scale
-    }
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+fn squared_length([x, y, z]: [f64; 3]) -> f64 {
+    x * x + y * y + z * z
 }
 
 /// Finds the nearest of a set of distinct positions.
 pub(crate) struct NeighbourSearch<'a> {
-    distinct: &'a DistinctPositions,
-    /// None for so few positions that looking at all of them is the search.
-    tree: Option<ImmutableKdTree<f64, 3>>,
+    positions: &'a [[f64; 3]],
+    /// From the nodes over leaves to the root, which is alone in its level.
+    levels: Vec<Vec<Node>>,
     /// How many neighbours each query returns, if there are as many.
     count: usize,
 }
 
 impl<'a> NeighbourSearch<'a> {
     /// Prepares queries for the `count` nearest neighbours.
-    pub fn new(distinct: &'a DistinctPositions, count: usize) -> Result<Self> {
-        let tree = if distinct.len() > count + 1 + SPARE {
-            let built = ImmutableKdTree::new_from_slice_parallel(&distinct.positions);
-            Some(built.map_err(|e| Error::Usage(format!("no search tree can be built over the points: {e}")))?)
-        } else {
-            None
-        };
-        Ok(Self { distinct, tree, count })
+    pub fn new(distinct: &'a DistinctPositions, count: usize) -> Self {
+        let positions = distinct.as_slice();
+        let mut level: Vec<Node> =
+            positions.par_chunks(FAN * FAN).map(|chunk| Node::around(chunk.chunks(FAN))).collect();
+        let mut levels = Vec::new();
+        while level.len() > 1 {
+            let above = level.par_chunks(FAN).map(Node::above).collect();
+            levels.push(std::mem::replace(&mut level, above));
+        }
+        levels.push(level);
+        Self { positions, levels, count }
     }
 
     /// Fills `found` with the nearest neighbours of position `index`, itself excluded, nearest first and equal
     /// distances in the order of [`DistinctPositions`].
-    ///
-    /// Which of several equally far candidates a search tree returns depends on how it was built. So a result whose
-    /// last place is contested is searched again by radius: every candidate at that distance is then seen, and the
-    /// total order above decides.
     pub fn nearest(&self, index: u32, found: &mut Vec<Neighbour>) {
-        let distinct = self.distinct;
-        let query = distinct.position(index);
-        let neighbour =
-            |other: u32| Neighbour { squared_distance: query.distance_squared(distinct.position(other)), index: other };
         found.clear();
-        let Some(tree) = &self.tree else {
-            found.extend((0..distinct.len() as u32).filter(|&other| other != index).map(neighbour));
-            return keep_nearest(found, self.count);
-        };
-        let wanted = NonZero::<usize>::MIN.saturating_add(self.count + SPARE);
-        let candidates = tree.query(&query.to_array()).nearest_n::<SquaredEuclidean<f64>>(wanted).execute();
-        found.extend(candidates.iter().filter(|c| c.item != index).map(|c| neighbour(c.item)));
-        sort(found);
-        let reach = found.last().map_or(0.0, |n| n.squared_distance);
-        let last = found.get(self.count.wrapping_sub(1)).map_or(f64::MAX, |n| n.squared_distance) * (1.0 + SLACK);
-        if reach <= last {
-            let candidates = tree.query(&query.to_array()).within::<SquaredEuclidean<f64>>(last).unsorted().execute();
-            found.clear();
-            found.extend(candidates.iter().filter(|c| c.item != index).map(|c| neighbour(c.item)));
+        let index = index as usize;
+        let mut query = Query { search: self, index, at: self.positions[index], found, reach: f64::MAX };
+        // From the leaf of the query outward: most neighbours are found at once, and the rest is out of reach.
+        let mut home = index / FAN;
+        query.visit_leaf(home);
+        for level in 0..self.levels.len() {
+            let node = home / FAN;
+            query.visit_node(level, node, Some(home % FAN));
+            home = node;
         }
-        keep_nearest(found, self.count);
     }
 }
 
-fn sort(found: &mut [Neighbour]) {
-    found.sort_unstable_by(|a, b| a.squared_distance.total_cmp(&b.squared_distance).then(a.index.cmp(&b.index)));
+struct Query<'a> {
+    search: &'a NeighbourSearch<'a>,
+    index: usize,
+    at: [f64; 3],
+    /// The nearest so far, sorted.
+    found: &'a mut Vec<Neighbour>,
+    /// Squared distance beyond which nothing is wanted any more; finite, so an empty box is always beyond.
+    reach: f64,
 }
 
-fn keep_nearest(found: &mut Vec<Neighbour>, count: usize) {
-    sort(found);
-    found.truncate(count);
-}
+impl Query<'_> {
+    fn visit_leaf(&mut self, leaf: usize) {
+        let first = leaf * FAN;
+        let positions = self.search.positions.iter().enumerate().skip(first).take(FAN);
+        for (index, position) in positions {
+            let offset = std::array::from_fn(|axis| position[axis] - self.at[axis]);
+            let squared_distance = squared_length(offset);
+            if squared_distance <= self.reach && index != self.index {
+                self.insert(Neighbour { squared_distance, index: index as u32 });
+            }
+        }
+    }
 
-/// The largest e with 2^e <= x, for x > 0; at least -1000.
-pub(crate) fn exponent(x: f64) -> i32 {
-    (((x.to_bits() >> 52) & 0x7ff) as i32 - 1023).max(-1000)
-}
+    fn insert(&mut self, new: Neighbour) {
+        let before = |n: &Neighbour| (n.squared_distance, n.index) < (new.squared_distance, new.index);
+        let place = self.found.iter().rposition(before).map_or(0, |last| last + 1);
+        if place >= self.search.count {
+            return;
+        }
+        self.found.truncate(self.search.count - 1);
+        self.found.insert(place, new);
+        if let Some(last) = self.found.get(self.search.count - 1) {
+            self.reach = last.squared_distance;
+        }
+    }
 
-/// 2^e, exactly; e is limited to what a normal f64 holds.
-pub(crate) fn power_of_two(e: i32) -> f64 {
-    f64::from_bits(((e.clamp(-1022, 1023) + 1023) as u64) << 52)
-}
-
-/// Puts two zeros before each of the lower 21 bits.
-fn spread_bits(x: u64) -> u64 {
-    let mut x = x.min(0x1f_ffff);
-    x = (x | x << 32) & 0x1f_0000_0000_ffff;
-    x = (x | x << 16) & 0x1f_0000_ff00_00ff;
-    x = (x | x << 8) & 0x100f_00f0_0f00_f00f;
-    x = (x | x << 4) & 0x10c3_0c30_c30c_30c3;
-    (x | x << 2) & 0x1249_2492_4924_9249
+    /// Visits the children of a node within reach, nearest first, but not `done`.
+    fn visit_node(&mut self, level: usize, node: usize, done: Option<usize>) {
+        let distances = self.search.levels[level][node].squared_distances(&self.at);
+        let mut order = [(0.0, 0); FAN];
+        let mut count = 0;
+        for (child, distance) in distances.into_iter().enumerate() {
+            if distance <= self.reach && done != Some(child) {
+                let mut place = count;
+                while place > 0 && order[place - 1].0 > distance {
+                    order[place] = order[place - 1];
+                    place -= 1;
+                }
+                order[place] = (distance, child);
+                count += 1;
+            }
+        }
+        for (distance, child) in order.into_iter().take(count) {
+            if distance > self.reach {
+                break;
+            }
+            let child = node * FAN + child;
+            match level.checked_sub(1) {
+                Some(below) => self.visit_node(below, child, None),
+                None => self.visit_leaf(child),
+            }
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use glam::DVec3;
+
     use super::*;
+    use crate::scene::Bounds;
 
     fn distinct(points: &[[f64; 3]]) -> DistinctPositions {
         let bounds = points.iter().fold(Bounds::EMPTY, |b, p| b.with_point(DVec3::from_array(*p)));
@@ -199,9 +206,9 @@ mod tests {
     fn check(points: &[[f64; 3]], count: usize, step: usize) {
         let distinct = distinct(points);
         for (point, &index) in points.iter().zip(distinct.of_point()) {
-            assert_eq!((DVec3::from_array(*point) * distinct.scale()).to_array(), distinct.positions[index as usize]);
+            assert_eq!((DVec3::from_array(*point) * distinct.scale()).to_array(), distinct.as_slice()[index as usize]);
         }
-        let search = NeighbourSearch::new(&distinct, count).unwrap();
+        let search = NeighbourSearch::new(&distinct, count);
         let (mut found, mut expected) = (Vec::new(), Vec::new());
         for index in (0..distinct.len() as u32).step_by(step) {
             search.nearest(index, &mut found);
@@ -210,7 +217,8 @@ mod tests {
                 squared_distance: distinct.position(index).distance_squared(distinct.position(other)),
                 index: other,
             }));
-            keep_nearest(&mut expected, count);
+            expected.sort_by(|a, b| a.squared_distance.total_cmp(&b.squared_distance).then(a.index.cmp(&b.index)));
+            expected.truncate(count);
             assert_eq!(found, expected, "query {index}");
         }
     }
@@ -286,6 +294,13 @@ mod tests {
     }
 
     #[test]
+    fn a_far_outlier() {
+        let mut points = random(20_000);
+        points.push([1e15, 0.0, 0.0]);
+        check(&points, 12, 97);
+    }
+
+    #[test]
     fn extreme_sizes() {
         for size in [1e-320, 1e-290, 1e-150, 1e-20, 1e18] {
             let points: Vec<_> = random(500).into_iter().map(|p| p.map(|c| c * size)).collect();
@@ -293,7 +308,7 @@ mod tests {
         }
         let spread: Vec<_> = (0..300).map(|i| [10f64.powi(-i), 0.0, 0.0]).collect();
         let distinct = distinct(&spread);
-        let search = NeighbourSearch::new(&distinct, 12).unwrap();
+        let search = NeighbourSearch::new(&distinct, 12);
         let mut found = Vec::new();
         for index in 0..distinct.len() as u32 {
             search.nearest(index, &mut found);

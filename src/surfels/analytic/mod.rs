@@ -154,7 +154,8 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::scene::Bounds;
-    use crate::surfels::neighbours::{DistinctPositions, NeighbourSearch};
+    use crate::surfels::neighbours::NeighbourSearch;
+    use crate::surfels::positions::DistinctPositions;
 
     /// Signed distance from the unbounded surface.
     fn distance(shape: Shape, p: DVec3) -> f64 {
@@ -197,7 +198,7 @@ mod tests {
                 let bounds = points.iter().fold(Bounds::EMPTY, |b, p| b.with_point(DVec3::from_array(*p)));
                 let distinct = DistinctPositions::new(&points, &bounds, DVec3::ZERO).unwrap();
                 assert_eq!(distinct.len(), points.len());
-                let search = NeighbourSearch::new(&distinct, 1).unwrap();
+                let search = NeighbourSearch::new(&distinct, 1);
                 let spacing = (shape.area() / count as f64).sqrt();
                 let mut found = Vec::new();
                 let (mut low, mut high) = (f64::MAX, 0.0f64);

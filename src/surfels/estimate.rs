@@ -10,16 +10,17 @@ use super::neighbours::{Neighbour, NeighbourSearch};
 use super::positions::DistinctPositions;
 use crate::Progress;
 
-/// How many neighbours a plane is fitted to. Fewer follow curvature better, more average noise better; on spheres and
-/// tori of 1e3 to 1e6 points with and without noise of a tenth of the spacing, 12 is within a few percent of the best
-/// count at either end, and twelve is exactly the first three rings of a square grid.
-pub(crate) const NORMAL_NEIGHBOURS: usize = 12;
+/// How many neighbours a plane is fitted to. Few follow edges and curvature, many average noise. Measured on spheres of
+/// random points, RMS error of the normal in degrees, for 8, 12, 16, 24 neighbours: 200,000 points with radial noise of
+/// 0.1 spacings 4.6, 2.8, 2.0, 1.3; with 0.3 spacings 17, 9.2, 6.3, 4.0; 2,000 points without noise 1.8, 1.5, 1.4, 1.3.
+/// From 16 on more neighbours buy little that their wider rounding of edges does not cost.
+pub(crate) const NORMAL_NEIGHBOURS: usize = 16;
 
 /// How many neighbours a radius is the mean distance of: the first two rings of a square grid.
 const RADIUS_NEIGHBOURS: usize = 8;
 
 /// Disk radius for each unit of mean distance to [`RADIUS_NEIGHBOURS`] neighbours. Gives 1.45 spacings on a square
-/// grid, and leaves less than a thousandth of a random (Poisson) plane uncovered, where 1.0 leaves one percent.
+/// grid, and leaves 0.03 % of a random (Poisson) plane uncovered, where 1.0 leaves 0.4 % and 1.1 leaves 0.12 %.
 const RADIUS_FACTOR: f64 = 1.2;
 
 /// A radius is at most this many times the mean distance of its neighbours from their own centre. That distance is a

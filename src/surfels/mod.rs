@@ -18,7 +18,7 @@ use self::gather::Gathered;
 use self::positions::{DistinctPositions, exponent, power_of_two};
 use crate::io::Points;
 use crate::scene::{Bounds, Scene, Surfel, Up};
-use crate::{Error, Progress, Result};
+use crate::{Progress, Result};
 
 /// The largest absolute coordinate of a point, world units (in metres, a hundred light years). Larger ones are treated
 /// like ones that are not finite, because products of f32 lengths would overflow on the way to the image.
@@ -53,8 +53,8 @@ pub struct Preparation {
 ///
 /// # Errors
 ///
-/// [`Error::EmptyScene`] if no input holds a usable point, [`Error::Usage`] if normals or radii are missing and there are more
-/// than 2^32 - 1 points.
+/// [`Error::EmptyScene`](crate::Error::EmptyScene) if no input holds a usable point, and
+/// [`Error::Usage`](crate::Error::Usage) if normals or radii are missing and there are more than 2^32 - 1 points.
 pub fn build(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Preparation)> {
     let Gathered { positions, normals, radii, colors, up, mut preparation } = gather::gather(inputs)?;
     let bounds = bounds_of(&positions);

@@ -38,9 +38,9 @@ impl Node {
         let mut node = Self::EMPTY;
         for (child, group) in groups.enumerate().take(FAN) {
             for position in group {
-                for axis in 0..3 {
-                    node.low[axis][child] = smaller(node.low[axis][child], position[axis]);
-                    node.high[axis][child] = larger(node.high[axis][child], position[axis]);
+                for (axis, &coordinate) in position.iter().enumerate() {
+                    node.low[axis][child] = smaller(node.low[axis][child], coordinate);
+                    node.high[axis][child] = larger(node.high[axis][child], coordinate);
                 }
             }
         }
@@ -137,8 +137,8 @@ struct Query<'a> {
 impl Query<'_> {
     fn visit_leaf(&mut self, leaf: usize) {
         let first = leaf * FAN;
-        let positions = self.search.positions.iter().enumerate().skip(first).take(FAN);
-        for (index, position) in positions {
+        let end = self.search.positions.len().min(first + FAN);
+        for (index, position) in (first..).zip(&self.search.positions[first..end]) {
             let offset = std::array::from_fn(|axis| position[axis] - self.at[axis]);
             let squared_distance = squared_length(offset);
             if squared_distance <= self.reach && index != self.index {

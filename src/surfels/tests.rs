@@ -2,6 +2,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::Error;
 use crate::scene::Colors;
 use crate::scene::color::DEFAULT_COLOR;
 
@@ -220,6 +221,11 @@ fn speed() {
         ("random plane", {
             let mut next = noise(1);
             (0..1_000_000).map(|_| [next() * 1e3 + 5e5, next() * 1e3 + 6e6, next() * 0.1]).collect()
+        }),
+        ("sphere and a far outlier", {
+            let mut positions = sphere(999_999);
+            positions.push([1e15, 0.0, 0.0]);
+            positions
         }),
         (
             "cubic grid",

@@ -35,9 +35,9 @@ pub fn depth_along_ray(shape: Shape, origin: DVec3, direction: DVec3) -> Option<
 /// All t at which the line `start + t * direction` crosses the torus, ascending. `start` is the line's point nearest to
 /// the world origin, `direction` a unit vector.
 ///
-/// With q = |p|^2 + R^2 - r^2 the torus is q^2 = 4 R^2 (x^2 + y^2), a quartic in t. Its roots are separated by those of its
-/// derivative, found in the same way, so none is lost and none needs a guess; a Newton step or two on the
-/// signed distance then removes the rounding of the coefficients.
+/// With q = |p|^2 + R^2 - r^2 the torus is q^2 = 4 R^2 (x^2 + y^2), a quartic in t. Its roots are separated by those of
+/// its derivative, found in the same way, so none is lost and none needs a guess; a Newton step or two on the signed
+/// distance then removes the rounding of the coefficients.
 fn torus_crossings(start: DVec3, direction: DVec3) -> Vec<f64> {
     let reach = TORUS_MAJOR + TORUS_MINOR;
     let half_chord_squared = reach * reach - start.length_squared();
@@ -62,7 +62,7 @@ fn torus_crossings(start: DVec3, direction: DVec3) -> Vec<f64> {
             let normal = (p.truncate() * ((from_axis - TORUS_MAJOR) / from_axis)).extend(p.z) / from_ring;
             let step = (from_ring - TORUS_MINOR) / normal.dot(direction);
             // Near a grazing point the step means nothing, and the bracketed root is the better answer.
-            if !(step.abs() < 1e-6) {
+            if step.is_nan() || step.abs() > 1e-6 {
                 break;
             }
             *t -= step;

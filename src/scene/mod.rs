@@ -5,7 +5,7 @@ pub mod color;
 pub mod light;
 pub mod needs;
 pub mod options;
-#[allow(clippy::module_inception)]
+#[expect(clippy::module_inception, reason = "the file is named for the type it holds")]
 pub mod scene;
 pub mod surfel;
 

@@ -1,73 +1,187 @@
-//! stub
-use super::*;
+//! The scene: surfels around an origin, their colours, and which way is up.
+
 use glam::DVec3;
-/// s
-#[derive(Clone, Debug)]
-pub struct Scene {
-    /// o
-    pub origin: DVec3,
-    /// s
-    pub surfels: Vec<Surfel>,
-    /// c
-    pub colors: Colors,
-    /// o
-    pub oriented: bool,
-    /// u
-    pub up: Up,
-}
-/// b
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds {
-    /// m
-    pub min: DVec3,
-    /// m
-    pub max: DVec3,
-}
-impl Scene {
-    /// b
-    pub fn bounds(&self) -> Bounds {
-        let mut b = Bounds { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
-        for s in &self.surfels {
-            let c = glam::Vec3::from_array(s.center).as_dvec3();
-            b.min = b.min.min(c);
-            b.max = b.max.max(c);
-        }
-        b
-    }
-    /// c
-    pub fn color_range(&self) -> ([f32; 4], [f32; 4]) {
-        let mut r = ([f32::INFINITY; 4], [f32::NEG_INFINITY; 4]);
-        for i in 0..self.surfels.len() {
-            let [a, b, c, d] = self.colors.linear(i);
-            for (k, v) in [a * d, b * d, c * d, d].into_iter().enumerate() {
-                r.0[k] = r.0[k].min(v);
-                r.1[k] = r.1[k].max(v);
-            }
-        }
-        r
-    }
-}
-/// u
+use rayon::prelude::*;
+
+use super::{Colors, Surfel};
+
+/// The world axis that points up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Up {
-    /// y
+    /// Most mesh formats.
     Y,
-    /// z
+    /// Survey data.
     Z,
 }
+
 impl Up {
-    /// a
+    /// The unit vector of the axis.
     pub fn axis(self) -> DVec3 {
         match self {
-            Up::Y => DVec3::Y,
-            Up::Z => DVec3::Z,
+            Self::Y => DVec3::Y,
+            Self::Z => DVec3::Z,
         }
     }
-    /// o
+
+    /// The unit vector that serves as up in a view along the axis.
     pub fn other(self) -> DVec3 {
         match self {
-            Up::Y => DVec3::Z,
-            Up::Z => DVec3::Y,
+            Self::Y => DVec3::Z,
+            Self::Z => DVec3::Y,
         }
+    }
+}
+
+/// What is rendered, as every reader and generator delivers it.
+///
+/// A surfel lies at `origin + surfel.center`. Splitting a world coordinate into an f64 origin and an f32 offset keeps
+/// georeferenced clouds free of jitter: offsets are as small as the scene, however far away its map origin is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// World coordinates of the point that surfel centres are relative to.
+    pub origin: DVec3,
+    /// The surfels, in world units relative to [`Scene::origin`].
+    pub surfels: Vec<Surfel>,
+    /// One colour for all, or one for each surfel in the same order.
+    pub colors: Colors,
+    /// Normals were given, so they tell the two sides of a surface apart; estimated ones do not.
+    pub oriented: bool,
+    /// The axis a camera without instructions takes as up.
+    pub up: Up,
+}
+
+/// An axis-aligned box, world units; for a scene relative to [`Scene::origin`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// Smallest coordinates, +inf when nothing is inside.
+    pub min: DVec3,
+    /// Largest coordinates, -inf when nothing is inside.
+    pub max: DVec3,
+}
+
+impl Bounds {
+    /// The box around nothing.
+    pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
+
+    /// Whether nothing is inside.
+    pub fn is_empty(&self) -> bool {
+        !self.min.cmple(self.max).all()
+    }
+
+    /// The middle; zero for the empty box.
+    pub fn center(&self) -> DVec3 {
+        if self.is_empty() { DVec3::ZERO } else { self.min + (self.max - self.min) * 0.5 }
+    }
+
+    /// The lengths of the edges; zero for the empty box.
+    pub fn extent(&self) -> DVec3 {
+        if self.is_empty() { DVec3::ZERO } else { self.max - self.min }
+    }
+
+    /// The smallest box that holds this one and `point`; a non-finite point changes nothing.
+    pub fn with_point(self, point: DVec3) -> Self {
+        if point.is_finite() { Self { min: self.min.min(point), max: self.max.max(point) } } else { self }
+    }
+
+    /// The smallest box that holds both.
+    pub fn union(self, other: Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+}
+
+impl Scene {
+    /// The box of the finite surfel centres, world units relative to [`Scene::origin`]; disks reach past it by up to
+    /// [`Scene::largest_radius`].
+    pub fn bounds(&self) -> Bounds {
+        self.surfels
+            .par_iter()
+            .fold(
+                || Bounds::EMPTY,
+                |bounds, surfel| {
+                    let [x, y, z] = surfel.center.map(f64::from);
+                    bounds.with_point(DVec3::new(x, y, z))
+                },
+            )
+            .reduce(|| Bounds::EMPTY, Bounds::union)
+    }
+
+    /// Smallest and largest premultiplied linear colour `(r a, g a, b a, a)` of the scene, each component on its own,
+    /// every product rounded to f32 once. The same for any order of surfels; zero for a scene without surfels.
+    pub fn color_range(&self) -> ([f32; 4], [f32; 4]) {
+        if self.surfels.is_empty() {
+            return ([0.0; 4], [0.0; 4]);
+        }
+        // Adding +0 makes the two zeros one, or their order would show in the sign bit of the result.
+        let premultiplied = |[r, g, b, a]: [f32; 4]| [r * a + 0.0, g * a + 0.0, b * a + 0.0, a + 0.0];
+        if let Colors::Constant(color) = self.colors {
+            let color = premultiplied(color);
+            return (color, color);
+        }
+        let nothing = || ([f32::INFINITY; 4], [f32::NEG_INFINITY; 4]);
+        let count = match &self.colors {
+            Colors::Constant(_) => 0,
+            Colors::Srgb8(codes) => codes.len(),
+            Colors::Linear(colors) => colors.len(),
+        };
+        let merge = |(low, high): ([f32; 4], [f32; 4]), (other_low, other_high): ([f32; 4], [f32; 4])| {
+            let low = std::array::from_fn(|i| f32::min(low[i], other_low[i]));
+            let high = std::array::from_fn(|i| f32::max(high[i], other_high[i]));
+            (low, high)
+        };
+        (0..count)
+            .into_par_iter()
+            .fold(nothing, |range, index| {
+                let color = premultiplied(self.colors.linear(index));
+                merge(range, (color, color))
+            })
+            .reduce(nothing, merge)
+    }
+
+    /// The largest [`Surfel::radius`], world units; zero for a scene without surfels.
+    pub fn largest_radius(&self) -> f32 {
+        self.surfels.par_iter().map(Surfel::radius).reduce(|| 0.0, f32::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    fn scene(colors: Colors) -> Scene {
+        let surfels = (0..1000)
+            .map(|i| Surfel::disk(Vec3::new(i as f32, -(i as f32), 0.5), Vec3::Z, 0.25 + (i == 700) as u8 as f32))
+            .collect();
+        Scene { origin: DVec3::new(6e6, 0.0, 0.0), surfels, colors, up: Up::Z }
+    }
+
+    #[test]
+    fn bounds_are_relative_to_the_origin_and_skip_what_is_not_finite() {
+        let mut scene = scene(Colors::Constant([1.0; 4]));
+        scene.surfels[3].center[1] = f32::NAN;
+        let bounds = scene.bounds();
+        assert_eq!(bounds.min, DVec3::new(0.0, -999.0, 0.5));
+        assert_eq!(bounds.max, DVec3::new(999.0, 0.0, 0.5));
+        assert_eq!(bounds.center(), DVec3::new(499.5, -499.5, 0.5));
+        scene.surfels.clear();
+        assert!(scene.bounds().is_empty());
+        assert_eq!(scene.bounds().extent(), DVec3::ZERO);
+    }
+
+    #[test]
+    fn largest_radius_is_the_longest_half_axis() {
+        assert!((scene(Colors::Constant([1.0; 4])).largest_radius() - 1.25).abs() < 1e-6);
+    }
+
+    #[test]
+    fn color_range_is_premultiplied() {
+        let mut colors = vec![[0.5, 0.5, 0.5, 1.0]; 1000];
+        colors[10] = [8.0, 2.0, -3.0, 0.5];
+        let (low, high) = scene(Colors::Linear(colors)).color_range();
+        assert_eq!(low, [0.5, 0.5, -1.5, 0.5]);
+        assert_eq!(high, [4.0, 1.0, 0.5, 1.0]);
+        let constant = scene(Colors::Constant([1.0, 2.0, 4.0, 0.5])).color_range();
+        assert_eq!(constant, ([0.5, 1.0, 2.0, 0.5], [0.5, 1.0, 2.0, 0.5]));
     }
 }

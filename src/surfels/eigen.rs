@@ -1,0 +1,121 @@
+//! Eigenvectors of symmetric 3x3 matrices.
+
+use glam::DVec3;
+
+/// The symmetric matrix `[[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Symmetric3 {
+    pub xx: f64,
+    pub yy: f64,
+    pub zz: f64,
+    pub xy: f64,
+    pub xz: f64,
+    pub yz: f64,
+}
+
+impl Symmetric3 {
+    /// The sum of `v v^T` over the vectors.
+    pub fn scatter(vectors: impl Iterator<Item = DVec3>) -> Self {
+        let mut sum = Self { xx: 0.0, yy: 0.0, zz: 0.0, xy: 0.0, xz: 0.0, yz: 0.0 };
+        for v in vectors {
+            sum.xx += v.x * v.x;
+            sum.yy += v.y * v.y;
+            sum.zz += v.z * v.z;
+            sum.xy += v.x * v.y;
+            sum.xz += v.x * v.z;
+            sum.yz += v.y * v.z;
+        }
+        sum
+    }
+
+    /// Eigenvalues in ascending order and their orthonormal eigenvectors, by cyclic Jacobi rotations (Golub and
+    /// Van Loan, Matrix Computations, section 8.5). Only `+ - * / sqrt` are used, so that every machine that follows
+    /// IEEE 754 gets the same bits. Entries of 1e-150 to 1e150 in size (or zero) neither overflow nor underflow.
+    pub fn eigen(self) -> ([f64; 3], [DVec3; 3]) {
+        let largest =
+            [self.xx, self.yy, self.zz, self.xy, self.xz, self.yz].iter().fold(0.0, |m: f64, e| m.max(e.abs()));
+        if largest == 0.0 || !largest.is_finite() {
+            return ([0.0; 3], [DVec3::X, DVec3::Y, DVec3::Z]);
+        }
+        let mut diagonal = [self.xx / largest, self.yy / largest, self.zz / largest];
+        // Entry i is the off-diagonal one of the row and column that are not i.
+        let mut off = [self.yz / largest, self.xz / largest, self.xy / largest];
+        let mut vectors = [DVec3::X, DVec3::Y, DVec3::Z];
+        // Convergence is quadratic: four or five sweeps do, and the bound only guards against a surprise.
+        for _ in 0..30 {
+            if off.iter().all(|e| e.abs() < 1e-300) {
+                break;
+            }
+            for (p, q, r) in [(0, 1, 2), (0, 2, 1), (1, 2, 0)] {
+                let entry = off[r];
+                if entry.abs() <= f64::EPSILON * 1e-3 * (diagonal[p].abs() * diagonal[q].abs()).sqrt() || entry == 0.0 {
+                    off[r] = 0.0;
+                    continue;
+                }
+                let theta = (diagonal[q] - diagonal[p]) / (2.0 * entry);
+                // Squaring a large theta may overflow to infinity: t then becomes zero, which is its limit.
+                let t = 1f64.copysign(theta) / (theta.abs() + (theta * theta + 1.0).sqrt());
+                let c = 1.0 / (t * t + 1.0).sqrt();
+                let s = t * c;
+                diagonal[p] -= t * entry;
+                diagonal[q] += t * entry;
+                off[r] = 0.0;
+                let (pr, qr) = (off[q], off[p]);
+                off[q] = c * pr - s * qr;
+                off[p] = s * pr + c * qr;
+                let (vp, vq) = (vectors[p], vectors[q]);
+                vectors[p] = vp * c - vq * s;
+                vectors[q] = vp * s + vq * c;
+            }
+        }
+        let mut order = [0, 1, 2];
+        order.sort_by(|&a, &b| diagonal[a].total_cmp(&diagonal[b]));
+        (order.map(|i| diagonal[i] * largest), order.map(|i| vectors[i].normalize()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn product(m: &Symmetric3, v: DVec3) -> DVec3 {
+        DVec3::new(
+            m.xx * v.x + m.xy * v.y + m.xz * v.z,
+            m.xy * v.x + m.yy * v.y + m.yz * v.z,
+            m.xz * v.x + m.yz * v.y + m.zz * v.z,
+        )
+    }
+
+    proptest! {
+        #[test]
+        fn eigenvectors_are_orthonormal_and_eigen(
+            entries in prop::array::uniform6(prop_oneof![Just(0.0), -1.0..1.0f64, -1e-9..1e-9f64]),
+            exponent in -149i32..149,
+        ) {
+            let scale = 10f64.powi(exponent);
+            let [xx, yy, zz, xy, xz, yz] = entries.map(|e| e * scale);
+            let matrix = Symmetric3 { xx, yy, zz, xy, xz, yz };
+            let (values, vectors) = matrix.eigen();
+            prop_assert!(values[0] <= values[1] && values[1] <= values[2]);
+            for i in 0..3 {
+                prop_assert!((vectors[i].length() - 1.0).abs() < 1e-14);
+                prop_assert!(vectors[i].dot(vectors[(i + 1) % 3]).abs() < 1e-13);
+                let error = (product(&matrix, vectors[i]) - vectors[i] * values[i]).length();
+                prop_assert!(error <= 1e-13 * scale, "{error} {scale}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_thin_sheet_keeps_its_normal() {
+        let normal = DVec3::new(1.0, 2.0, -2.0) / 3.0;
+        let (a, b) = (DVec3::new(2.0, 1.0, 2.0) / 3.0, DVec3::new(2.0, -2.0, -1.0) / 3.0);
+        for thickness in [0.0, 1e-9, 1e-4] {
+            let points = [a, -a, b * 0.3, -b * 0.3, normal * thickness, -normal * thickness];
+            let (_, vectors) = Symmetric3::scatter(points.into_iter()).eigen();
+            assert!(vectors[0].cross(normal).length() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! All inputs as one set of points with finite coordinates.
+
+use super::colors::ColorGatherer;
+use super::{LARGEST_COORDINATE, Preparation};
+use crate::io::{Points, Up};
+use crate::scene::Colors;
+use crate::{Error, Result};
+
+/// The usable points of all inputs, in order.
+pub(crate) struct Gathered {
+    /// World coordinates; none is -0.
+    pub positions: Vec<[f64; 3]>,
+    /// As given; zero where missing. None if no input has any.
+    pub normals: Option<Vec<[f32; 3]>>,
+    /// As given; zero where missing. None if no input has any.
+    pub radii: Option<Vec<f32>>,
+    /// The colours of the points.
+    pub colors: Colors,
+    /// What the inputs say.
+    pub up: Option<Up>,
+    /// The counts so far.
+    pub preparation: Preparation,
+}
+
+/// Joins the inputs and drops points whose coordinates are unusable.
+pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
+    let mut preparation = Preparation::default();
+    let mut positions = Vec::new();
+    let (mut normals, mut radii) = (None, None);
+    let mut colors = ColorGatherer::new();
+    let mut up = None;
+    let input_count = inputs.len();
+    for mut input in inputs {
+        let read = input.positions.len();
+        preparation.points += read as u64;
+        let keep: Vec<bool> = input.positions.iter().map(is_usable).collect();
+        let kept = keep.iter().filter(|&&keep| keep).count();
+        if kept < read {
+            preparation.dropped_non_finite += (read - kept) as u64;
+            retain(&mut input.positions, &keep);
+            input.normals.iter_mut().for_each(|all| retain(all, &keep));
+            input.radii.iter_mut().for_each(|all| retain(all, &keep));
+            match &mut input.colors {
+                Some(Colors::Srgb8(codes)) => retain(codes, &keep),
+                Some(Colors::Linear(colors)) => retain(colors, &keep),
+                _ => {}
+            }
+        }
+        let before = positions.len();
+        append(&mut normals, before, input.normals, kept);
+        append(&mut radii, before, input.radii, kept);
+        colors.append(input.colors, kept);
+        if positions.is_empty() {
+            positions = input.positions;
+        } else {
+            positions.append(&mut input.positions);
+        }
+        up = match (up, input.up) {
+            (Some(Up::Z), _) | (_, Some(Up::Z)) => Some(Up::Z),
+            (said, says) => said.or(says),
+        };
+    }
+    if positions.is_empty() {
+        let what = match (input_count, preparation.points) {
+            (0, _) => "no input was given, so there is nothing to draw".to_owned(),
+            (_, 0) => "the input holds no points, so there is nothing to draw".to_owned(),
+            (_, points) => format!(
+                "none of the {points} points read has three finite coordinates of at most {LARGEST_COORDINATE:e} in \
+                 size, so there is nothing to draw"
+            ),
+        };
+        return Err(Error::EmptyScene(what));
+    }
+    for coordinate in positions.iter_mut().flatten() {
+        // -0 + 0 is 0: one position, one bit pattern.
+        *coordinate += 0.0;
+    }
+    preparation.replaced_colors = colors.replaced;
+    Ok(Gathered { positions, normals, radii, colors: colors.finish(), up, preparation })
+}
+
+fn is_usable(position: &[f64; 3]) -> bool {
+    position.iter().all(|c| c.abs() <= LARGEST_COORDINATE)
+}
+
+/// Keeps the values whose flag is set.
+fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
+    let mut flags = keep.iter();
+    values.retain(|_| flags.next().copied().unwrap_or(false));
+}
+
+/// Appends `count` values to the `before` values of earlier inputs; what is missing on either side becomes default.
+fn append<T: Clone + Default>(all: &mut Option<Vec<T>>, before: usize, added: Option<Vec<T>>, count: usize) {
+    let Some(mut added) = added else {
+        if let Some(all) = all {
+            all.resize(before + count, T::default());
+        }
+        return;
+    };
+    added.resize(count, T::default());
+    match all {
+        Some(all) => all.append(&mut added),
+        None if before == 0 => *all = Some(added),
+        None => {
+            let mut joined = vec![T::default(); before];
+            joined.append(&mut added);
+            *all = Some(joined);
+        }
+    }
+}

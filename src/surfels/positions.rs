@@ -1,0 +1,162 @@
+//! The distinct positions of a cloud, in an order of their own.
+
+use std::cmp::Ordering;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::scene::Bounds;
+use crate::{Error, Result};
+
+/// Scaled coordinates below 2^-400 become zero, so that the squared distance of two distinct positions is never zero.
+const SMALLEST: f64 = f64::from_bits((1023 - 400) << 52);
+
+/// The distinct positions of a cloud, in an order that only depends on the set: along a Morton curve, so that what is
+/// near in space is near in memory.
+pub(crate) struct DistinctPositions {
+    /// Positions relative to the scene's origin, times [`DistinctPositions::scale`].
+    positions: Vec<[f64; 3]>,
+    /// For each point, the index of its position.
+    of_point: Vec<u32>,
+    /// A power of two that brings the scene's extent to about one, so squares neither overflow nor underflow.
+    scale: f64,
+}
+
+impl DistinctPositions {
+    /// The distinct ones of `points` (world units, finite), which all lie in `bounds`, relative to `origin`.
+    pub fn new(points: &[[f64; 3]], bounds: &Bounds, origin: DVec3) -> Result<Self> {
+        if points.len() > u32::MAX as usize {
+            return Err(Error::Usage(format!(
+                "{} points are more than the {} that normals and radii can be estimated for: split the inputs, or give \
+                 both as attributes",
+                points.len(),
+                u32::MAX
+            )));
+        }
+        let extent = bounds.extent().max_element();
+        let scale = if extent > 0.0 { power_of_two(-exponent(extent)) } else { 1.0 };
+        let low = ((bounds.min - origin) * scale).to_array();
+        let place = |point: &[f64; 3]| -> [f64; 3] {
+            let scaled = (DVec3::from_array(*point) - origin) * scale;
+            scaled.to_array().map(|c| if c.abs() < SMALLEST { 0.0 } else { c })
+        };
+        // The scaled extent is below 2, so 61 bits after the point make 62 in all.
+        let cell = |p: &[f64; 3]| -> [u64; 3] { std::array::from_fn(|i| ((p[i] - low[i]) * power_of_two(61)) as u64) };
+        let mut order: Vec<(u64, u32)> = points
+            .par_iter()
+            .zip(0..points.len() as u32)
+            .map(|(point, index)| (morton_prefix(cell(&place(point))), index))
+            .collect();
+        // Points that compare equal are the same position, so it does not matter that this sort is not stable.
+        order.par_sort_unstable_by(|a, b| {
+            a.0.cmp(&b.0).then_with(|| {
+                let (a, b) = (place(&points[a.1 as usize]), place(&points[b.1 as usize]));
+                let lexicographic = || a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])).then(a[2].total_cmp(&b[2]));
+                morton_order(cell(&a), cell(&b)).then_with(lexicographic)
+            })
+        });
+        let mut positions: Vec<[f64; 3]> = Vec::with_capacity(points.len());
+        let mut of_point = vec![0; points.len()];
+        for &(_, index) in &order {
+            let position = place(&points[index as usize]);
+            if positions.last() != Some(&position) {
+                positions.push(position);
+            }
+            of_point[index as usize] = (positions.len() - 1) as u32;
+        }
+        Ok(Self { positions, of_point, scale })
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// All of them, scaled units.
+    pub fn as_slice(&self) -> &[[f64; 3]] {
+        &self.positions
+    }
+
+    /// Position `index`, scaled units.
+    pub fn position(&self, index: u32) -> DVec3 {
+        DVec3::from_array(self.positions[index as usize])
+    }
+
+    /// For each point that was given, which position it has.
+    pub fn of_point(&self) -> &[u32] {
+        &self.of_point
+    }
+
+    /// Scaled units per world unit.
+    pub fn scale(&self) -> f64 {
+        self.scale
+    }
+}
+
+/// The largest e with 2^e <= x, for x > 0; at least -1000.
+pub(crate) fn exponent(x: f64) -> i32 {
+    (((x.to_bits() >> 52) & 0x7ff) as i32 - 1023).max(-1000)
+}
+
+/// 2^e, exactly; e is limited to what a normal f64 holds.
+pub(crate) fn power_of_two(e: i32) -> f64 {
+    f64::from_bits(((e.clamp(-1022, 1023) + 1023) as u64) << 52)
+}
+
+/// The upper 21 of 62 bits of each coordinate, interleaved.
+fn morton_prefix(cell: [u64; 3]) -> u64 {
+    let [x, y, z] = cell.map(|c| spread_bits(c >> 41));
+    x | y << 1 | z << 2
+}
+
+/// The order of the full interleaved coordinates, without interleaving them: the coordinate with the highest differing
+/// bit decides (Chan 2002). Where an outlier makes the whole cloud one cell of the prefix, this keeps the curve.
+fn morton_order(a: [u64; 3], b: [u64; 3]) -> Ordering {
+    let mut decisive = 2;
+    for axis in [1, 0] {
+        let (other, most) = (a[axis] ^ b[axis], a[decisive] ^ b[decisive]);
+        // Whether the highest bit of `most` is below that of `other`.
+        if most < other && most < (most ^ other) {
+            decisive = axis;
+        }
+    }
+    a[decisive].cmp(&b[decisive])
+}
+
+/// Puts two zeros before each of the lower 21 bits.
+fn spread_bits(x: u64) -> u64 {
+    let mut x = x.min(0x1f_ffff);
+    x = (x | x << 32) & 0x1f_0000_0000_ffff;
+    x = (x | x << 16) & 0x1f_0000_ff00_00ff;
+    x = (x | x << 8) & 0x100f_00f0_0f00_f00f;
+    x = (x | x << 4) & 0x10c3_0c30_c30c_30c3;
+    (x | x << 2) & 0x1249_2492_4924_9249
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn prefix_and_full_order_agree() {
+        let mut state = 1u64;
+        let mut next = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            // Few bits, so that cells share prefixes.
+            (state >> 40 & 7) << 58 | (state >> 50 & 3) << 41
+        };
+        for _ in 0..10_000 {
+            let (a, b) = ([next(), next(), next()], [next(), next(), next()]);
+            assert_eq!(morton_prefix(a).cmp(&morton_prefix(b)), morton_order(a, b));
+        }
+    }
+
+    #[test]
+    fn powers_of_two_are_exact() {
+        for x in [1e-300f64, 0.3, 1.0, 1.5, 2.0, 1e18] {
+            let power = power_of_two(exponent(x));
+            assert!(power <= x && x < 2.0 * power);
+        }
+        assert_eq!(exponent(5e-324), -1000);
+    }
+}

@@ -1,5 +1,46 @@
 //! Files: one format each; every reader ends in [`Points`], every writer appears whole or not at all.
 
+pub mod atomic;
+mod fault;
+pub mod las;
+pub mod obj;
+pub mod ply;
 pub mod points;
+mod values;
 
 pub use points::{Points, Up};
+
+use crate::{Error, Progress, Result};
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+/// Reads any supported file: PLY, LAS, LAZ (COPC too) or OBJ, by its extension in either case, or else by its first bytes.
+///
+/// Points come in the file's own order and coordinates. A file with no points is no error here.
+///
+/// # Errors
+///
+/// [`Error::Read`] for a missing file or a directory, [`Error::Malformed`] for a file that is none of these formats or
+/// is not what its format says.
+pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
+    let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
+    match extension.as_deref() {
+        Some("ply") => ply::read(path, progress),
+        Some("las" | "laz") => las::read(path, progress),
+        Some("obj") => obj::read(path, progress),
+        _ => match &magic(path).map_err(|error| Error::read(path, error))? {
+            b"ply\n" | b"ply\r" => ply::read(path, progress),
+            b"LASF" => las::read(path, progress),
+            _ => Err(Error::malformed(path, "its format is not known; PLY, LAS, LAZ and OBJ files are read")),
+        },
+    }
+}
+
+/// The first four bytes, zeros where the file is shorter.
+fn magic(path: &Path) -> std::io::Result<[u8; 4]> {
+    let mut bytes = Vec::with_capacity(4);
+    File::open(path)?.take(4).read_to_end(&mut bytes)?;
+    bytes.resize(4, 0);
+    Ok(bytes.first_chunk().copied().unwrap_or_default())
+}

@@ -1,0 +1,218 @@
+//! What a LAS or LAZ file promises, checked against how long it is, before the decoder allocates what it promises.
+//!
+//! The decoder takes every length in a file for true: a record's, a chunk's, a layer's. One flipped bit would have it
+//! allocate gigabytes, which no error handling survives, so each of these lengths is looked at here first.
+
+use super::arithmetic::Integers;
+use crate::io::fault::Fault;
+use las::raw::{Header, Vlr};
+use std::io::{Read, Seek, SeekFrom};
+
+/// A decoded chunk larger than this is decoded by one thread, which needs no buffer for it.
+const CHUNK_LIMIT: u64 = 1 << 28;
+
+/// How a file's points are decoded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Decoding {
+    /// Uncompressed, or one chunk after the other.
+    Sequential,
+    /// Chunks in parallel.
+    Parallel,
+}
+
+fn malformed<T>(what: impl Into<String>) -> Result<T, Fault> {
+    Err(Fault::Malformed(what.into()))
+}
+
+/// The number of points that the header promises.
+pub(super) fn promised(header: &Header) -> u64 {
+    match (header.number_of_point_records, header.large_file) {
+        (0, Some(large)) => large.number_of_point_records,
+        (legacy, _) => u64::from(legacy),
+    }
+}
+
+/// Checks that every length in the file lies within its `length` bytes, and says how its points can be decoded.
+pub(super) fn check(file: &mut (impl Read + Seek), header: &Header, length: u64) -> Result<Decoding, Fault> {
+    let start = u64::from(header.offset_to_point_data);
+    let record = u64::from(header.point_data_record_length);
+    let promised = promised(header);
+    if let Some(extended) = &header.evlr {
+        let at = extended.start_of_first_evlr;
+        if at.saturating_add(60) > length {
+            return malformed(format!("it ends at byte {length}, before its extended records at byte {at}"));
+        }
+        file.seek(SeekFrom::Start(at + 20))?;
+        let size = read_u64(file)?;
+        if size > length - at - 60 {
+            return malformed(format!("an extended record of {size} bytes does not fit in the file"));
+        }
+    }
+    if header.point_data_record_format & 0x80 == 0 {
+        let held = length.saturating_sub(start).checked_div(record).unwrap_or(0);
+        if held < promised {
+            return malformed(format!("the header promises {promised} points, the file ends after {held}"));
+        }
+        return Ok(Decoding::Sequential);
+    }
+    let Some(laszip) = laszip_record(file, header)? else {
+        return malformed("it is compressed, but has no LASzip record");
+    };
+    let scheme = Scheme::parse(&laszip).filter(|scheme| scheme.record == record && record > 0);
+    let Some(scheme) = scheme else {
+        return malformed("its LASzip record does not describe its points");
+    };
+    if promised == 0 || scheme.compressor == 1 {
+        return Ok(Decoding::Sequential);
+    }
+    let mut chunks = chunk_table(file, start, length, &scheme, promised)?;
+    if scheme.compressor == 3 {
+        check_layers(file, start + 8, &scheme, &mut chunks)?;
+    }
+    let held = chunks.iter().fold(0u64, |sum, chunk| sum.saturating_add(chunk.points));
+    if held < promised {
+        return malformed(format!("the header promises {promised} points, the file ends after {held}"));
+    }
+    let largest = chunks.iter().map(|chunk| chunk.points.max(scheme.chunk.map_or(0, u64::from))).max().unwrap_or(0);
+    Ok(if largest.saturating_mul(record) > CHUNK_LIMIT { Decoding::Sequential } else { Decoding::Parallel })
+}
+
+/// The data of the record that says how the points are compressed.
+fn laszip_record(file: &mut (impl Read + Seek), header: &Header) -> Result<Option<Vec<u8>>, Fault> {
+    file.seek(SeekFrom::Start(u64::from(header.header_size)))?;
+    for _ in 0..header.number_of_variable_length_records {
+        let Ok(record) = Vlr::read_from(&mut *file, false) else {
+            return malformed("it ends inside its variable-length records");
+        };
+        if record.record_id == 22204 && record.user_id.starts_with(b"laszip encoded") {
+            return Ok(Some(record.data));
+        }
+    }
+    Ok(None)
+}
+
+/// How the points are compressed.
+#[derive(Debug)]
+struct Scheme {
+    /// 1: one chunk; 2: chunks; 3: chunks in layers.
+    compressor: u16,
+    /// Points per chunk; `None` where the chunk table gives them.
+    chunk: Option<u32>,
+    /// Bytes per decoded point.
+    record: u64,
+    /// Layers per chunk, where chunks are in layers.
+    layers: u64,
+}
+
+impl Scheme {
+    fn parse(data: &[u8]) -> Option<Self> {
+        let u16_at = |at: usize| data.get(at..)?.first_chunk().copied().map(u16::from_le_bytes);
+        let chunk = u32::from_le_bytes(data.get(12..)?.first_chunk().copied()?);
+        let items = u16_at(32)?;
+        let (mut record, mut layers) = (0, 0);
+        for item in 0..usize::from(items) {
+            let (kind, size) = (u16_at(34 + 6 * item)?, u64::from(u16_at(36 + 6 * item)?));
+            record += size;
+            layers += match kind {
+                10 => 9,      // coordinates, flags, intensity, angle, user data, source, time
+                11 | 13 => 1, // colour; wave packet
+                12 => 2,      // colour and near infrared
+                14 => size,   // extra bytes: one each
+                _ => 0,
+            };
+        }
+        let chunk = Some(chunk).filter(|&chunk| chunk != 0 && chunk != u32::MAX);
+        Some(Self { compressor: u16_at(0)?, chunk, record, layers })
+    }
+}
+
+/// One separately compressed run of points.
+#[derive(Clone, Copy, Debug)]
+struct Chunk {
+    points: u64,
+    bytes: u64,
+}
+
+fn chunk_table(
+    file: &mut (impl Read + Seek),
+    start: u64,
+    length: u64,
+    scheme: &Scheme,
+    promised: u64,
+) -> Result<Vec<Chunk>, Fault> {
+    let early = format!("the header promises {promised} points, but the file ends at byte {length}, before");
+    if start.saturating_add(8) > length {
+        return malformed(format!("{early} the first of them"));
+    }
+    file.seek(SeekFrom::Start(start))?;
+    let mut table = read_u64(file)?;
+    if table as i64 <= start as i64 {
+        // A writer that could not seek back puts the table's place at the end of the file.
+        file.seek(SeekFrom::Start(length - 8))?;
+        table = read_u64(file)?;
+    }
+    if table < start + 8 || table.saturating_add(8) > length {
+        return malformed(format!("{early} its chunk table"));
+    }
+    file.seek(SeekFrom::Start(table))?;
+    let count = read_u64(file)? >> 32;
+    let available = table - start - 8;
+    // A chunk begins with one whole point.
+    if count > available / scheme.record {
+        return malformed(format!("its chunk table lists {count} chunks, more than the file can hold"));
+    }
+    let unreadable = || Fault::Malformed("its chunk table cannot be decoded".into());
+    let mut chunks = Vec::new();
+    if count == 0 {
+        return Ok(chunks);
+    }
+    let mut integers = Integers::new(file, 2).map_err(|_| unreadable())?;
+    let (mut points, mut bytes, mut sum) = (0, 0, 0u64);
+    for _ in 0..count {
+        if scheme.chunk.is_none() {
+            points = integers.next(points, 0).map_err(|_| unreadable())?;
+        }
+        bytes = integers.next(bytes, 1).map_err(|_| unreadable())?;
+        let (Ok(held), Ok(bytes)) = (u64::try_from(points), u64::try_from(bytes)) else { return Err(unreadable()) };
+        sum += bytes;
+        if sum > available {
+            return malformed("the chunks of its chunk table do not fit in the file");
+        }
+        chunks.push(Chunk { points: scheme.chunk.map_or(held, u64::from), bytes });
+    }
+    Ok(chunks)
+}
+
+/// Checks that the layers of each chunk lie within it, and learns from them how full the last chunk is.
+fn check_layers(
+    file: &mut (impl Read + Seek),
+    mut at: u64,
+    scheme: &Scheme,
+    chunks: &mut [Chunk],
+) -> Result<(), Fault> {
+    let mut sizes = vec![0; 4 * scheme.layers as usize];
+    for (index, chunk) in chunks.iter_mut().enumerate() {
+        let fixed = scheme.record + 4 + 4 * scheme.layers;
+        if chunk.bytes > 0 || chunk.points > 0 {
+            file.seek(SeekFrom::Start(at + scheme.record))?;
+            let mut count = [0; 4];
+            let whole = file.read_exact(&mut count).and_then(|()| file.read_exact(&mut sizes)).is_ok();
+            let layers: u64 = sizes.as_chunks().0.iter().map(|size| u64::from(u32::from_le_bytes(*size))).sum();
+            if !whole || fixed + layers > chunk.bytes {
+                return malformed(format!("the layers of its chunk {} do not fit in it", index + 1));
+            }
+            let count = u64::from(u32::from_le_bytes(count));
+            if count > 0 {
+                chunk.points = chunk.points.min(count);
+            }
+        }
+        at += chunk.bytes;
+    }
+    Ok(())
+}
+
+fn read_u64(file: &mut impl Read) -> Result<u64, Fault> {
+    let mut bytes = [0; 8];
+    file.read_exact(&mut bytes)?;
+    Ok(u64::from_le_bytes(bytes))
+}

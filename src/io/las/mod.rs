@@ -1,0 +1,137 @@
+//! LAS and LAZ 1.0 to 1.4, through the `las` crate.
+
+mod arithmetic;
+mod chunks;
+mod color;
+
+use crate::io::fault::{self, Fault, reserve};
+use crate::io::{Points, Up};
+use crate::{Progress, Result};
+use las::reader::{LazParallelism, ReaderOptions};
+use las::{PointData, PointDataBuilder, Reader, raw};
+use std::fs::File;
+use std::io::{self, BufReader, Seek};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+/// Bytes of records that are decoded together.
+const BLOCK: u64 = 1 << 25;
+
+/// Reads the points of a LAS or LAZ file, COPC included: all but those marked as withheld, which are deleted points.
+///
+/// Coordinates are scaled and offset in f64, in the file's own system; up is z. Colours come from the format's RGB:
+/// where the 16-bit codes of the whole file are widened 8-bit values, or no code is above 255, they are 8-bit sRGB; else
+/// they are 16-bit sRGB codes and become linear light; all zero means none. A format without RGB whose intensities vary
+/// gives sRGB greys, with the 99.9th percentile as white.
+///
+/// # Errors
+///
+/// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where
+/// the file is not LAS, ends early, or cannot be decoded.
+pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
+    let opened = surviving(|| {
+        let (mut file, header, length) = open(path)?;
+        let decoding = chunks::check(&mut file, &header, length).map_err(early)?;
+        Ok((file, decoding, chunks::promised(&header), length))
+    });
+    let (file, decoding, promised, length) = opened.map_err(|fault| fault.of(path))?;
+    progress.begin(&format!("reading {}", fault::name(path)), promised);
+    let points = surviving(|| decode(file, decoding, promised.min(length), progress));
+    progress.end();
+    points.map_err(|fault| fault.of(path))
+}
+
+/// Runs what calls the decoder: corrupt data can make it panic.
+fn surviving<T>(run: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fault> {
+    catch_unwind(AssertUnwindSafe(run))
+        .unwrap_or_else(|_| Err(Fault::Malformed("its points cannot be decoded; the file is damaged".into())))
+}
+
+fn open(path: &Path) -> Result<(BufReader<File>, raw::Header, u64), Fault> {
+    let file = File::open(path)?;
+    let length = file.metadata()?.len();
+    let mut file = BufReader::with_capacity(1 << 20, file);
+    let header = raw::Header::read_from(&mut file).map_err(of_las)?;
+    Ok((file, header, length))
+}
+
+/// The decoder's failures that are the file's fault, told from the system's.
+fn of_las(error: las::Error) -> Fault {
+    match error {
+        las::Error::Io(error) => early(Fault::Io(error)),
+        las::Error::InvalidFileSignature(_) => {
+            Fault::Malformed("it is not a LAS file: it does not begin with 'LASF'".into())
+        }
+        other => Fault::Malformed(other.to_string()),
+    }
+}
+
+fn early(fault: Fault) -> Fault {
+    match fault {
+        Fault::Io(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
+            Fault::Malformed("the file ends early".into())
+        }
+        Fault::Io(error) if matches!(error.kind(), io::ErrorKind::InvalidData | io::ErrorKind::InvalidInput) => {
+            Fault::Malformed(error.to_string())
+        }
+        other => other,
+    }
+}
+
+fn decode(
+    mut file: BufReader<File>,
+    decoding: chunks::Decoding,
+    capacity: u64,
+    progress: &dyn Progress,
+) -> Result<Points, Fault> {
+    file.rewind()?;
+    let parallelism = match decoding {
+        chunks::Decoding::Parallel => LazParallelism::Yes,
+        chunks::Decoding::Sequential => LazParallelism::No,
+    };
+    let options = ReaderOptions::default().with_laz_parallelism(parallelism);
+    let mut reader = Reader::with_options(file, options).map_err(of_las)?;
+    let header = reader.header();
+    let promised = header.number_of_points();
+    let format = *header.point_format();
+    let mut block = PointDataBuilder::new().for_header(header).build();
+    let block_points = (BLOCK / u64::from(format.len()).max(1)).max(1);
+    let mut positions = Vec::new();
+    reserve(&mut positions, capacity)?;
+    let mut codes: Vec<[u16; 3]> = Vec::new();
+    let mut intensities = Vec::new();
+    let mut read = 0;
+    while read < promised {
+        let count = reader.fill_points(block_points, &mut block).map_err(|error| match early(of_las(error)) {
+            Fault::Malformed(what) => Fault::Malformed(format!(
+                "the header promises {promised} points, but decoding fails after {read}: {what}"
+            )),
+            other => other,
+        })?;
+        if count == 0 {
+            return Err(Fault::Malformed(format!("the header promises {promised} points, the file ends after {read}")));
+        }
+        read += count;
+        let kept = || withheld(&block).map(|withheld| !withheld);
+        let coordinates = block.x().zip(block.y()).zip(block.z()).map(|((x, y), z)| [x, y, z]);
+        positions.extend(coordinates.zip(kept()).filter_map(|(position, kept)| kept.then_some(position)));
+        if let Some(rgb) = block.rgb() {
+            codes.extend(rgb.zip(kept()).filter_map(|((r, g, b), kept)| kept.then_some([r, g, b])));
+        } else {
+            intensities.extend(block.intensity().zip(kept()).filter_map(|(value, kept)| kept.then_some(value)));
+        }
+        progress.advance(count);
+    }
+    let colors = if format.has_color { color::from_rgb(codes) } else { color::from_intensity(intensities) };
+    Ok(Points { positions, colors, up: Some(Up::Z), ..Points::default() })
+}
+
+/// Whether each point of a block is marked as deleted: bit 7 of the classification byte, in the extended formats bit 2
+/// of the flags before it.
+fn withheld(block: &PointData) -> impl Iterator<Item = bool> {
+    let mask = if block.format().is_extended { 1 << 2 } else { 1 << 7 };
+    block
+        .raw_bytes()
+        .chunks_exact(block.record_len().max(1))
+        .map(move |record| record.get(15).is_some_and(|b| b & mask != 0))
+}

@@ -1,0 +1,196 @@
+//! The lines of an OBJ file, as the face parser is given them.
+
+use crate::Progress;
+use crate::io::fault::Fault;
+use crate::io::values::{finite, parse_number, shown};
+use crate::scene::color::{DEFAULT_COLOR, srgb_to_linear};
+use std::io::{self, BufRead, Read};
+
+/// No line is longer, with those that continue it; a polygon of a million corners is shorter.
+const LINE_LIMIT: usize = 1 << 24;
+
+/// What the vertex lines of a file say.
+#[derive(Debug, Default)]
+pub(super) struct Lines {
+    pub(super) positions: Vec<[f64; 3]>,
+    /// One linear colour for each position, or none at all.
+    pub(super) colors: Vec<[f32; 4]>,
+    pub(super) normals: Vec<[f32; 3]>,
+    pub(super) every_corner_has_a_normal: bool,
+    /// Lines read.
+    pub(super) count: u64,
+}
+
+/// Reads vertices, and passes the parser the faces.
+///
+/// The parser renumbers vertices by first use, drops those of no face, repeats those of several groups or materials,
+/// and stops at text that is not UTF-8. So vertices are kept here; the parser gets each one's number in place of its
+/// coordinates, and sees neither groups nor materials, texture coordinates or comments.
+pub(super) struct Source<'a, R> {
+    reader: R,
+    progress: &'a dyn Progress,
+    unreported: u64,
+    lines: Lines,
+    line: Vec<u8>,
+    /// What the parser is given of the current line, and how much of it has been taken.
+    passed: Vec<u8>,
+    taken: usize,
+    fault: Option<Fault>,
+}
+
+impl<'a, R: BufRead> Source<'a, R> {
+    pub(super) fn new(reader: R, progress: &'a dyn Progress) -> Self {
+        let lines = Lines { every_corner_has_a_normal: true, ..Lines::default() };
+        let (line, passed) = (Vec::new(), Vec::new());
+        Self { reader, progress, unreported: 0, lines, line, passed, taken: 0, fault: None }
+    }
+
+    /// What was read, unless reading is why the parser stopped.
+    pub(super) fn finish(self) -> Result<Lines, Fault> {
+        self.progress.advance(self.unreported);
+        match self.fault {
+            Some(fault) => Err(fault),
+            None => Ok(self.lines),
+        }
+    }
+
+    /// Takes the next line, with those that continue it; `false` at the end of the file.
+    fn next_line(&mut self) -> Result<bool, Fault> {
+        self.line.clear();
+        loop {
+            let room = LINE_LIMIT.saturating_sub(self.line.len());
+            let bytes = self.reader.by_ref().take(room as u64).read_until(b'\n', &mut self.line)?;
+            if room == 0 {
+                let line = self.lines.count;
+                return Err(Fault::Malformed(format!("line {line} is longer than {LINE_LIMIT} bytes")));
+            }
+            if bytes == 0 {
+                return Ok(!self.line.is_empty());
+            }
+            self.lines.count += 1;
+            self.unreported += bytes as u64;
+            if self.unreported >= 1 << 20 {
+                self.progress.advance(std::mem::take(&mut self.unreported));
+            }
+            match self.line.trim_ascii_end().strip_suffix(b"\\") {
+                Some(continued) => {
+                    let length = continued.len();
+                    self.line.truncate(length);
+                    self.line.push(b' ');
+                }
+                None if self.line.len() < LINE_LIMIT || self.line.ends_with(b"\n") => return Ok(true),
+                None => {}
+            }
+        }
+    }
+
+    fn take_line(&mut self) -> Result<(), Fault> {
+        let Self { lines, line, passed, .. } = self;
+        let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        match words.next() {
+            Some(b"v") => {
+                lines.vertex(words)?;
+                passed.extend(format!("v {} 0 0\n", lines.positions.len() - 1).bytes());
+            }
+            Some(b"vn") => {
+                let mut normal = [0.0; 3];
+                for component in &mut normal {
+                    *component = lines.number(words.next())? as f32;
+                }
+                lines.normals.push(normal);
+                let [x, y, z] = normal;
+                passed.extend(format!("vn {x} {y} {z}\n").bytes());
+            }
+            // A face of one or two corners has no area, and one of none is refused by the parser.
+            Some(b"f") if words.clone().count() > 2 => {
+                passed.push(b'f');
+                for word in words.take_while(|word| !word.starts_with(b"#")) {
+                    let mut indices = word.split(|&byte| byte == b'/');
+                    let (vertex, _, normal) = (indices.next(), indices.next(), indices.next());
+                    let normal = normal.filter(|normal| !normal.is_empty());
+                    lines.every_corner_has_a_normal &= normal.is_some();
+                    passed.push(b' ');
+                    passed.extend(vertex.unwrap_or_default());
+                    if let Some(normal) = normal {
+                        passed.extend(b"//");
+                        passed.extend(normal);
+                    }
+                }
+                passed.push(b'\n');
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+}
+
+impl Lines {
+    fn number(&self, word: Option<&[u8]>) -> Result<f64, Fault> {
+        let line = self.count;
+        let word = word.ok_or_else(|| Fault::Malformed(format!("line {line}: too few numbers")))?;
+        parse_number(word).ok_or_else(|| Fault::Malformed(format!("line {line}: '{}' is not a number", shown(word))))
+    }
+
+    /// `x y z`, then nothing, or a weight `w`, or `r g b`, or `r g b a`.
+    fn vertex<'w>(&mut self, words: impl Iterator<Item = &'w [u8]>) -> Result<(), Fault> {
+        let mut numbers = [0.0; 7];
+        let mut count = 0;
+        for word in words.take_while(|word| !word.starts_with(b"#")) {
+            let number = self.number(Some(word))?;
+            if let Some(place) = numbers.get_mut(count) {
+                *place = number;
+            }
+            count += 1;
+        }
+        let [x, y, z, rest @ ..] = numbers;
+        let mut position = [x, y, z];
+        let mut color = None;
+        match (count, rest) {
+            (3, _) => {}
+            (4, [w, ..]) if w != 0.0 => position = position.map(|coordinate| coordinate / w),
+            (6, [r, g, b, _]) => color = Some([r, g, b, 1.0]),
+            (7, color_and_alpha) => color = Some(color_and_alpha),
+            _ => {
+                let line = self.count;
+                return Err(Fault::Malformed(format!(
+                    "line {line}: a vertex has three numbers, then a weight that is not zero, or a colour of three or four"
+                )));
+            }
+        }
+        match color {
+            Some([r, g, b, a]) => {
+                // Vertices before the first coloured one.
+                self.colors.resize(self.positions.len(), DEFAULT_COLOR);
+                let [r, g, b] = [r, g, b].map(|code| finite(srgb_to_linear(code)));
+                self.colors.push([r, g, b, finite(a)]);
+            }
+            None if !self.colors.is_empty() => self.colors.push(DEFAULT_COLOR),
+            None => {}
+        }
+        self.positions.push(position);
+        Ok(())
+    }
+}
+
+impl<R: BufRead> Read for Source<'_, R> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        while self.taken == self.passed.len() {
+            self.passed.clear();
+            self.taken = 0;
+            let taken = match self.next_line() {
+                Ok(false) => return Ok(0),
+                Ok(true) => self.take_line(),
+                Err(fault) => Err(fault),
+            };
+            if let Err(fault) = taken {
+                self.fault = Some(fault);
+                return Err(io::ErrorKind::InvalidData.into());
+            }
+        }
+        let rest = &self.passed[self.taken..];
+        let count = rest.len().min(out.len());
+        out[..count].copy_from_slice(&rest[..count]);
+        self.taken += count;
+        Ok(count)
+    }
+}

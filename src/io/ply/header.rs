@@ -1,0 +1,171 @@
+//! The header of a PLY file (Turk 1994): encoding, elements and their properties.
+
+use crate::io::fault::Fault;
+use crate::io::values::shown;
+use std::io::{BufRead, Read};
+
+/// No header line is longer; a comment may hold a processing history.
+const LINE_LIMIT: u64 = 1 << 16;
+
+/// How the values after the header are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Encoding {
+    Ascii,
+    LittleEndian,
+    BigEndian,
+}
+
+/// The type of one number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Scalar {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+impl Scalar {
+    /// Both naming styles: the format's own, and that of later writers.
+    fn parse(name: &str) -> Option<Self> {
+        Some(match name {
+            "char" | "int8" => Self::I8,
+            "uchar" | "uint8" => Self::U8,
+            "short" | "int16" => Self::I16,
+            "ushort" | "uint16" => Self::U16,
+            "int" | "int32" => Self::I32,
+            "uint" | "uint32" => Self::U32,
+            "float" | "float32" => Self::F32,
+            "double" | "float64" => Self::F64,
+            _ => return None,
+        })
+    }
+
+    /// Bytes in a binary file.
+    pub(super) fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+
+    pub(super) fn is_float(self) -> bool {
+        matches!(self, Self::F32 | Self::F64)
+    }
+}
+
+/// The type of a property.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Scalar(Scalar),
+    List { count: Scalar, item: Scalar },
+}
+
+/// One property of an element.
+#[derive(Clone, Debug)]
+pub(super) struct Property {
+    pub(super) name: String,
+    pub(super) kind: Kind,
+}
+
+/// One element: so many rows, each with all properties.
+#[derive(Clone, Debug)]
+pub(super) struct Element {
+    pub(super) name: String,
+    pub(super) count: u64,
+    pub(super) properties: Vec<Property>,
+}
+
+/// Everything before the values.
+#[derive(Clone, Debug)]
+pub(super) struct Header {
+    pub(super) encoding: Encoding,
+    pub(super) elements: Vec<Element>,
+    /// Lines, `end_header` included: the first value of an ASCII file is on the next.
+    pub(super) lines: u64,
+}
+
+/// Reads up to and including the line `end_header`.
+pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
+    let mut line = Vec::new();
+    let mut encoding = None;
+    let mut elements: Vec<Element> = Vec::new();
+    for number in 1.. {
+        line.clear();
+        reader.take(LINE_LIMIT).read_until(b'\n', &mut line)?;
+        if number == 1 {
+            if line.trim_ascii_end() != b"ply" {
+                return Err(Fault::Malformed("it is not a PLY file: its first line is not 'ply'".into()));
+            }
+            continue;
+        }
+        let complete = line.last() == Some(&b'\n');
+        let text = String::from_utf8_lossy(&line);
+        let mut words = text.split_ascii_whitespace();
+        let keyword = words.next();
+        // The last line of a file without values may lack its line feed.
+        if !complete && keyword != Some("end_header") {
+            return Err(Fault::Malformed(if line.len() as u64 == LINE_LIMIT {
+                format!("line {number} of the PLY header is longer than {LINE_LIMIT} bytes")
+            } else {
+                format!("the file ends inside the PLY header, at line {number}")
+            }));
+        }
+        let malformed =
+            |what: &str| Fault::Malformed(format!("line {number}: {what}: '{}'", shown(text.trim().as_bytes())));
+        match keyword {
+            None | Some("comment" | "obj_info") => {}
+            Some("format") => {
+                let parsed = match words.next() {
+                    Some("ascii") => Some(Encoding::Ascii),
+                    Some("binary_little_endian") => Some(Encoding::LittleEndian),
+                    Some("binary_big_endian") => Some(Encoding::BigEndian),
+                    _ => None,
+                };
+                let version = words.next();
+                encoding = parsed.filter(|_| version.is_none_or(|v| v == "1.0"));
+                if encoding.is_none() {
+                    return Err(malformed(
+                        "not a PLY format that is read (ascii, binary_little_endian or binary_big_endian 1.0)",
+                    ));
+                }
+            }
+            Some("element") => {
+                let (Some(name), Some(count), None) = (words.next(), words.next(), words.next()) else {
+                    return Err(malformed("an element needs a name and a count"));
+                };
+                let count = count.parse().map_err(|_| malformed("the element's count is not a number of rows"))?;
+                elements.push(Element { name: name.to_owned(), count, properties: Vec::new() });
+            }
+            Some("property") => {
+                let property = property(words).ok_or_else(|| malformed("not a property"))?;
+                let element = elements.last_mut().ok_or_else(|| malformed("a property before any element"))?;
+                element.properties.push(property);
+            }
+            Some("end_header") => {
+                let encoding = encoding.ok_or_else(|| malformed("the PLY header has no format line"))?;
+                return Ok(Header { encoding, elements, lines: number });
+            }
+            Some(_) => return Err(malformed("not a PLY header line")),
+        }
+    }
+    Err(Fault::Malformed("the PLY header has no end".into()))
+}
+
+/// `TYPE NAME` or `list COUNT ITEM NAME`.
+fn property<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Property> {
+    let kind = match words.next()? {
+        "list" => {
+            let count = Scalar::parse(words.next()?).filter(|count| !count.is_float())?;
+            Kind::List { count, item: Scalar::parse(words.next()?)? }
+        }
+        scalar => Kind::Scalar(Scalar::parse(scalar)?),
+    };
+    let name = words.next()?.to_owned();
+    words.next().is_none().then_some(Property { name, kind })
+}

@@ -1,0 +1,191 @@
+//! What the properties of a PLY vertex mean, and the points they become.
+
+use super::header::{Element, Kind, Scalar};
+use crate::io::Points;
+use crate::io::fault::{Fault, reserve};
+use crate::io::values::{SRGB16_TO_LINEAR, finite};
+use crate::scene::Colors;
+use crate::scene::color::SRGB8_TO_LINEAR;
+
+/// A property that is used, by where it lies among the row's numbers.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Column {
+    /// Which of the row's scalar properties.
+    pub(super) slot: usize,
+    /// Bytes from the start of a binary row; lists do not count.
+    pub(super) offset: usize,
+    pub(super) scalar: Scalar,
+}
+
+/// How a colour channel is coded: by its type.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Coding {
+    /// sRGB, 0 to 255; any integer type of another size is taken to hold such codes.
+    Code8,
+    /// sRGB, 0 to 65535.
+    Code16,
+    /// Linear light.
+    Linear,
+}
+
+impl Coding {
+    fn of(scalar: Scalar) -> Self {
+        match scalar {
+            Scalar::U16 => Self::Code16,
+            Scalar::F32 | Scalar::F64 => Self::Linear,
+            _ => Self::Code8,
+        }
+    }
+
+    fn light(self, value: f64) -> f32 {
+        match self {
+            Self::Code8 => SRGB8_TO_LINEAR[usize::from(value as u8)],
+            Self::Code16 => SRGB16_TO_LINEAR[usize::from(value as u16)],
+            Self::Linear => finite(value),
+        }
+    }
+
+    fn alpha(self, value: f64) -> f32 {
+        match self {
+            Self::Code8 => f32::from(value as u8) / 255.0,
+            Self::Code16 => f32::from(value as u16) / 65535.0,
+            Self::Linear => finite(value),
+        }
+    }
+}
+
+/// Where a row's attributes are: each number an index into `columns`.
+#[derive(Clone, Debug)]
+pub(super) struct Layout {
+    pub(super) columns: Vec<Column>,
+    /// All scalar properties of a row, used or not, in order.
+    pub(super) scalars: Vec<Scalar>,
+    /// Bytes of a binary row's scalar properties.
+    pub(super) row_size: usize,
+    position: [usize; 3],
+    normal: Option<[usize; 3]>,
+    radius: Option<usize>,
+    color: Option<[(usize, Coding); 3]>,
+    alpha: Option<(usize, Coding)>,
+}
+
+impl Layout {
+    pub(super) fn of(vertex: &Element) -> Result<Self, Fault> {
+        let mut scalars = Vec::new();
+        let mut places: Vec<(&str, Column)> = Vec::new();
+        let mut offset = 0;
+        for property in &vertex.properties {
+            if let Kind::Scalar(scalar) = property.kind {
+                places.push((&property.name, Column { slot: scalars.len(), offset, scalar }));
+                scalars.push(scalar);
+                offset += scalar.size();
+            }
+        }
+        let mut columns = Vec::new();
+        let mut column = |names: &[&str]| -> Option<usize> {
+            let found = names.iter().find_map(|name| places.iter().find(|(place, _)| place == name))?;
+            columns.push(found.1);
+            Some(columns.len() - 1)
+        };
+        let position = [column(&["x"]), column(&["y"]), column(&["z"])];
+        let [Some(x), Some(y), Some(z)] = position else {
+            let missing: Vec<&str> = position
+                .iter()
+                .zip(["x", "y", "z"])
+                .filter(|(found, _)| found.is_none())
+                .map(|(_, name)| name)
+                .collect();
+            return Err(Fault::Malformed(format!("its vertices have no property {}", missing.join(", "))));
+        };
+        let mut triple = |names: [&[&str]; 3]| Some([column(names[0])?, column(names[1])?, column(names[2])?]);
+        let normal = triple([&["nx", "normal_x"], &["ny", "normal_y"], &["nz", "normal_z"]]);
+        let color =
+            triple([&["red", "r", "diffuse_red"], &["green", "g", "diffuse_green"], &["blue", "b", "diffuse_blue"]]);
+        let alpha = color.and_then(|_| column(&["alpha", "a", "diffuse_alpha"]));
+        let radius = column(&["radius", "scale"]);
+        let coded = |index: usize| (index, Coding::of(columns[index].scalar));
+        let (color, alpha) = (color.map(|color| color.map(coded)), alpha.map(coded));
+        Ok(Self { columns, scalars, row_size: offset, position: [x, y, z], normal, radius, color, alpha })
+    }
+
+    /// Whether colours stay the 8-bit codes they are in the file.
+    fn is_srgb8(&self) -> bool {
+        self.color.iter().flatten().chain(&self.alpha).all(|(_, coding)| *coding == Coding::Code8)
+    }
+}
+
+/// The points of a file while they are being read.
+#[derive(Debug)]
+pub(super) struct Vertices<'a> {
+    layout: &'a Layout,
+    positions: Vec<[f64; 3]>,
+    normals: Vec<[f32; 3]>,
+    radii: Vec<f32>,
+    srgb8: Vec<[u8; 4]>,
+    linear: Vec<[f32; 4]>,
+}
+
+impl<'a> Vertices<'a> {
+    /// Room for `rows`, which must be a number that the file's length allows.
+    pub(super) fn with_capacity(layout: &'a Layout, rows: u64) -> Result<Self, Fault> {
+        let (mut positions, mut normals, mut radii) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut srgb8, mut linear) = (Vec::new(), Vec::new());
+        reserve(&mut positions, rows)?;
+        reserve(&mut normals, if layout.normal.is_some() { rows } else { 0 })?;
+        reserve(&mut radii, if layout.radius.is_some() { rows } else { 0 })?;
+        let (codes, lights) = match (layout.color.is_some(), layout.is_srgb8()) {
+            (false, _) => (0, 0),
+            (true, true) => (rows, 0),
+            (true, false) => (0, rows),
+        };
+        reserve(&mut srgb8, codes)?;
+        reserve(&mut linear, lights)?;
+        Ok(Self { layout, positions, normals, radii, srgb8, linear })
+    }
+
+    pub(super) fn len(&self) -> u64 {
+        self.positions.len() as u64
+    }
+
+    /// One row: `rows` values of each column, in the order of [`Layout::columns`].
+    pub(super) fn extend(&mut self, rows: usize, value: impl Fn(usize, usize) -> f64) {
+        let layout = self.layout;
+        let [x, y, z] = layout.position;
+        self.positions.extend((0..rows).map(|row| [value(x, row), value(y, row), value(z, row)]));
+        if let Some(normal) = layout.normal {
+            self.normals.extend((0..rows).map(|row| normal.map(|column| value(column, row) as f32)));
+        }
+        if let Some(radius) = layout.radius {
+            self.radii.extend((0..rows).map(|row| value(radius, row) as f32));
+        }
+        if let Some(color) = layout.color {
+            if layout.is_srgb8() {
+                self.srgb8.extend((0..rows).map(|row| {
+                    let [r, g, b] = color.map(|(column, _)| value(column, row) as u8);
+                    [r, g, b, layout.alpha.map_or(255, |(column, _)| value(column, row) as u8)]
+                }));
+            } else {
+                self.linear.extend((0..rows).map(|row| {
+                    let [r, g, b] = color.map(|(column, coding)| coding.light(value(column, row)));
+                    [r, g, b, layout.alpha.map_or(1.0, |(column, coding)| coding.alpha(value(column, row)))]
+                }));
+            }
+        }
+    }
+
+    pub(super) fn into_points(self) -> Points {
+        let layout = self.layout;
+        let colors = match (layout.color.is_some(), layout.is_srgb8()) {
+            (false, _) => None,
+            (true, true) => Some(Colors::Srgb8(self.srgb8)),
+            (true, false) => Some(Colors::Linear(self.linear)),
+        };
+        Points {
+            positions: self.positions,
+            normals: layout.normal.map(|_| self.normals),
+            radii: layout.radius.map(|_| self.radii),
+            colors,
+            up: None,
+        }
+    }
+}

@@ -1,0 +1,62 @@
+//! Conversions that several formats share: numbers in text, 16-bit colour codes, colours kept finite.
+
+use crate::scene::color::srgb_to_linear;
+use std::sync::LazyLock;
+
+/// Linear light for each 16-bit sRGB code.
+pub(super) static SRGB16_TO_LINEAR: LazyLock<Vec<f32>> =
+    LazyLock::new(|| (0..=u16::MAX).map(|code| srgb_to_linear(f64::from(code) / 65535.0) as f32).collect());
+
+/// A number in text, as C's `printf` writes it: `nan`, `inf` and Microsoft's `-nan(ind)`, `1.#QNAN` and `1.#INF` too.
+pub(super) fn parse_number(token: &[u8]) -> Option<f64> {
+    let text = std::str::from_utf8(token).ok()?;
+    text.parse().ok().or_else(|| {
+        let lower = text.to_ascii_lowercase();
+        let unsigned = lower.trim_start_matches(['-', '+']);
+        if unsigned.starts_with("nan(") || unsigned.starts_with("1.#qnan") || unsigned.starts_with("1.#ind") {
+            Some(f64::NAN)
+        } else if unsigned.starts_with("1.#inf") {
+            Some(if lower.starts_with('-') { f64::NEG_INFINITY } else { f64::INFINITY })
+        } else {
+            None
+        }
+    })
+}
+
+/// A colour channel as a finite f32: not a number becomes 0, what is too large becomes the largest.
+pub(super) fn finite(value: f64) -> f32 {
+    if value.is_nan() { 0.0 } else { value.clamp(f64::from(f32::MIN), f64::from(f32::MAX)) as f32 }
+}
+
+/// A token or a name from a file, shortened so that it fits in a one-line message.
+pub(super) fn shown(token: &[u8]) -> String {
+    let text: String =
+        String::from_utf8_lossy(token).chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect();
+    if text.chars().count() > 40 { text.chars().take(40).chain("...".chars()).collect() } else { text }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_read_as_c_writes_them() {
+        assert_eq!(parse_number(b"-1.5e3"), Some(-1500.0));
+        assert_eq!(parse_number(b"+2"), Some(2.0));
+        assert_eq!(parse_number(b"-1.#INF"), Some(f64::NEG_INFINITY));
+        for nan in ["nan", "-nan", "-nan(ind)", "1.#QNAN"] {
+            assert!(parse_number(nan.as_bytes()).is_some_and(f64::is_nan), "{nan}");
+        }
+        for other in ["", "x", "1,5", "0x10", "--1"] {
+            assert_eq!(parse_number(other.as_bytes()), None, "{other}");
+        }
+    }
+
+    #[test]
+    fn colour_channels_stay_finite() {
+        assert_eq!(finite(f64::NAN), 0.0);
+        assert_eq!(finite(f64::INFINITY), f32::MAX);
+        assert_eq!(finite(-1e300), f32::MIN);
+        assert_eq!(finite(0.25), 0.25);
+    }
+}

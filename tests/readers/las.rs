@@ -1,0 +1,178 @@
+//! LAS and LAZ files that must be read.
+
+use super::{Folder, data};
+use epsplat::io::{self, Up};
+use epsplat::scene::Colors;
+use epsplat::scene::color::srgb_to_linear;
+use las::point::Format;
+use las::{Builder, Color, Point, Transform, Vector, Writer};
+use std::io::Cursor;
+
+/// A file of the given version and point format, written by the `las` crate.
+pub fn file(minor: u8, format: u8, compressed: bool, points: impl IntoIterator<Item = Point>) -> Vec<u8> {
+    let mut builder = Builder::from((1, minor));
+    builder.point_format = Format::new(format).unwrap();
+    builder.point_format.is_compressed = compressed;
+    let transform = |offset| Transform { scale: 0.001, offset };
+    builder.transforms = Vector { x: transform(500_000.0), y: transform(5_600_000.0), z: transform(0.0) };
+    let format = builder.point_format;
+    let mut writer = Writer::new(Cursor::new(Vec::new()), builder.into_header().unwrap()).unwrap();
+    for mut point in points {
+        point.gps_time = format.has_gps_time.then_some(1.0);
+        point.color = point.color.filter(|_| format.has_color).or(format.has_color.then(Color::default));
+        point.nir = format.has_nir.then_some(7);
+        writer.write_point(point).unwrap();
+    }
+    writer.into_inner().unwrap().into_inner()
+}
+
+pub fn point(i: u32, color: Option<[u16; 3]>) -> Point {
+    let [x, y, z] = coordinates(i);
+    Point {
+        x,
+        y,
+        z,
+        color: color.map(|[red, green, blue]| Color { red, green, blue }),
+        return_number: 1,
+        number_of_returns: 1,
+        ..Point::default()
+    }
+}
+
+fn coordinates(i: u32) -> [f64; 3] {
+    let i = f64::from(i);
+    [500_000.0 + 0.017 * i, 5_600_000.0 + (0.1 * i).sin(), 0.001 * i]
+}
+
+fn assert_positions(positions: &[[f64; 3]], numbers: impl ExactSizeIterator<Item = u32>) {
+    assert_eq!(positions.len(), numbers.len());
+    for (position, i) in positions.iter().zip(numbers) {
+        let expected = coordinates(i);
+        assert!((0..3).all(|axis| (position[axis] - expected[axis]).abs() <= 0.000_51), "{i}: {position:?}");
+    }
+}
+
+/// Every version and point format, compressed or not, that the tests write.
+pub const KINDS: [(u8, u8, bool); 16] = [
+    (2, 0, false),
+    (2, 1, false),
+    (2, 2, false),
+    (2, 3, false),
+    (3, 3, false),
+    (4, 6, false),
+    (4, 7, false),
+    (4, 8, false),
+    (2, 0, true),
+    (2, 1, true),
+    (2, 2, true),
+    (2, 3, true),
+    (3, 2, true),
+    (4, 6, true),
+    (4, 7, true),
+    (4, 8, true),
+];
+
+#[test]
+fn every_version_and_format_with_and_without_compression() {
+    let folder = Folder::new();
+    for (minor, format, compressed) in KINDS {
+        let color = |i: u32| Some([i as u16 % 256, 20, 30].map(|v| v * 257));
+        let bytes = file(minor, format, compressed, (0..1000).map(|i| point(i, color(i))));
+        let points = folder.read("a.laz", &bytes).unwrap();
+        assert_positions(&points.positions, 0..1000);
+        assert_eq!((points.normals, points.radii, points.up), (None, None, Some(Up::Z)));
+        match points.colors {
+            Some(Colors::Srgb8(codes)) => assert_eq!((codes[5], codes[999]), ([5, 20, 30, 255], [231, 20, 30, 255])),
+            other => assert!([0, 1, 6].contains(&format) && other.is_none(), "{format}: {other:?}"),
+        }
+    }
+}
+
+#[test]
+fn many_chunks_join_without_a_seam() {
+    let folder = Folder::new();
+    for format in [3, 7] {
+        let bytes = file(4, format, true, (0..170_001).map(|i| point(i, None)));
+        let points = folder.read("a.laz", &bytes).unwrap();
+        assert_positions(&points.positions, 0..170_001);
+        assert_eq!(points.colors, None);
+    }
+}
+
+#[test]
+fn a_file_of_no_points_is_no_error() {
+    let folder = Folder::new();
+    for (minor, format, compressed) in KINDS {
+        let points = folder.read("a.las", &file(minor, format, compressed, [])).unwrap();
+        assert_eq!((points.positions.len(), points.colors), (0, None));
+    }
+}
+
+#[test]
+fn colour_codes_are_understood_over_the_whole_file() {
+    let folder = Folder::new();
+    let read = |scale: u16, offset: u16| {
+        let color = |i: u32| [(i as u16 % 200) * scale + offset, 50 * scale, 0];
+        folder.read("a.las", &file(2, 2, false, (0..300).map(|i| point(i, Some(color(i)))))).unwrap().colors
+    };
+    for scale in [1, 256, 257] {
+        let Some(Colors::Srgb8(codes)) = read(scale, 0) else { panic!("{scale} is an 8-bit code") };
+        assert_eq!(codes[201], [1, 50, 0, 255]);
+    }
+    let Some(Colors::Linear(colors)) = read(256, 3) else { panic!("these are 16-bit codes") };
+    let light = |code: f64| srgb_to_linear(code / 65535.0) as f32;
+    assert_eq!(colors[201], [light(259.0), light(12800.0), 0.0, 1.0]);
+    assert_eq!(folder.read("a.las", &file(2, 2, false, [point(1, None)])).unwrap().colors, None);
+}
+
+#[test]
+fn intensities_stand_in_for_colours_where_a_format_has_none() {
+    let folder = Folder::new();
+    let with_intensity = |i: u32| Point { intensity: i as u16 * 10, ..point(i, None) };
+    for format in [0, 6] {
+        let colors = folder.read("a.las", &file(4, format, false, (0..101).map(with_intensity))).unwrap().colors;
+        let Some(Colors::Srgb8(codes)) = colors else { panic!("{colors:?}") };
+        assert_eq!((codes[0], codes[50], codes[100]), ([0, 0, 0, 255], [128, 128, 128, 255], [255; 4]));
+    }
+    assert_eq!(folder.read("a.las", &file(2, 2, false, (0..101).map(with_intensity))).unwrap().colors, None);
+}
+
+#[test]
+fn withheld_points_are_left_out_and_synthetic_ones_are_not() {
+    let folder = Folder::new();
+    for (minor, format, compressed) in KINDS {
+        let points = (0..100).map(|i| Point {
+            is_withheld: i % 2 == 1,
+            is_synthetic: i % 3 == 0,
+            is_key_point: i % 5 == 0,
+            ..point(i, Some([i as u16, 0, 255]))
+        });
+        let points = folder.read("a.las", &file(minor, format, compressed, points)).unwrap();
+        assert_positions(&points.positions, (0..50).map(|i| 2 * i).collect::<Vec<_>>().into_iter());
+        if let Some(Colors::Srgb8(codes)) = points.colors {
+            assert_eq!((codes.len(), codes[49]), (50, [98, 0, 255, 255]));
+        }
+    }
+}
+
+#[test]
+fn a_survey_keeps_its_digits() {
+    let points = io::read(&data("autzen.laz"), &()).unwrap();
+    assert_eq!(points.positions.len(), 110_000);
+    assert!(points.positions.iter().all(|[x, y, z]| {
+        (636_000.0..=638_990.0).contains(x) && (848_000.0..=854_000.0).contains(y) && (400.0..=620.0).contains(z)
+    }));
+    // Coordinates are whole hundredths of a foot.
+    assert!(points.positions.iter().flatten().all(|v| (v * 100.0 - (v * 100.0).round()).abs() < 1e-4));
+    assert!(matches!(points.colors, Some(Colors::Srgb8(codes)) if codes.len() == 110_000));
+}
+
+#[test]
+fn a_cloud_optimised_file_is_read_whole() {
+    let points = io::read(&data("simple.copc.laz"), &()).unwrap();
+    assert_eq!(points.positions.len(), 1065);
+    assert!(points.positions.iter().all(|[x, y, z]| {
+        (635_600.0..=638_990.0).contains(x) && (848_890.0..=853_540.0).contains(y) && (406.0..=587.0).contains(z)
+    }));
+    assert!(matches!(points.colors, Some(Colors::Srgb8(codes)) if codes.len() == 1065));
+}

@@ -1,0 +1,109 @@
+//! LAS and LAZ files that cannot be read.
+
+use super::las::{KINDS, file, point};
+use super::{Folder, Random, data, sentence};
+
+/// Where a header has the number of its points: the legacy field, and that of LAS 1.4.
+const COUNT: usize = 107;
+const LARGE_COUNT: usize = 247;
+
+fn sample(kind: (u8, u8, bool)) -> Vec<u8> {
+    file(kind.0, kind.1, kind.2, (0..60).map(|i| point(i, Some([i as u16, 3, 4]))))
+}
+
+#[test]
+fn promises_of_the_header_are_held_against_the_file() {
+    let folder = Folder::new();
+    for kind in KINDS {
+        for count in [61u32, 100_000, u32::MAX] {
+            let mut bytes = sample(kind);
+            bytes[COUNT..COUNT + 4].copy_from_slice(&count.to_le_bytes());
+            let message = folder.refusal("a.las", &bytes);
+            let said = format!("the header promises {count} points, ");
+            assert!(message.starts_with(&said), "{kind:?}: {message}");
+            if !kind.2 || kind.0 == 4 {
+                assert_eq!(message, format!("{said}the file ends after 60"), "{kind:?}");
+            }
+        }
+        if kind.0 == 4 {
+            let mut bytes = sample(kind);
+            bytes[COUNT..COUNT + 4].fill(0);
+            bytes[LARGE_COUNT..LARGE_COUNT + 8].copy_from_slice(&u64::MAX.to_le_bytes());
+            let message = folder.refusal("a.las", &bytes);
+            assert_eq!(message, format!("the header promises {} points, the file ends after 60", u64::MAX), "{kind:?}");
+        }
+    }
+}
+
+#[test]
+fn a_file_cut_anywhere_is_refused() {
+    let folder = Folder::new();
+    for kind in KINDS {
+        let sample = sample(kind);
+        for length in 0..sample.len() {
+            let message = folder.refusal("a.laz", &sample[..length]);
+            assert!(!message.contains("damaged"), "{kind:?} of {length} bytes: {message}");
+        }
+    }
+}
+
+#[test]
+fn a_survey_cut_short_is_refused() {
+    let folder = Folder::new();
+    let whole = std::fs::read(data("autzen.laz")).unwrap();
+    for length in (0..whole.len()).step_by(9973).chain(whole.len() - 40..whole.len()) {
+        folder.refusal("a.laz", &whole[..length]);
+    }
+    let message = folder.refusal("a.laz", &whole[..300_000]);
+    assert_eq!(message, "the header promises 110000 points, but the file ends at byte 300000, before its chunk table");
+}
+
+#[test]
+fn what_is_not_las_is_refused() {
+    let folder = Folder::new();
+    assert_eq!(folder.refusal("a.las", b""), "the file ends early");
+    assert_eq!(folder.refusal("a.las", &[b'x'; 400]), "it is not a LAS file: it does not begin with 'LASF'");
+}
+
+#[test]
+fn flipped_bytes_never_panic() {
+    let folder = Folder::new();
+    let mut random = Random(0x1a2);
+    let path = folder.path("a.laz");
+    for kind in KINDS {
+        let sample = sample(kind);
+        for _ in 0..200 {
+            let mut bytes = sample.clone();
+            for _ in 0..=random.below(3) {
+                let at = random.below(bytes.len());
+                bytes[at] = random.below(256) as u8;
+            }
+            if let Err(error) = folder.read("a.laz", &bytes) {
+                sentence(&error, &path);
+            }
+        }
+    }
+}
+
+#[test]
+fn lengths_in_damaged_files_are_not_allocated() {
+    let folder = Folder::new();
+    // Each 32-bit word of a compressed file in turn, set to what would be gigabytes of points, layers, chunks or records.
+    let copc = std::fs::read(data("simple.copc.laz")).unwrap();
+    for sample in [sample((2, 3, true)), sample((4, 7, true)), copc] {
+        for at in (90..sample.len() - 4).step_by(if sample.len() > 10_000 { 97 } else { 2 }) {
+            let mut bytes = sample.clone();
+            bytes[at..at + 4].copy_from_slice(&0x7fff_ff00u32.to_le_bytes());
+            if let Err(error) = folder.read("a.laz", &bytes) {
+                sentence(&error, &folder.path("a.laz"));
+            }
+        }
+    }
+    #[cfg(target_os = "linux")]
+    {
+        let status = std::fs::read_to_string("/proc/self/status").unwrap();
+        let peak = status.lines().find(|line| line.starts_with("VmHWM")).unwrap();
+        let kib: u64 = peak.split_whitespace().nth(1).unwrap().parse().unwrap();
+        assert!(kib < 1 << 20, "{peak}");
+    }
+}

@@ -1,0 +1,138 @@
+//! The readers on files of every kind they promise to read, and on damaged ones.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod las;
+mod las_damage;
+mod obj;
+mod ply;
+mod ply_damage;
+
+use epsplat::io::{self, Points};
+use epsplat::{Error, Progress};
+use std::path::Path;
+use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
+use tempfile::TempDir;
+
+/// A folder with one file to read.
+pub(crate) struct Folder(TempDir);
+
+impl Folder {
+    /// An empty one.
+    pub fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    /// Where a file in it is.
+    pub fn path(&self, name: &str) -> std::path::PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// Reads `bytes` as a file called `name`.
+    pub fn read(&self, name: &str, bytes: &[u8]) -> Result<Points, Error> {
+        let path = self.path(name);
+        std::fs::write(&path, bytes).unwrap();
+        io::read(&path, &())
+    }
+
+    /// The message about `bytes`, which must be one sentence about this file.
+    pub fn refusal(&self, name: &str, bytes: &[u8]) -> String {
+        let Err(error) = self.read(name, bytes) else { panic!("{name} was read") };
+        sentence(&error, &self.path(name))
+    }
+}
+
+/// Checks that an error is one line about `path`, and returns what it says after the path.
+pub fn sentence(error: &Error, path: &Path) -> String {
+    let message = error.to_string();
+    let prefix = format!("{}: ", path.display());
+    assert!(message.lines().count() == 1 && message.len() < 400 + prefix.len(), "{message}");
+    assert!(matches!(error, Error::Malformed { .. }), "{message}");
+    message.strip_prefix(&prefix).unwrap_or_else(|| panic!("{message}")).to_owned()
+}
+
+/// Numbers that differ from run to run of nothing (xorshift64).
+pub struct Random(pub u64);
+
+impl Random {
+    /// The next, less than `bound`.
+    pub fn below(&mut self, bound: usize) -> usize {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 16) as usize % bound
+    }
+}
+
+/// Counts what it is told.
+#[derive(Default)]
+struct Count {
+    announced: AtomicU64,
+    advanced: AtomicU64,
+    open: AtomicI64,
+}
+
+impl Progress for Count {
+    fn begin(&self, what: &str, units: u64) {
+        assert!(what.starts_with("reading "), "{what}");
+        self.announced.fetch_add(units, Ordering::Relaxed);
+        self.open.fetch_add(1, Ordering::Relaxed);
+    }
+    fn advance(&self, units: u64) {
+        self.advanced.fetch_add(units, Ordering::Relaxed);
+    }
+    fn end(&self) {
+        self.open.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+/// A file that lies in `data/`.
+pub fn data(name: &str) -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("data").join(name)
+}
+
+#[test]
+fn progress_adds_up_to_what_was_announced() {
+    let folder = Folder::new();
+    let ply = folder.path("a.ply");
+    let vertices = "1 2 3\n".repeat(70_000);
+    let header = "ply\nformat ascii 1.0\nelement vertex 70000\nproperty float x\nproperty float y\nproperty float z\n";
+    std::fs::write(&ply, format!("{header}end_header\n{vertices}")).unwrap();
+    for path in [ply, data("autzen.laz"), data("bunny.obj")] {
+        let count = Count::default();
+        io::read(&path, &count).unwrap();
+        assert_eq!(count.announced.into_inner(), count.advanced.into_inner(), "{}", path.display());
+        assert_eq!(count.open.into_inner(), 0);
+    }
+}
+
+#[test]
+fn files_are_known_by_extension_or_by_their_first_bytes() {
+    let folder = Folder::new();
+    let ply =
+        b"ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
+    let laz = std::fs::read(data("autzen.laz")).unwrap();
+    for name in ["a.ply", "a.PLY", "a", "a.txt"] {
+        assert_eq!(folder.read(name, ply).unwrap().positions.len(), 0, "{name}");
+    }
+    for name in ["a.laz", "a.LAS", "a.copc.laz", "scan", "scan.bin"] {
+        assert_eq!(folder.read(name, &laz).unwrap().positions.len(), 110_000, "{name}");
+    }
+    assert_eq!(folder.read("a.Obj", b"v 1 2 3").unwrap().positions.len(), 1);
+    for unknown in [&b""[..], b"pl", b"plyx", b"v 1 2 3"] {
+        let said = folder.refusal("a.xyz", unknown);
+        assert_eq!(said, "its format is not known; PLY, LAS, LAZ and OBJ files are read");
+    }
+}
+
+#[test]
+fn missing_files_and_directories_cannot_be_read() {
+    let folder = Folder::new();
+    for name in ["a.ply", "a.las", "a.laz", "a.obj", "a", "no/such/a.ply"] {
+        assert!(matches!(io::read(&folder.path(name), &()), Err(Error::Read { .. })), "{name}");
+    }
+    for name in ["d.ply", "d.las", "d.laz", "d.obj", "d"] {
+        std::fs::create_dir(folder.path(name)).unwrap();
+        let error = io::read(&folder.path(name), &()).unwrap_err();
+        assert!(matches!(error, Error::Read { .. }), "{error}");
+    }
+}

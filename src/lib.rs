@@ -3,6 +3,7 @@ pub mod error;
 pub mod frame;
 pub mod gpu;
 pub mod io;
+pub mod metrics;
 pub mod passes;
 pub mod progress;
 pub mod render;

@@ -1,10 +1,13 @@
 //! Files: one format each; every reader ends in [`Points`], every writer appears whole or not at all.
 
 pub mod atomic;
+pub mod camera;
+pub mod exr;
 mod fault;
 pub mod las;
 pub mod obj;
 pub mod ply;
+pub mod png;
 pub mod points;
 mod values;
 

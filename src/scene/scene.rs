@@ -153,7 +153,7 @@ mod tests {
         let surfels = (0..1000)
             .map(|i| Surfel::disk(Vec3::new(i as f32, -(i as f32), 0.5), Vec3::Z, 0.25 + (i == 700) as u8 as f32))
             .collect();
-        Scene { origin: DVec3::new(6e6, 0.0, 0.0), surfels, colors, up: Up::Z }
+        Scene { origin: DVec3::new(6e6, 0.0, 0.0), surfels, colors, oriented: true, up: Up::Z }
     }
 
     #[test]

@@ -56,8 +56,7 @@ pub fn compare(a: &Frame, b: &Frame) -> Result<Comparison> {
         )));
     }
     let pixels = a.color.len();
-    let worst_in_pixel: Vec<f64> =
-        a.color.par_iter().zip(&b.color).map(|(a, b)| largest_difference(a, b)).collect();
+    let worst_in_pixel: Vec<f64> = a.color.par_iter().zip(&b.color).map(|(a, b)| largest_difference(a, b)).collect();
     let squared: f64 = a
         .color
         .iter()
@@ -105,12 +104,7 @@ fn largest_difference<const N: usize>(a: &[f32; N], b: &[f32; N]) -> f64 {
     differences.fold(0.0, f64::max)
 }
 
-fn map_error<const N: usize>(
-    map: &'static str,
-    a: &[[f32; N]],
-    b: &[[f32; N]],
-    excused: Option<&[bool]>,
-) -> MapError {
+fn map_error<const N: usize>(map: &'static str, a: &[[f32; N]], b: &[[f32; N]], excused: Option<&[bool]>) -> MapError {
     let finite = b.iter().flatten().filter(|v| v.is_finite());
     let (low, high) = finite.fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
     let range = if high > low { f64::from(high) - f64::from(low) } else { 0.0 };

@@ -70,8 +70,18 @@ fn a_render_reports_what_it_did() {
     let (sphere, image) = (folder.path("s.ply"), folder.path("s.exr"));
     succeeds(&["generate", "sphere", "--count", "500", "-o", text(&sphere)]);
     let output = succeeds(&[
-        "render", text(&sphere), "-o", text(&image), "--size", "64x48", "--backend", "reference", "--aov",
-        "depth,normal,weight,count,decision", "--json", "-",
+        "render",
+        text(&sphere),
+        "-o",
+        text(&image),
+        "--size",
+        "64x48",
+        "--backend",
+        "reference",
+        "--aov",
+        "depth,normal,weight,count,decision",
+        "--json",
+        "-",
     ]);
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(report["backend"], "reference");

@@ -11,7 +11,8 @@ fn commands() -> Vec<String> {
     let mut commands = Vec::new();
     for block in readme.split("```sh\n").skip(1) {
         let block = block.split("```").next().unwrap().replace("\\\n", " ");
-        commands.extend(block.lines().map(str::trim).filter(|l| !l.is_empty() && !l.starts_with('#')).map(str::to_owned));
+        commands
+            .extend(block.lines().map(str::trim).filter(|l| !l.is_empty() && !l.starts_with('#')).map(str::to_owned));
     }
     commands
 }

@@ -48,13 +48,21 @@ fn table(c: &Comparison) -> String {
     let _ = writeln!(text, "psnr               {psnr}");
     let _ = writeln!(text, "coverage mismatch  {:.4} %", 100.0 * c.coverage_mismatch);
     if let Some(excused) = c.excused {
-        let _ = writeln!(text, "excused pixels     {:.4} % (a fragment within {DECISION_MARGIN:.0e} of a decision)", 100.0 * excused);
+        let _ = writeln!(
+            text,
+            "excused pixels     {:.4} % (a fragment within {DECISION_MARGIN:.0e} of a decision)",
+            100.0 * excused
+        );
     }
     let decided = if c.excused.is_some() { "  not excused" } else { "" };
     let _ = writeln!(text, "\nmap        range        max abs    max / range{decided}");
     for map in &c.maps {
         let decided = map.max_of_range_decided.map_or(String::new(), |e| format!("    {e:.3e}"));
-        let _ = writeln!(text, "{:<8} {:>9.4e}    {:.3e}    {:.3e}{decided}", map.map, map.range, map.max_abs, map.max_of_range);
+        let _ = writeln!(
+            text,
+            "{:<8} {:>9.4e}    {:.3e}    {:.3e}{decided}",
+            map.map, map.range, map.max_abs, map.max_of_range
+        );
     }
     text
 }

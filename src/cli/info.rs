@@ -91,7 +91,11 @@ fn table(input: &std::path::Path, info: &Info) -> String {
     if let Some(spacing) = info.preparation.median_spacing {
         let _ = writeln!(text, "  spacing   {spacing:.4} (median distance to the nearest other point)");
     }
-    let _ = writeln!(text, "A renderer makes {} surfels of it, radius up to {:.4},", info.preparation.surfels, info.largest_radius);
+    let _ = writeln!(
+        text,
+        "A renderer makes {} surfels of it, radius up to {:.4},",
+        info.preparation.surfels, info.largest_radius
+    );
     let _ = writeln!(text, "in f32 relative to the origin {}.", vector(info.origin));
     for note in info.preparation.notes() {
         let _ = writeln!(text, "{note}");

@@ -142,9 +142,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 /// One line: what was drawn, and how long each pass took.
 fn summary(report: &Report, output: &Path) -> String {
     let order = ["project_ms", "visibility_ms", "accumulate_ms", "resolve_ms"];
-    let passes = order.iter().filter_map(|name| {
-        report.passes.get(*name).map(|ms| format!("{} {ms:.1}", name.trim_end_matches("_ms")))
-    });
+    let passes = order
+        .iter()
+        .filter_map(|name| report.passes.get(*name).map(|ms| format!("{} {ms:.1}", name.trim_end_matches("_ms"))));
     let clock = match (report.backend, report.clock) {
         ("gpu", "wall") => ", wall time: the adapter has no timestamps",
         _ => "",
@@ -244,9 +244,8 @@ impl View {
                     (None, None) => Lens::Fov(arguments.fov.unwrap_or(DEFAULT_FOV)),
                 };
                 // Without a target the pose waits for the scene; NaN marks that until then.
-                let pose = arguments
-                    .eye
-                    .map(|eye| Pose::LookAt(eye, arguments.target.unwrap_or(DVec3::NAN), arguments.up));
+                let pose =
+                    arguments.eye.map(|eye| Pose::LookAt(eye, arguments.target.unwrap_or(DVec3::NAN), arguments.up));
                 Self { size: arguments.size.unwrap_or(DEFAULT_SIZE), lens, pose, near: arguments.near }
             }
         };

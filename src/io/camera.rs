@@ -132,7 +132,8 @@ mod tests {
     #[test]
     fn the_two_matrices_are_inverse_to_each_other() {
         let inner = r#""width": 8, "height": 8, "fx": 5, "cx": 4, "cy": 4"#;
-        let a = parse(&format!(r#"{{{inner}, "camera_to_world": [[0,0,1,3],[1,0,0,4],[0,1,0,5],[0,0,0,1]]}}"#)).unwrap();
+        let a =
+            parse(&format!(r#"{{{inner}, "camera_to_world": [[0,0,1,3],[1,0,0,4],[0,1,0,5],[0,0,0,1]]}}"#)).unwrap();
         let b =
             parse(&format!(r#"{{{inner}, "world_to_camera": [[0,1,0,-4],[0,0,1,-5],[1,0,0,-3],[0,0,0,1]]}}"#)).unwrap();
         assert_eq!(a, b);

@@ -27,8 +27,7 @@ pub fn write(path: &Path, frame: &Frame) -> Outcome<()> {
         let channels = AnyChannels::sort(channels.into_iter().collect());
         Layer::new(size, LayerAttributes::named(Text::new_or_panic(name)), encoding, channels)
     };
-    let channel =
-        |name: &str, values: Vec<f32>| AnyChannel::new(Text::new_or_panic(name), FlatSamples::F32(values));
+    let channel = |name: &str, values: Vec<f32>| AnyChannel::new(Text::new_or_panic(name), FlatSamples::F32(values));
     let plane = |k: usize| frame.color.iter().map(|c| c[k]).collect::<Vec<_>>();
     let mut layers = vec![layer(
         "color",

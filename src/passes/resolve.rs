@@ -30,7 +30,7 @@ pub fn reference(sums: &[PixelSums], camera: &Camera, options: &RenderOptions, f
             depth = sum.depth / sum.weight;
         }
         frame.color[pixel] = color.map(|c| c as f32);
-        let mut set = |map: &mut Option<Vec<f32>>, value: f64| {
+        let set = |map: &mut Option<Vec<f32>>, value: f64| {
             if let Some(map) = map {
                 map[pixel] = value as f32;
             }

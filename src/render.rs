@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::kernel::{PixelLayout, Program};
-use crate::gpu::layout::{Band, View};
+use crate::gpu::layout::{Band, MOST_ROUNDS, TILE, View};
 use crate::gpu::timing::Timing;
 use crate::gpu::{Gpu, Sources};
 use crate::passes::accumulate::AttributeBuffer;
@@ -133,14 +133,13 @@ fn on_gpu(
         resolve::read_back(&recorder, rows, &needs, image, &mut frame)?;
     }
     let total_ms = start.elapsed().as_secs_f64() * 1e3;
-    let splats_drawn = splats.drawn(&recorder)?;
     let clock = if recorder.timing.on_device() { "timestamps" } else { "wall" };
     let passes = recorder.timing.finish(gpu)?;
     let report = Report {
         backend: "gpu",
         adapter: gpu.adapter.name.clone(),
         surfels: scene.surfels.len() as u64,
-        splats_drawn,
+        splats_drawn: splats.drawn,
         width: camera.width,
         height: camera.height,
         passes: passes.into_iter().map(|(stage, ms)| (format!("{stage}_ms"), ms)).collect(),
@@ -164,7 +163,9 @@ fn bands(gpu: &Gpu, camera: &Camera, pixel: &PixelLayout) -> Result<Vec<Rows>> {
             what: format!("for one row of {} pixels; choose a narrower image", camera.width),
         });
     }
-    let rows_per_band = rows_per_band.min(u64::from(camera.height)) as u32;
+    // A workgroup that draws a splat over the whole band must not tire its invocations.
+    let most_pixels = u64::from(MOST_ROUNDS * TILE * TILE);
+    let rows_per_band = rows_per_band.min(most_pixels / u64::from(camera.width)).min(u64::from(camera.height)) as u32;
     let mut bands = Vec::new();
     let mut first = 0;
     while first < camera.height {

@@ -6,14 +6,42 @@ struct Rectangle {
     last: vec2<u32>,
 }
 
+fn bounds(splat: Splat) -> Rectangle {
+    return Rectangle(
+        vec2<u32>(splat.bounds_first & 0xffffu, splat.bounds_first >> 16u),
+        vec2<u32>(splat.bounds_last & 0xffffu, (splat.bounds_last & ~AWAY) >> 16u),
+    );
+}
+
 // The pixels of the band that the splat can reach; empty if a first lies past a last.
 fn reach(splat: Splat) -> Rectangle {
-    let first = vec2<u32>(splat.bounds_first & 0xffffu, splat.bounds_first >> 16u);
-    let last = vec2<u32>(splat.bounds_last & 0xffffu, (splat.bounds_last & ~AWAY) >> 16u);
+    let extent = bounds(splat);
     return Rectangle(
-        vec2<u32>(first.x, max(first.y, band.first_row)),
-        vec2<u32>(last.x, min(last.y, band.first_row + band.rows - 1u)),
+        vec2<u32>(extent.first.x, max(extent.first.y, band.first_row)),
+        vec2<u32>(extent.last.x, min(extent.last.y, band.first_row + band.rows - 1u)),
     );
+}
+
+// Splats whose bounds hold more pixels than LARGE get a workgroup each, the others an invocation: one invocation with a
+// hundred thousand pixels would hold up all others, and some drivers end its loop early (Mesa's llvmpipe after 65,535
+// rounds, without a word).
+override LARGE: u32;
+
+fn is_large(splat: Splat) -> bool {
+    let extent = bounds(splat);
+    let size = extent.last - extent.first + 1u;
+    return all(extent.first <= extent.last) && size.x * size.y > LARGE;
+}
+
+// The queue of large splats, as project.wgsl wrote it.
+@group(0) @binding(13) var<storage, read> queued: array<u32>;
+const QUEUE_START: u32 = 2u;
+const TILE: u32 = 16u;
+
+// The splat of this workgroup, or none (a number that is no index).
+fn large_splat(workgroup: vec3<u32>, workgroups: vec3<u32>) -> u32 {
+    let place = workgroup.y * workgroups.x + workgroup.x;
+    return select(0xffffffffu, queued[QUEUE_START + place], place < queued[0]);
 }
 
 fn footprint(splat: Splat, x: u32, y: u32) -> Fragment {

@@ -2,7 +2,8 @@
 
 @group(0) @binding(2) var<storage, read> surfels: array<Surfel>;
 @group(0) @binding(3) var<storage, read_write> splats: array<Splat>;
-@group(0) @binding(4) var<storage, read_write> drawn: atomic<u32>;
+// Word 0 counts the large splats, word 1 all that are in view; from QUEUE_START on, the large ones' indices.
+@group(0) @binding(4) var<storage, read_write> queue: array<atomic<u32>>;
 
 var<workgroup> group_drawn: atomic<u32>;
 
@@ -64,6 +65,10 @@ fn project_surfel(index: u32) -> bool {
         splat.a_low = array<f32, 3>(h.a_low.x, h.a_low.y, h.a_low.z);
     }
     splats[index] = splat;
+    if (visible && is_large(splat)) {
+        // Places depend on the schedule, but nothing later depends on places.
+        atomicStore(&queue[QUEUE_START + atomicAdd(&queue[0], 1u)], index);
+    }
     return visible;
 }
 
@@ -81,6 +86,6 @@ fn project(
     }
     workgroupBarrier();
     if (local == 0u) {
-        atomicAdd(&drawn, atomicLoad(&group_drawn));
+        atomicAdd(&queue[1], atomicLoad(&group_drawn));
     }
 }

@@ -1,4 +1,4 @@
-// Stage 2: the nearest depth at every pixel. One invocation a splat. Twin: src/passes/visibility.rs.
+// Stage 2: the nearest depth at every pixel. One invocation a splat, one workgroup a large splat. Twin: src/passes/visibility.rs.
 // Depths are positive, so the bits of an f32 order as u32.
 
 @group(0) @binding(5) var<storage, read> projected: array<Splat>;
@@ -19,6 +19,13 @@ fn clear(
     }
 }
 
+fn cover(splat: Splat, x: u32, y: u32) {
+    let fragment = footprint(splat, x, y);
+    if (fragment.hit) {
+        atomicMin(&nearest[pixel_index(x, y)], bitcast<u32>(fragment.depth));
+    }
+}
+
 @compute @workgroup_size(WORKGROUP)
 fn visibility(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -30,13 +37,32 @@ fn visibility(
         return;
     }
     let splat = projected[index];
+    if (is_large(splat)) {
+        return;
+    }
     let pixels = reach(splat);
     for (var y = pixels.first.y; y <= pixels.last.y; y++) {
         for (var x = pixels.first.x; x <= pixels.last.x; x++) {
-            let fragment = footprint(splat, x, y);
-            if (fragment.hit) {
-                atomicMin(&nearest[pixel_index(x, y)], bitcast<u32>(fragment.depth));
-            }
+            cover(splat, x, y);
+        }
+    }
+}
+
+@compute @workgroup_size(TILE, TILE)
+fn visibility_large(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_id) local: vec3<u32>,
+) {
+    let index = large_splat(workgroup, workgroups);
+    if (index >= arrayLength(&projected)) {
+        return;
+    }
+    let splat = projected[index];
+    let pixels = reach(splat);
+    for (var y = pixels.first.y + local.y; y <= pixels.last.y; y += TILE) {
+        for (var x = pixels.first.x + local.x; x <= pixels.last.x; x += TILE) {
+            cover(splat, x, y);
         }
     }
 }

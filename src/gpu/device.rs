@@ -80,8 +80,9 @@ impl AdapterDescription {
     }
 }
 
-/// The most storage buffers a kernel uses (accumulate: splats, surfels, depths, sums, colours, the sRGB table).
-const STORAGE_BUFFERS: u32 = 6;
+/// The most storage buffers a kernel uses (accumulate: splats, surfels, depths, sums, colours, the sRGB table,
+/// the queue).
+const STORAGE_BUFFERS: u32 = 7;
 
 /// What to do about a missing adapter.
 pub const INSTALL_HINT: &str = "install a Vulkan driver (on Debian or Ubuntu without a GPU: \

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use super::device::Gpu;
-use super::layout::{SUM_WORDS, WORKGROUP};
+use super::layout::{LARGE, SUM_WORDS, WORKGROUP};
 use crate::error::{Error, Result};
 use crate::scene::{ColorNeed, Kernel, Projection, RenderOptions, SceneNeeds};
 
@@ -182,6 +182,7 @@ pub fn overrides(needs: &SceneNeeds, options: &RenderOptions) -> Vec<(&'static s
     let layout = PixelLayout::of(needs);
     let Kernel::Ellipse { a, n } = options.kernel;
     vec![
+        ("LARGE", LARGE.into()),
         ("PIXEL_WORDS", layout.sum_words.into()),
         ("COLOR_WORD", layout.color_word.into()),
         ("COLOR_CHANNELS", color_channels(needs).into()),
@@ -226,7 +227,8 @@ pub struct Program {
 }
 
 /// The stages' entry points, in order.
-pub const STAGES: [&str; 5] = ["project", "clear", "visibility", "accumulate", "resolve"];
+pub const STAGES: [&str; 7] =
+    ["project", "clear", "visibility", "visibility_large", "accumulate", "accumulate_large", "resolve"];
 
 impl Program {
     /// Compiles the kernels for `needs`.
@@ -292,8 +294,12 @@ impl Program {
 
 /// The 2-D grid of workgroups for `invocations`, within the adapter's limit per dimension.
 pub fn grid(gpu: &Gpu, invocations: u64) -> Result<(u32, u32)> {
+    workgroup_grid(gpu, invocations.div_ceil(u64::from(WORKGROUP)))
+}
+
+/// A 2-D grid of at least `groups` workgroups, within the adapter's limit per dimension.
+pub fn workgroup_grid(gpu: &Gpu, groups: u64) -> Result<(u32, u32)> {
     let limit = u64::from(gpu.limits.max_compute_workgroups_per_dimension);
-    let groups = invocations.div_ceil(u64::from(WORKGROUP));
     let rows = groups.div_ceil(limit).max(1);
     if rows > limit {
         return Err(Error::Limit {
@@ -301,7 +307,7 @@ pub fn grid(gpu: &Gpu, invocations: u64) -> Result<(u32, u32)> {
             limit: "max_compute_workgroups_per_dimension",
             available: limit,
             needed: rows,
-            what: format!("in two dimensions for {invocations} invocations"),
+            what: format!("in two dimensions for {groups} workgroups"),
         });
     }
     Ok((groups.div_ceil(rows) as u32, rows as u32))

@@ -10,6 +10,18 @@ use crate::scene::{Bounds, Camera, Light, RenderOptions, Scene};
 /// Invocations of a workgroup, in every kernel.
 pub const WORKGROUP: u32 = 64;
 
+/// Splats whose bounds hold more pixels than this get a workgroup each instead of an invocation.
+pub const LARGE: u32 = 1024;
+
+/// Words at the start of a page's queue of large splats: how many there are, and how many splats are in view at all.
+pub const QUEUE_START: u32 = 2;
+
+/// The most pixels that one invocation may visit for one splat: llvmpipe ends loops after 65,535 rounds.
+pub const MOST_ROUNDS: u32 = 32_768;
+
+/// Invocations of a workgroup that draws a large splat: a square of 16.
+pub const TILE: u32 = 16;
+
 /// Words (u32) of one fixed-point sum: low and high.
 pub const SUM_WORDS: u32 = 2;
 

@@ -153,5 +153,7 @@ pub fn record(
     buffer: &AttributeBuffer,
 ) -> Result<()> {
     let buffers = [("visible", &visible.nearest.raw), ("sums", &buffer.sums.raw)];
-    splats.dispatch(recorder, "accumulate", rows, &buffers, |encoder| encoder.clear_buffer(&buffer.sums.raw, 0, None))
+    splats.dispatch(recorder, ("accumulate", "accumulate_large"), rows, &buffers, |encoder| {
+        encoder.clear_buffer(&buffer.sums.raw, 0, None)
+    })
 }

@@ -17,7 +17,7 @@ use super::upload::SurfelBuffer;
 use super::{Recorder, Rows};
 use crate::error::Result;
 use crate::gpu::buffers::Buffer;
-use crate::gpu::kernel::grid;
+use crate::gpu::kernel::{grid, workgroup_grid};
 use crate::gpu::layout;
 use crate::scene::{Camera, Projection, Scene, Surfel};
 
@@ -209,34 +209,44 @@ fn orthographic(camera: &Camera, p: DVec3, s: DVec3, t: DVec3, away: f64) -> Pro
     }
 }
 
-/// Splats in device memory, page for page as the surfels, whose colours later stages still read.
+/// Splats in device memory, page for page as the surfels, whose attributes later stages still read.
 pub struct SplatBuffer {
     /// The surfels they came from.
     pub surfels: SurfelBuffer,
     /// A page of splats for each page of surfels.
-    pub pages: Vec<Buffer<layout::Splat>>,
-    drawn: Buffer<u32>,
+    pub pages: Vec<SplatPage>,
+    /// Splats that may touch a pixel of the image.
+    pub drawn: u64,
 }
 
-/// Records the projection of every page.
+/// One page of a [`SplatBuffer`].
+pub struct SplatPage {
+    /// The records.
+    pub splats: Buffer<layout::Splat>,
+    /// Two counts, then the indices of the large splats.
+    queue: Buffer<u32>,
+    /// How many are large: they get a workgroup each.
+    large: u64,
+}
+
+/// Records the projection of every page, and waits for the counts.
 pub fn record(recorder: &mut Recorder<'_>, surfels: SurfelBuffer) -> Result<SplatBuffer> {
-    let gpu = recorder.gpu;
-    let drawn = Buffer::storage(gpu, "count of splats", 1)?;
-    let pages = surfels
-        .pages
-        .iter()
-        .map(|page| Buffer::storage(gpu, "splats", page.surfels.len))
-        .collect::<Result<Vec<_>>>()?;
-    let program = recorder.program;
+    let (gpu, program) = (recorder.gpu, recorder.program);
     let view = &recorder.view.raw;
+    let mut pages = Vec::with_capacity(surfels.pages.len());
+    for page in &surfels.pages {
+        let splats = Buffer::storage(gpu, "splats", page.surfels.len)?;
+        let queue = Buffer::storage(gpu, "queue of large splats", page.surfels.len + u64::from(layout::QUEUE_START))?;
+        pages.push(SplatPage { splats, queue, large: 0 });
+    }
     recorder.timing.pass(
         gpu,
         "project",
         |_| {},
         |pass| {
-            for (page, splats) in surfels.pages.iter().zip(&pages) {
+            for (page, SplatPage { splats, queue, .. }) in surfels.pages.iter().zip(&pages) {
                 let buffers =
-                    [("view", view), ("surfels", &page.surfels.raw), ("splats", &splats.raw), ("drawn", &drawn.raw)];
+                    [("view", view), ("surfels", &page.surfels.raw), ("splats", &splats.raw), ("queue", &queue.raw)];
                 let (pipeline, group) = program.bind(gpu, "project", &buffers)?;
                 let (x, y) = grid(gpu, page.surfels.len)?;
                 pass.set_pipeline(pipeline);
@@ -246,20 +256,22 @@ pub fn record(recorder: &mut Recorder<'_>, surfels: SurfelBuffer) -> Result<Spla
             Ok(())
         },
     )?;
+    let mut drawn = 0;
+    for page in &mut pages {
+        if let [large, in_view] = page.queue.read(gpu, layout::QUEUE_START.into())?[..] {
+            page.large = large.into();
+            drawn += u64::from(in_view);
+        }
+    }
     Ok(SplatBuffer { surfels, pages, drawn })
 }
 
 impl SplatBuffer {
-    /// How many splats may touch a pixel of the image.
-    pub fn drawn(&self, recorder: &Recorder<'_>) -> Result<u64> {
-        Ok(self.drawn.read(recorder.gpu, 1)?.first().copied().unwrap_or(0).into())
-    }
-
-    /// Records one dispatch of `stage` per page, over its splats.
+    /// Records `stage` over the splats of every page: an invocation each, and of `large` a workgroup each.
     pub(crate) fn dispatch(
         &self,
         recorder: &mut Recorder<'_>,
-        stage: &'static str,
+        (stage, large): (&'static str, &'static str),
         rows: &Rows,
         buffers: &[(&str, &wgpu::Buffer)],
         before: impl FnOnce(&mut wgpu::CommandEncoder),
@@ -271,17 +283,24 @@ impl SplatBuffer {
                 let mut bound = vec![
                     ("view", view),
                     ("band", &rows.uniform.raw),
-                    ("projected", &splats.raw),
+                    ("projected", &splats.splats.raw),
+                    ("queued", &splats.queue.raw),
                     ("surfels", &page.surfels.raw),
                 ];
                 bound.extend_from_slice(buffers);
                 bound.extend(page.colors.as_ref().map(|colors| ("colors", colors)));
                 bound.extend(self.surfels.srgb_to_linear.as_ref().map(|table| ("srgb_to_linear", &table.raw)));
-                let (pipeline, group) = program.bind(gpu, stage, &bound)?;
-                let (x, y) = grid(gpu, splats.len)?;
-                pass.set_pipeline(pipeline);
-                pass.set_bind_group(0, &group, &[]);
-                pass.dispatch_workgroups(x, y, 1);
+                let mut dispatch = |kernel: &str, (x, y): (u32, u32)| -> Result<()> {
+                    let (pipeline, group) = program.bind(gpu, kernel, &bound)?;
+                    pass.set_pipeline(pipeline);
+                    pass.set_bind_group(0, &group, &[]);
+                    pass.dispatch_workgroups(x, y, 1);
+                    Ok(())
+                };
+                dispatch(stage, grid(gpu, splats.splats.len)?)?;
+                if splats.large > 0 {
+                    dispatch(large, workgroup_grid(gpu, splats.large)?)?;
+                }
             }
             Ok(())
         })

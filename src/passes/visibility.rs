@@ -58,5 +58,5 @@ pub fn record(recorder: &mut Recorder<'_>, splats: &SplatBuffer, rows: &Rows, bu
             Ok(())
         },
     )?;
-    splats.dispatch(recorder, "visibility", rows, &buffers, |_| {})
+    splats.dispatch(recorder, ("visibility", "visibility_large"), rows, &buffers, |_| {})
 }

@@ -19,10 +19,13 @@ use super::{note, write_json};
 ///
 /// Without a camera the scene is framed from its bounds. Several inputs make one scene.
 #[derive(Args)]
-#[command(after_help = "Examples:\n  \
+#[command(
+    allow_negative_numbers = true,
+    after_help = "Examples:\n  \
     epsplat render scan.laz -o scan.png\n  \
     epsplat render a.ply b.ply -o maps.exr --aov depth,normal --size 1920x1080\n  \
-    epsplat render scan.laz -o top.png --eye 0,0,500 --target 0,0,0 --ortho 300")]
+    epsplat render scan.laz -o top.png --eye 0,0,500 --target 0,0,0 --ortho 300"
+)]
 pub struct Arguments {
     /// Point clouds or meshes: .ply, .las, .laz, .obj
     #[arg(required = true)]
@@ -55,7 +58,7 @@ pub struct Arguments {
     #[arg(long, value_name = "WORLD_HEIGHT", conflicts_with = "intrinsics")]
     ortho: Option<f64>,
     /// Focal lengths and principal point in pixels
-    #[arg(long, value_name = "FX,FY,CX,CY", value_parser = parse_intrinsics)]
+    #[arg(long, value_name = "FX,FY,CX,CY", value_parser = parse_intrinsics, allow_hyphen_values = true)]
     intrinsics: Option<[f64; 4]>,
     /// A camera file (see the README); takes the place of all other camera arguments but --size
     #[arg(long, value_name = "CAMERA.json", conflicts_with_all = ["eye", "target", "up", "fov", "ortho", "intrinsics"])]

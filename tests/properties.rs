@@ -1,0 +1,125 @@
+//! What holds for every scene: invariants of the maps, agreement with the reference, and bits that depend on nothing but
+//! the set of surfels.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use epsplat::frame::Frame;
+use epsplat::metrics::compare;
+use epsplat::render::{Backend, render};
+use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Lens, Light, Maps, RenderOptions, Scene, Shading, Surfel, Up};
+use glam::{DVec3, Vec3};
+use proptest::prelude::*;
+use proptest::test_runner::{Config, TestRunner};
+
+const SIZE: (u32, u32) = (48, 37);
+
+fn vector(reach: f32) -> impl Strategy<Value = Vec3> {
+    prop::array::uniform3(-reach..reach).prop_map(Vec3::from_array)
+}
+
+fn surfel() -> impl Strategy<Value = Surfel> {
+    // From a hundredth of a pixel to the whole image, round to 1:100, some reaching behind the camera.
+    (vector(1.5), vector(1.0), -3.0f32..0.3, -2.0f32..0.0, 0.0f32..6.3).prop_map(
+        |(center, normal, size, shape, turn)| {
+            let normal = if normal.length() > 1e-3 { normal } else { Vec3::Z };
+            let disk = Surfel::disk(center, normal, 10f32.powf(size));
+            let (s, t) = (Vec3::from_array(disk.s), Vec3::from_array(disk.t) * 10f32.powf(shape));
+            let (sin, cos) = turn.sin_cos();
+            Surfel { center: disk.center, s: (s * cos + t * sin).to_array(), t: (t * cos - s * sin).to_array() }
+        },
+    )
+}
+
+fn scene() -> impl Strategy<Value = Scene> {
+    let colored = (surfel(), prop::array::uniform4(any::<u8>()));
+    (prop::collection::vec(colored, 1..60), any::<bool>(), any::<bool>()).prop_map(|(all, linear, oriented)| {
+        let (surfels, codes): (Vec<_>, Vec<_>) = all.into_iter().unzip();
+        let colors = Colors::Srgb8(codes);
+        let colors = if linear {
+            Colors::Linear((0..surfels.len()).map(|i| colors.linear(i).map(|c| 3.0 * c).map(|c| c.min(1.0))).collect())
+        } else {
+            colors
+        };
+        Scene { origin: DVec3::new(5e5, -3e6, 80.0), surfels, colors, oriented, up: Up::Z }
+    })
+}
+
+fn camera(scene: &Scene, orthographic: bool) -> Camera {
+    let lens = if orthographic { Lens::OrthographicHeight(3.0) } else { Lens::Intrinsics([50.0, 44.0, 20.0, 22.0]) };
+    let eye = scene.origin + DVec3::new(0.3, -2.0, 0.8);
+    Camera::look_at(SIZE, lens, eye, scene.origin, None, Up::Z, 1e-2).unwrap()
+}
+
+fn options() -> impl Strategy<Value = RenderOptions> {
+    (0usize..3, prop_oneof![Just(3.0), Just(2.0), Just(1.7)], any::<bool>()).prop_map(|(epsilon, n, lit)| {
+        RenderOptions {
+            epsilon: [Epsilon::Relative(0.01), Epsilon::Absolute(0.05), Epsilon::Relative(0.0)][epsilon],
+            kernel: Kernel::Ellipse { a: 6.0, n },
+            shading: if lit { Shading::Lambert } else { Shading::Unlit },
+            lights: vec![Light::Headlight { intensity: 0.7 }, Light::Directional { toward: Vec3::Z, intensity: 0.3 }],
+            background: [0.0; 4],
+            maps: Maps { depth: true, normal: true, weight: true, count: true, decision: false },
+        }
+    })
+}
+
+/// Depth, weight, count and normal exist exactly where a fragment was accepted, and nothing is NaN.
+fn check_maps(frame: &Frame) -> Result<(), TestCaseError> {
+    let (depth, weight) = (frame.depth.as_ref().unwrap(), frame.weight.as_ref().unwrap());
+    let (count, normal) = (frame.count.as_ref().unwrap(), frame.normal.as_ref().unwrap());
+    for pixel in 0..frame.color.len() {
+        let covered = weight[pixel] > 0.0;
+        prop_assert_eq!(covered, depth[pixel].is_finite());
+        prop_assert_eq!(covered, count[pixel] > 0.0);
+        prop_assert!(frame.color[pixel].iter().chain(&normal[pixel]).all(|v| v.is_finite()));
+        let length = Vec3::from_array(normal[pixel]).length();
+        prop_assert!(length == 0.0 || (covered && (length - 1.0).abs() < 1e-5));
+        if !covered {
+            prop_assert_eq!(frame.color[pixel], [0.0; 4]);
+        }
+    }
+    Ok(())
+}
+
+/// The same scene with its surfels turned round and dealt into three hands.
+fn dealt(scene: &Scene) -> Scene {
+    let count = scene.surfels.len();
+    let order: Vec<usize> = (0..3).flat_map(|hand| (0..count).rev().filter(move |i| i % 3 == hand)).collect();
+    let colors = match &scene.colors {
+        Colors::Srgb8(codes) => Colors::Srgb8(order.iter().map(|&i| codes[i]).collect()),
+        Colors::Linear(colors) => Colors::Linear(order.iter().map(|&i| colors[i]).collect()),
+        constant => constant.clone(),
+    };
+    Scene { surfels: order.iter().map(|&i| scene.surfels[i]).collect(), colors, ..scene.clone() }
+}
+
+#[test]
+fn maps_are_consistent_and_the_gpu_agrees_with_the_reference() {
+    let gpu = common::gpu().map(Backend::gpu);
+    let config = Config { cases: 48, failure_persistence: None, ..Config::default() };
+    TestRunner::new(config)
+        .run(&(scene(), options(), any::<bool>()), |(scene, options, orthographic)| {
+            let camera = camera(&scene, orthographic);
+            let with_decision = RenderOptions { maps: Maps { decision: true, ..options.maps }, ..options.clone() };
+            let (reference, _) = render(&scene, &camera, &with_decision, &Backend::Reference, &()).unwrap();
+            check_maps(&reference)?;
+            let Some(gpu) = &gpu else { return Ok(()) };
+            let (frame, _) = render(&scene, &camera, &options, gpu, &()).unwrap();
+            check_maps(&frame)?;
+            let comparison = compare(&frame, &reference).unwrap();
+            let of =
+                |map: &str| comparison.maps.iter().find(|m| m.map == map).and_then(|m| m.max_of_range_decided).unwrap();
+            // Premultiplied sums are divided by a mean alpha of 1/255 and more, which scales the bound of 2 * 1.2e-5.
+            let alpha = reference.color.iter().map(|c| c[3]).filter(|a| *a > 0.0).fold(1.0, f32::min);
+            prop_assert!(of("color") < 1e-4 / f64::from(alpha), "color {:?} alpha {}", comparison, alpha);
+            prop_assert!(of("depth") < 1e-5, "depth {:?}", comparison);
+            prop_assert!(of("weight") < 1e-5, "weight {:?}", comparison);
+            prop_assert_eq!(of("count"), 0.0);
+            let (again, _) = render(&dealt(&scene), &camera, &options, gpu, &()).unwrap();
+            prop_assert!(frame == again, "the order of the surfels changed the image");
+            Ok(())
+        })
+        .unwrap();
+}

@@ -19,18 +19,14 @@
 //!
 //! ```
 //! use epsplat::render::{Backend, render};
-//! use epsplat::scene::{Bounds, Camera, Lens, RenderOptions};
+//! use epsplat::scene::{Camera, Lens, RenderOptions};
 //!
 //! let points = epsplat::io::Points {
 //!     positions: vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]],
 //!     ..Default::default()
 //! };
 //! let (scene, _) = epsplat::surfels::build(vec![points], &())?;
-//! let local = scene.bounds();
-//! let bounds = Bounds { min: local.min + scene.origin, max: local.max + scene.origin };
-//! let (size, lens) = ((64, 64), Lens::Fov(45.0));
-//! let (eye, target) = Camera::framing(size, lens, &bounds, scene.up)?;
-//! let camera = Camera::look_at(size, lens, eye, target, None, scene.up, Camera::default_near(&bounds))?;
+//! let camera = Camera::framing((64, 64), Lens::Fov(45.0), &scene, Camera::default_near(&scene.bounds()))?;
 //! let (frame, report) = render(&scene, &camera, &RenderOptions::default(), &Backend::Reference, &())?;
 //! assert!(frame.color.iter().any(|pixel| pixel[3] > 0.0));
 //! assert_eq!(report.surfels, 4);

@@ -11,7 +11,7 @@ use epsplat::frame::Frame;
 use epsplat::io;
 use epsplat::render::{Backend, render};
 use epsplat::scene::color::linear_to_srgb;
-use epsplat::scene::{Bounds, Camera, Colors, Lens, Light, RenderOptions, Scene, Shading};
+use epsplat::scene::{Camera, Colors, Lens, Light, RenderOptions, Scene, Shading};
 use epsplat::surfels::analytic::{Shape, generate};
 use epsplat::surfels::build;
 use glam::Vec3;
@@ -34,10 +34,7 @@ fn file(name: &str) -> Scene {
 }
 
 fn framed(scene: &Scene, size: (u32, u32), lens: Lens) -> Camera {
-    let local = scene.bounds();
-    let bounds = Bounds { min: local.min + scene.origin, max: local.max + scene.origin };
-    let (eye, target) = Camera::framing(size, lens, &bounds, scene.up).unwrap();
-    Camera::look_at(size, lens, eye, target, None, scene.up, Camera::default_near(&bounds)).unwrap()
+    Camera::framing(size, lens, scene, Camera::default_near(&scene.bounds())).unwrap()
 }
 
 fn cases() -> Vec<(&'static str, Scene, Camera, RenderOptions)> {
@@ -62,7 +59,7 @@ fn cases() -> Vec<(&'static str, Scene, Camera, RenderOptions)> {
     case("torus", generated(Shape::Torus, 20_000), (200, 150), Lens::OrthographicHeight(2.8), lit);
     let unlit = RenderOptions { shading: Shading::Unlit, ..default.clone() };
     case("checkerboard", generated(Shape::Checkerboard, 40_000), (160, 120), Lens::Fov(60.0), unlit);
-    case("sphere", generated(Shape::Sphere, 300), (120, 120), Lens::Intrinsics([150.0, 120.0, 50.0, 70.0]), default);
+    case("sphere", generated(Shape::Sphere, 3000), (120, 120), Lens::Intrinsics([150.0, 120.0, 50.0, 70.0]), default);
     cases
 }
 

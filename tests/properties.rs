@@ -6,6 +6,7 @@
 mod common;
 
 use epsplat::frame::Frame;
+use epsplat::gpu::Sources;
 use epsplat::metrics::compare;
 use epsplat::render::{Backend, render};
 use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Lens, Light, Maps, RenderOptions, Scene, Shading, Surfel, Up};
@@ -95,31 +96,44 @@ fn dealt(scene: &Scene) -> Scene {
     Scene { surfels: order.iter().map(|&i| scene.surfels[i]).collect(), colors, ..scene.clone() }
 }
 
+/// Runs the property on `cases` random scenes.
+fn agree(gpu: Option<&Backend>, cases: u32) -> Result<(), String> {
+    let config = Config { cases, failure_persistence: None, max_shrink_iters: 0, ..Config::default() };
+    let strategy = (scene(), options(), any::<bool>());
+    let outcome = TestRunner::new(config).run(&strategy, |(scene, options, orthographic)| {
+        let camera = camera(&scene, orthographic);
+        let with_decision = RenderOptions { maps: Maps { decision: true, ..options.maps }, ..options.clone() };
+        let (reference, _) = render(&scene, &camera, &with_decision, &Backend::Reference, &()).unwrap();
+        check_maps(&reference)?;
+        let Some(gpu) = gpu else { return Ok(()) };
+        let (frame, _) = render(&scene, &camera, &options, gpu, &()).unwrap();
+        check_maps(&frame)?;
+        let comparison = compare(&frame, &reference).unwrap();
+        let of =
+            |map: &str| comparison.maps.iter().find(|m| m.map == map).and_then(|m| m.max_of_range_decided).unwrap();
+        // Premultiplied sums are divided by a mean alpha of 1/255 and more, which scales the bound of 2 * 1.2e-5.
+        let alpha = reference.color.iter().map(|c| c[3]).filter(|a| *a > 0.0).fold(1.0, f32::min);
+        prop_assert!(of("color") < 1e-4 / f64::from(alpha), "color {:?} alpha {}", comparison, alpha);
+        prop_assert!(of("depth") < 1e-5, "depth {:?}", comparison);
+        prop_assert!(of("weight") < 1e-5, "weight {:?}", comparison);
+        prop_assert_eq!(of("count"), 0.0);
+        let (again, _) = render(&dealt(&scene), &camera, &options, gpu, &()).unwrap();
+        prop_assert!(frame == again, "the order of the surfels changed the image");
+        Ok(())
+    });
+    outcome.map_err(|e| e.to_string())
+}
+
 #[test]
 fn maps_are_consistent_and_the_gpu_agrees_with_the_reference() {
     let gpu = common::gpu().map(Backend::gpu);
-    let config = Config { cases: 48, failure_persistence: None, ..Config::default() };
-    TestRunner::new(config)
-        .run(&(scene(), options(), any::<bool>()), |(scene, options, orthographic)| {
-            let camera = camera(&scene, orthographic);
-            let with_decision = RenderOptions { maps: Maps { decision: true, ..options.maps }, ..options.clone() };
-            let (reference, _) = render(&scene, &camera, &with_decision, &Backend::Reference, &()).unwrap();
-            check_maps(&reference)?;
-            let Some(gpu) = &gpu else { return Ok(()) };
-            let (frame, _) = render(&scene, &camera, &options, gpu, &()).unwrap();
-            check_maps(&frame)?;
-            let comparison = compare(&frame, &reference).unwrap();
-            let of =
-                |map: &str| comparison.maps.iter().find(|m| m.map == map).and_then(|m| m.max_of_range_decided).unwrap();
-            // Premultiplied sums are divided by a mean alpha of 1/255 and more, which scales the bound of 2 * 1.2e-5.
-            let alpha = reference.color.iter().map(|c| c[3]).filter(|a| *a > 0.0).fold(1.0, f32::min);
-            prop_assert!(of("color") < 1e-4 / f64::from(alpha), "color {:?} alpha {}", comparison, alpha);
-            prop_assert!(of("depth") < 1e-5, "depth {:?}", comparison);
-            prop_assert!(of("weight") < 1e-5, "weight {:?}", comparison);
-            prop_assert_eq!(of("count"), 0.0);
-            let (again, _) = render(&dealt(&scene), &camera, &options, gpu, &()).unwrap();
-            prop_assert!(frame == again, "the order of the surfels changed the image");
-            Ok(())
-        })
-        .unwrap();
+    agree(gpu.as_ref(), 48).unwrap();
+}
+
+/// The control: with a kernel that is a little wrong, the property must fail.
+#[test]
+fn a_wrong_kernel_is_noticed() {
+    let Some(gpu) = common::gpu() else { return };
+    let sources = Sources::default().replace("kernel_ellipse.wgsl", "exp(-KERNEL_A", "exp(-1.002 * KERNEL_A").unwrap();
+    assert!(agree(Some(&Backend::Gpu { gpu: Box::new(gpu), sources }), 48).is_err());
 }

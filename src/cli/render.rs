@@ -275,10 +275,7 @@ impl View {
                 let target = if target.is_nan() { (bounds.min + bounds.max) * 0.5 } else { target };
                 Camera::look_at(self.size, self.lens, eye, target, up, scene.up, near)
             }
-            None => {
-                let (eye, target) = Camera::framing(self.size, self.lens, &bounds, scene.up)?;
-                Camera::look_at(self.size, self.lens, eye, target, None, scene.up, near)
-            }
+            None => Camera::framing(self.size, self.lens, scene, near),
         }
     }
 }

@@ -266,11 +266,11 @@ impl Program {
     }
 
     /// Binds `buffers` by name for `stage`: each of the stage's variables must be among them, others are ignored.
-    pub(crate) fn bind<'a>(
+    pub(crate) fn bind(
         &self,
         gpu: &Gpu,
         stage: &str,
-        buffers: &[(&str, &'a wgpu::Buffer)],
+        buffers: &[(&str, &wgpu::Buffer)],
     ) -> Result<(&wgpu::ComputePipeline, wgpu::BindGroup)> {
         let (Some(pipeline), Some(variables)) = (self.pipelines.get(stage), self.bindings.get(stage)) else {
             return Err(gpu.error(format!("there is no kernel {stage}")));

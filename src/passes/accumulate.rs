@@ -157,3 +157,27 @@ pub fn record(
         encoder.clear_buffer(&buffer.sums.raw, 0, None)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_accumulator_has_its_file_and_the_words_that_buffers_are_laid_out_for() {
+        for row in ACCUMULATORS {
+            assert!(crate::gpu::kernel::FILES.iter().any(|(name, _)| *name == row.file), "{}", row.file);
+            assert_eq!(row.words, crate::gpu::layout::SUM_WORDS);
+        }
+    }
+
+    #[test]
+    fn a_decision_is_near_only_if_nothing_else_decides() {
+        // Just inside the rim, well inside the tolerance.
+        assert!((decision(1.0 - 1e-7, 2.0, 2.2, 0.1) - 1e-7).abs() < 1e-12);
+        // At the rim, but far behind the tolerance: out either way.
+        assert_eq!(decision(1.0 - 1e-7, 2.0, 1.0, 0.1), f64::INFINITY);
+        // At the tolerance, but outside the disk.
+        assert_eq!(decision(1.5, 2.0, 2.0, 0.1), f64::INFINITY);
+        assert_eq!(decision(0.5, 2.0, 2.0, 0.1), 0.0);
+    }
+}

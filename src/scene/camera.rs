@@ -60,7 +60,7 @@ pub enum Lens {
 }
 
 impl Lens {
-    fn intrinsics(self, width: u32, height: u32) -> Result<(Projection, [f64; 4])> {
+    pub(super) fn intrinsics(self, width: u32, height: u32) -> Result<(Projection, [f64; 4])> {
         let (w, h) = (f64::from(width), f64::from(height));
         let (projection, values) = match self {
             Self::Fov(degrees) => {
@@ -117,7 +117,7 @@ impl Camera {
         let right = match up {
             Some(up) => {
                 let right = forward.cross(up.normalize_or_zero());
-                if !(right.length() > 1e-6) {
+                if right.length().is_nan() || right.length() <= 1e-6 {
                     return Err(Error::Usage("the camera's up is zero or points along its view".into()));
                 }
                 right
@@ -137,8 +137,9 @@ impl Camera {
         check_size(width, height)?;
         let (projection, [fx, fy, cx, cy]) = lens.intrinsics(width, height)?;
         let skew = (rotation * rotation.transpose() - DMat3::IDENTITY).to_cols_array();
-        // NaN must fail too, so the comparison is for the good case.
-        if !skew.iter().all(|e| e.abs() < 1e-6) || !(rotation.determinant() > 0.0) || !eye.is_finite() {
+        // NaN must fail too, so the comparisons are for the good case.
+        let rigid = skew.iter().all(|e| e.abs() < 1e-6) && rotation.determinant() > 0.0;
+        if !rigid || !eye.is_finite() {
             return Err(Error::Usage(
                 "the camera's pose is not a rigid motion: its rotation must be orthonormal with determinant +1".into(),
             ));
@@ -154,55 +155,6 @@ impl Camera {
     pub fn default_near(bounds: &Bounds) -> f64 {
         let diagonal = (bounds.max - bounds.min).length();
         if diagonal > 0.0 { diagonal * 1e-6 } else { 1e-6 }
-    }
-
-    /// The pose chosen when nobody chose one, as eye and target: the scene's bounding box fills the image up to a margin
-    /// of 4 % and lies centred in it, seen from the front, a little from the right and above (z-up scenes, which tend
-    /// to be terrain, from steeper). `bounds` in world coordinates.
-    pub fn framing((width, height): (u32, u32), lens: Lens, bounds: &Bounds, up: Up) -> Result<(DVec3, DVec3)> {
-        check_size(width, height)?;
-        let (projection, [fx, fy, cx, cy]) = lens.intrinsics(width, height)?;
-        let forward = match up {
-            Up::Y => -DVec3::new(0.45, 0.35, 1.0),
-            Up::Z => DVec3::new(-0.3, 1.0, -1.2),
-        }
-        .normalize();
-        let right = forward.cross(up.axis()).normalize();
-        let down = forward.cross(right);
-        let center = (bounds.min + bounds.max) * 0.5;
-        let half = (bounds.max - bounds.min) * 0.5;
-        let radius = half.length();
-        let radius = if radius > 0.0 { radius } else { 0.5 };
-        if projection == Projection::Orthographic {
-            return Ok((center - forward * radius * 2.0, center));
-        }
-        // Tangents of the half-angles to the nearer image edges, less the margin.
-        let tangent = |center: f64, size: f64, f: f64| (0.96 * center.min(size - center) / f).max(1e-3);
-        let (tan_x, tan_y) = (tangent(cx, f64::from(width), fx), tangent(cy, f64::from(height), fy));
-        // The eye (x, y, z) in the frame (right, down, forward) about the centre must keep every corner between four
-        // planes, X - tan_x Z <= x - tan_x z and so on; the foremost such eye between each pair of planes.
-        let corners = (0..8).map(|corner| {
-            let sign = |bit: u32| if corner >> bit & 1 == 0 { -1.0 } else { 1.0 };
-            let offset = half * DVec3::new(sign(0), sign(1), sign(2));
-            DVec3::new(offset.dot(right), offset.dot(down), offset.dot(forward))
-        });
-        let (mut planes, mut nearest) = ([f64::NEG_INFINITY; 4], f64::INFINITY);
-        for p in corners {
-            let reach = [p.x - tan_x * p.z, -p.x - tan_x * p.z, p.y - tan_y * p.z, -p.y - tan_y * p.z];
-            planes = std::array::from_fn(|k| planes[k].max(reach[k]));
-            nearest = nearest.min(p.z);
-        }
-        let z = -((planes[0] + planes[1]) / (2.0 * tan_x)).max((planes[2] + planes[3]) / (2.0 * tan_y));
-        let z = z.min(nearest - 0.05 * radius);
-        let shift = right * ((planes[0] - planes[1]) * 0.5) + down * ((planes[2] - planes[3]) * 0.5);
-        Ok((center + shift + forward * z, center + shift))
-    }
-
-    /// The world height of an orthographic view that holds the whole scene.
-    pub fn orthographic_height((width, height): (u32, u32), bounds: &Bounds) -> f64 {
-        let diagonal = (bounds.max - bounds.min).length().max(1e-30);
-        let aspect = f64::from(width) / f64::from(height);
-        diagonal * 1.04 / aspect.min(1.0)
     }
 
     /// A world point in camera space.
@@ -237,31 +189,6 @@ mod tests {
         assert!((camera.to_camera(DVec3::X) - DVec3::X).length() < 1e-15);
         assert!((camera.to_camera(DVec3::Z) + DVec3::Y).length() < 1e-15);
         assert!((camera.fx - 50.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn framing_keeps_every_corner_in_the_image() {
-        let bounds = Bounds { min: DVec3::new(-3.0, 2.0, 1.0), max: DVec3::new(9.0, 4.0, 1.5) };
-        for (up, size) in [(Up::Y, (640, 480)), (Up::Z, (100, 900)), (Up::Z, (1024, 64))] {
-            let lens = Lens::Fov(45.0);
-            let (eye, target) = Camera::framing(size, lens, &bounds, up).unwrap();
-            let camera = Camera::look_at(size, lens, eye, target, None, up, 1e-3).unwrap();
-            let mut closest_to_edge = f64::INFINITY;
-            let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-            for corner in 0..8 {
-                let pick = |axis: usize| if corner >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
-                let p = camera.to_camera(DVec3::new(pick(0), pick(1), pick(2)));
-                let (x, y) = (camera.fx * p.x / p.z + camera.cx, camera.fy * p.y / p.z + camera.cy);
-                let inside = x.min(f64::from(size.0) - x) / f64::from(size.0) * 2.0;
-                let inside = inside.min(y.min(f64::from(size.1) - y) / f64::from(size.1) * 2.0);
-                closest_to_edge = closest_to_edge.min(inside);
-            }
-            assert!(closest_to_edge > 0.039 && closest_to_edge < 0.2, "{closest_to_edge}");
-            // The axis that fills the image is centred; the other has its middle within the image's middle half.
-            let off = (low + high) * 0.5 - DVec3::new(f64::from(size.0), f64::from(size.1), 0.0) * 0.5;
-            assert!(off.x.abs().min(off.y.abs()) < 1e-6, "{off}");
-            assert!(off.x.abs() < f64::from(size.0) * 0.25 && off.y.abs() < f64::from(size.1) * 0.25, "{off}");
-        }
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 pub mod camera;
 pub mod color;
+pub mod framing;
 pub mod light;
 pub mod needs;
 pub mod options;

@@ -1,0 +1,56 @@
+//! Whole frames and the preparation before them: `cargo bench`.
+
+#![allow(missing_docs, clippy::unwrap_used)]
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use epsplat::gpu::Gpu;
+use epsplat::io::Points;
+use epsplat::render::{Backend, render};
+use epsplat::scene::{Camera, Lens, RenderOptions};
+use epsplat::surfels::analytic::{Shape, generate};
+use epsplat::surfels::build;
+
+fn sphere(count: u64, with_normals: bool) -> Points {
+    let samples: Vec<_> = generate(Shape::Sphere, count).collect();
+    Points {
+        positions: samples.iter().map(|s| s.position).collect(),
+        normals: with_normals.then(|| samples.iter().map(|s| s.normal).collect()),
+        radii: with_normals.then(|| samples.iter().map(|s| s.radius).collect()),
+        ..Points::default()
+    }
+}
+
+/// A frame of 1024x1024, upload included.
+fn frames(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("frame");
+    group.sample_size(10);
+    let mut backends = vec![("reference", Backend::Reference)];
+    backends.extend(Gpu::open(None).ok().map(|gpu| ("gpu", Backend::gpu(gpu))));
+    for count in [10_000, 100_000, 1_000_000] {
+        let (scene, _) = build(vec![sphere(count, true)], &()).unwrap();
+        let near = Camera::default_near(&scene.bounds());
+        let camera = Camera::framing((1024, 1024), Lens::Fov(45.0), &scene, near).unwrap();
+        group.throughput(Throughput::Elements(count));
+        for (name, backend) in &backends {
+            group.bench_function(BenchmarkId::new(*name, count), |b| {
+                b.iter(|| render(&scene, &camera, &RenderOptions::default(), backend, &()).unwrap());
+            });
+        }
+    }
+}
+
+/// Normals and radii of points that have none.
+fn estimates(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("estimate");
+    group.sample_size(10);
+    for count in [10_000, 100_000] {
+        let points = sphere(count, false);
+        group.throughput(Throughput::Elements(count));
+        group.bench_function(BenchmarkId::from_parameter(count), |b| {
+            b.iter(|| build(vec![points.clone()], &()).unwrap());
+        });
+    }
+}
+
+criterion_group!(benches, frames, estimates);
+criterion_main!(benches);

@@ -110,6 +110,7 @@ fn on_gpu(
     let mut recorder = Recorder { gpu, program: &program, view, pixel, timing };
 
     let surfels = SurfelBuffer::upload(gpu, scene, &needs, progress)?;
+    progress.begin("rendering rows", camera.height.into());
     let start = Instant::now();
     let splats = project::record(&mut recorder, surfels)?;
     let mut frame = Frame::new(camera, &options.maps);
@@ -131,7 +132,9 @@ fn on_gpu(
         accumulate::record(&mut recorder, &splats, rows, nearest, sums)?;
         resolve::record(&mut recorder, rows, nearest, sums, image)?;
         resolve::read_back(&recorder, rows, &needs, image, &mut frame)?;
+        progress.advance(rows.count.into());
     }
+    progress.end();
     let total_ms = start.elapsed().as_secs_f64() * 1e3;
     let clock = if recorder.timing.on_device() { "timestamps" } else { "wall" };
     let passes = recorder.timing.finish(gpu)?;

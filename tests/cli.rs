@@ -150,6 +150,7 @@ fn unusable_arguments_exit_with_2() {
     };
     render(&["--size", "0x0"], &["0x0"]);
     render(&["--size", "100000x100000"], &["100000x100000", "32768"]);
+    render(&["--size", "32768x32768"], &["268435456"]);
     render(&["--size", "big"], &["WIDTHxHEIGHT"]);
     render(&["--fov", "40", "--ortho", "3"], &["--ortho"]);
     render(&["--camera", camera, "--eye", "0,0,1"], &["--eye"]);

@@ -2,6 +2,7 @@
 
 use std::io::IsTerminal;
 use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 
 use epsplat::Progress;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -25,10 +26,15 @@ impl Progress for Bars {
     fn begin(&self, what: &str, units: u64) {
         self.with(|bar| {
             *bar = if units > 0 { ProgressBar::new(units) } else { ProgressBar::new_spinner() };
-            let template = "{msg:24} {bar:40} {percent:>3} %  {eta}";
-            // The template is a constant that parses; the default serves should it ever not.
+            let template = if units > 0 {
+                "{spinner} {msg:24} {bar:40} {percent:>3} %  {elapsed}"
+            } else {
+                "{spinner} {msg:24} {elapsed}"
+            };
+            // The templates are constants that parse; the default serves should one ever not.
             bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
             bar.set_message(what.to_owned());
+            bar.enable_steady_tick(Duration::from_millis(120));
         });
     }
 

@@ -89,10 +89,16 @@ impl Lens {
     }
 }
 
+/// The most pixels of an image: with colour alone, 4 GiB in host memory.
+pub const MAX_PIXELS: u64 = 1 << 28;
+
 /// Rejects image sizes that no backend can hold.
 pub fn check_size(width: u32, height: u32) -> Result<()> {
     if width == 0 || height == 0 || width > MAX_SIDE || height > MAX_SIDE {
         return Err(Error::Usage(format!("an image is 1 to {MAX_SIDE} pixels wide and high, {width}x{height} is not")));
+    }
+    if u64::from(width) * u64::from(height) > MAX_PIXELS {
+        return Err(Error::Usage(format!("an image has at most {MAX_PIXELS} pixels, {width}x{height} has more")));
     }
     Ok(())
 }

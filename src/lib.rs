@@ -2,6 +2,7 @@
 pub mod error;
 pub mod frame;
 pub mod gpu;
+pub mod inspect;
 pub mod io;
 pub mod passes;
 pub mod progress;

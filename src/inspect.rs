@@ -56,13 +56,7 @@ impl Stages {
 ///
 /// # Errors
 /// [`Error::Usage`] if the image's sums need more than one buffer; and whatever a render can fail with.
-pub fn stages(
-    scene: &Scene,
-    camera: &Camera,
-    options: &RenderOptions,
-    gpu: &Gpu,
-    sources: &Sources,
-) -> Result<Stages> {
+pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu, sources: &Sources) -> Result<Stages> {
     let color_range = scene.color_range();
     let needs = SceneNeeds::of(scene, &color_range, camera, options);
     let program = Program::compile(gpu, sources, &needs, options)?;

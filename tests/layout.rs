@@ -131,7 +131,9 @@ fn shape(module: &Module, ty: naga::Handle<naga::Type>) -> Result<Shape, String>
     };
     match module.types[ty].inner {
         TypeInner::Scalar(scalar) | TypeInner::Atomic(scalar) => one(scalar),
-        TypeInner::Vector { size: naga::VectorSize::Tri, .. } => Err("a vec3, whose alignment no Pod struct has".into()),
+        TypeInner::Vector { size: naga::VectorSize::Tri, .. } => {
+            Err("a vec3, whose alignment no Pod struct has".into())
+        }
         TypeInner::Vector { size, scalar } => Ok(Shape { scalars: size as usize, ..one(scalar)? }),
         TypeInner::Matrix { .. } => Err("a matrix".into()),
         TypeInner::Array { base, size: ArraySize::Constant(count), stride } => {
@@ -206,7 +208,9 @@ fn compare(
         for member in from {
             match to.iter().find(|other| other.name == member.name) {
                 None => found.push(format!("{name}.{} exists {side} only", member.name)),
-                Some(other) if other != member => found.push(format!("{name}: {member:?} and {other:?} ({side} first)")),
+                Some(other) if other != member => {
+                    found.push(format!("{name}: {member:?} and {other:?} ({side} first)"))
+                }
                 Some(_) => {}
             }
         }
@@ -254,7 +258,8 @@ fn a_changed_layout_is_noticed() {
         let sources = Sources::default().replace("layout.wgsl", from, to).unwrap();
         differences(&reflect(&sources.join(&needs)).unwrap().0).join("; ")
     };
-    let swapped = broken("    a: array<f32, 3>,\n    b: array<f32, 3>,\n", "    b: array<f32, 3>,\n    a: array<f32, 3>,\n");
+    let swapped =
+        broken("    a: array<f32, 3>,\n    b: array<f32, 3>,\n", "    b: array<f32, 3>,\n    a: array<f32, 3>,\n");
     assert!(swapped.contains("Splat") && swapped.contains("\"a\""), "{swapped}");
     // A field that no kernel uses, so that the module stays valid.
     let renamed = broken("    padding_2: u32,\n}\n\n// The rows", "    padding_x: u32,\n}\n\n// The rows");
@@ -314,7 +319,7 @@ fn constants_agree() {
     assert_eq!(ONE, 1 << 24);
     // A pixel's row fits beside the flag, its column below the row.
     assert_eq!((MAX_SIDE - 1) << 16 & AWAY, 0);
-    assert!(MAX_SIDE - 1 <= 0xffff);
+    const { assert!(MAX_SIDE - 1 <= 0xffff) };
     // The scale is stated once: no kernel repeats it as a number.
     let repeated = FILES.iter().map(|(_, text)| text.matches("16777216").count()).sum::<usize>();
     assert_eq!(repeated, 1);

@@ -42,7 +42,8 @@ fn an_invalid_kernel_or_one_with_a_feature_is_noticed() {
     let needs = common::all_needs()[0];
     let broken = Sources::default().replace("kernel_ellipse.wgsl", "exp(-KERNEL_A", "exp(-view").unwrap();
     assert!(reflect(&broken.join(&needs)).is_err());
-    let wide = Sources::default().replace("kernel_ellipse.wgsl", "var power: f32;", "var power: f32; let w = 1lu;").unwrap();
+    let wide =
+        Sources::default().replace("kernel_ellipse.wgsl", "var power: f32;", "var power: f32; let w = 1lu;").unwrap();
     let text = wide.join(&needs);
     let module = naga::front::wgsl::parse_str(&text).unwrap();
     assert!(Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module).is_err());
@@ -59,8 +60,7 @@ fn every_file_is_known_and_reached() {
     let known: BTreeSet<String> = FILES.iter().map(|(name, _)| (*name).to_owned()).collect();
     assert_eq!(on_disk, known);
     assert_eq!(known.len(), FILES.len());
-    let reached: BTreeSet<String> =
-        common::all_needs().iter().flat_map(files).map(str::to_owned).collect();
+    let reached: BTreeSet<String> = common::all_needs().iter().flat_map(files).map(str::to_owned).collect();
     assert_eq!(reached, known);
 }
 

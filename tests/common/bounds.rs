@@ -132,9 +132,13 @@ impl Precision {
         let Some(center) = self.center else {
             let ray = self.anchor_ray.length() + step.length() / self.focal;
             let anchor = self.principal.abs().element_sum() + splat.anchor[0].abs().max(splat.anchor[1].abs()) as f64;
-            let factor = (15.0 * E + evaluation) * ray + 5.0 * E * self.anchor_ray.length() + 3.0 * E * anchor / self.focal;
+            let factor =
+                (15.0 * E + evaluation) * ray + 5.0 * E * self.anchor_ray.length() + 3.0 * E * anchor / self.focal;
             let depth = z * factor / (self.distance * self.cosine) + self.determinant() + evaluation;
-            return Bound { rho: z * inverse_axes * factor + rho * (self.determinant() + depth + 1.5 * evaluation), depth };
+            return Bound {
+                rho: z * inverse_axes * factor + rho * (self.determinant() + depth + 1.5 * evaluation),
+                depth,
+            };
         };
         let from_center = DVec2::new(f64::from(x), f64::from(y)) + 0.5 - center;
         let distance = from_center.length();

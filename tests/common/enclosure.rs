@@ -21,6 +21,11 @@ impl Interval {
         self.low <= value && value <= self.high
     }
 
+    /// Infinite where it reaches down to zero or up to infinity.
+    pub fn relative_width(&self) -> f64 {
+        if self.low > 0.0 && self.high.is_finite() { self.high / self.low - 1.0 } else { f64::INFINITY }
+    }
+
     fn add(&mut self, low: f64, high: f64) {
         self.low += low;
         self.high += high;

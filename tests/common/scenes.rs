@@ -115,11 +115,9 @@ fn scene(kinds: &[(Kind, usize)], camera: &Camera, origin: DVec3, length: f64, n
     random.shuffle(&mut surfels);
     // Colours beyond [0, 1] and differing in alpha: the widest case.
     let mut channel = |low, high| random.between(low, high) as f32;
-    let colors = surfels
-        .iter()
-        .map(|_| [channel(-0.5, 3.0), channel(0.0, 1.0), channel(0.2, 0.9), channel(0.1, 1.0)])
-        .collect();
-    Scene { origin, surfels, colors: Colors::Linear(colors), oriented: seed % 2 == 0, up: Up::Z }
+    let colors =
+        surfels.iter().map(|_| [channel(-0.5, 3.0), channel(0.0, 1.0), channel(0.2, 0.9), channel(0.1, 1.0)]).collect();
+    Scene { origin, surfels, colors: Colors::Linear(colors), oriented: seed.is_multiple_of(2), up: Up::Z }
 }
 
 const MIXED: &[(Kind, usize)] = &[
@@ -170,10 +168,7 @@ pub fn sphere(count: usize, radius: f64) -> Scene {
     let code = |x: f64| (127.0 + 127.0 * (9.0 * x).sin()) as u8;
     Scene {
         origin: DVec3::ZERO,
-        surfels: points
-            .iter()
-            .map(|p| Surfel::disk(p.as_vec3(), p.as_vec3(), (radius * spacing) as f32))
-            .collect(),
+        surfels: points.iter().map(|p| Surfel::disk(p.as_vec3(), p.as_vec3(), (radius * spacing) as f32)).collect(),
         colors: Colors::Srgb8(points.iter().map(|p| [code(p.x), code(p.y), code(p.z), 255]).collect()),
         oriented: true,
         up: Up::Y,
@@ -182,9 +177,16 @@ pub fn sphere(count: usize, radius: f64) -> Scene {
 
 /// A view of [`sphere`] that it fills.
 pub fn sphere_camera(size: u32, projection: Projection) -> Camera {
-    let lens = match projection {
-        Projection::Pinhole => Lens::Fov(45.0),
-        Projection::Orthographic => Lens::OrthographicHeight(2.1),
-    };
+    sphere_camera_with(
+        size,
+        match projection {
+            Projection::Pinhole => Lens::Fov(45.0),
+            Projection::Orthographic => Lens::OrthographicHeight(2.1),
+        },
+    )
+}
+
+/// The same through another lens.
+pub fn sphere_camera_with(size: u32, lens: Lens) -> Camera {
     Camera::look_at((size, size), lens, DVec3::new(1.2, 0.7, 2.4), DVec3::ZERO, None, Up::Y, 1e-5).unwrap()
 }

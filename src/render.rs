@@ -154,7 +154,7 @@ fn on_gpu(
 }
 
 /// The image in bands of whole rows whose sums fit a binding.
-fn bands(gpu: &Gpu, camera: &Camera, pixel: &PixelLayout) -> Result<Vec<Rows>> {
+pub(crate) fn bands(gpu: &Gpu, camera: &Camera, pixel: &PixelLayout) -> Result<Vec<Rows>> {
     let row_bytes = u64::from(camera.width) * u64::from(pixel.sum_words.max(pixel.image_words)) * 4;
     let rows_per_band = gpu.buffer_limit() / row_bytes;
     if rows_per_band == 0 {

@@ -39,11 +39,12 @@ fn homography(
     let x = image_of(center[0], 0u);
     let y = image_of(center[1], 1u);
     let image = vec2<f32>(x.high, y.high);
-    if (p_z + sqrt(s.z * s.z + t.z * t.z) < view.near || h.away == 0.0 || any(abs(image) >= vec2<f32>(4194304.0))) {
+    if (p_z + sqrt(s.z * s.z + t.z * t.z) < view.near || h.away == 0.0) {
         return h;
     }
     let focal = view.intrinsics.xy;
-    let pixel = floor(image);
+    // A centre farther out than this is no better an anchor for the pixels of the image, and whole numbers stay exact.
+    let pixel = clamp(floor(image), vec2<f32>(-4194304.0), vec2<f32>(4194304.0));
     let offset = (image - pixel) + vec2<f32>(x.low, y.low) - 0.5;
     let a = vec2<f32>(t.y, -t.x) / (h.away * focal);
     let b = vec2<f32>(-s.y, s.x) / (h.away * focal);

@@ -80,9 +80,8 @@ impl AdapterDescription {
     }
 }
 
-/// The most storage buffers a kernel uses (accumulate: splats, surfels, depths, sums, colours, the sRGB table,
-/// the queue).
-const STORAGE_BUFFERS: u32 = 7;
+/// The most storage buffers a kernel uses (accumulate: splats, surfels, depths, sums, colours, the sRGB table, the queue).
+pub const STORAGE_BUFFERS: u32 = 7;
 
 /// What to do about a missing adapter.
 pub const INSTALL_HINT: &str = "install a Vulkan driver (on Debian or Ubuntu without a GPU: \
@@ -161,6 +160,14 @@ impl Gpu {
             }
         });
         Ok(Self { adapter, limits, device, queue, failure })
+    }
+
+    /// The same device with smaller buffers, of at most `bytes` each: scenes and images are cut into more pages and bands
+    /// than the adapter asks for. It bounds memory, and lets tests cross page borders with small scenes.
+    pub fn with_buffer_limit(mut self, bytes: u64) -> Self {
+        let limit = &mut self.limits.max_storage_buffer_binding_size;
+        *limit = bytes.min(*limit);
+        self
     }
 
     /// An error of this device.

@@ -113,10 +113,14 @@ pub fn files(needs: &SceneNeeds) -> Vec<&'static str> {
 pub struct PixelLayout {
     /// Words of a pixel in the sums; the weight's come first.
     pub sum_words: u32,
-    color_word: u32,
-    normal_word: u32,
-    depth_word: u32,
-    count_word: u32,
+    /// Word of the first colour channel's sum; only if colours differ.
+    pub color_word: u32,
+    /// Word of the normal's x sum; only if normals are accumulated.
+    pub normal_word: u32,
+    /// Word of the depth's sum; only if depth is accumulated.
+    pub depth_word: u32,
+    /// Word of the fragment count; only if fragments are counted.
+    pub count_word: u32,
     /// Words of a pixel in the image; the colour's four come first.
     pub image_words: u32,
     /// Word of the normal map's x in the image.

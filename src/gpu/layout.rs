@@ -28,6 +28,9 @@ pub const SUM_WORDS: u32 = 2;
 /// Units of a weight sum: 2^24.
 pub const ONE: u32 = 1 << 24;
 
+/// Bit of [`Splat::bounds_last`] that says that s x t points away from the viewer.
+pub const AWAY: u32 = 1 << 31;
+
 /// The camera, options and ranges of one render, as the kernels see them. See the WGSL for the meaning of each field.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]

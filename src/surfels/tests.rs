@@ -213,32 +213,6 @@ fn up_follows_the_inputs_then_the_shape() {
     assert_eq!(up(cloud(sphere(100))), Up::Y);
 }
 
-#[test]
-#[ignore = "prints points per second"]
-fn speed() {
-    for (name, positions) in [
-        ("sphere", sphere(1_000_000)),
-        ("random plane", {
-            let mut next = noise(1);
-            (0..1_000_000).map(|_| [next() * 1e3 + 5e5, next() * 1e3 + 6e6, next() * 0.1]).collect()
-        }),
-        ("sphere and a far outlier", {
-            let mut positions = sphere(999_999);
-            positions.push([1e15, 0.0, 0.0]);
-            positions
-        }),
-        (
-            "cubic grid",
-            (0..1_000_000).map(|i| [f64::from(i % 100), f64::from(i / 100 % 100), f64::from(i / 10_000)]).collect(),
-        ),
-    ] {
-        let start = std::time::Instant::now();
-        let (_, preparation) = build(vec![cloud(positions)], &()).unwrap();
-        let seconds = start.elapsed().as_secs_f64();
-        println!("{name}: {seconds:.2} s, {:.0} points/s, {preparation:?}", 1e6 / seconds);
-    }
-}
-
 fn coordinate() -> impl Strategy<Value = f64> {
     prop_oneof![
         8 => (-3i32..3).prop_map(f64::from),

@@ -2,7 +2,12 @@
 
 #![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+pub mod bounds;
+pub mod enclosure;
+pub mod scenes;
+
 use epsplat::gpu::Gpu;
+use epsplat::scene::{ColorNeed, Projection, SceneNeeds};
 
 /// The adapter, or `None` with a line on stderr where there is none and none is required.
 pub fn gpu() -> Option<Gpu> {
@@ -14,6 +19,70 @@ pub fn gpu() -> Option<Gpu> {
         Err(_) => {
             eprintln!("skipped: no adapter");
             None
+        }
+    }
+}
+
+/// Every set of needs that a scene and its options can have.
+pub fn all_needs() -> Vec<SceneNeeds> {
+    let mut all = Vec::new();
+    for bits in 0..1u32 << 8 {
+        let bit = |k: u32| bits >> k & 1 == 1;
+        let (lambert, normal_map, turn_normals, alpha) = (bit(0), bit(1), bit(2), bit(3));
+        let normal = lambert || normal_map;
+        for color in [ColorNeed::Constant, ColorNeed::Srgb8, ColorNeed::Linear] {
+            if (turn_normals && !normal) || (alpha && color == ColorNeed::Constant) {
+                continue;
+            }
+            let projection = if bit(4) { Projection::Pinhole } else { Projection::Orthographic };
+            let (depth, count, weight_map) = (bit(5), bit(6), bit(7));
+            all.push(SceneNeeds {
+                projection,
+                color,
+                alpha,
+                normal,
+                turn_normals,
+                depth,
+                count,
+                lambert,
+                normal_map,
+                weight_map,
+                decision: false,
+            });
+        }
+    }
+    all
+}
+
+/// Seeded numbers: splitmix64 (Steele et al. 2014).
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// Uniform in [0, 1).
+    pub fn unit(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    /// Uniform in the logarithm.
+    pub fn scale(&mut self, low: f64, high: f64) -> f64 {
+        self.between(low.ln(), high.ln()).exp()
+    }
+
+    pub fn shuffle<T>(&mut self, values: &mut [T]) {
+        for k in (1..values.len()).rev() {
+            values.swap(k, (self.bits() % (k as u64 + 1)) as usize);
         }
     }
 }

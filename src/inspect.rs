@@ -1,0 +1,153 @@
+//! What a researcher reads back between the stages: the device's own splats, depths and sums, and a way to run one
+//! function of a kernel over an array. Both are for study and for tests; a render keeps all of it on the device.
+
+use bytemuck::Pod;
+
+use crate::error::{Error, Result};
+use crate::gpu::buffers::Buffer;
+use crate::gpu::kernel::{PixelLayout, Program, grid, reflect};
+use crate::gpu::layout::{Splat, View};
+use crate::gpu::timing::Timing;
+use crate::gpu::{Gpu, Sources};
+use crate::passes::accumulate::AttributeBuffer;
+use crate::passes::upload::SurfelBuffer;
+use crate::passes::visibility::VisibilityBuffer;
+use crate::passes::{Recorder, accumulate, project, visibility};
+use crate::render::bands;
+use crate::scene::{Camera, RenderOptions, Scene, SceneNeeds};
+
+/// What the first three stages leave on the device.
+#[derive(Clone, Debug)]
+pub struct Stages {
+    /// The record of each surfel, in the order of the scene.
+    pub splats: Vec<Splat>,
+    /// The nearest depth of each pixel: bits of an f32 in device units, +inf where nothing is.
+    pub nearest: Vec<u32>,
+    /// [`PixelLayout::sum_words`] a pixel; see [`sum`](Self::sum).
+    pub sums: Vec<u32>,
+    /// Where each sum lies.
+    pub pixel: PixelLayout,
+    /// The uniform that the kernels saw.
+    pub view: View,
+}
+
+impl Stages {
+    /// The nearest depth of `pixel`, world units, +inf where nothing is. `None` past the image.
+    pub fn nearest_depth(&self, pixel: usize) -> Option<f64> {
+        let bits = self.nearest.get(pixel)?;
+        Some(f64::from(f32::from_bits(*bits)) * f64::from(self.view.world))
+    }
+
+    /// The 64-bit sum that starts at `word` of `pixel`, in units of 2^-24. `None` past the end.
+    pub fn sum(&self, pixel: usize, word: u32) -> Option<u64> {
+        let at = pixel.checked_mul(self.pixel.sum_words as usize)?.checked_add(word as usize)?;
+        let (low, high) = (self.sums.get(at)?, self.sums.get(at + 1)?);
+        Some(u64::from(*high) << 32 | u64::from(*low))
+    }
+
+    /// The fragments accepted at `pixel`. `None` if they were not counted.
+    pub fn count(&self, pixel: usize) -> Option<u32> {
+        let at = pixel.checked_mul(self.pixel.sum_words as usize)?.checked_add(self.pixel.count_word as usize)?;
+        (self.pixel.count_word < self.pixel.sum_words).then(|| self.sums.get(at).copied())?
+    }
+}
+
+/// Runs project, visibility and accumulate on `gpu` and reads back what each made.
+///
+/// # Errors
+/// [`Error::Usage`] if the image's sums need more than one buffer; and whatever a render can fail with.
+pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu, sources: &Sources) -> Result<Stages> {
+    let color_range = scene.color_range();
+    let needs = SceneNeeds::of(scene, &color_range, camera, options);
+    let program = Program::compile(gpu, sources, &needs, options)?;
+    let pixel = PixelLayout::of(&needs);
+    let bands = bands(gpu, camera, &pixel)?;
+    let [rows] = bands.as_slice() else {
+        return Err(Error::Usage(format!(
+            "an image of {}x{} pixels needs {} bands on {}, and stages are read back from images of one: choose a \
+             smaller image",
+            camera.width,
+            camera.height,
+            bands.len(),
+            gpu.adapter.name
+        )));
+    };
+    let view = View::new(scene, &scene.bounds(), &color_range, camera, options);
+    let timing = Timing::new(gpu, 4)?;
+    let mut recorder = Recorder { gpu, program: &program, view: Buffer::uniform(gpu, "view", &view)?, pixel, timing };
+    let surfels = SurfelBuffer::upload(gpu, scene, &needs, &())?;
+    let projected = project::record(&mut recorder, surfels)?;
+    let nearest = VisibilityBuffer::new(&recorder, rows.pixels)?;
+    let sums = AttributeBuffer::new(&recorder, rows.pixels)?;
+    visibility::record(&mut recorder, &projected, rows, &nearest)?;
+    accumulate::record(&mut recorder, &projected, rows, &nearest, &sums)?;
+    let mut splats = Vec::with_capacity(scene.surfels.len());
+    for page in &projected.pages {
+        splats.extend(page.splats.read(gpu, page.splats.len)?);
+    }
+    Ok(Stages {
+        splats,
+        nearest: nearest.nearest.read(gpu, rows.pixels)?,
+        sums: sums.sums.read(gpu, rows.pixels * u64::from(pixel.sum_words))?,
+        pixel,
+        view,
+    })
+}
+
+/// Runs the entry point `evaluate` of the module `text` over `inputs`, an invocation each.
+///
+/// The module may bind `view` (uniform), `inputs` (read-only storage) and `outputs` (`output_len` elements, at first
+/// zero). Its workgroups have [`WORKGROUP`](crate::gpu::layout::WORKGROUP) invocations, in a 2-D grid.
+///
+/// # Errors
+/// A module that is not valid, binds anything else, or fails on the device.
+pub fn evaluate<I: Pod, O: Pod>(gpu: &Gpu, text: &str, view: &View, inputs: &[I], output_len: u64) -> Result<Vec<O>> {
+    const ENTRY: &str = "evaluate";
+    let (_, bindings, _) = reflect(text).map_err(|e| Error::Usage(format!("the kernel is not valid WGSL: {e}")))?;
+    let variables =
+        bindings.get(ENTRY).ok_or_else(|| Error::Usage(format!("the kernel has no entry point {ENTRY}")))?;
+    let view = Buffer::uniform(gpu, "view", view)?;
+    let source = Buffer::storage(gpu, "inputs", inputs.len() as u64)?;
+    source.write(gpu, inputs, &())?;
+    let target = Buffer::<O>::storage(gpu, "outputs", output_len)?;
+    let buffers = [("view", &view.raw), ("inputs", &source.raw), ("outputs", &target.raw)];
+    let guard = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
+    let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some(ENTRY),
+        source: wgpu::ShaderSource::Wgsl(text.into()),
+    });
+    let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some(ENTRY),
+        layout: None,
+        module: &module,
+        entry_point: Some(ENTRY),
+        compilation_options: Default::default(),
+        cache: None,
+    });
+    if let Some(error) = pollster::block_on(guard.pop()) {
+        return Err(gpu.error(format!("the driver refused the kernel: {error}")));
+    }
+    let mut entries = Vec::with_capacity(variables.len());
+    for (name, binding) in variables {
+        let (_, buffer) = buffers
+            .iter()
+            .find(|(given, _)| given == name)
+            .ok_or_else(|| Error::Usage(format!("the kernel binds {name}, which is none of view, inputs, outputs")))?;
+        entries.push(wgpu::BindGroupEntry { binding: *binding, resource: buffer.as_entire_binding() });
+    }
+    let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some(ENTRY),
+        layout: &pipeline.get_bind_group_layout(0),
+        entries: &entries,
+    });
+    let (x, y) = grid(gpu, inputs.len() as u64)?;
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let mut pass = encoder.begin_compute_pass(&Default::default());
+    pass.set_pipeline(&pipeline);
+    pass.set_bind_group(0, &group, &[]);
+    pass.dispatch_workgroups(x, y, 1);
+    drop(pass);
+    gpu.queue.submit([encoder.finish()]);
+    gpu.wait()?;
+    target.read(gpu, output_len)
+}

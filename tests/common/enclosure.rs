@@ -1,0 +1,170 @@
+//! What each pixel's depth and sums can be on the device, as intervals around the twins' values: a fragment that the
+//! bounds leave undecided (at a rim, at epsilon, at the near depth) may be in or out, all others must be as the twin
+//! says. No pixel is excused; how many are left undecided is counted.
+
+use epsplat::passes::footprint::intersect;
+use epsplat::passes::project::Splat;
+use epsplat::scene::{Camera, Kernel, RenderOptions, Scene};
+
+use super::bounds::{E, Precision};
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    pub low: f64,
+    pub high: f64,
+}
+
+impl Interval {
+    pub const ZERO: Self = Self { low: 0.0, high: 0.0 };
+
+    pub fn holds(&self, value: f64) -> bool {
+        self.low <= value && value <= self.high
+    }
+
+    /// Infinite where it reaches down to zero or up to infinity.
+    pub fn relative_width(&self) -> f64 {
+        if self.low > 0.0 && self.high.is_finite() { self.high / self.low - 1.0 } else { f64::INFINITY }
+    }
+
+    fn add(&mut self, low: f64, high: f64) {
+        self.low += low;
+        self.high += high;
+    }
+}
+
+/// Everything about one pixel.
+#[derive(Clone, Debug)]
+pub struct Pixel {
+    /// Nearest depth, world units.
+    pub nearest: Interval,
+    pub count: (u32, u32),
+    pub weight: Interval,
+    /// Weighted sums of colour and normal, mapped to [0, 1].
+    pub color: [Interval; 4],
+    pub normal: [Interval; 3],
+    /// Mean depth, world units.
+    pub depth: Interval,
+}
+
+impl Pixel {
+    /// All its fragments are surely in or surely out.
+    pub fn decided(&self) -> bool {
+        self.count.0 == self.count.1
+    }
+}
+
+/// Relative error of a kernel weight at rho: WGSL grants exp 3 + 2 |x| units, and its argument takes three roundings.
+fn weight_error(kernel: Kernel, weight: f64) -> f64 {
+    let Kernel::Ellipse { n, .. } = kernel;
+    let exponent = -weight.ln();
+    // pow is exp2(y log2 x): its error grows with the logarithm, which is small where the weight is not.
+    let power = if [2.0, 3.0, 4.0].contains(&n) { 3.0 } else { 64.0 };
+    (3.0 + 2.0 * exponent) * 2.0 * E + power * exponent * E
+}
+
+struct Candidate {
+    pixel: usize,
+    depth: Interval,
+    rho: Interval,
+    sure: bool,
+    splat: usize,
+}
+
+/// The enclosures of an image.
+pub fn enclose(scene: &Scene, camera: &Camera, options: &RenderOptions, splats: &[Splat]) -> Vec<Pixel> {
+    let (width, height) = (camera.width, camera.height);
+    let blank = Pixel {
+        nearest: Interval { low: f64::INFINITY, high: f64::INFINITY },
+        count: (0, 0),
+        weight: Interval::ZERO,
+        color: [Interval::ZERO; 4],
+        normal: [Interval::ZERO; 3],
+        depth: Interval { low: f64::INFINITY, high: f64::NEG_INFINITY },
+    };
+    let mut pixels = vec![blank; camera.pixels()];
+    let mut candidates = Vec::new();
+    let mut open = vec![false; splats.len()];
+    for (index, splat) in splats.iter().enumerate() {
+        let precision = Precision::of(splat, scene, camera);
+        open[index] = precision.side_is_open();
+        // A pixel more on each side: what the twin's bounds leave out must be out for other reasons too.
+        for y in splat.first[1].saturating_sub(1)..=(splat.last[1] + 1).min(height - 1) {
+            for x in splat.first[0].saturating_sub(1)..=(splat.last[0] + 1).min(width - 1) {
+                let Some(at) = intersect(splat, camera, x, y) else { continue };
+                let bound = precision.fragment(splat, x, y, &at);
+                let rho = at.rho2.sqrt();
+                let rho = Interval { low: (rho - bound.rho).max(0.0), high: rho + bound.rho };
+                let span = at.depth.abs() * bound.depth;
+                let depth = Interval { low: at.depth - span, high: at.depth + span };
+                let near = camera.near;
+                if rho.low > 1.0 || depth.high < near * (1.0 - 4.0 * E) || rho.low.is_nan() {
+                    continue;
+                }
+                let sure = rho.high <= 1.0 && depth.low >= near * (1.0 + 4.0 * E) && !open[index];
+                let pixel = y as usize * width as usize + x as usize;
+                let nearest = &mut pixels[pixel].nearest;
+                nearest.low = nearest.low.min(depth.low.max(near * (1.0 - 4.0 * E)));
+                if sure {
+                    nearest.high = nearest.high.min(depth.high);
+                }
+                candidates.push(Candidate { pixel, depth, rho, sure, splat: index });
+            }
+        }
+    }
+    accumulate(scene, options, splats, &candidates, &open, &mut pixels);
+    pixels
+}
+
+fn accumulate(
+    scene: &Scene,
+    options: &RenderOptions,
+    splats: &[Splat],
+    candidates: &[Candidate],
+    open: &[bool],
+    pixels: &mut [Pixel],
+) {
+    let (low, high) = scene.color_range();
+    let (relative, absolute) = options.epsilon.parts();
+    for candidate in candidates {
+        let splat = &splats[candidate.splat];
+        let pixel = &mut pixels[candidate.pixel];
+        let back = |front: f64| front * (1.0 + relative) + absolute;
+        if candidate.depth.low > back(pixel.nearest.high) * (1.0 + 4.0 * E) {
+            continue;
+        }
+        // What is nearest itself is accepted whatever its depth is.
+        let sure = candidate.sure && candidate.depth.high <= back(pixel.nearest.low) * (1.0 - 4.0 * E);
+        let weight_at = |rho: f64| options.kernel.weight(rho.min(1.0).powi(2));
+        let (least, most) = (weight_at(candidate.rho.high), weight_at(candidate.rho.low));
+        let least = if sure { least * (1.0 - weight_error(options.kernel, least)) } else { 0.0 };
+        let most = most * (1.0 + weight_error(options.kernel, most));
+        // Rounding to units of 2^-24, in f32, is one unit for the weight and one more for each term.
+        let add = |sum: &mut Interval, value: Interval, units: f64| {
+            let low = (least * (value.low - 4.0 * E).max(0.0) - units * E).max(0.0);
+            let high = most * (value.high + 4.0 * E).min(1.0) + units * E;
+            sum.add(if sure { low } else { 0.0 }, high);
+        };
+        add(&mut pixel.weight, Interval { low: 1.0, high: 1.0 }, 1.0);
+        let [r, g, b, alpha] = scene.colors.linear(splat.surfel as usize);
+        for (k, value) in [r * alpha, g * alpha, b * alpha, alpha].into_iter().enumerate() {
+            let span = f64::from(high[k]) - f64::from(low[k]);
+            let mapped = if span > 0.0 { (f64::from(value) - f64::from(low[k])) / span } else { 0.0 };
+            // The difference from the low end may be exact to 1e of the larger magnitude only.
+            let blur = if span > 0.0 { 2.0 * E * f64::from(low[k].abs().max(high[k].abs())) / span } else { 0.0 };
+            add(&mut pixel.color[k], Interval { low: mapped - blur, high: mapped + blur }, 2.0);
+        }
+        let turned = if splat.away && !scene.oriented { -splat.normal } else { splat.normal };
+        for (k, value) in turned.to_array().into_iter().enumerate() {
+            let size = if open[candidate.splat] && !scene.oriented { value.abs() } else { f64::NAN };
+            let mapped = match size.is_nan() {
+                true => Interval { low: value * 0.5 + 0.5 - 4.0 * E, high: value * 0.5 + 0.5 + 4.0 * E },
+                false => Interval { low: 0.5 - 0.5 * size - 4.0 * E, high: 0.5 + 0.5 * size + 4.0 * E },
+            };
+            add(&mut pixel.normal[k], mapped, 2.0);
+        }
+        pixel.depth.low = pixel.depth.low.min(candidate.depth.low);
+        pixel.depth.high = pixel.depth.high.max(candidate.depth.high);
+        pixel.count.0 += u32::from(sure);
+        pixel.count.1 += 1;
+    }
+}

@@ -1,0 +1,76 @@
+//! Cases that renderers like to get wrong: the GPU against the f64 reference.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use epsplat::metrics::compare;
+use epsplat::render::{Backend, render};
+use epsplat::scene::{Camera, Colors, Lens, Maps, RenderOptions, Scene, Surfel, Up};
+use glam::{DVec3, Vec3};
+
+/// Disks seen by a camera at the origin that looks along z; colours differ, so that every attribute is summed.
+fn check(name: &str, surfels: Vec<Surfel>, camera: &Camera, covered: f64) {
+    let Some(gpu) = common::gpu() else { return };
+    let colors = Colors::Srgb8((0..surfels.len()).map(|i| [40 * (i as u8 % 6), 90, 200, 255]).collect());
+    let scene = Scene { origin: DVec3::ZERO, surfels, colors, oriented: true, up: Up::Y };
+    let maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
+    let options = RenderOptions { maps, ..RenderOptions::default() };
+    let with_decision = RenderOptions { maps: Maps { decision: true, ..maps }, ..options.clone() };
+    let (reference, _) = render(&scene, camera, &with_decision, &Backend::Reference, &()).unwrap();
+    let (frame, _) = render(&scene, camera, &options, &Backend::gpu(gpu), &()).unwrap();
+    let share = reference.color.iter().filter(|c| c[3] > 0.0).count() as f64 / camera.pixels() as f64;
+    assert!((share - covered).abs() < 0.02, "{name}: the reference covers {share}");
+    let comparison = compare(&frame, &reference).unwrap();
+    assert!(comparison.excused.unwrap() < 0.01, "{name}: {comparison:?}");
+    for map in &comparison.maps {
+        // A map that hardly varies has no range to speak of; then the error is some units of 2^-24.
+        assert!(map.max_of_range_decided.unwrap() <= 1e-4 || map.max_abs <= 4.0 / 16_777_216.0, "{name}: {map:?}");
+    }
+}
+
+fn pinhole(size: (u32, u32)) -> Camera {
+    Camera::look_at(size, Lens::Fov(60.0), DVec3::ZERO, DVec3::Z, Some(DVec3::NEG_Y), Up::Y, 1e-3).unwrap()
+}
+
+fn orthographic(size: (u32, u32)) -> Camera {
+    let lens = Lens::OrthographicHeight(4.0);
+    Camera::look_at(size, lens, DVec3::ZERO, DVec3::Z, Some(DVec3::NEG_Y), Up::Y, 1e-3).unwrap()
+}
+
+#[test]
+fn one_disk_of_a_million_pixels_is_drawn_to_its_last_row() {
+    // Over 65,535 pixels, where llvmpipe ends a loop.
+    let disks = vec![Surfel::disk(Vec3::new(0.1, 0.2, 3.0), Vec3::new(0.1, 0.2, -1.0), 30.0); 2];
+    check("pinhole", disks.clone(), &pinhole((1100, 1000)), 1.0);
+    check("orthographic", disks, &orthographic((1100, 1000)), 1.0);
+}
+
+#[test]
+fn a_disk_whose_centre_is_millions_of_pixels_away_still_covers_the_image() {
+    let disk = |x: f32, radius: f32| Surfel::disk(Vec3::new(x, 0.0, 5.0), Vec3::new(0.0, 0.0, -1.0), radius);
+    check("pinhole", vec![disk(6e5, 1e6)], &pinhole((64, 48)), 1.0);
+    check("orthographic", vec![disk(6e5, 1e6)], &orthographic((64, 48)), 1.0);
+}
+
+#[test]
+fn disks_through_and_around_the_camera_show_their_part_in_front() {
+    // The floor under the camera fills the lower half; a wall beside it the left.
+    let floor = Surfel::disk(Vec3::new(0.0, 1.0, 0.0), Vec3::NEG_Y, 1000.0);
+    check("floor", vec![floor], &pinhole((160, 120)), 0.5);
+    let behind = Surfel::disk(Vec3::new(0.0, 1.0, -5.0), Vec3::NEG_Y, 20.0);
+    check("centre behind", vec![floor, behind], &pinhole((160, 120)), 0.5);
+    // The camera lies in the plane of this disk, inside it: exactly edge-on, and nothing to see.
+    let around = Surfel::disk(Vec3::ZERO, Vec3::Y, 10.0);
+    check("camera inside", vec![around, floor], &pinhole((160, 120)), 0.5);
+    check("nothing", vec![Surfel::disk(Vec3::new(0.0, 0.0, -2.0), Vec3::Z, 1.0)], &pinhole((16, 16)), 0.0);
+}
+
+#[test]
+fn odd_image_sizes_work() {
+    let disks = vec![Surfel::disk(Vec3::new(0.0, 0.0, 3.0), Vec3::new(1e-4, 2e-4, -1.0), 30_000.0); 3];
+    for size in [(1, 1), (17, 3), (4097, 1), (1, 300)] {
+        check("pinhole", disks.clone(), &pinhole(size), 1.0);
+        check("orthographic", disks.clone(), &orthographic(size), 1.0);
+    }
+}

@@ -28,7 +28,7 @@ fn frames(criterion: &mut Criterion) {
     backends.extend(Gpu::open(None).ok().map(|gpu| ("gpu", Backend::gpu(gpu))));
     for count in [10_000, 100_000, 1_000_000] {
         let (scene, _) = build(vec![sphere(count, true)], &()).unwrap();
-        let near = Camera::default_near(&scene.bounds());
+        let near = Camera::default_near(&scene);
         let camera = Camera::framing((1024, 1024), Lens::Fov(45.0), &scene, near).unwrap();
         group.throughput(Throughput::Elements(count));
         for (name, backend) in &backends {

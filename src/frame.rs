@@ -42,7 +42,14 @@ impl Frame {
 
     /// A frame of no rows, to [`append`](Self::append) to.
     pub fn empty(camera: &Camera, maps: &Maps) -> Self {
-        Self::new(&Camera { height: 0, ..camera.clone() }, maps)
+        let mut frame = Self::new(&Camera { height: 0, ..camera.clone() }, maps);
+        let pixels = camera.pixels();
+        frame.color.reserve_exact(pixels);
+        for map in [&mut frame.depth, &mut frame.weight, &mut frame.count, &mut frame.decision].into_iter().flatten() {
+            map.reserve_exact(pixels);
+        }
+        frame.normal.iter_mut().for_each(|map| map.reserve_exact(pixels));
+        frame
     }
 
     /// Puts the rows of `below` under these; both have the same width and maps.

@@ -5,12 +5,13 @@ use bytemuck::Pod;
 
 use crate::error::{Error, Result};
 use crate::gpu::buffers::Buffer;
-use crate::gpu::kernel::{PixelLayout, Program, grid, reflect};
+use crate::gpu::kernel::{grid, reflect};
 use crate::gpu::layout::{Splat, View};
 use crate::gpu::timing::Timing;
 use crate::gpu::{Gpu, Sources};
 use crate::passes::accumulate::AttributeBuffer;
 use crate::passes::upload::SurfelBuffer;
+use crate::passes::variant::{PixelLayout, Variant};
 use crate::passes::visibility::VisibilityBuffer;
 use crate::passes::{Recorder, accumulate, project, visibility};
 use crate::render::bands;
@@ -23,7 +24,7 @@ pub struct Stages {
     pub splats: Vec<Splat>,
     /// The nearest depth of each pixel: bits of an f32 in device units, +inf where nothing is.
     pub nearest: Vec<u32>,
-    /// [`PixelLayout::sum_words`] a pixel; see [`sum`](Self::sum).
+    /// [`Variant::sum_words`] a pixel; see [`sum`](Self::sum).
     pub sums: Vec<u32>,
     /// Where each sum lies.
     pub pixel: PixelLayout,
@@ -38,17 +39,16 @@ impl Stages {
         Some(f64::from(f32::from_bits(*bits)) * f64::from(self.view.world))
     }
 
-    /// The 64-bit sum that starts at `word` of `pixel`, in units of 2^-24. `None` past the end.
-    pub fn sum(&self, pixel: usize, word: u32) -> Option<u64> {
-        let at = pixel.checked_mul(self.pixel.sum_words as usize)?.checked_add(word as usize)?;
+    /// The sum of `channel` at `pixel` by the accumulator `fixed`, in units of 2^-30. `None` past the end.
+    pub fn sum(&self, pixel: usize, channel: u32) -> Option<u64> {
+        let at = pixel.checked_mul(self.pixel.channels as usize)?.checked_add(channel as usize)?.checked_mul(2)?;
         let (low, high) = (self.sums.get(at)?, self.sums.get(at + 1)?);
         Some(u64::from(*high) << 32 | u64::from(*low))
     }
 
-    /// The fragments accepted at `pixel`. `None` if they were not counted.
-    pub fn count(&self, pixel: usize) -> Option<u32> {
-        let at = pixel.checked_mul(self.pixel.sum_words as usize)?.checked_add(self.pixel.count_word as usize)?;
-        (self.pixel.count_word < self.pixel.sum_words).then(|| self.sums.get(at).copied())?
+    /// The fragments accepted at `pixel`, by the accumulator `fixed`. `None` if they were not counted.
+    pub fn count(&self, pixel: usize) -> Option<u64> {
+        (self.pixel.count_channel < self.pixel.channels).then(|| self.sum(pixel, self.pixel.count_channel))?
     }
 }
 
@@ -59,9 +59,10 @@ impl Stages {
 pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu, sources: &Sources) -> Result<Stages> {
     let color_range = scene.color_range();
     let needs = SceneNeeds::of(scene, &color_range, camera, options);
-    let program = Program::compile(gpu, sources, &needs, options)?;
-    let pixel = PixelLayout::of(&needs);
-    let bands = bands(gpu, camera, &pixel)?;
+    let variant = Variant::of(&needs, options, scene.surfels.len() as u64)?;
+    variant.accumulator.check(gpu)?;
+    let program = variant.compile(gpu, sources)?;
+    let bands = bands(gpu, camera, &variant)?;
     let [rows] = bands.as_slice() else {
         return Err(Error::Usage(format!(
             "an image of {}x{} pixels needs {} bands on {}, and stages are read back from images of one: choose a \
@@ -74,7 +75,8 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
     };
     let view = View::new(scene, &scene.bounds(), &color_range, camera, options);
     let timing = Timing::new(gpu, 4)?;
-    let mut recorder = Recorder { gpu, program: &program, view: Buffer::uniform(gpu, "view", &view)?, pixel, timing };
+    let mut recorder =
+        Recorder { gpu, program: &program, view: Buffer::uniform(gpu, "view", &view)?, variant: &variant, timing };
     let surfels = SurfelBuffer::upload(gpu, scene, &needs, &())?;
     let projected = project::record(&mut recorder, surfels)?;
     let nearest = VisibilityBuffer::new(&recorder, rows.pixels)?;
@@ -88,8 +90,8 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
     Ok(Stages {
         splats,
         nearest: nearest.nearest.read(gpu, rows.pixels)?,
-        sums: sums.sums.read(gpu, rows.pixels * u64::from(pixel.sum_words))?,
-        pixel,
+        sums: sums.sums.read(gpu, rows.pixels * u64::from(variant.sum_words()))?,
+        pixel: variant.pixel,
         view,
     })
 }

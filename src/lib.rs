@@ -26,7 +26,7 @@
 //!     ..Default::default()
 //! };
 //! let (scene, _) = epsplat::surfels::build(vec![points], &())?;
-//! let camera = Camera::framing((64, 64), Lens::Fov(45.0), &scene, Camera::default_near(&scene.bounds()))?;
+//! let camera = Camera::framing((64, 64), Lens::Fov(45.0), &scene, Camera::default_near(&scene))?;
 //! let (frame, report) = render(&scene, &camera, &RenderOptions::default(), &Backend::Reference, &())?;
 //! assert!(frame.color.iter().any(|pixel| pixel[3] > 0.0));
 //! assert_eq!(report.surfels, 4);

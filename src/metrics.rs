@@ -23,7 +23,7 @@ pub struct Comparison {
     pub coverage_mismatch: f64,
     /// 99.9th percentile over pixels of the largest absolute difference in the pixel.
     pub percentile_99_9: f64,
-    /// The maps that both images have, and the colour as one of them.
+    /// The maps that both images have; of the colour, RGB and alpha apart.
     pub maps: Vec<MapError>,
     /// Only if A or B has a `decision` map: share of pixels that are excused because a fragment lies within
     /// [`DECISION_MARGIN`] of a decision.
@@ -34,11 +34,11 @@ pub struct Comparison {
 /// The error of one map, relative to the range that B's values span.
 #[derive(Clone, Debug, Serialize)]
 pub struct MapError {
-    /// color, depth, normal, weight or count.
+    /// color (RGB), alpha, depth, normal, weight or count.
     pub map: &'static str,
     /// Largest minus smallest finite value of B.
     pub range: f64,
-    /// Largest absolute difference over pixels that are finite in both.
+    /// Largest absolute difference; of depths, over pixels that both cover.
     pub max_abs: f64,
     /// The same as a fraction of the range.
     pub max_of_range: f64,
@@ -57,13 +57,8 @@ pub fn compare(a: &Frame, b: &Frame) -> Result<Comparison> {
     }
     let pixels = a.color.len();
     let worst_in_pixel: Vec<f64> = a.color.par_iter().zip(&b.color).map(|(a, b)| largest_difference(a, b)).collect();
-    let squared: f64 = a
-        .color
-        .iter()
-        .zip(&b.color)
-        .flat_map(|(a, b)| a.iter().zip(b))
-        .map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2))
-        .sum();
+    let values = a.color.iter().zip(&b.color).flat_map(|(a, b)| a.iter().zip(b));
+    let squared: f64 = values.map(|(a, b)| difference(*a, *b).powi(2)).sum();
     let rmse = (squared / (4 * pixels) as f64).sqrt();
     let uncovered = a.color.iter().zip(&b.color).filter(|(a, b)| (a[3] > 0.0) != (b[3] > 0.0)).count();
     let mut sorted = worst_in_pixel;
@@ -72,7 +67,12 @@ pub fn compare(a: &Frame, b: &Frame) -> Result<Comparison> {
 
     let decision = b.decision.as_ref().or(a.decision.as_ref());
     let excused: Option<Vec<bool>> = decision.map(|map| map.iter().map(|d| *d < DECISION_MARGIN).collect());
-    let mut maps = vec![map_error("color", &a.color, &b.color, excused.as_deref())];
+    let rgb = |frame: &Frame| frame.color.iter().map(|c| [c[0], c[1], c[2]]).collect::<Vec<_>>();
+    let alpha = |frame: &Frame| frame.color.iter().map(|c| [c[3]]).collect::<Vec<_>>();
+    let mut maps = vec![
+        map_error("color", &rgb(a), &rgb(b), excused.as_deref()),
+        map_error("alpha", &alpha(a), &alpha(b), excused.as_deref()),
+    ];
     let scalar = |map: &'static str, a: &Option<Vec<f32>>, b: &Option<Vec<f32>>| {
         let wrap = |values: &Vec<f32>| values.iter().map(|v| [*v]).collect::<Vec<_>>();
         let (a, b) = (a.as_ref()?, b.as_ref()?);
@@ -95,13 +95,18 @@ pub fn compare(a: &Frame, b: &Frame) -> Result<Comparison> {
     })
 }
 
-/// NaN in either counts as an infinite difference: it must not pass for equality.
+/// The absolute difference. A value that is not finite against any other counts as the largest f32: it must neither pass
+/// for equality nor make the other measures meaningless.
+fn difference(a: f32, b: f32) -> f64 {
+    if a == b {
+        return 0.0;
+    }
+    let difference = (f64::from(a) - f64::from(b)).abs();
+    if difference.is_finite() { difference } else { f32::MAX.into() }
+}
+
 fn largest_difference<const N: usize>(a: &[f32; N], b: &[f32; N]) -> f64 {
-    let differences = a.iter().zip(b).map(|(a, b)| {
-        let d = if a == b { 0.0 } else { (f64::from(*a) - f64::from(*b)).abs() };
-        if d.is_nan() { f64::INFINITY } else { d }
-    });
-    differences.fold(0.0, f64::max)
+    a.iter().zip(b).map(|(a, b)| difference(*a, *b)).fold(0.0, f64::max)
 }
 
 fn map_error<const N: usize>(map: &'static str, a: &[[f32; N]], b: &[[f32; N]], excused: Option<&[bool]>) -> MapError {
@@ -110,8 +115,8 @@ fn map_error<const N: usize>(map: &'static str, a: &[[f32; N]], b: &[[f32; N]], 
     let range = if high > low { f64::from(high) - f64::from(low) } else { 0.0 };
     let (mut max_abs, mut max_decided) = (0f64, 0f64);
     for (pixel, (a, b)) in a.iter().zip(b).enumerate() {
-        // Infinite depth marks the background; that the two agree on it is what the coverage says.
-        if a.iter().chain(b).any(|v| v.is_infinite()) {
+        // Infinite depth marks the background; whether the two agree on it is what the coverage says.
+        if map == "depth" && a.iter().chain(b).any(|v| *v == f32::INFINITY) {
             continue;
         }
         let difference = largest_difference(a, b);
@@ -120,7 +125,8 @@ fn map_error<const N: usize>(map: &'static str, a: &[[f32; N]], b: &[[f32; N]], 
             max_decided = max_decided.max(difference);
         }
     }
-    let of_range = |error: f64| if error == 0.0 { 0.0 } else { error / range };
+    // Without a range any error is as large as can be.
+    let of_range = |error: f64| if error == 0.0 { 0.0 } else { (error / range).min(f32::MAX.into()) };
     MapError {
         map,
         range,
@@ -166,7 +172,9 @@ mod tests {
     fn nan_coverage_and_excuses_are_seen() {
         let a = frame(&[f32::NAN, 0.5]);
         let mut b = frame(&[0.0, 0.5]);
-        assert_eq!(compare(&a, &b).unwrap().max_abs, f64::INFINITY);
+        let c = compare(&a, &b).unwrap();
+        assert_eq!(c.max_abs, f64::from(f32::MAX));
+        assert!(c.psnr_db.unwrap() < -700.0 && c.maps[0].max_abs > 1e38);
         b.color[1][3] = 0.0;
         assert_eq!(compare(&a, &b).unwrap().coverage_mismatch, 0.5);
         let a = frame(&[0.0, 0.5, 0.5]);

@@ -10,13 +10,13 @@ use serde::Serialize;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::buffers::Buffer;
-use crate::gpu::kernel::{PixelLayout, Program};
 use crate::gpu::layout::{Band, MOST_ROUNDS, TILE, View};
 use crate::gpu::timing::Timing;
 use crate::gpu::{Gpu, Sources};
-use crate::passes::accumulate::AttributeBuffer;
+use crate::passes::accumulate::{ACCUMULATORS, AttributeBuffer};
 use crate::passes::resolve::ImageBuffer;
 use crate::passes::upload::SurfelBuffer;
+use crate::passes::variant::Variant;
 use crate::passes::visibility::VisibilityBuffer;
 use crate::passes::{Recorder, Rows, accumulate, project, resolve, visibility};
 use crate::progress::Progress;
@@ -50,6 +50,11 @@ pub struct Report {
     pub backend: &'static str,
     /// The adapter's name; of the reference, the processor threads.
     pub adapter: String,
+    /// How sums were kept; the reference adds in f64.
+    pub accumulator: &'static str,
+    /// How often a sum of the accumulator that was asked for wrapped. If ever, the frame was rendered again with `fixed`,
+    /// and `total_ms` holds both.
+    pub overflows: u64,
     /// Surfels in the scene.
     pub surfels: u64,
     /// Splats that may touch a pixel.
@@ -80,7 +85,7 @@ pub fn render(
         return Err(Error::Usage(format!("a render has at most {MAX_LIGHTS} lights, not {}", options.lights.len())));
     }
     if u32::try_from(scene.surfels.len()).is_err() {
-        return Err(Error::Usage(format!("a scene has at most 2^32 surfels, not {}", scene.surfels.len())));
+        return Err(Error::Usage(format!("a scene has at most 2^32 - 1 surfels, not {}", scene.surfels.len())));
     }
     match backend {
         Backend::Gpu { gpu, sources } => on_gpu(scene, camera, options, gpu, sources, progress),
@@ -101,21 +106,22 @@ fn on_gpu(
     }
     let color_range = scene.color_range();
     let needs = SceneNeeds::of(scene, &color_range, camera, options);
-    let program = Program::compile(gpu, sources, &needs, options)?;
-    let pixel = PixelLayout::of(&needs);
-    let bands = bands(gpu, camera, &pixel)?;
+    let variant = Variant::of(&needs, options, scene.surfels.len() as u64)?;
+    variant.accumulator.check(gpu)?;
+    let program = variant.compile(gpu, sources)?;
+    let bands = bands(gpu, camera, &variant)?;
     let view = View::new(scene, &scene.bounds(), &color_range, camera, options);
     let view = Buffer::uniform(gpu, "view", &view)?;
     let timing = Timing::new(gpu, 1 + 4 * bands.len() as u32)?;
-    let mut recorder = Recorder { gpu, program: &program, view, pixel, timing };
+    let mut recorder = Recorder { gpu, program: &program, view, variant: &variant, timing };
 
     let surfels = SurfelBuffer::upload(gpu, scene, &needs, progress)?;
     progress.begin("rendering rows", camera.height.into());
     let start = Instant::now();
     let splats = project::record(&mut recorder, surfels)?;
     let mut frame = Frame::new(camera, &options.maps);
-    let widest = bands.iter().map(|rows| rows.pixels).max().unwrap_or(0);
     let mut buffers: Option<(u64, VisibilityBuffer, AttributeBuffer, ImageBuffer)> = None;
+    let mut overflows = 0;
     for rows in &bands {
         // The last band may be lower, and a buffer's length is the number of its pixels.
         if buffers.as_ref().is_none_or(|(pixels, ..)| *pixels != rows.pixels) {
@@ -124,23 +130,37 @@ fn on_gpu(
                 rows.pixels,
                 VisibilityBuffer::new(&recorder, rows.pixels)?,
                 AttributeBuffer::new(&recorder, rows.pixels)?,
-                ImageBuffer::new(&recorder, rows.pixels.min(widest))?,
+                ImageBuffer::new(&recorder, rows.pixels)?,
             ));
         }
         let Some((_, nearest, sums, image)) = &buffers else { continue };
         visibility::record(&mut recorder, &splats, rows, nearest)?;
         accumulate::record(&mut recorder, &splats, rows, nearest, sums)?;
         resolve::record(&mut recorder, rows, nearest, sums, image)?;
-        resolve::read_back(&recorder, rows, &needs, image, &mut frame)?;
+        resolve::read_back(&recorder, rows, image, &mut frame)?;
+        overflows = sums.overflows(gpu)?;
+        if overflows > 0 {
+            break;
+        }
         progress.advance(rows.count.into());
     }
     progress.end();
+    if overflows > 0 {
+        // The device's memory is free again before the second try.
+        drop((buffers, splats));
+        let exact = RenderOptions { accumulator: ACCUMULATORS[0].name, ..options.clone() };
+        let (frame, report) = on_gpu(scene, camera, &exact, gpu, sources, progress)?;
+        let total_ms = report.total_ms + start.elapsed().as_secs_f64() * 1e3;
+        return Ok((frame, Report { overflows, total_ms, ..report }));
+    }
     let total_ms = start.elapsed().as_secs_f64() * 1e3;
     let clock = if recorder.timing.on_device() { "timestamps" } else { "wall" };
     let passes = recorder.timing.finish(gpu)?;
     let report = Report {
         backend: "gpu",
         adapter: gpu.adapter.name.clone(),
+        accumulator: variant.accumulator.name,
+        overflows: 0,
         surfels: scene.surfels.len() as u64,
         splats_drawn: splats.drawn,
         width: camera.width,
@@ -154,8 +174,8 @@ fn on_gpu(
 }
 
 /// The image in bands of whole rows whose sums fit a binding.
-pub(crate) fn bands(gpu: &Gpu, camera: &Camera, pixel: &PixelLayout) -> Result<Vec<Rows>> {
-    let row_bytes = u64::from(camera.width) * u64::from(pixel.sum_words.max(pixel.image_words)) * 4;
+pub(crate) fn bands(gpu: &Gpu, camera: &Camera, variant: &Variant) -> Result<Vec<Rows>> {
+    let row_bytes = u64::from(camera.width) * u64::from(variant.sum_words().max(variant.pixel.image_words)) * 4;
     let rows_per_band = gpu.buffer_limit() / row_bytes;
     if rows_per_band == 0 {
         return Err(Error::Limit {
@@ -194,33 +214,35 @@ fn on_reference(scene: &Scene, camera: &Camera, options: &RenderOptions, progres
     let (starts, members) = bin(&splats, bands as usize);
     progress.begin("rendering rows", camera.height.into());
     let spent: [AtomicU64; 3] = Default::default();
-    let finished: Vec<Frame> = (0..bands)
-        .into_par_iter()
-        .map(|band| {
-            let first_row = band * REFERENCE_ROWS;
-            let rows = REFERENCE_ROWS.min(camera.height - first_row);
-            let range = starts[band as usize]..starts[band as usize + 1];
-            let splats = || members[range.clone()].iter().map(|&index| &splats[index as usize]);
-            let clock = Instant::now();
-            let lap = |stage: usize, from: f64| {
-                let now = clock.elapsed().as_secs_f64();
-                spent[stage].fetch_add(((now - from) * 1e9) as u64, Ordering::Relaxed);
-                now
-            };
-            let nearest = visibility::reference(splats(), camera, first_row, rows);
-            let seen = lap(0, 0.0);
-            let sums = accumulate::reference(splats(), scene, camera, options, first_row, &nearest);
-            let summed = lap(1, seen);
-            let strip = Camera { height: rows, ..camera.clone() };
-            let mut frame = Frame::new(&strip, &options.maps);
-            resolve::reference(&sums, camera, options, first_row, &mut frame);
-            lap(2, summed);
-            progress.advance(rows.into());
-            frame
-        })
-        .collect();
+    let strip = |band: u32| {
+        let first_row = band * REFERENCE_ROWS;
+        let rows = REFERENCE_ROWS.min(camera.height - first_row);
+        let range = starts[band as usize]..starts[band as usize + 1];
+        let splats = || members[range.clone()].iter().map(|&index| &splats[index as usize]);
+        let clock = Instant::now();
+        let lap = |stage: usize, from: f64| {
+            let now = clock.elapsed().as_secs_f64();
+            spent[stage].fetch_add(((now - from) * 1e9) as u64, Ordering::Relaxed);
+            now
+        };
+        let nearest = visibility::reference(splats(), camera, first_row, rows);
+        let seen = lap(0, 0.0);
+        let sums = accumulate::reference(splats(), scene, camera, options, first_row, &nearest);
+        let summed = lap(1, seen);
+        let strip = Camera { height: rows, ..camera.clone() };
+        let mut frame = Frame::new(&strip, &options.maps);
+        resolve::reference(&sums, camera, options, first_row, &mut frame);
+        lap(2, summed);
+        progress.advance(rows.into());
+        frame
+    };
+    // A few strips at a time: all of them beside the frame would double its memory.
     let mut frame = Frame::empty(camera, &options.maps);
-    finished.into_iter().for_each(|strip| frame.append(strip));
+    let group = 8 * rayon::current_num_threads() as u32;
+    for first in (0..bands).step_by(group as usize) {
+        let strips: Vec<Frame> = (first..bands.min(first + group)).into_par_iter().map(strip).collect();
+        strips.into_iter().for_each(|strip| frame.append(strip));
+    }
     progress.end();
     let threads = rayon::current_num_threads();
     let mut passes = BTreeMap::from([("project_ms".to_owned(), project_ms)]);
@@ -229,7 +251,9 @@ fn on_reference(scene: &Scene, camera: &Camera, options: &RenderOptions, progres
     }
     let report = Report {
         backend: "reference",
-        adapter: format!("{threads} processor threads, f64"),
+        adapter: format!("{threads} processor threads"),
+        accumulator: "f64",
+        overflows: 0,
         surfels: scene.surfels.len() as u64,
         splats_drawn: splats.len() as u64,
         width: camera.width,

@@ -5,13 +5,14 @@
 
 @group(0) @binding(7) var<storage, read> visible: array<u32>;
 
-// Words of a pixel's sums; each attribute knows where in them its own begin.
-override PIXEL_WORDS: u32;
-const WEIGHT_WORD: u32 = 0u;
+// 2^-10: see LEAST_WEIGHT in src/scene/options.rs.
+const LEAST_WEIGHT: f32 = 0.0009765625;
 
 struct Attributes {
     color: vec4<f32>,
     normal: vec3<f32>,
+    // Device units; 0 where epsilon does not depend on it.
+    radius: f32,
 }
 
 fn blend(splat: Splat, attributes: Attributes, x: u32, y: u32) {
@@ -21,17 +22,14 @@ fn blend(splat: Splat, attributes: Attributes, x: u32, y: u32) {
     }
     let pixel = pixel_index(x, y);
     let front = bitcast<f32>(visible[pixel]);
-    let back = farthest_accepted(front);
-    if (fragment.depth > back) {
+    if (fragment.depth > farthest_accepted(front, attributes.radius)) {
         return;
     }
-    let word = pixel * PIXEL_WORDS;
-    let weight = quantise(kernel_weight(fragment.rho2));
-    add(word + WEIGHT_WORD, weight);
-    accumulate_color(word, weight, attributes.color);
-    accumulate_normal(word, weight, attributes.normal);
-    accumulate_depth(word, weight, fragment.depth, front, back);
-    accumulate_count(word);
+    let weight = quantise(max(kernel_weight(fragment.rho2), LEAST_WEIGHT));
+    accumulate_color(pixel, weight, attributes.color);
+    accumulate_normal(pixel, weight, attributes.normal);
+    accumulate_depth(pixel, weight, fragment.depth, front);
+    accumulate_count(pixel);
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -49,7 +47,7 @@ fn accumulate(
     if (any(pixels.first > pixels.last) || is_large(splat)) {
         return;
     }
-    let attributes = Attributes(color_of(index), normal_of(index, splat));
+    let attributes = Attributes(color_of(index), normal_of(index, splat), radius_of(index));
     for (var y = pixels.first.y; y <= pixels.last.y; y++) {
         for (var x = pixels.first.x; x <= pixels.last.x; x++) {
             blend(splat, attributes, x, y);
@@ -69,7 +67,7 @@ fn accumulate_large(
     }
     let splat = projected[index];
     let pixels = reach(splat);
-    let attributes = Attributes(color_of(index), normal_of(index, splat));
+    let attributes = Attributes(color_of(index), normal_of(index, splat), radius_of(index));
     for (var y = pixels.first.y + local.y; y <= pixels.last.y; y += TILE) {
         for (var x = pixels.first.x + local.x; x <= pixels.last.x; x += TILE) {
             blend(splat, attributes, x, y);

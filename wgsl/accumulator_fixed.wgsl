@@ -1,30 +1,46 @@
-// Sums in fixed point: 24 fractional bits a term, two words a sum (low, high) with an exact carry.
-// Twin and error bound: src/passes/accumulate.rs.
+// Sums in fixed point: 30 fractional bits a term, two words a sum (low, high) with an exact carry.
+// Error bound: src/passes/accumulate.rs.
 
-const SUM_WORDS: u32 = 2u;
-// Units of a weight sum.
-const ONE: f32 = 16777216.0;
+override CHANNELS: u32;
 
 @group(0) @binding(8) var<storage, read_write> sums: array<atomic<u32>>;
 
-// A weight in (0, 1] as fixed point. Never 0: where depth is written, weight is.
-fn quantise(weight: f32) -> u32 {
-    return max(u32(round(weight * ONE)), 1u);
+alias Term = u32;
+const COUNT_ONE: Term = 1u;
+
+// The units of a weight of 1: 2^30.
+const ONE: f32 = 1073741824.0;
+
+fn quantise(weight: f32) -> Term {
+    return u32(round(weight * ONE));
 }
 
-// weight * value for a value in [0, 1]. The weight is an integer of at most 24 bits, so exact as f32.
-fn term(weight: u32, value: f32) -> u32 {
+// weight * value for a value in [0, 1]. The weight came from an f32, so it has at most 24 significant bits and is exact
+// as f32.
+fn term(weight: Term, value: f32) -> Term {
     return u32(round(f32(weight) * clamp(value, 0.0, 1.0)));
 }
 
-fn add(word: u32, value: u32) {
+fn add(pixel: u32, channel: u32, value: Term) {
+    let word = 2u * (pixel * CHANNELS + channel);
     let before = atomicAdd(&sums[word], value);
     if (before + value < before) {
         atomicAdd(&sums[word + 1u], 1u);
     }
 }
 
-// A sum read back, in units of 2^-24; ratios of two sums have no unit.
-fn sum_at(word: u32) -> f32 {
+// Two sums that are neighbours; the first is an even channel.
+fn add_pair(pixel: u32, channel: u32, first: Term, second: Term) {
+    add(pixel, channel, first);
+    add(pixel, channel + 1u, second);
+}
+
+// A sum read back, in the units of the terms; ratios of two sums have no unit.
+fn sum_at(pixel: u32, channel: u32) -> f32 {
+    let word = 2u * (pixel * CHANNELS + channel);
     return f32(atomicLoad(&sums[word + 1u])) * 4294967296.0 + f32(atomicLoad(&sums[word]));
+}
+
+fn weight_at(pixel: u32) -> f32 {
+    return sum_at(pixel, WEIGHT_CHANNEL) / ONE;
 }

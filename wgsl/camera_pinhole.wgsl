@@ -9,10 +9,10 @@ fn image_of(position: Double, depth: Double, axis: u32) -> Double {
 
 // The extent of a disk wholly before the camera along one image axis, relative to its centre's X/Z.
 // Lines of constant x tangent to the disk: k^2 D + 2 k B - E = 0 with E >= 0 and D > 0 (conic of the disk's boundary).
-fn tangents(s: f32, t: f32, s_z: f32, t_z: f32, p_z: f32) -> vec2<f32> {
+fn tangents(s: f32, t: f32, s_z: f32, t_z: f32, p_z: f32, slope: f32) -> vec2<f32> {
     let e = s * s + t * t;
     let b = s * s_z + t * t_z;
-    let d = p_z * p_z - s_z * s_z - t_z * t_z;
+    let d = (p_z - slope) * (p_z + slope);
     let root = sqrt(b * b + d * e);
     // Each root in the form that does not cancel; where both vanish the extent is zero.
     let far = abs(b) + root;
@@ -22,11 +22,18 @@ fn tangents(s: f32, t: f32, s_z: f32, t_z: f32, p_z: f32) -> vec2<f32> {
 
 // The extent along one axis, as X/Z, of the part of a disk at depths of `near` and more, for a disk that crosses that
 // depth: tangents of the conic that touch it there, and the two ends of the chord at `near`.
-fn clipped_extent(s: vec2<f32>, t: vec2<f32>, p: vec2<f32>, end_0: vec2<f32>, end_1: vec2<f32>) -> vec2<f32> {
-    let chord_0 = (p.x + end_0.x * s.x + end_0.y * t.x) / view.near;
-    let chord_1 = (p.x + end_1.x * s.x + end_1.y * t.x) / view.near;
+fn clipped_extent(
+    s: vec2<f32>,
+    t: vec2<f32>,
+    p: vec2<f32>,
+    end_0: vec2<f32>,
+    end_1: vec2<f32>,
+    near: f32,
+) -> vec2<f32> {
+    let chord_0 = (p.x + end_0.x * s.x + end_0.y * t.x) / near;
+    let chord_1 = (p.x + end_1.x * s.x + end_1.y * t.x) / near;
     // The chord's ends are exact to the rounding of a sum of these magnitudes.
-    let blur = 1e-6 * (abs(p.x) + abs(s.x) + abs(t.x)) / view.near;
+    let blur = 1e-6 * (abs(p.x) + abs(s.x) + abs(t.x)) / near;
     var extent = vec2<f32>(min(chord_0, chord_1) - blur, max(chord_0, chord_1) + blur);
     let a = s.y * s.y + t.y * t.y - p.y * p.y;
     let b = s.x * s.y + t.x * t.y - p.x * p.y;
@@ -40,7 +47,7 @@ fn clipped_extent(s: vec2<f32>, t: vec2<f32>, p: vec2<f32>, end_0: vec2<f32>, en
             let line = vec3<f32>(s.x - k * s.y, t.x - k * t.y, p.x - k * p.y);
             let depth = p.y - (line.x * s.y + line.y * t.y) / line.z;
             // Half of `near` leaves room for rounding; a tangent too many only widens the bounds. NaN fails.
-            if (depth >= 0.5 * view.near) {
+            if (depth >= 0.5 * near) {
                 extent = vec2<f32>(min(extent.x, k), max(extent.y, k));
             }
         }
@@ -81,6 +88,31 @@ fn homography(
     s_world: vec3<f32>,
     t_world: vec3<f32>,
 ) -> Homography {
+    // In units of its own distance no product of a splat's lengths under- or overflows, however small a part of the scene
+    // it is. The unit is a power of two, so this is exact.
+    let largest = max(max(abs(center[0].high), abs(center[1].high)), abs(center[2].high));
+    let scale = bitcast<f32>(0x7f000000u - (bitcast<u32>(max(largest, 1e-30)) & 0x7f800000u));
+    var scaled: array<Double, 3>;
+    for (var i = 0u; i < 3u; i++) {
+        scaled[i] = Double(center[i].high * scale, center[i].low * scale);
+    }
+    var h = scaled_homography(scaled, s * scale, t * scale, s_world * scale, t_world * scale, view.near * scale);
+    // The rows are inverse lengths.
+    h.a *= scale;
+    h.a_low *= scale;
+    h.b *= scale;
+    h.c *= scale;
+    return h;
+}
+
+fn scaled_homography(
+    center: array<Double, 3>,
+    s: vec3<f32>,
+    t: vec3<f32>,
+    s_world: vec3<f32>,
+    t_world: vec3<f32>,
+    near: f32,
+) -> Homography {
     let p = vec3<f32>(center[0].high, center[1].high, center[2].high);
     let slope = sqrt(s.z * s.z + t.z * t.z);
     let normal = cross(s, t);
@@ -89,7 +121,7 @@ fn homography(
     h.away = away;
     h.low = vec2<f32>(1.0);
     h.high = vec2<f32>(0.0);
-    if (p.z + slope < view.near || away == 0.0) {
+    if (p.z + slope < near || away == 0.0) {
         return h;
     }
     let focal = view.intrinsics.xy;
@@ -97,7 +129,7 @@ fn homography(
     let a = cross(t, p) * scale;
     let b = cross(p, s) * scale;
     let c = normal * scale;
-    if (p.z - slope >= view.near) {
+    if (p.z - slope >= near) {
         let x = image_of(center[0], center[2], 0u);
         let y = image_of(center[1], center[2], 1u);
         let image = vec2<f32>(x.high, y.high);
@@ -122,8 +154,8 @@ fn homography(
             let ratio = p.xy / p.z;
             let s_x = s.xy - ratio * s.z;
             let t_x = t.xy - ratio * t.z;
-            let across = tangents(s_x.x, t_x.x, s.z, t.z, p.z) * focal.x;
-            let down = tangents(s_x.y, t_x.y, s.z, t.z, p.z) * focal.y;
+            let across = tangents(s_x.x, t_x.x, s.z, t.z, p.z, slope) * focal.x;
+            let down = tangents(s_x.y, t_x.y, s.z, t.z, p.z, slope) * focal.y;
             h.low = image + vec2<f32>(across.x, down.x);
             h.high = image + vec2<f32>(across.y, down.y);
             return h;
@@ -141,13 +173,13 @@ fn homography(
     var end_1 = vec2<f32>(0.0);
     if (slope > 0.0) {
         let steepest = vec2<f32>(s.z, t.z) / slope;
-        let along = clamp((view.near - p.z) / slope, -1.0, 1.0);
+        let along = clamp((near - p.z) / slope, -1.0, 1.0);
         let half = sqrt(max(0.0, 1.0 - along * along));
         end_0 = along * steepest + half * vec2<f32>(-steepest.y, steepest.x);
         end_1 = along * steepest - half * vec2<f32>(-steepest.y, steepest.x);
     }
-    let across = clipped_extent(s.xz, t.xz, p.xz, end_0, end_1) * focal.x + view.intrinsics.z;
-    let down = clipped_extent(s.yz, t.yz, p.yz, end_0, end_1) * focal.y + view.intrinsics.w;
+    let across = clipped_extent(s.xz, t.xz, p.xz, end_0, end_1, near) * focal.x + view.intrinsics.z;
+    let down = clipped_extent(s.yz, t.yz, p.yz, end_0, end_1, near) * focal.y + view.intrinsics.w;
     h.low = vec2<f32>(across.x, down.x) - 1.0;
     h.high = vec2<f32>(across.y, down.y) + 1.0;
     return h;

@@ -4,8 +4,10 @@ fn color_of(index: u32) -> vec4<f32> {
     return vec4<f32>(0.0);
 }
 
-fn accumulate_color(word: u32, weight: u32, color: vec4<f32>) {}
+fn accumulate_color(pixel: u32, weight: Term, color: vec4<f32>) {
+    add(pixel, WEIGHT_CHANNEL, weight);
+}
 
-fn resolve_color(word: u32, weight: f32) -> vec4<f32> {
+fn resolve_color(pixel: u32, weight: f32) -> vec4<f32> {
     return view.color_low;
 }

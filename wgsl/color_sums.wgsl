@@ -1,7 +1,7 @@
-// Premultiplied linear colour, each channel mapped from the scene's range to [0, 1] before it is summed.
-// Twin: src/passes/accumulate.rs, src/passes/resolve.rs.
+// Premultiplied linear colour, each channel mapped from the scene's range to [0, 1] before it is summed. Channels: weight
+// and red, green and blue, alpha where it varies. Twin: src/passes/accumulate.rs, src/passes/resolve.rs.
 
-override COLOR_WORD: u32;
+const COLOR_CHANNEL: u32 = 1u;
 // 3, or 4 where alpha varies.
 override COLOR_CHANNELS: u32;
 
@@ -9,16 +9,18 @@ fn in_range(premultiplied: vec4<f32>) -> vec4<f32> {
     return (premultiplied - view.color_low) * view.color_scale;
 }
 
-fn accumulate_color(word: u32, weight: u32, color: vec4<f32>) {
-    for (var k = 0u; k < COLOR_CHANNELS; k++) {
-        add(word + COLOR_WORD + k * SUM_WORDS, term(weight, color[k]));
+fn accumulate_color(pixel: u32, weight: Term, color: vec4<f32>) {
+    add_pair(pixel, WEIGHT_CHANNEL, weight, term(weight, color.r));
+    add_pair(pixel, COLOR_CHANNEL + 1u, term(weight, color.g), term(weight, color.b));
+    if (COLOR_CHANNELS == 4u) {
+        add(pixel, COLOR_CHANNEL + 3u, term(weight, color.a));
     }
 }
 
-fn resolve_color(word: u32, weight: f32) -> vec4<f32> {
+fn resolve_color(pixel: u32, weight: f32) -> vec4<f32> {
     var mean = vec4<f32>(0.0);
     for (var k = 0u; k < COLOR_CHANNELS; k++) {
-        mean[k] = sum_at(word + COLOR_WORD + k * SUM_WORDS) / weight;
+        mean[k] = sum_at(pixel, COLOR_CHANNEL + k) / weight;
     }
     return view.color_low + view.color_span * mean;
 }

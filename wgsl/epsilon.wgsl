@@ -1,5 +1,14 @@
-// The farthest depth that counts as the surface whose nearest depth is `front` (paper 000, section 5.3).
-// Twin: src/passes/accumulate.rs.
-fn farthest_accepted(front: f32) -> f32 {
-    return front + (front * view.epsilon_relative + view.epsilon_absolute);
+// The farthest depth that counts as the surface whose nearest depth is `front` (paper 000, section 5.3), the same for
+// every surfel. Twin: src/passes/accumulate.rs.
+
+fn radius_of(index: u32) -> f32 {
+    return 0.0;
+}
+
+fn deepest_accepted(front: f32) -> f32 {
+    return min(front + (front * view.epsilon_relative + view.epsilon_absolute), view.farthest);
+}
+
+fn farthest_accepted(front: f32, radius: f32) -> f32 {
+    return deepest_accepted(front);
 }

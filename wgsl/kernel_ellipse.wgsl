@@ -1,7 +1,9 @@
-// psi_E(rho) = exp(-a rho^n), paper 000, Eq. 12. Twin: Kernel::weight in src/scene/options.rs.
+// psi_E(rho) = exp(-a rho^n), paper 000, Eq. 12; KERNEL_STEP is 0, or exp(-a) to end at 0.
+// Twin: Kernel::weight in src/scene/options.rs.
 
 override KERNEL_A: f32;
 override KERNEL_N: f32;
+override KERNEL_STEP: f32;
 
 fn kernel_weight(rho2: f32) -> f32 {
     var power: f32;
@@ -15,5 +17,5 @@ fn kernel_weight(rho2: f32) -> f32 {
     } else {
         power = pow(rho2, 0.5 * KERNEL_N);
     }
-    return exp(-KERNEL_A * power);
+    return (exp(-KERNEL_A * power) - KERNEL_STEP) / (1.0 - KERNEL_STEP);
 }

@@ -2,7 +2,7 @@
 // the two field by field; bindings are looked up by name.
 
 // All lengths on the device are in units of `1 / unit` world units, where `unit` is a power of two chosen so that the
-// scene and the camera's distance are near one: scaling by it is exact, and no product over- or underflows.
+// scene and the camera's distance are near one: scaling by it is exact, and no length or square overflows.
 struct View {
     // World to camera, rows right, down, forward: nine leading parts, then nine trailing parts (see double.wgsl).
     rotation: array<vec4<f32>, 3>,
@@ -33,9 +33,11 @@ struct View {
     epsilon_absolute: f32,
     // 1 / unit: device lengths times this are world lengths.
     world: f32,
-    padding_0: u32,
-    padding_1: u32,
-    padding_2: u32,
+    // Epsilon as a multiple of the surfel's radius, and that multiple of the largest radius, device units.
+    epsilon_radius: f32,
+    epsilon_deepest: f32,
+    // No surfel lies deeper, device units: an unbounded epsilon accepts up to here.
+    farthest: f32,
 }
 
 // The rows of the image that the visibility and attribute buffers hold.
@@ -70,6 +72,9 @@ struct Splat {
 }
 
 const AWAY: u32 = 0x80000000u;
+
+// The channel of a pixel's sums that holds the weight.
+const WEIGHT_CHANNEL: u32 = 0u;
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<uniform> band: Band;

@@ -1,7 +1,7 @@
 // Normals, mapped from [-1, 1] to [0, 1] before they are summed.
 // Twin: src/passes/accumulate.rs, src/passes/resolve.rs.
 
-override NORMAL_WORD: u32;
+override NORMAL_CHANNEL: u32;
 // Normals have no consistent side, so each is turned toward the viewer before blending.
 override TURN_NORMALS: bool;
 
@@ -17,17 +17,16 @@ fn normal_of(index: u32, splat: Splat) -> vec3<f32> {
     return normal * 0.5 + 0.5;
 }
 
-fn accumulate_normal(word: u32, weight: u32, normal: vec3<f32>) {
-    for (var k = 0u; k < 3u; k++) {
-        add(word + NORMAL_WORD + k * SUM_WORDS, term(weight, normal[k]));
-    }
+fn accumulate_normal(pixel: u32, weight: Term, normal: vec3<f32>) {
+    add_pair(pixel, NORMAL_CHANNEL, term(weight, normal.x), term(weight, normal.y));
+    add(pixel, NORMAL_CHANNEL + 2u, term(weight, normal.z));
 }
 
 // The normalised mean; 0 where opposite normals cancel.
-fn resolve_normal(word: u32, weight: f32) -> vec3<f32> {
+fn resolve_normal(pixel: u32, weight: f32) -> vec3<f32> {
     var mean: vec3<f32>;
     for (var k = 0u; k < 3u; k++) {
-        mean[k] = sum_at(word + NORMAL_WORD + k * SUM_WORDS) / weight * 2.0 - 1.0;
+        mean[k] = sum_at(pixel, NORMAL_CHANNEL + k) / weight * 2.0 - 1.0;
     }
     let length_2 = dot(mean, mean);
     return select(vec3<f32>(0.0), mean * inverseSqrt(length_2), length_2 > 1e-12);

@@ -31,25 +31,24 @@ fn resolve(
     }
     let x = pixel % view.width;
     let y = pixel / view.width + band.first_row;
-    let word = pixel * PIXEL_WORDS;
     let out = pixel * IMAGE_WORDS;
-    let weight = sum_at(word + WEIGHT_WORD);
+    let weight = sum_at(pixel, WEIGHT_CHANNEL);
     let front = bitcast<f32>(visible[pixel]);
     if (weight == 0.0) {
         write_color(out, view.background);
         write_normal(out, vec3<f32>(0.0));
-        write_no_depth(out, front);
+        write_no_depth(out);
         write_weight(out, 0.0);
-        write_count(out, word);
+        write_count(out, pixel);
         return;
     }
-    let premultiplied = resolve_color(word, weight);
+    let premultiplied = resolve_color(pixel, weight);
     let alpha = premultiplied.a;
     let color = select(vec3<f32>(0.0), premultiplied.rgb / alpha, alpha > 0.0);
-    let normal = resolve_normal(word, weight);
+    let normal = resolve_normal(pixel, weight);
     write_color(out, over(vec4<f32>(shade(color, normal, x, y), alpha), view.background));
     write_normal(out, normal);
-    write_depth(out, word, weight, front);
-    write_weight(out, weight);
-    write_count(out, word);
+    write_depth(out, pixel, weight, front);
+    write_weight(out, weight_at(pixel));
+    write_count(out, pixel);
 }

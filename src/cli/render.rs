@@ -6,9 +6,11 @@ use clap::{Args, ValueEnum};
 use epsplat::frame::Frame;
 use epsplat::gpu::Gpu;
 use epsplat::io::camera::{self, Pose};
+use epsplat::passes::accumulate::accumulator;
 use epsplat::render::{Backend, Report, render};
 use epsplat::scene::camera::DEFAULT_FOV;
-use epsplat::scene::{Bounds, Camera, Epsilon, Kernel, Lens, Light, Maps, RenderOptions, Scene, Shading};
+use epsplat::scene::light::MAX_LIGHTS;
+use epsplat::scene::{Camera, Epsilon, Kernel, Lens, Light, Maps, RenderOptions, Scene, Shading, Up};
 use epsplat::{Error, Result, io, surfels};
 use glam::DVec3;
 
@@ -66,12 +68,15 @@ pub struct Arguments {
     /// Smallest depth drawn, world units [default: a millionth of the scene]
     #[arg(long)]
     near: Option<f64>,
-    /// Depth tolerance: rel:E (fraction of the depth) or abs:E (world units)
+    /// Depth tolerance: rel:E (fraction of the depth), abs:E (world units) or radius:K (times the surfel's own)
     #[arg(long, default_value = "rel:0.01")]
     epsilon: Epsilon,
-    /// Blending kernel: ellipse:A,N is exp(-A rho^N)
+    /// Blending kernel over the disk: gaussian[:SIGMA], ellipse:A,N[,smooth] (exp(-A rho^N)), hat or constant
     #[arg(long, default_value = "ellipse:6,3")]
     kernel: Kernel,
+    /// How sums are kept on the device: fixed, fixed32, fixed64, packed64, float or cas (see the README)
+    #[arg(long, value_name = "NAME", value_parser = parse_accumulator)]
+    accumulator: Option<&'static str>,
     /// Shading of the blended colour
     #[arg(long, value_enum, default_value_t = ShadingName::Lambert)]
     shading: ShadingName,
@@ -120,7 +125,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let format = Format::of(&arguments.output)?;
     let options = options(arguments, format)?;
     check_folder(&arguments.output)?;
-    // What the arguments alone decide is refused before minutes of reading.
+    if let Some(json) = &arguments.json {
+        check_json(json, arguments)?;
+    }
     let view = View::of(arguments)?;
     let backend = backend(arguments)?;
 
@@ -132,6 +139,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     let camera = view.camera(&scene)?;
     let (frame, report) = render(&scene, &camera, &options, &backend, &bars)?;
+    if report.overflows > 0 {
+        note(&format!(
+            "{} sums overflowed: rendered again with the accumulator {}",
+            report.overflows, report.accumulator
+        ));
+    }
     format.write(&arguments.output, &frame)?;
     match &arguments.json {
         Some(path) => write_json(path, &report),
@@ -177,10 +190,14 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
     if maps.decision && arguments.backend != BackendName::Reference {
         return Err(Error::Usage("--aov decision is made by --backend reference only".into()));
     }
+    if arguments.lights.len() > MAX_LIGHTS {
+        return Err(Error::Usage(format!("at most {MAX_LIGHTS} lights shine, not {}", arguments.lights.len())));
+    }
     let default = RenderOptions::default();
     Ok(RenderOptions {
         epsilon: arguments.epsilon,
         kernel: arguments.kernel,
+        accumulator: arguments.accumulator.unwrap_or(default.accumulator),
         shading: match arguments.shading {
             ShadingName::Unlit => Shading::Unlit,
             ShadingName::Lambert => Shading::Lambert,
@@ -193,6 +210,9 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
 
 fn backend(arguments: &Arguments) -> Result<Backend> {
     if arguments.backend == BackendName::Reference {
+        if arguments.accumulator.is_some() {
+            return Err(Error::Usage("--backend reference adds in f64: leave --accumulator out".into()));
+        }
         if arguments.adapter.is_some() {
             return Err(Error::Usage("--backend reference uses no adapter: leave --adapter out".into()));
         }
@@ -214,10 +234,18 @@ fn backend(arguments: &Arguments) -> Result<Backend> {
 /// The camera as far as the arguments decide it.
 struct View {
     size: (u32, u32),
-    /// None: an orthographic or perspective view is fitted to the scene.
     lens: Lens,
-    pose: Option<Pose>,
+    place: Place,
     near: Option<f64>,
+}
+
+enum Place {
+    /// Chosen to show the scene.
+    Framed,
+    /// At the eye; looks at the scene's centre.
+    Eye(DVec3, Option<DVec3>),
+    /// As given.
+    Pose(Pose),
 }
 
 impl View {
@@ -238,7 +266,7 @@ impl View {
                     )));
                 }
                 let size = arguments.size.or(file.size).unwrap_or(DEFAULT_SIZE);
-                Self { size, lens: file.lens, pose: Some(file.pose), near: arguments.near.or(file.near) }
+                Self { size, lens: file.lens, place: Place::Pose(file.pose), near: arguments.near.or(file.near) }
             }
             None => {
                 let lens = match (arguments.intrinsics, arguments.ortho) {
@@ -246,36 +274,39 @@ impl View {
                     (None, Some(height)) => Lens::OrthographicHeight(height),
                     (None, None) => Lens::Fov(arguments.fov.unwrap_or(DEFAULT_FOV)),
                 };
-                // Without a target the pose waits for the scene; NaN marks that until then.
-                let pose =
-                    arguments.eye.map(|eye| Pose::LookAt(eye, arguments.target.unwrap_or(DVec3::NAN), arguments.up));
-                Self { size: arguments.size.unwrap_or(DEFAULT_SIZE), lens, pose, near: arguments.near }
+                let place = match (arguments.eye, arguments.target) {
+                    (None, _) => Place::Framed,
+                    (Some(eye), None) => Place::Eye(eye, arguments.up),
+                    (Some(eye), Some(target)) => Place::Pose(Pose::LookAt(eye, target, arguments.up)),
+                };
+                Self { size: arguments.size.unwrap_or(DEFAULT_SIZE), lens, place, near: arguments.near }
             }
         };
-        // A camera at an arbitrary place tells whether size, lens and near can be used at all.
-        Camera::look_at(
-            view.size,
-            view.lens,
-            DVec3::ZERO,
-            DVec3::X,
-            None,
-            epsplat::scene::Up::Z,
-            view.near.unwrap_or(1.0),
-        )?;
+        // What the arguments decide is refused before minutes of reading: only the scene's centre is not known yet.
+        let stand_in = match &view.place {
+            Place::Pose(pose) => pose.clone(),
+            Place::Framed | Place::Eye(..) => Pose::LookAt(DVec3::ZERO, DVec3::X, None),
+        };
+        view.posed(&stand_in, Up::Z, view.near.unwrap_or(1.0))?;
         Ok(view)
     }
 
+    fn posed(&self, pose: &Pose, up: Up, near: f64) -> Result<Camera> {
+        match *pose {
+            Pose::Rigid(rotation, eye) => Camera::posed(self.size, self.lens, eye, rotation, near),
+            Pose::LookAt(eye, target, own_up) => Camera::look_at(self.size, self.lens, eye, target, own_up, up, near),
+        }
+    }
+
     fn camera(&self, scene: &Scene) -> Result<Camera> {
-        let local = scene.bounds();
-        let bounds = Bounds { min: local.min + scene.origin, max: local.max + scene.origin };
-        let near = self.near.unwrap_or_else(|| Camera::default_near(&bounds));
-        match self.pose {
-            Some(Pose::Rigid(rotation, eye)) => Camera::posed(self.size, self.lens, eye, rotation, near),
-            Some(Pose::LookAt(eye, target, up)) => {
-                let target = if target.is_nan() { (bounds.min + bounds.max) * 0.5 } else { target };
-                Camera::look_at(self.size, self.lens, eye, target, up, scene.up, near)
+        let near = self.near.unwrap_or_else(|| Camera::default_near(scene));
+        match &self.place {
+            Place::Framed => Camera::framing(self.size, self.lens, scene, near),
+            Place::Eye(eye, up) => {
+                let center = scene.origin + scene.bounds().center();
+                self.posed(&Pose::LookAt(*eye, center, *up), scene.up, near)
             }
-            None => Camera::framing(self.size, self.lens, scene, near),
+            Place::Pose(pose) => self.posed(pose, scene.up, near),
         }
     }
 }
@@ -316,6 +347,23 @@ fn check_folder(output: &Path) -> Result<()> {
     }
 }
 
+/// A report must not take the place of the image or of an input.
+fn check_json(json: &Path, arguments: &Arguments) -> Result<()> {
+    if json == Path::new("-") {
+        return Ok(());
+    }
+    // Files that are not there yet have no canonical path; then their names must do.
+    let name = |path: &Path| std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    if arguments.inputs.iter().chain([&arguments.output]).any(|path| name(path) == name(json)) {
+        return Err(Error::Usage(format!("--json {} would overwrite an input or the image", json.display())));
+    }
+    check_folder(json)
+}
+
+fn parse_accumulator(text: &str) -> Result<&'static str, String> {
+    accumulator(text).map(|row| row.name).map_err(|e| e.to_string())
+}
+
 fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let side = |part: &str| part.parse::<u32>().map_err(|_| format!("{part:?} is not a number of pixels"));
     let (width, height) = text.split_once('x').ok_or("a size is WIDTHxHEIGHT")?;
@@ -350,5 +398,8 @@ fn parse_color(text: &str) -> Result<[f32; 4], String> {
         [r, g, b, a] => [r, g, b, a],
         _ => return Err("three or four numbers are needed: R,G,B[,A]".into()),
     };
+    if color.iter().any(|c| !c.is_finite()) {
+        return Err("a colour must be finite".into());
+    }
     if color[3] < 0.0 || color[3] > 1.0 { Err("alpha lies between 0 and 1".into()) } else { Ok(color) }
 }

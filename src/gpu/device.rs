@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex};
 
 use serde::Serialize;
 
+use super::layout::{TILE, WORKGROUP};
 use crate::error::{Error, Result};
 
 /// What an adapter is and what of it matters here.
@@ -58,12 +59,14 @@ impl AdapterDescription {
             max_compute_workgroups_per_dimension: limits.max_compute_workgroups_per_dimension,
             max_storage_buffers_per_shader_stage: limits.max_storage_buffers_per_shader_stage,
             timestamps: features.contains(wgpu::Features::TIMESTAMP_QUERY),
-            atomics_u64: features.contains(wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS),
+            atomics_u64: features.contains(wgpu::Features::SHADER_INT64 | wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS),
             atomics_f32: features.contains(wgpu::Features::SHADER_FLOAT32_ATOMIC),
             subgroups: features.contains(wgpu::Features::SUBGROUP),
             usable: compute
                 && limits.max_storage_buffers_per_shader_stage >= STORAGE_BUFFERS
-                && limits.max_compute_invocations_per_workgroup >= super::layout::WORKGROUP,
+                && limits.max_compute_invocations_per_workgroup >= WORKGROUP.max(TILE * TILE)
+                && limits.max_compute_workgroup_size_x >= WORKGROUP.max(TILE)
+                && limits.max_compute_workgroup_size_y >= TILE,
         }
     }
 
@@ -80,8 +83,15 @@ impl AdapterDescription {
     }
 }
 
-/// The most storage buffers a kernel uses (accumulate: splats, surfels, depths, sums, colours, the sRGB table, the queue).
-pub const STORAGE_BUFFERS: u32 = 7;
+/// The most storage buffers a kernel uses (accumulate: splats, surfels, depths, sums, colours, the sRGB table, the queue,
+/// the overflow count).
+pub const STORAGE_BUFFERS: u32 = 8;
+
+/// Features that are used where an adapter has them: GPU times, and atomics of some accumulators.
+const OPTIONAL_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
+    .union(wgpu::Features::SHADER_INT64)
+    .union(wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS)
+    .union(wgpu::Features::SHADER_FLOAT32_ATOMIC);
 
 /// What to do about a missing adapter.
 pub const INSTALL_HINT: &str = "install a Vulkan driver (on Debian or Ubuntu without a GPU: \
@@ -136,7 +146,7 @@ impl Gpu {
         let limits = handle.limits();
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("epsplat"),
-            required_features: handle.features() & wgpu::Features::TIMESTAMP_QUERY,
+            required_features: handle.features() & OPTIONAL_FEATURES,
             required_limits: limits.clone(),
             // Few large buffers: no pooling, so that a scene costs what its buffers cost.
             memory_hints: wgpu::MemoryHints::MemoryUsage,

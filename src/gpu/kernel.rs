@@ -4,9 +4,8 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use super::device::Gpu;
-use super::layout::{LARGE, SUM_WORDS, WORKGROUP};
+use super::layout::WORKGROUP;
 use crate::error::{Error, Result};
-use crate::scene::{ColorNeed, Kernel, Projection, RenderOptions, SceneNeeds};
 
 macro_rules! wgsl {
     ($($name:literal),* $(,)?) => {
@@ -17,7 +16,12 @@ macro_rules! wgsl {
 /// Every file of `wgsl/`.
 pub const FILES: &[(&str, &str)] = wgsl![
     "accumulate.wgsl",
+    "accumulator_cas.wgsl",
     "accumulator_fixed.wgsl",
+    "accumulator_fixed32.wgsl",
+    "accumulator_fixed64.wgsl",
+    "accumulator_float.wgsl",
+    "accumulator_packed64.wgsl",
     "camera_orthographic.wgsl",
     "camera_pinhole.wgsl",
     "color_constant.wgsl",
@@ -30,8 +34,12 @@ pub const FILES: &[(&str, &str)] = wgsl![
     "depth_absent.wgsl",
     "double.wgsl",
     "epsilon.wgsl",
+    "epsilon_radius.wgsl",
     "footprint.wgsl",
+    "kernel_constant.wgsl",
     "kernel_ellipse.wgsl",
+    "kernel_gaussian.wgsl",
+    "kernel_hat.wgsl",
     "layout.wgsl",
     "normal.wgsl",
     "normal_absent.wgsl",
@@ -68,140 +76,10 @@ impl Sources {
         Ok(self)
     }
 
-    /// The module for `needs`: WGSL's module scope is free of order, so joining is concatenation.
-    pub fn join(&self, needs: &SceneNeeds) -> String {
-        files(needs).iter().map(|name| self.0.get(name).map_or("", |text| text)).collect::<Vec<_>>().join("\n")
+    /// One module of `files`: WGSL's module scope is free of order, so joining is concatenation.
+    pub fn join(&self, files: &[&str]) -> String {
+        files.iter().map(|name| self.0.get(name).map_or("", |text| text)).collect::<Vec<_>>().join("\n")
     }
-}
-
-/// The files that a render with `needs` is made of.
-pub fn files(needs: &SceneNeeds) -> Vec<&'static str> {
-    let pick = |needed, file, absent| if needed { file } else { absent };
-    let mut files = vec![
-        "layout.wgsl",
-        "double.wgsl",
-        "rows.wgsl",
-        match needs.projection {
-            Projection::Pinhole => "camera_pinhole.wgsl",
-            Projection::Orthographic => "camera_orthographic.wgsl",
-        },
-        "project.wgsl",
-        "footprint.wgsl",
-        "visibility.wgsl",
-        "accumulate.wgsl",
-        "epsilon.wgsl",
-        "kernel_ellipse.wgsl",
-        "accumulator_fixed.wgsl",
-        "resolve.wgsl",
-        pick(needs.normal, "normal.wgsl", "normal_absent.wgsl"),
-        pick(needs.normal_map, "normal_map.wgsl", "normal_map_absent.wgsl"),
-        pick(needs.depth, "depth.wgsl", "depth_absent.wgsl"),
-        pick(needs.weight_map, "weight_map.wgsl", "weight_map_absent.wgsl"),
-        pick(needs.count, "count.wgsl", "count_absent.wgsl"),
-        pick(needs.lambert, "shade_lambert.wgsl", "shade_unlit.wgsl"),
-    ];
-    match needs.color {
-        ColorNeed::Constant => files.push("color_constant.wgsl"),
-        ColorNeed::Srgb8 => files.extend(["color_srgb8.wgsl", "color_sums.wgsl"]),
-        ColorNeed::Linear => files.extend(["color_linear.wgsl", "color_sums.wgsl"]),
-    }
-    files
-}
-
-/// Where a pixel's words lie, in the sums and in the image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PixelLayout {
-    /// Words of a pixel in the sums; the weight's come first.
-    pub sum_words: u32,
-    /// Word of the first colour channel's sum; only if colours differ.
-    pub color_word: u32,
-    /// Word of the normal's x sum; only if normals are accumulated.
-    pub normal_word: u32,
-    /// Word of the depth's sum; only if depth is accumulated.
-    pub depth_word: u32,
-    /// Word of the fragment count; only if fragments are counted.
-    pub count_word: u32,
-    /// Words of a pixel in the image; the colour's four come first.
-    pub image_words: u32,
-    /// Word of the normal map's x in the image.
-    pub normal_image: u32,
-    /// Word of the depth in the image.
-    pub depth_image: u32,
-    /// Word of the weight in the image.
-    pub weight_image: u32,
-    /// Word of the count in the image.
-    pub count_image: u32,
-}
-
-impl PixelLayout {
-    /// What is not needed takes no room.
-    pub fn of(needs: &SceneNeeds) -> Self {
-        let mut next = 0;
-        let mut take = |words: u32| {
-            next += words;
-            next - words
-        };
-        let channels = color_channels(needs);
-        take(SUM_WORDS);
-        let color_word = take(channels * SUM_WORDS);
-        let normal_word = take(if needs.normal { 3 * SUM_WORDS } else { 0 });
-        let depth_word = take(if needs.depth { SUM_WORDS } else { 0 });
-        let count_word = take(u32::from(needs.count));
-        let sum_words = take(0);
-        next = 0;
-        let mut take = |words: u32| {
-            next += words;
-            next - words
-        };
-        take(4);
-        let normal_image = take(if needs.normal_map { 3 } else { 0 });
-        let depth_image = take(u32::from(needs.depth));
-        let weight_image = take(u32::from(needs.weight_map));
-        let count_image = take(u32::from(needs.count));
-        let image_words = take(0);
-        Self {
-            sum_words,
-            color_word,
-            normal_word,
-            depth_word,
-            count_word,
-            image_words,
-            normal_image,
-            depth_image,
-            weight_image,
-            count_image,
-        }
-    }
-}
-
-fn color_channels(needs: &SceneNeeds) -> u32 {
-    match needs.color {
-        ColorNeed::Constant => 0,
-        _ => 3 + u32::from(needs.alpha),
-    }
-}
-
-/// The overridable constants of a render, by name.
-pub fn overrides(needs: &SceneNeeds, options: &RenderOptions) -> Vec<(&'static str, f64)> {
-    let layout = PixelLayout::of(needs);
-    let Kernel::Ellipse { a, n } = options.kernel;
-    vec![
-        ("LARGE", LARGE.into()),
-        ("PIXEL_WORDS", layout.sum_words.into()),
-        ("COLOR_WORD", layout.color_word.into()),
-        ("COLOR_CHANNELS", color_channels(needs).into()),
-        ("NORMAL_WORD", layout.normal_word.into()),
-        ("TURN_NORMALS", u32::from(needs.turn_normals).into()),
-        ("DEPTH_WORD", layout.depth_word.into()),
-        ("COUNT_WORD", layout.count_word.into()),
-        ("IMAGE_WORDS", layout.image_words.into()),
-        ("NORMAL_IMAGE", layout.normal_image.into()),
-        ("DEPTH_IMAGE", layout.depth_image.into()),
-        ("WEIGHT_IMAGE", layout.weight_image.into()),
-        ("COUNT_IMAGE", layout.count_image.into()),
-        ("KERNEL_A", a),
-        ("KERNEL_N", n),
-    ]
 }
 
 /// Bindings of a module's kernels, by entry point: the names of the variables each uses and their numbers.
@@ -230,25 +108,20 @@ pub struct Program {
     bindings: Bindings,
 }
 
-/// The stages' entry points, in order.
-pub const STAGES: [&str; 7] =
-    ["project", "clear", "visibility", "visibility_large", "accumulate", "accumulate_large", "resolve"];
-
 impl Program {
-    /// Compiles the kernels for `needs`.
-    pub fn compile(gpu: &Gpu, sources: &Sources, needs: &SceneNeeds, options: &RenderOptions) -> Result<Self> {
-        let text = sources.join(needs);
+    /// Compiles the entry points `stages` of the module `text`. Of `constants` those are set that it declares.
+    pub fn compile(gpu: &Gpu, text: String, stages: &[&str], constants: &[(&str, f64)]) -> Result<Self> {
         let (_, bindings, declared) =
             reflect(&text).map_err(|e| gpu.error(format!("a kernel is not valid WGSL: {e}")))?;
         let constants: Vec<_> =
-            overrides(needs, options).into_iter().filter(|(name, _)| declared.iter().any(|d| d == name)).collect();
+            constants.iter().copied().filter(|(name, _)| declared.iter().any(|d| d == name)).collect();
         let guard = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("epsplat"),
             source: wgpu::ShaderSource::Wgsl(text.into()),
         });
         let mut pipelines = BTreeMap::new();
-        for stage in STAGES {
+        for &stage in stages {
             let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                 label: Some(stage),
                 layout: None,

@@ -22,11 +22,8 @@ pub const MOST_ROUNDS: u32 = 32_768;
 /// Invocations of a workgroup that draws a large splat: a square of 16.
 pub const TILE: u32 = 16;
 
-/// Words (u32) of one fixed-point sum: low and high.
-pub const SUM_WORDS: u32 = 2;
-
-/// Units of a weight sum: 2^24.
-pub const ONE: u32 = 1 << 24;
+/// Units of a weight of 1 in the sums of the accumulator `fixed`: 2^30.
+pub const ONE: u32 = 1 << 30;
 
 /// Bit of [`Splat::bounds_last`] that says that s x t points away from the viewer.
 pub const AWAY: u32 = 1 << 31;
@@ -56,9 +53,9 @@ pub struct View {
     pub epsilon_relative: f32,
     pub epsilon_absolute: f32,
     pub world: f32,
-    pub padding_0: u32,
-    pub padding_1: u32,
-    pub padding_2: u32,
+    pub epsilon_radius: f32,
+    pub epsilon_deepest: f32,
+    pub farthest: f32,
 }
 
 /// The rows of the image that the per-pixel buffers hold at a time.
@@ -144,7 +141,15 @@ impl View {
                 Light::Directional { toward, intensity } => toward.extend(intensity).to_array(),
             };
         }
-        let (relative, absolute) = options.epsilon.parts();
+        let (relative, absolute, of_radius) = options.epsilon.parts();
+        // Past every surfel, with room for the rounding of depths. An epsilon that accepts everything must not make the
+        // interval that depths are measured in infinite, nor coarser than the scene.
+        let corners = (0..8).map(|corner| {
+            let pick = |axis: usize| if corner >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
+            DVec3::new(pick(0), pick(1), pick(2)) - eye_relative
+        });
+        let farthest = corners.map(|corner| camera.rotation.row(2).dot(corner)).fold(0.0, f64::max);
+        let farthest = (farthest + f64::from(scene.largest_radius())) * 1.001;
         Self {
             rotation,
             rotation_low,
@@ -162,13 +167,14 @@ impl View {
             height: camera.height,
             zero: 0,
             unit: unit as f32,
-            near: (camera.near * unit) as f32,
+            // Squares of 1 / near must stay finite.
+            near: (camera.near * unit).max(1e-18) as f32,
             epsilon_relative: relative as f32,
             epsilon_absolute: (absolute * unit) as f32,
             world: (1.0 / unit) as f32,
-            padding_0: 0,
-            padding_1: 0,
-            padding_2: 0,
+            epsilon_radius: of_radius as f32,
+            epsilon_deepest: (of_radius * f64::from(scene.largest_radius()) * unit) as f32,
+            farthest: (farthest * unit) as f32,
         }
     }
 }

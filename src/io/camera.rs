@@ -113,6 +113,9 @@ fn parse(text: &str) -> std::result::Result<CameraFile, String> {
         (None, None, ..) => return Err("the camera needs eye and target, camera_to_world or world_to_camera".into()),
         _ => return Err("the camera gives its pose twice".into()),
     };
+    if raw.up.is_some() && matches!(pose, Pose::Rigid(..)) {
+        return Err("a pose given as a matrix has its own up".into());
+    }
     Ok(CameraFile { size, lens, pose, near: raw.near })
 }
 

@@ -50,7 +50,8 @@ pub fn write(path: &Path, frame: &Frame) -> Outcome<()> {
     write_whole(path, |file| image.write().to_buffered(file).map_err(std::io::Error::other))
 }
 
-/// Reads the layers that [`write`] writes; others are ignored. A single unnamed layer counts as the colour.
+/// Reads the layers that [`write`] writes. The colour is the layer `color`, or the first with R, G and B if none is
+/// called so; others are ignored.
 pub fn read(path: &Path) -> Outcome<Frame> {
     // exr reports a missing file as an I/O error of its own kind; asking first keeps the sentence plain.
     std::fs::File::open(path).map_err(|e| EpsplatError::read(path, e))?;
@@ -87,7 +88,10 @@ pub fn read(path: &Path) -> Outcome<Frame> {
             "weight" => frame.weight = channel("Y"),
             "count" => frame.count = channel("Y"),
             "decision" => frame.decision = channel("Y"),
-            _ => {
+            name => {
+                if name != "color" && !frame.color.is_empty() {
+                    continue;
+                }
                 if let (Some(r), Some(g), Some(b)) = (channel("R"), channel("G"), channel("B")) {
                     let a = channel("A").unwrap_or_else(|| vec![1.0; pixels]);
                     frame.color = (0..pixels).map(|i| [r[i], g[i], b[i], a[i]]).collect();

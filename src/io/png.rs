@@ -32,6 +32,8 @@ pub fn read(path: &Path) -> Result<Frame> {
     let reader = ImageReader::open(path).map_err(|e| Error::read(path, e))?;
     let mut reader = reader;
     reader.set_format(image::ImageFormat::Png);
+    // Our own limit is the size; the library's is less than we write.
+    reader.no_limits();
     let picture = reader.decode().map_err(|e| Error::malformed(path, format!("not a readable PNG: {e}")))?;
     let picture = picture.into_rgba16();
     let color = picture.pixels().map(|pixel| {

@@ -1,30 +1,41 @@
 //! Stage 3: over the fragments within epsilon of the nearest depth, the sums of weight and of weight times attribute
 //! (paper 000, Eq. 9 and 10).
 //!
-//! # The `fixed` accumulator
+//! # Accumulators
 //!
-//! Each fragment is turned into integers before anything is added, and integer addition is associative: the sums, and
-//! so the image, do not depend on the order of the surfels, on pages, or on the schedule.
+//! Let W be a fragment's weight w, turned into the units of its sum, and a its attribute, mapped from the scene's own
+//! range to [0, 1]. A fragment adds W to the weight and W a to each attribute. The mean of n accepted fragments of summed
+//! weight w then errs by at most [`Accumulator::error_bound`], as a fraction of the attribute's range, beside the errors
+//! of the fragments themselves. Let u = 2^-24, the rounding of one f32 operation.
 //!
-//! With W = round(2^24 w), at least 1, a fragment adds W to the weight and round(W a) to each attribute, a mapped from
-//! the scene's own range to [0, 1]. Sums have 64 bits in two words: `before = atomicAdd(low, x)`; if that wrapped,
-//! `atomicAdd(high, 1)`. They overflow after 2^40 fragments of full weight.
-//!
-//! **Error bound.** For n accepted fragments the rounded terms give a mean that differs from the exact mean of the
-//! rounded weights by at most `n / (2 sum W)`, of the range; rounding the weights themselves moves it by at most
-//! `n / (2 sum W)` times the spread of the fragments' attributes, both plus a relative 2^-24 for each f32 operation. For
-//! one fragment at the rim of the default kernel (w = exp(-6)) that is 1.2e-5 of the range; for full weights 3e-8.
+//! - **fixed**: W = round(2^30 w), and W a is rounded to f32 and then to an integer. Integer addition is associative: the
+//!   sums, and so the image, do not depend on the order of the surfels, on pages, or on the schedule. Sums have 64 bits in
+//!   two words: `before = atomicAdd(low, x)`; if that wrapped, `atomicAdd(high, 1)`. They overflow after 2^34 full weights.
+//!   A term errs by a relative u of itself, which moves the mean by at most u, and by half a unit, which moves it by
+//!   `n / (2 sum W)`; rounding the weights moves it by as much again, times the spread of the attributes, which is at most
+//!   1: `n 2^-30 / w`. Reading two sums, dividing, and mapping back are four f32 operations: `5 u` in all. With 30 bits
+//!   rather than 24 a carry is needed for every fourth full weight, which is still rare, and the tail of a kernel keeps
+//!   its digits.
+//! - **fixed32**: the same in one word. B fraction bits, `32 - bits(min(surfels, 255))`, are at least 24 and let 255 full
+//!   weights (or all surfels there are) meet in a pixel; a sum that wraps is noticed and the frame rendered again with
+//!   `fixed`. `n 2^-B / w + 4 u`.
+//! - **fixed64**: W = 2^40 w exactly, and W a, rounded as f32 and cut at 2^-40, in one u64: each term errs by a relative u
+//!   of itself, so the mean by u, whatever n: `5 u + n 2^-40 / w`.
+//! - **packed64**: the terms of `fixed32`, two sums in the halves of one u64.
+//! - **float**, **cas**: f32 sums, by atomic add or by compare and exchange. A sum of n terms in any order errs by at most
+//!   `(n - 1) u` of itself, and so does the weight's: `2 n u + 4 u`. The order shows.
 
 use super::footprint::intersect;
 use super::project::{Splat, SplatBuffer};
 use super::visibility::VisibilityBuffer;
 use super::{Recorder, Rows};
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
 use crate::scene::{Camera, RenderOptions, Scene};
 
 /// An accumulator: one row of the table below, one file `wgsl/accumulator_*.wgsl`.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub struct Accumulator {
     /// Its name.
     pub name: &'static str,
@@ -34,18 +45,107 @@ pub struct Accumulator {
     pub words: u32,
     /// The image's bits are the same for any order of fragments.
     pub deterministic: bool,
-    /// Bound on the error of a mean of n fragments with summed weight w, as a fraction of the attribute's range.
-    pub error_bound: fn(n: f64, w: f64) -> f64,
+    /// What it needs of the adapter beyond core WebGPU.
+    pub features: Features,
+    /// Bound on the error of a mean of n fragments of summed weight w, B fraction bits, as a fraction of the range.
+    pub error_bound: fn(n: f64, w: f64, bits: u32) -> f64,
 }
 
-/// Every accumulator.
-pub const ACCUMULATORS: &[Accumulator] = &[Accumulator {
-    name: "fixed",
-    file: "accumulator_fixed.wgsl",
-    words: crate::gpu::layout::SUM_WORDS,
-    deterministic: true,
-    error_bound: |n, w| n / (w * f64::from(crate::gpu::layout::ONE)) + 4.0 / 16_777_216.0,
-}];
+/// Optional features of an adapter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Features {
+    /// Core WebGPU.
+    None,
+    /// 64-bit integers and atomics.
+    AtomicsU64,
+    /// f32 atomic add.
+    AtomicsF32,
+}
+
+/// The rounding of one f32 operation.
+const U: f64 = 1.0 / 16_777_216.0;
+
+/// Every accumulator; the first is the default.
+pub const ACCUMULATORS: &[Accumulator] = &[
+    Accumulator {
+        name: "fixed",
+        file: "accumulator_fixed.wgsl",
+        words: 2,
+        deterministic: true,
+        features: Features::None,
+        error_bound: |n, w, _| n * (-30f64).exp2() / w + 5.0 * U,
+    },
+    Accumulator {
+        name: "fixed32",
+        file: "accumulator_fixed32.wgsl",
+        words: 1,
+        deterministic: true,
+        features: Features::None,
+        error_bound: |n, w, bits| n * (-f64::from(bits)).exp2() / w + 4.0 * U,
+    },
+    Accumulator {
+        name: "fixed64",
+        file: "accumulator_fixed64.wgsl",
+        words: 2,
+        deterministic: true,
+        features: Features::AtomicsU64,
+        error_bound: |n, w, _| n * (-40f64).exp2() / w + 5.0 * U,
+    },
+    Accumulator {
+        name: "packed64",
+        file: "accumulator_packed64.wgsl",
+        words: 1,
+        deterministic: true,
+        features: Features::AtomicsU64,
+        error_bound: |n, w, bits| n * (-f64::from(bits)).exp2() / w + 4.0 * U,
+    },
+    Accumulator {
+        name: "float",
+        file: "accumulator_float.wgsl",
+        words: 1,
+        deterministic: false,
+        features: Features::AtomicsF32,
+        error_bound: |n, _, _| 2.0 * n * U + 4.0 * U,
+    },
+    Accumulator {
+        name: "cas",
+        file: "accumulator_cas.wgsl",
+        words: 1,
+        deterministic: false,
+        features: Features::None,
+        error_bound: |n, _, _| 2.0 * n * U + 4.0 * U,
+    },
+];
+
+/// The accumulator called `name`.
+pub fn accumulator(name: &str) -> Result<&'static Accumulator> {
+    ACCUMULATORS.iter().find(|row| row.name == name).ok_or_else(|| {
+        let names = ACCUMULATORS.iter().map(|row| row.name).collect::<Vec<_>>().join(", ");
+        Error::Usage(format!("there is no accumulator {name:?}: take one of {names}"))
+    })
+}
+
+impl Accumulator {
+    /// Fraction bits of the one-word accumulators in a scene of `surfels`: as many as the sums of all surfels, or of 255
+    /// full weights, leave free.
+    pub fn fraction_bits(&self, surfels: u64) -> u32 {
+        let most = surfels.clamp(1, 255) as u32;
+        32 - (32 - most.leading_zeros())
+    }
+
+    /// Fails with a sentence if `gpu` lacks what it needs.
+    pub fn check(&self, gpu: &Gpu) -> Result<()> {
+        let (has, what) = match self.features {
+            Features::None => return Ok(()),
+            Features::AtomicsU64 => (gpu.adapter.atomics_u64, "64-bit atomics"),
+            Features::AtomicsF32 => (gpu.adapter.atomics_f32, "f32 atomic add"),
+        };
+        if has {
+            return Ok(());
+        }
+        Err(gpu.error(format!("the accumulator {} needs {what}, which this adapter lacks: take fixed", self.name)))
+    }
+}
 
 /// The sums of one pixel, in f64: weight, weight times attributes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,18 +184,20 @@ pub fn reference<'a>(
 ) -> Vec<PixelSums> {
     let width = camera.width as usize;
     let rows = (nearest.len() / width) as u32;
-    let (relative, absolute) = options.epsilon.parts();
+    let (relative, absolute, of_radius) = options.epsilon.parts();
     let mut sums = vec![PixelSums::ZERO; nearest.len()];
     for splat in splats {
         let [r, g, b, alpha] = scene.colors.linear(splat.surfel as usize).map(f64::from);
         let color = [r * alpha, g * alpha, b * alpha, alpha];
+        let radius = f64::from(scene.surfels[splat.surfel as usize].radius());
+        let epsilon = absolute + of_radius * radius;
         let normal = if splat.away && !scene.oriented { -splat.normal } else { splat.normal };
         for y in splat.first[1].max(first_row)..=splat.last[1].min(first_row + rows - 1) {
             let row = (y - first_row) as usize * width;
             for x in splat.first[0]..=splat.last[0] {
                 let Some(at) = intersect(splat, camera, x, y) else { continue };
                 let pixel = row + x as usize;
-                let back = nearest[pixel] * (1.0 + relative) + absolute;
+                let back = nearest[pixel] * (1.0 + relative) + epsilon;
                 let sum = &mut sums[pixel];
                 if options.maps.decision {
                     sum.decision = sum.decision.min(decision(at.rho2.sqrt(), at.depth, back, camera.near));
@@ -132,15 +234,25 @@ fn decision(rho: f64, depth: f64, back: f64, near: f64) -> f64 {
 
 /// The sums of each pixel of some rows.
 pub struct AttributeBuffer {
-    /// [`PixelLayout::sum_words`](crate::gpu::kernel::PixelLayout::sum_words) a pixel.
+    /// [`Variant::sum_words`](super::variant::Variant::sum_words) a pixel.
     pub sums: Buffer<u32>,
+    /// How often a one-word sum wrapped since the buffer was made.
+    overflows: Buffer<u32>,
 }
 
 impl AttributeBuffer {
     /// Room for `pixels`.
     pub fn new(recorder: &Recorder<'_>, pixels: u64) -> Result<Self> {
-        let words = pixels * u64::from(recorder.pixel.sum_words);
-        Ok(Self { sums: Buffer::storage(recorder.gpu, "weighted sums", words)? })
+        let words = pixels * u64::from(recorder.variant.sum_words());
+        Ok(Self {
+            sums: Buffer::storage(recorder.gpu, "weighted sums", words)?,
+            overflows: Buffer::storage(recorder.gpu, "overflow count", 1)?,
+        })
+    }
+
+    /// How often a sum wrapped: the image is wrong unless this is 0.
+    pub fn overflows(&self, gpu: &Gpu) -> Result<u64> {
+        Ok(self.overflows.read(gpu, 1)?.first().copied().unwrap_or(0).into())
     }
 }
 
@@ -152,9 +264,9 @@ pub fn record(
     visible: &VisibilityBuffer,
     buffer: &AttributeBuffer,
 ) -> Result<()> {
-    let buffers = [("visible", &visible.nearest.raw), ("sums", &buffer.sums.raw)];
+    let buffers = [("visible", &visible.nearest.raw), ("sums", &buffer.sums.raw), ("overflows", &buffer.overflows.raw)];
     splats.dispatch(recorder, ("accumulate", "accumulate_large"), rows, &buffers, |encoder| {
-        encoder.clear_buffer(&buffer.sums.raw, 0, None)
+        encoder.clear_buffer(&buffer.sums.raw, 0, None);
     })
 }
 
@@ -163,10 +275,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_accumulator_has_its_file_and_the_words_that_buffers_are_laid_out_for() {
+    fn every_accumulator_has_its_file_and_its_own_name() {
         for row in ACCUMULATORS {
             assert!(crate::gpu::kernel::FILES.iter().any(|(name, _)| *name == row.file), "{}", row.file);
-            assert_eq!(row.words, crate::gpu::layout::SUM_WORDS);
+            assert_eq!(accumulator(row.name).map(|r| r.file).ok(), Some(row.file));
+        }
+        assert!(accumulator("double").is_err());
+    }
+
+    #[test]
+    fn fraction_bits_leave_room_for_every_surfel() {
+        for (surfels, bits) in [(0, 31), (1, 31), (2, 30), (3, 30), (4, 29), (127, 25), (128, 24), (1_000_000_000, 24)]
+        {
+            assert_eq!(ACCUMULATORS[1].fraction_bits(surfels), bits, "{surfels}");
         }
     }
 

@@ -9,18 +9,20 @@
 //! | [`accumulate`] | splats, nearest depths | [`accumulate::AttributeBuffer`] |
 //! | [`resolve`] | sums | [`Frame`](crate::frame::Frame) |
 //!
-//! [`footprint`] is evaluated inside visibility and accumulate.
+//! [`footprint`] is evaluated inside visibility and accumulate; [`variant`] says which kernels a render is made of.
 
 pub mod accumulate;
 pub mod footprint;
 pub mod project;
 pub mod resolve;
 pub mod upload;
+pub mod variant;
 pub mod visibility;
 
+use self::variant::Variant;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
-use crate::gpu::kernel::{PixelLayout, Program};
+use crate::gpu::kernel::Program;
 use crate::gpu::layout::{Band, View};
 use crate::gpu::timing::Timing;
 
@@ -32,8 +34,8 @@ pub struct Recorder<'a> {
     pub program: &'a Program,
     /// The view uniform.
     pub view: Buffer<View>,
-    /// Words per pixel.
-    pub pixel: PixelLayout,
+    /// What they were made of.
+    pub variant: &'a Variant,
     /// Time per pass.
     pub timing: Timing,
 }

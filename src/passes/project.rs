@@ -152,7 +152,8 @@ fn tangents(s: [f64; 2], t: [f64; 2], p: [f64; 2]) -> DVec2 {
     let (s_x, t_x) = (s[0] - ratio * s[1], t[0] - ratio * t[1]);
     let e = s_x * s_x + t_x * t_x;
     let b = s_x * s[1] + t_x * t[1];
-    let d = p[1] * p[1] - s[1] * s[1] - t[1] * t[1];
+    let slope = s[1].hypot(t[1]);
+    let d = (p[1] - slope) * (p[1] + slope);
     let far = b.abs() + (b * b + d * e).sqrt();
     let near = if far > 0.0 { e / far } else { 0.0 };
     if b >= 0.0 { DVec2::new(-far / d, near) } else { DVec2::new(-near, far / d) }

@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::frame::Frame;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::kernel::grid;
-use crate::scene::{Camera, Light, RenderOptions, SceneNeeds, Shading};
+use crate::scene::{Camera, Light, RenderOptions, Shading};
 
 /// The twin: resolves `sums`, which start at row `first_row` of the image, into `frame`, which holds just their rows.
 pub fn reference(sums: &[PixelSums], camera: &Camera, options: &RenderOptions, first_row: u32, frame: &mut Frame) {
@@ -75,14 +75,14 @@ fn over(front: [f64; 4], back: [f64; 4]) -> [f64; 4] {
 
 /// Resolved pixels of some rows.
 pub struct ImageBuffer {
-    /// [`PixelLayout::image_words`](crate::gpu::kernel::PixelLayout::image_words) a pixel.
+    /// [`PixelLayout::image_words`](super::variant::PixelLayout::image_words) a pixel.
     pub image: Buffer<f32>,
 }
 
 impl ImageBuffer {
     /// Room for `pixels`.
     pub fn new(recorder: &Recorder<'_>, pixels: u64) -> Result<Self> {
-        let words = pixels * u64::from(recorder.pixel.image_words);
+        let words = pixels * u64::from(recorder.variant.pixel.image_words);
         Ok(Self { image: Buffer::storage(recorder.gpu, "image", words)? })
     }
 }
@@ -120,14 +120,8 @@ pub fn record(
 }
 
 /// Reads resolved rows back into `frame`.
-pub fn read_back(
-    recorder: &Recorder<'_>,
-    rows: &Rows,
-    needs: &SceneNeeds,
-    buffer: &ImageBuffer,
-    frame: &mut Frame,
-) -> Result<()> {
-    let layout = recorder.pixel;
+pub fn read_back(recorder: &Recorder<'_>, rows: &Rows, buffer: &ImageBuffer, frame: &mut Frame) -> Result<()> {
+    let layout = recorder.variant.pixel;
     let words = layout.image_words as usize;
     let values = buffer.image.read(recorder.gpu, rows.pixels * words as u64)?;
     let start = rows.first as usize * frame.width as usize;
@@ -139,11 +133,11 @@ pub fn read_back(
             map[pixel] = [value[at], value[at + 1], value[at + 2]];
         }
         let maps = [
-            (&mut frame.depth, layout.depth_image, needs.depth),
-            (&mut frame.weight, layout.weight_image, needs.weight_map),
-            (&mut frame.count, layout.count_image, needs.count),
+            (&mut frame.depth, layout.depth_image),
+            (&mut frame.weight, layout.weight_image),
+            (&mut frame.count, layout.count_image),
         ];
-        for (map, word, _) in maps.into_iter().filter(|(_, _, needed)| *needed) {
+        for (map, word) in maps {
             if let Some(map) = map {
                 map[pixel] = value[word as usize];
             }

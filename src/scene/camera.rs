@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{Bounds, Up};
+use super::{Scene, Up};
 use crate::error::{Error, Result};
 
 /// How camera space becomes pixels.
@@ -80,17 +80,22 @@ impl Lens {
             Self::OrthographicScale(values) => (Projection::Orthographic, values),
         };
         let [fx, fy, cx, cy] = values;
-        if !(fx > 0.0 && fy > 0.0 && values.iter().all(|v| v.is_finite())) {
+        let scale = 1.0 / LARGEST..=LARGEST;
+        if !(scale.contains(&fx) && scale.contains(&fy) && cx.abs() <= 1e9 && cy.abs() <= 1e9) {
             return Err(Error::Usage(format!(
-                "the camera's scale must be positive and finite: fx = {fx}, fy = {fy}, cx = {cx}, cy = {cy}"
+                "the camera's scale must be positive and its numbers within reason: fx = {fx}, fy = {fy}, cx = {cx}, \
+                 cy = {cy}"
             )));
         }
         Ok((projection, values))
     }
 }
 
-/// The most pixels of an image: with colour alone, 4 GiB in host memory.
-pub const MAX_PIXELS: u64 = 1 << 28;
+/// The most pixels of an image. On the way to a file each takes up to 48 bytes of host memory, and 24 more for every map.
+pub const MAX_PIXELS: u64 = 1 << 27;
+
+/// The largest coordinate, scale or depth of a camera, and the inverse of the smallest: the device computes in f32.
+const LARGEST: f64 = 1e18;
 
 /// Rejects image sizes that no backend can hold.
 pub fn check_size(width: u32, height: u32) -> Result<()> {
@@ -116,13 +121,15 @@ impl Camera {
         near: f64,
     ) -> Result<Self> {
         let forward = target - eye;
-        if !(forward.length() > 0.0 && forward.is_finite() && eye.is_finite()) {
-            return Err(Error::Usage("the camera's eye and target must be finite and apart from each other".into()));
+        if forward == DVec3::ZERO || !forward.abs().cmple(DVec3::splat(2.0 * LARGEST)).all() {
+            return Err(Error::Usage(format!(
+                "the camera's eye and target must be apart from each other and within {LARGEST:e} of the origin"
+            )));
         }
-        let forward = forward.normalize();
+        let forward = unit(forward);
         let right = match up {
             Some(up) => {
-                let right = forward.cross(up.normalize_or_zero());
+                let right = forward.cross(unit(up));
                 if right.length().is_nan() || right.length() <= 1e-6 {
                     return Err(Error::Usage("the camera's up is zero or points along its view".into()));
                 }
@@ -143,24 +150,30 @@ impl Camera {
         check_size(width, height)?;
         let (projection, [fx, fy, cx, cy]) = lens.intrinsics(width, height)?;
         let skew = (rotation * rotation.transpose() - DMat3::IDENTITY).to_cols_array();
-        // NaN must fail too, so the comparisons are for the good case.
-        let rigid = skew.iter().all(|e| e.abs() < 1e-6) && rotation.determinant() > 0.0;
-        if !rigid || !eye.is_finite() {
+        if !eye.abs().cmple(DVec3::splat(LARGEST)).all() {
+            return Err(Error::Usage(format!("the camera's eye must be within {LARGEST:e} of the origin")));
+        }
+        // Poses come from text with few decimals; what is nearly a rotation is made one. NaN must fail too, so the
+        // comparisons are for the good case.
+        let rigid = skew.iter().all(|e| e.abs() < 1e-4) && rotation.determinant() > 0.0;
+        if !rigid {
             return Err(Error::Usage(
                 "the camera's pose is not a rigid motion: its rotation must be orthonormal with determinant +1".into(),
             ));
         }
-        if !(near > 0.0 && near.is_finite()) {
-            return Err(Error::Usage(format!("the near depth must be positive and finite, {near} is not")));
+        if !(1.0 / LARGEST..=LARGEST).contains(&near) {
+            return Err(Error::Usage(format!("the near depth must be positive and within reason, {near} is not")));
         }
+        let forward = rotation.row(2).normalize();
+        let right = rotation.row(0).reject_from_normalized(forward).normalize();
+        let rotation = DMat3::from_cols(right, forward.cross(right), forward).transpose();
         Ok(Self { projection, width, height, fx, fy, cx, cy, eye, rotation, near })
     }
 
-    /// The depth below which nothing is drawn when none is given: far enough from zero for f32 reciprocals, and a
-    /// millionth of the scene.
-    pub fn default_near(bounds: &Bounds) -> f64 {
-        let diagonal = (bounds.max - bounds.min).length();
-        if diagonal > 0.0 { diagonal * 1e-6 } else { 1e-6 }
+    /// The depth below which nothing is drawn when none is given: a millionth of the scene.
+    pub fn default_near(scene: &Scene) -> f64 {
+        let size = scene.bounds().extent().length().max(2.0 * f64::from(scene.largest_radius()));
+        (size * 1e-6).clamp(1.0 / LARGEST, LARGEST)
     }
 
     /// A world point in camera space.
@@ -181,6 +194,11 @@ impl Camera {
     pub fn pixels(&self) -> usize {
         self.width as usize * self.height as usize
     }
+}
+
+/// The vector with unit length, whatever its length; zero for zero.
+fn unit(v: DVec3) -> DVec3 {
+    (v / v.abs().max_element()).normalize_or_zero()
 }
 
 #[cfg(test)]

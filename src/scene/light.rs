@@ -44,7 +44,9 @@ impl FromStr for Light {
         }
         let mut parts = kind.split(',').map(|part| part.trim().parse::<f32>());
         let mut next = || parts.next().ok_or_else(bad)?.map_err(|_| bad());
-        let toward = Vec3::new(next()?, next()?, next()?).normalize_or_zero();
+        let toward = Vec3::new(next()?, next()?, next()?);
+        // The largest component first, so that no square overflows.
+        let toward = (toward / toward.abs().max_element()).normalize_or_zero();
         if parts.next().is_some() || toward == Vec3::ZERO {
             return Err(bad());
         }

@@ -1,6 +1,6 @@
 //! What a scene and its options need, computed once: the only variant key of the kernels.
 
-use super::{Camera, Colors, Projection, RenderOptions, Scene, Shading};
+use super::{Camera, Colors, Epsilon, KernelShape, Projection, RenderOptions, Scene, Shading};
 
 /// Where a surfel's colour comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -18,6 +18,12 @@ pub enum ColorNeed {
 pub struct SceneNeeds {
     /// The camera model.
     pub projection: Projection,
+    /// How sums are kept on the device, by name.
+    pub accumulator: &'static str,
+    /// The kernel's formula.
+    pub kernel: KernelShape,
+    /// Epsilon depends on the surfel's radius.
+    pub epsilon_radius: bool,
     /// The colour source.
     pub color: ColorNeed,
     /// Surfels differ in alpha.
@@ -53,6 +59,9 @@ impl SceneNeeds {
         let lambert = options.shading == Shading::Lambert;
         Self {
             projection: camera.projection,
+            accumulator: options.accumulator,
+            kernel: options.kernel.shape(),
+            epsilon_radius: matches!(options.epsilon, Epsilon::Radius(_)),
             color,
             alpha: low[3] != high[3],
             normal: lambert || options.maps.normal,
@@ -77,7 +86,14 @@ impl SceneNeeds {
             ColorNeed::Srgb8 => "color-srgb8",
             ColorNeed::Linear => "color-linear",
         };
+        let kernel = match self.kernel {
+            KernelShape::Gaussian => "kernel-gaussian",
+            KernelShape::Ellipse => "kernel-ellipse",
+            KernelShape::Hat => "kernel-hat",
+            KernelShape::Constant => "kernel-constant",
+        };
         let flags = [
+            (self.epsilon_radius, "epsilon-radius"),
             (self.alpha, "alpha"),
             (self.normal, "normal"),
             (self.turn_normals, "turn-normals"),
@@ -88,6 +104,9 @@ impl SceneNeeds {
             (self.weight_map, "weight-map"),
             (self.decision, "decision"),
         ];
-        [projection, color].into_iter().chain(flags.into_iter().filter(|(on, _)| *on).map(|(_, name)| name)).collect()
+        [projection, kernel, color]
+            .into_iter()
+            .chain(flags.into_iter().filter(|(on, _)| *on).map(|(_, name)| name))
+            .collect()
     }
 }

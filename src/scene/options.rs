@@ -12,6 +12,8 @@ pub enum Epsilon {
     Relative(f64),
     /// World units.
     Absolute(f64),
+    /// A multiple of the fragment's own surfel's longer half-axis.
+    Radius(f64),
 }
 
 /// The smallest relative tolerance in force: visibility and attribute pass must agree that the nearest fragment is
@@ -19,11 +21,13 @@ pub enum Epsilon {
 pub const LEAST_EPSILON: f64 = 4.0 / 16_777_216.0;
 
 impl Epsilon {
-    /// (relative, absolute) parts: the farthest accepted depth is `nearest * (1 + relative) + absolute`.
-    pub fn parts(self) -> (f64, f64) {
+    /// The parts (relative, absolute, of the radius): the farthest accepted depth of a surfel of radius r is
+    /// `nearest * (1 + relative) + absolute + of_radius * r`.
+    pub fn parts(self) -> (f64, f64, f64) {
         match self {
-            Self::Relative(e) => (e.max(LEAST_EPSILON), 0.0),
-            Self::Absolute(e) => (LEAST_EPSILON, e),
+            Self::Relative(e) => (e.max(LEAST_EPSILON), 0.0, 0.0),
+            Self::Absolute(e) => (LEAST_EPSILON, e, 0.0),
+            Self::Radius(k) => (LEAST_EPSILON, 0.0, k),
         }
     }
 }
@@ -42,28 +46,72 @@ impl FromStr for Epsilon {
         match kind {
             "rel" => Ok(Self::Relative(value)),
             "abs" => Ok(Self::Absolute(value)),
+            "radius" => Ok(Self::Radius(value)),
             _ => Err(bad()),
         }
     }
 }
 
-/// The weight of a fragment over the unit disk of its surfel.
+/// The weight of a fragment over the unit disk of its surfel, rho in [0, 1].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kernel {
+    /// `exp(-rho^2 / (2 sigma^2))` (paper 000, Eq. 11), cut off at the rim.
+    Gaussian {
+        /// Standard deviation, in radii.
+        sigma: f64,
+    },
     /// `psi_E(rho) = exp(-a rho^n)` (paper 000, Eq. 12, where b cancels).
     Ellipse {
         /// Drop-off: the weight at the rim is `exp(-a)`.
         a: f64,
         /// Steepness: higher values have a wider plateau.
         n: f64,
+        /// `(psi_E - exp(-a)) / (1 - exp(-a))` instead, which ends at 0: no step at the rim.
+        smooth: bool,
     },
+    /// `1 - rho`.
+    Hat,
+    /// 1.
+    Constant,
+}
+
+/// The least weight of a fragment. It keeps "depth written implies weight > 0" true for kernels that end at 0, and is
+/// large enough that a pixel reached by a kernel's tail alone keeps 14 bits of its attributes in 24-bit sums.
+pub const LEAST_WEIGHT: f64 = 1.0 / 1024.0;
+
+/// A kernel without its numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[allow(missing_docs)]
+pub enum KernelShape {
+    Gaussian,
+    Ellipse,
+    Hat,
+    Constant,
 }
 
 impl Kernel {
-    /// The weight at squared radius `rho2` in [0, 1].
+    /// The weight at squared radius `rho2` in [0, 1], at least [`LEAST_WEIGHT`].
     pub fn weight(self, rho2: f64) -> f64 {
-        let Self::Ellipse { a, n } = self;
-        (-a * rho2.powf(0.5 * n)).exp()
+        let weight = match self {
+            Self::Gaussian { sigma } => (-0.5 * rho2 / (sigma * sigma)).exp(),
+            Self::Ellipse { a, n, smooth } => {
+                let step = if smooth { (-a).exp() } else { 0.0 };
+                ((-a * rho2.powf(0.5 * n)).exp() - step) / (1.0 - step)
+            }
+            Self::Hat => 1.0 - rho2.sqrt(),
+            Self::Constant => 1.0,
+        };
+        weight.max(LEAST_WEIGHT)
+    }
+
+    /// Which it is.
+    pub fn shape(self) -> KernelShape {
+        match self {
+            Self::Gaussian { .. } => KernelShape::Gaussian,
+            Self::Ellipse { .. } => KernelShape::Ellipse,
+            Self::Hat => KernelShape::Hat,
+            Self::Constant => KernelShape::Constant,
+        }
     }
 }
 
@@ -71,12 +119,36 @@ impl FromStr for Kernel {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self, Error> {
-        let bad =
-            || Error::Usage(format!("a kernel is ellipse:A,N with A from 0 to 16 and N from 0.1 to 100, not {text:?}"));
-        let (a, n) = text.strip_prefix("ellipse:").and_then(|rest| rest.split_once(',')).ok_or_else(bad)?;
-        let (a, n): (f64, f64) = (a.trim().parse().map_err(|_| bad())?, n.trim().parse().map_err(|_| bad())?);
-        // Beyond exp(-16) a rim weight is under one unit of the 24-bit sums.
-        if (0.0..=16.0).contains(&a) && (0.1..=100.0).contains(&n) { Ok(Self::Ellipse { a, n }) } else { Err(bad()) }
+        let bad = || {
+            Error::Usage(format!(
+                "a kernel is gaussian[:SIGMA] (0.05 to 10), ellipse:A,N[,smooth] (A from 0 to 16, N from 0.1 to 100), \
+                 hat or constant, not {text:?}"
+            ))
+        };
+        let number = |text: &str| text.trim().parse::<f64>().map_err(|_| bad());
+        let kernel = match text.split_once(':') {
+            None => match text {
+                "gaussian" => Self::Gaussian { sigma: 1.0 / 3.0 },
+                "hat" => Self::Hat,
+                "constant" => Self::Constant,
+                _ => return Err(bad()),
+            },
+            Some(("gaussian", sigma)) => Self::Gaussian { sigma: number(sigma)? },
+            Some(("ellipse", numbers)) => match numbers.split(',').collect::<Vec<_>>()[..] {
+                [a, n] => Self::Ellipse { a: number(a)?, n: number(n)?, smooth: false },
+                [a, n, "smooth"] => Self::Ellipse { a: number(a)?, n: number(n)?, smooth: true },
+                _ => return Err(bad()),
+            },
+            Some(_) => return Err(bad()),
+        };
+        let usable = match kernel {
+            Self::Gaussian { sigma } => (0.05..=10.0).contains(&sigma),
+            Self::Ellipse { a, n, smooth } => {
+                (if smooth { 0.01 } else { 0.0 }..=16.0).contains(&a) && (0.1..=100.0).contains(&n)
+            }
+            Self::Hat | Self::Constant => true,
+        };
+        if usable { Ok(kernel) } else { Err(bad()) }
     }
 }
 
@@ -113,6 +185,8 @@ pub struct RenderOptions {
     pub epsilon: Epsilon,
     /// Blending kernel.
     pub kernel: Kernel,
+    /// Name of the device's accumulator; see [`crate::passes::accumulate::ACCUMULATORS`].
+    pub accumulator: &'static str,
     /// Shading model.
     pub shading: Shading,
     /// Lights of the Lambert model.
@@ -127,7 +201,8 @@ impl Default for RenderOptions {
     fn default() -> Self {
         Self {
             epsilon: Epsilon::Relative(0.01),
-            kernel: Kernel::Ellipse { a: 6.0, n: 3.0 },
+            kernel: Kernel::Ellipse { a: 6.0, n: 3.0, smooth: false },
+            accumulator: "fixed",
             shading: Shading::Lambert,
             lights: vec![Light::Headlight { intensity: 1.0 }],
             background: [0.0; 4],
@@ -145,20 +220,46 @@ mod tests {
     fn options_are_read_and_refused() {
         assert_eq!("rel:0.01".parse::<Epsilon>().unwrap(), Epsilon::Relative(0.01));
         assert_eq!("abs:2".parse::<Epsilon>().unwrap(), Epsilon::Absolute(2.0));
-        for bad in ["", "rel", "rel:", "rel:-1", "abs:nan", "abs:inf", "radius:1"] {
+        for bad in ["", "rel", "rel:", "rel:-1", "abs:nan", "abs:inf", "radii:1"] {
             assert!(bad.parse::<Epsilon>().is_err(), "{bad}");
         }
-        assert_eq!("ellipse:6,3".parse::<Kernel>().unwrap(), Kernel::Ellipse { a: 6.0, n: 3.0 });
-        for bad in ["", "ellipse", "ellipse:6", "ellipse:17,3", "ellipse:6,0", "gaussian", "ellipse:6,3,1"] {
+        assert_eq!("ellipse:6,3".parse::<Kernel>().unwrap(), Kernel::Ellipse { a: 6.0, n: 3.0, smooth: false });
+        for bad in [
+            "",
+            "ellipse",
+            "ellipse:6",
+            "ellipse:17,3",
+            "ellipse:6,0",
+            "gaussian:0",
+            "ellipse:6,3,1",
+            "hat:1",
+            "ellipse:0,3,smooth",
+        ] {
             assert!(bad.parse::<Kernel>().is_err(), "{bad}");
         }
     }
 
     #[test]
     fn the_ellipse_kernel_is_the_papers() {
-        let kernel = Kernel::Ellipse { a: 6.0, n: 3.0 };
+        let kernel = Kernel::Ellipse { a: 6.0, n: 3.0, smooth: false };
         assert_eq!(kernel.weight(0.0), 1.0);
         assert!((kernel.weight(0.25) - (-6.0f64 / 8.0).exp()).abs() < 1e-15);
         assert!((kernel.weight(1.0) - (-6.0f64).exp()).abs() < 1e-15);
+    }
+
+    #[test]
+    fn every_kernel_falls_from_one_and_never_below_the_floor() {
+        for text in
+            ["gaussian", "gaussian:0.2", "ellipse:6,3", "ellipse:6,3,smooth", "ellipse:16,0.5", "hat", "constant"]
+        {
+            let kernel: Kernel = text.parse().unwrap();
+            assert_eq!(kernel.weight(0.0), 1.0, "{text}");
+            let weights: Vec<_> = (0..=100).map(|i| kernel.weight(f64::from(i) / 100.0)).collect();
+            assert!(weights.windows(2).all(|w| w[0] >= w[1]) && weights[100] >= LEAST_WEIGHT, "{text}");
+        }
+        assert_eq!("ellipse:6,3,smooth".parse::<Kernel>().unwrap().weight(1.0), LEAST_WEIGHT);
+        assert_eq!(Kernel::Hat.weight(0.25), 0.5);
+        let sigma = 0.4;
+        assert!((Kernel::Gaussian { sigma }.weight(sigma * sigma) - (-0.5f64).exp()).abs() < 1e-15);
     }
 }

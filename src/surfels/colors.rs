@@ -56,6 +56,7 @@ impl ColorGatherer {
                         *color = DEFAULT_COLOR;
                         self.replaced += 1;
                     }
+                    color[3] = color[3].clamp(0.0, 1.0);
                 }
                 added.resize(count, DEFAULT_COLOR);
                 self.append_linear(added, before);
@@ -94,9 +95,9 @@ impl ColorGatherer {
     }
 }
 
-/// Whether the colour, and its product with its alpha, is finite.
+/// Whether the colour, and its products and differences on the way through f32, stay finite. NaN is not usable.
 fn is_usable(color: &[f32; 4]) -> bool {
-    color.iter().all(|c| c.is_finite() && (c * color[3]).is_finite())
+    color.iter().all(|c| c.abs() <= 1e18)
 }
 
 /// The 8-bit sRGB code nearest to [`DEFAULT_COLOR`].

@@ -1,0 +1,173 @@
+//! Which kernels a render is made of: the files that are joined, the numbers that are set, and the room a pixel takes.
+//! [`SceneNeeds`] is the only key.
+
+use super::accumulate::{Accumulator, accumulator};
+use crate::error::Result;
+use crate::gpu::kernel::Program;
+use crate::gpu::layout::LARGE;
+use crate::gpu::{Gpu, Sources};
+use crate::scene::{ColorNeed, Kernel, KernelShape, Projection, RenderOptions, SceneNeeds};
+
+/// The entry points of the stages, in order.
+pub const STAGES: [&str; 7] =
+    ["project", "clear", "visibility", "visibility_large", "accumulate", "accumulate_large", "resolve"];
+
+/// A render's kernels, before they are compiled.
+#[derive(Clone, Debug)]
+pub struct Variant {
+    /// The key.
+    pub needs: SceneNeeds,
+    /// How sums are kept.
+    pub accumulator: &'static Accumulator,
+    /// The room a pixel takes.
+    pub pixel: PixelLayout,
+    /// Overridable constants by name; a module takes those it declares.
+    pub constants: Vec<(&'static str, f64)>,
+}
+
+impl Variant {
+    /// The kernels for `surfels` surfels with these needs.
+    pub fn of(needs: &SceneNeeds, options: &RenderOptions, surfels: u64) -> Result<Self> {
+        let accumulator = accumulator(needs.accumulator)?;
+        let constants = overrides(needs, options, accumulator.fraction_bits(surfels));
+        Ok(Self { needs: *needs, accumulator, pixel: PixelLayout::of(needs), constants })
+    }
+
+    /// Compiles them.
+    pub fn compile(&self, gpu: &Gpu, sources: &Sources) -> Result<Program> {
+        Program::compile(gpu, sources.join(&files(&self.needs)), &STAGES, &self.constants)
+    }
+
+    /// u32 words of a pixel's sums.
+    pub fn sum_words(&self) -> u32 {
+        self.pixel.channels * self.accumulator.words
+    }
+}
+
+/// The files that a render with `needs` is made of.
+pub fn files(needs: &SceneNeeds) -> Vec<&'static str> {
+    let pick = |needed, file, absent| if needed { file } else { absent };
+    let mut files = vec![
+        "layout.wgsl",
+        "double.wgsl",
+        "rows.wgsl",
+        match needs.projection {
+            Projection::Pinhole => "camera_pinhole.wgsl",
+            Projection::Orthographic => "camera_orthographic.wgsl",
+        },
+        "project.wgsl",
+        "footprint.wgsl",
+        "visibility.wgsl",
+        "accumulate.wgsl",
+        pick(needs.epsilon_radius, "epsilon_radius.wgsl", "epsilon.wgsl"),
+        match needs.kernel {
+            KernelShape::Gaussian => "kernel_gaussian.wgsl",
+            KernelShape::Ellipse => "kernel_ellipse.wgsl",
+            KernelShape::Hat => "kernel_hat.wgsl",
+            KernelShape::Constant => "kernel_constant.wgsl",
+        },
+        accumulator(needs.accumulator).map_or("", |row| row.file),
+        "resolve.wgsl",
+        pick(needs.normal, "normal.wgsl", "normal_absent.wgsl"),
+        pick(needs.normal_map, "normal_map.wgsl", "normal_map_absent.wgsl"),
+        pick(needs.depth, "depth.wgsl", "depth_absent.wgsl"),
+        pick(needs.weight_map, "weight_map.wgsl", "weight_map_absent.wgsl"),
+        pick(needs.count, "count.wgsl", "count_absent.wgsl"),
+        pick(needs.lambert, "shade_lambert.wgsl", "shade_unlit.wgsl"),
+    ];
+    match needs.color {
+        ColorNeed::Constant => files.push("color_constant.wgsl"),
+        ColorNeed::Srgb8 => files.extend(["color_srgb8.wgsl", "color_sums.wgsl"]),
+        ColorNeed::Linear => files.extend(["color_linear.wgsl", "color_sums.wgsl"]),
+    }
+    files
+}
+
+/// Where a pixel's values lie, in the sums (by channel) and in the image (by word). What is not needed takes no room.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PixelLayout {
+    /// Sums of a pixel: an even number, for accumulators that keep them in pairs. The weight's is channel 0.
+    pub channels: u32,
+    /// The first of the normal's three channels.
+    pub normal_channel: u32,
+    /// The depth's channel.
+    pub depth_channel: u32,
+    /// The fragment count's channel.
+    pub count_channel: u32,
+    /// Words of a pixel in the image; the colour's four come first.
+    pub image_words: u32,
+    /// Word of the normal map's x in the image.
+    pub normal_image: u32,
+    /// Word of the depth in the image.
+    pub depth_image: u32,
+    /// Word of the weight in the image.
+    pub weight_image: u32,
+    /// Word of the count in the image.
+    pub count_image: u32,
+}
+
+/// The first colour channel: next to the weight's, so that the two make a pair.
+pub const COLOR_CHANNEL: u32 = 1;
+
+impl PixelLayout {
+    /// The layout for `needs`.
+    pub fn of(needs: &SceneNeeds) -> Self {
+        let channels = |needed: bool, count: u32| if needed { count } else { 0 };
+        // The normal's x and y are a pair, and pairs start at even channels.
+        let normal_channel = (COLOR_CHANNEL + color_channels(needs)).next_multiple_of(2);
+        let depth_channel = normal_channel + channels(needs.normal, 3);
+        let count_channel = depth_channel + channels(needs.depth, 1);
+        let normal_image = 4;
+        let depth_image = normal_image + channels(needs.normal_map, 3);
+        let weight_image = depth_image + channels(needs.depth, 1);
+        let count_image = weight_image + channels(needs.weight_map, 1);
+        Self {
+            channels: (count_channel + channels(needs.count, 1)).next_multiple_of(2),
+            normal_channel,
+            depth_channel,
+            count_channel,
+            image_words: count_image + channels(needs.count, 1),
+            normal_image,
+            depth_image,
+            weight_image,
+            count_image,
+        }
+    }
+}
+
+/// Colour sums of a pixel.
+pub fn color_channels(needs: &SceneNeeds) -> u32 {
+    match needs.color {
+        ColorNeed::Constant => 0,
+        _ => 3 + u32::from(needs.alpha),
+    }
+}
+
+/// The overridable constants of a render, by name.
+pub fn overrides(needs: &SceneNeeds, options: &RenderOptions, fraction_bits: u32) -> Vec<(&'static str, f64)> {
+    let layout = PixelLayout::of(needs);
+    let mut constants = vec![
+        ("LARGE", LARGE.into()),
+        ("CHANNELS", layout.channels.into()),
+        ("FRACTION_BITS", fraction_bits.into()),
+        ("COLOR_CHANNELS", color_channels(needs).into()),
+        ("NORMAL_CHANNEL", layout.normal_channel.into()),
+        ("TURN_NORMALS", u32::from(needs.turn_normals).into()),
+        ("DEPTH_CHANNEL", layout.depth_channel.into()),
+        ("COUNT_CHANNEL", layout.count_channel.into()),
+        ("IMAGE_WORDS", layout.image_words.into()),
+        ("NORMAL_IMAGE", layout.normal_image.into()),
+        ("DEPTH_IMAGE", layout.depth_image.into()),
+        ("WEIGHT_IMAGE", layout.weight_image.into()),
+        ("COUNT_IMAGE", layout.count_image.into()),
+    ];
+    match options.kernel {
+        Kernel::Gaussian { sigma } => constants.push(("KERNEL_FALL", 0.5 / (sigma * sigma))),
+        Kernel::Ellipse { a, n, smooth } => {
+            let step = if smooth { (-a).exp() } else { 0.0 };
+            constants.extend([("KERNEL_A", a), ("KERNEL_N", n), ("KERNEL_STEP", step)]);
+        }
+        Kernel::Hat | Kernel::Constant => {}
+    }
+    constants
+}

@@ -1,0 +1,34 @@
+// Sums in f32 by atomic add: what a hardware blender with float targets does. The rounding depends on the order, so two
+// runs may differ. Needs f32 atomics. Error bound: src/passes/accumulate.rs.
+
+override CHANNELS: u32;
+
+@group(0) @binding(8) var<storage, read_write> sums: array<atomic<f32>>;
+
+alias Term = f32;
+const COUNT_ONE: Term = 1.0;
+
+fn quantise(weight: f32) -> Term {
+    return weight;
+}
+
+fn term(weight: Term, value: f32) -> Term {
+    return weight * clamp(value, 0.0, 1.0);
+}
+
+fn add(pixel: u32, channel: u32, value: Term) {
+    atomicAdd(&sums[pixel * CHANNELS + channel], value);
+}
+
+fn add_pair(pixel: u32, channel: u32, first: Term, second: Term) {
+    add(pixel, channel, first);
+    add(pixel, channel + 1u, second);
+}
+
+fn sum_at(pixel: u32, channel: u32) -> f32 {
+    return atomicLoad(&sums[pixel * CHANNELS + channel]);
+}
+
+fn weight_at(pixel: u32) -> f32 {
+    return sum_at(pixel, WEIGHT_CHANNEL);
+}

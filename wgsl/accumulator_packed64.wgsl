@@ -1,0 +1,51 @@
+// Two neighbouring sums in the halves of one u64: half the atomic operations of accumulator_fixed32, and the same terms
+// and overflow. Needs 64-bit atomics. Error bound: src/passes/accumulate.rs.
+
+override CHANNELS: u32;
+override FRACTION_BITS: u32;
+
+@group(0) @binding(8) var<storage, read_write> sums: array<atomic<u64>>;
+@group(0) @binding(14) var<storage, read_write> overflows: atomic<u32>;
+
+alias Term = u32;
+const COUNT_ONE: Term = 1u;
+
+fn one() -> f32 {
+    return f32(1u << FRACTION_BITS);
+}
+
+fn quantise(weight: f32) -> Term {
+    return u32(round(weight * one()));
+}
+
+fn term(weight: Term, value: f32) -> Term {
+    return u32(round(f32(weight) * clamp(value, 0.0, 1.0)));
+}
+
+fn add_halves(pair: u32, low: Term, high: Term) {
+    let before = atomicAdd(&sums[pair], (u64(high) << 32u) | u64(low));
+    let before_low = u32(before & 0xfffffffflu);
+    let before_high = u32(before >> 32u);
+    // A low half that wraps carries into the high one, which is as wrong as a high half that wraps.
+    if (before_low + low < before_low || before_high + high < before_high) {
+        atomicAdd(&overflows, 1u);
+    }
+}
+
+fn add(pixel: u32, channel: u32, value: Term) {
+    let odd = (channel & 1u) == 1u;
+    add_halves((pixel * CHANNELS + channel) / 2u, select(value, 0u, odd), select(0u, value, odd));
+}
+
+fn add_pair(pixel: u32, channel: u32, first: Term, second: Term) {
+    add_halves((pixel * CHANNELS + channel) / 2u, first, second);
+}
+
+fn sum_at(pixel: u32, channel: u32) -> f32 {
+    let pair = atomicLoad(&sums[(pixel * CHANNELS + channel) / 2u]);
+    return f32(select(u32(pair & 0xfffffffflu), u32(pair >> 32u), (channel & 1u) == 1u));
+}
+
+fn weight_at(pixel: u32) -> f32 {
+    return sum_at(pixel, WEIGHT_CHANNEL) / one();
+}

@@ -1,0 +1,18 @@
+// Epsilon as a multiple of the fragment's own surfel's longer half-axis. Twin: src/passes/accumulate.rs.
+
+// Device units.
+fn radius_of(index: u32) -> f32 {
+    let surfel = surfels[index];
+    let s = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * view.unit;
+    let t = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]) * view.unit;
+    return max(length(s), length(t));
+}
+
+// Of the largest surfel: what depths are measured by.
+fn deepest_accepted(front: f32) -> f32 {
+    return min(front + (front * view.epsilon_relative + view.epsilon_deepest), view.farthest);
+}
+
+fn farthest_accepted(front: f32, radius: f32) -> f32 {
+    return min(front + (front * view.epsilon_relative + view.epsilon_radius * radius), view.farthest);
+}

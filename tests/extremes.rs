@@ -1,0 +1,75 @@
+//! Scenes at the ends of the number line: the GPU against the f64 reference.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use epsplat::io::Points;
+use epsplat::metrics::compare;
+use epsplat::render::{Backend, render};
+use epsplat::scene::{Camera, Epsilon, Lens, Maps, RenderOptions, Scene, Up};
+use epsplat::surfels::analytic::{Shape, generate};
+use epsplat::surfels::build;
+use glam::DVec3;
+
+/// A unit sphere, scaled and shifted, with more points beside it.
+fn sphere(scale: f64, shift: DVec3, more: &[DVec3]) -> Scene {
+    let samples: Vec<_> = generate(Shape::Sphere, 3000).collect();
+    let mut points = Points::default();
+    points.positions.extend(samples.iter().map(|s| (DVec3::from_array(s.position) * scale + shift).to_array()));
+    points.positions.extend(more.iter().map(|p| p.to_array()));
+    let rest = more.len();
+    let normals = samples.iter().map(|s| s.normal).chain(std::iter::repeat_n([0.0, 0.0, 1.0], rest));
+    let radii = samples.iter().map(|s| (f64::from(s.radius) * scale) as f32).chain(std::iter::repeat_n(1.0, rest));
+    points.normals = Some(normals.collect());
+    points.radii = Some(radii.collect());
+    build(vec![points], &()).unwrap().0
+}
+
+fn view(scale: f64, shift: DVec3) -> Camera {
+    let eye = shift + DVec3::new(0.4, 0.3, 3.0) * scale;
+    Camera::look_at((96, 80), Lens::Fov(45.0), eye, shift, Some(DVec3::Y), Up::Y, 0.01 * scale).unwrap()
+}
+
+fn check(name: &str, scene: &Scene, camera: &Camera, epsilon: Epsilon) {
+    let Some(gpu) = common::gpu() else { return };
+    let maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
+    let options = RenderOptions { epsilon, maps, ..RenderOptions::default() };
+    let with_decision = RenderOptions { maps: Maps { decision: true, ..maps }, ..options.clone() };
+    let (reference, _) = render(scene, camera, &with_decision, &Backend::Reference, &()).unwrap();
+    let (frame, _) = render(scene, camera, &options, &Backend::gpu(gpu), &()).unwrap();
+    let share = reference.color.iter().filter(|c| c[3] > 0.0).count() as f64 / camera.pixels() as f64;
+    assert!(share > 0.3, "{name}: the sphere covers {share}");
+    let comparison = compare(&frame, &reference).unwrap();
+    assert!(comparison.excused.unwrap() < 0.01, "{name}: {comparison:?}");
+    for map in &comparison.maps {
+        assert!(map.max_of_range_decided.unwrap() <= 1e-4, "{name}: {map:?}");
+    }
+}
+
+#[test]
+fn a_far_outlier_does_not_hurt_the_rest() {
+    for far in [1e6, 1e9, 1e11, 1e15] {
+        let scene = sphere(1.0, DVec3::ZERO, &[DVec3::new(far, 0.0, 0.0)]);
+        check(&format!("outlier at {far:e}"), &scene, &view(1.0, DVec3::ZERO), Epsilon::Relative(0.01));
+    }
+}
+
+#[test]
+fn small_large_and_distant_scenes_are_the_same_picture() {
+    for scale in [1e-6, 1e-3, 1e6, 1e12] {
+        let scene = sphere(scale, DVec3::ZERO, &[]);
+        check(&format!("scale {scale:e}"), &scene, &view(scale, DVec3::ZERO), Epsilon::Relative(0.01));
+    }
+    // Map coordinates, and detail of millimetres.
+    let shift = DVec3::new(6.26e6, 4.4e5, 1200.0);
+    check("map", &sphere(0.05, shift, &[]), &view(0.05, shift), Epsilon::Relative(0.01));
+}
+
+#[test]
+fn an_epsilon_that_accepts_everything_is_exact() {
+    let scene = sphere(1.0, DVec3::ZERO, &[]);
+    for epsilon in [Epsilon::Absolute(1e5), Epsilon::Absolute(1e300), Epsilon::Relative(1e9), Epsilon::Radius(1e30)] {
+        check(&format!("{epsilon:?}"), &scene, &view(1.0, DVec3::ZERO), epsilon);
+    }
+}

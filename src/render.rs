@@ -207,7 +207,7 @@ const REFERENCE_ROWS: u32 = 8;
 fn on_reference(scene: &Scene, camera: &Camera, options: &RenderOptions, progress: &dyn Progress) -> (Frame, Report) {
     let needs = SceneNeeds::of(scene, &scene.color_range(), camera, options);
     let start = Instant::now();
-    let splats = project::reference_all(scene, camera);
+    let splats = project::reference_all(scene, camera, options);
     let project_ms = start.elapsed().as_secs_f64() * 1e3;
 
     let bands = camera.height.div_ceil(REFERENCE_ROWS);
@@ -225,7 +225,7 @@ fn on_reference(scene: &Scene, camera: &Camera, options: &RenderOptions, progres
             spent[stage].fetch_add(((now - from) * 1e9) as u64, Ordering::Relaxed);
             now
         };
-        let nearest = visibility::reference(splats(), camera, first_row, rows);
+        let nearest = visibility::reference(splats(), camera, options.low_pass, first_row, rows);
         let seen = lap(0, 0.0);
         let sums = accumulate::reference(splats(), scene, camera, options, first_row, &nearest);
         let summed = lap(1, seen);

@@ -101,7 +101,9 @@ fn a_render_reports_what_it_did() {
     for key in ["rmse", "coverage_mismatch", "percentile_99_9"] {
         assert_eq!(comparison[key], 0.0, "{key}");
     }
-    assert_eq!(comparison["maps"].as_array().unwrap().len(), 5);
+    let maps: Vec<&str> =
+        comparison["maps"].as_array().unwrap().iter().map(|map| map["map"].as_str().unwrap()).collect();
+    assert_eq!(maps, ["color", "alpha", "depth", "normal", "weight", "count"]);
 }
 
 #[test]
@@ -150,7 +152,7 @@ fn unusable_arguments_exit_with_2() {
     };
     render(&["--size", "0x0"], &["0x0"]);
     render(&["--size", "100000x100000"], &["100000x100000", "32768"]);
-    render(&["--size", "32768x32768"], &["268435456"]);
+    render(&["--size", "32768x32768"], &["134217728"]);
     render(&["--size", "big"], &["WIDTHxHEIGHT"]);
     render(&["--fov", "40", "--ortho", "3"], &["--ortho"]);
     render(&["--camera", camera, "--eye", "0,0,1"], &["--eye"]);
@@ -164,7 +166,14 @@ fn unusable_arguments_exit_with_2() {
     render(&["--near", "0"], &["near"]);
     render(&["--intrinsics", "0,1,2,3"], &["fx"]);
     render(&["--epsilon", "0.01"], &["rel:E"]);
-    render(&["--kernel", "box"], &["ellipse:A,N"]);
+    render(&["--epsilon", "radius:-1"], &["rel:E"]);
+    for bad in
+        ["box", "gaussian:0", "gaussian:wide", "ellipse:17,3", "ellipse:6,3,rough", "ellipse:0,3,smooth", "hat:1"]
+    {
+        render(&["--kernel", bad], &["gaussian", "ellipse:A,N", "hat", "constant"]);
+    }
+    render(&["--accumulator", "double"], &["fixed", "fixed32", "fixed64", "packed64", "float", "cas"]);
+    render(&["--accumulator", "fixed"], &["--accumulator", "f64"]);
     render(&["--light", "0,0,0"], &["light"]);
     render(&["--aov", "depth"], &[".exr"]);
     render(&["--background", "1,2"], &["R,G,B"]);

@@ -34,7 +34,7 @@ fn file(name: &str) -> Scene {
 }
 
 fn framed(scene: &Scene, size: (u32, u32), lens: Lens) -> Camera {
-    Camera::framing(size, lens, scene, Camera::default_near(&scene.bounds())).unwrap()
+    Camera::framing(size, lens, scene, Camera::default_near(scene)).unwrap()
 }
 
 fn cases() -> Vec<(&'static str, Scene, Camera, RenderOptions)> {

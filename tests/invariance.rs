@@ -4,19 +4,19 @@
 
 mod common;
 
-use common::Random;
-use common::scenes::{cases, sphere, sphere_camera, sphere_camera_with};
+use common::UNIT;
+use common::scenes::{crowded, front, sphere, sphere_camera_with, stack};
 use epsplat::frame::Frame;
-use epsplat::gpu::buffers::page_len;
-use epsplat::gpu::layout::Splat;
+use epsplat::gpu::layout::ONE;
 use epsplat::gpu::{Gpu, Sources};
 use epsplat::inspect::stages;
-use epsplat::passes::accumulate::{ACCUMULATORS, PixelSums};
+use epsplat::passes::accumulate::{Accumulator, PixelSums};
 use epsplat::passes::resolve;
+use epsplat::passes::variant::COLOR_CHANNEL;
 use epsplat::render::{Backend, render};
 use epsplat::scene::camera::Lens;
 use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Maps, Projection, RenderOptions, Scene, Shading, Surfel, Up};
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 
 const E: f64 = 1.0 / 16_777_216.0;
 
@@ -30,89 +30,6 @@ fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Back
     render(scene, camera, options, backend, &()).unwrap().0
 }
 
-/// The frame's bits: equality of floats would take -0 for 0 and no NaN for itself.
-fn bits(frame: &Frame) -> Vec<u32> {
-    let maps = [&frame.depth, &frame.weight, &frame.count].into_iter().flatten().flatten();
-    let vectors = frame.color.iter().flatten().chain(frame.normal.iter().flatten().flatten());
-    vectors.chain(maps).map(|value| value.to_bits()).collect()
-}
-
-fn shuffled(scene: &Scene, seed: u64) -> Scene {
-    let mut order: Vec<usize> = (0..scene.surfels.len()).collect();
-    Random(seed).shuffle(&mut order);
-    let colors = match &scene.colors {
-        Colors::Constant(color) => Colors::Constant(*color),
-        Colors::Srgb8(codes) => Colors::Srgb8(order.iter().map(|&k| codes[k]).collect()),
-        Colors::Linear(colors) => Colors::Linear(order.iter().map(|&k| colors[k]).collect()),
-    };
-    Scene { surfels: order.iter().map(|&k| scene.surfels[k]).collect(), colors, ..scene.clone() }
-}
-
-/// Scenes with many fragments on a pixel, in both kinds of colour.
-fn crowded() -> Vec<(Scene, Camera)> {
-    let mut all = vec![(sphere(4000, 4.0), sphere_camera(96, Projection::Pinhole))];
-    all.extend(cases().into_iter().take(2).map(|case| (case.scene, case.camera)));
-    all
-}
-
-#[test]
-fn order_and_repetition_do_not_change_a_bit() {
-    let Some(gpu) = common::gpu() else { return };
-    let backend = Backend::gpu(gpu);
-    for (scene, camera) in crowded() {
-        let first = bits(&frame(&scene, &camera, &options(), &backend));
-        assert!(bits(&frame(&scene, &camera, &options(), &backend)) == first, "a second run differs");
-        for seed in [5, 6] {
-            let other = frame(&shuffled(&scene, seed), &camera, &options(), &backend);
-            assert!(bits(&other) == first, "order {seed} differs");
-        }
-        // The comparison sees one surfel moved by a unit in the last place.
-        let mut moved = scene.clone();
-        for surfel in &mut moved.surfels {
-            surfel.center[0] = surfel.center[0].next_up();
-        }
-        assert!(bits(&frame(&moved, &camera, &options(), &backend)) != first);
-    }
-    // And a sum in which the last fragment wins.
-    let Backend::Gpu { gpu, .. } = backend else { unreachable!() };
-    let sources = Sources::default()
-        .replace("accumulator_fixed.wgsl", "atomicAdd(&sums[word], value)", "atomicExchange(&sums[word], value)")
-        .unwrap();
-    let careless = Backend::Gpu { gpu, sources };
-    let (scene, camera) = crowded().remove(0);
-    let [one, other] = [&scene, &shuffled(&scene, 5)].map(|s| bits(&frame(s, &camera, &options(), &careless)));
-    assert!(one != other, "a sum that depends on the order was not noticed");
-}
-
-#[test]
-fn pages_and_bands_do_not_change_a_bit() {
-    let Some(whole) = common::gpu() else { return };
-    let whole = Backend::gpu(whole);
-    // 160 pixels of 19 words are 12,160 bytes: a row of the image a band; and 203 surfels a page.
-    for limit in [13_000, 40_000] {
-        let Some(small) = common::gpu() else { return };
-        let small = small.with_buffer_limit(limit);
-        assert_eq!(small.buffer_limit(), limit);
-        let (scene, camera) = crowded().remove(1);
-        let refused = stages(&scene, &camera, &options(), &small, &Sources::default());
-        assert!(refused.unwrap_err().to_string().contains("bands"));
-        assert!(page_len(&small, size_of::<Splat>()) < scene.surfels.len() as u64 / 2);
-        let small = Backend::gpu(small);
-        for (scene, camera) in crowded() {
-            let one = frame(&scene, &camera, &options(), &whole);
-            let many = frame(&scene, &camera, &options(), &small);
-            assert!(bits(&one) == bits(&many), "{limit} bytes a buffer give another image");
-        }
-    }
-}
-
-/// An orthographic camera that looks along +z from the origin, a unit a pixel.
-fn front(size: u32) -> Camera {
-    let half = f64::from(size) / 2.0;
-    let lens = Lens::OrthographicScale([1.0, 1.0, half, half]);
-    Camera::posed((size, size), lens, DVec3::ZERO, DMat3::IDENTITY, 1e-3).unwrap()
-}
-
 /// Disks on a grid in the plane z = `depth`, that cover `size` pixels and more.
 fn plane(size: i32, depth: f32) -> Vec<Surfel> {
     let at = |k: i32| 1.7 * k as f32 + 0.123 - size as f32 / 2.0;
@@ -123,10 +40,17 @@ fn plane(size: i32, depth: f32) -> Vec<Surfel> {
 #[test]
 fn a_plane_of_one_colour_is_exactly_that_colour() {
     let Some(gpu) = common::gpu() else { return };
+    let all = common::accumulators(&gpu);
     let backend = Backend::gpu(gpu);
+    for row in all {
+        check_plane(row, &backend);
+    }
+}
+
+fn check_plane(row: &Accumulator, backend: &Backend) {
     let camera = front(64);
     let surfels = plane(64, 5.0);
-    let options = RenderOptions { shading: Shading::Unlit, ..options() };
+    let options = RenderOptions { shading: Shading::Unlit, accumulator: row.name, ..options() };
     let color = [0.123_456_7, 7.654_321, 0.333_333_34, 1.0];
     let code = [200, 17, 99, 255];
     let decoded = Colors::Srgb8(vec![code]).linear(0);
@@ -136,19 +60,30 @@ fn a_plane_of_one_colour_is_exactly_that_colour() {
         (Colors::Srgb8(vec![code; surfels.len()]), decoded),
     ] {
         let scene = Scene { origin: DVec3::ZERO, surfels: surfels.clone(), colors, oriented: true, up: Up::Y };
-        let frame = frame(&scene, &camera, &options, &backend);
-        assert!(frame.color.iter().all(|pixel| *pixel == expected), "{:?} is not {expected:?}", frame.color[0]);
-        assert!(frame.depth.unwrap().iter().all(|depth| (depth - 5.0).abs() <= 5.0 * 4.0 * E as f32));
-        let normals = frame.normal.unwrap();
-        let bound = 2.0 * (ACCUMULATORS[0].error_bound)(1.0, 0.1) as f32;
-        assert!(normals.iter().all(|n| n[0].abs() < bound && n[1].abs() < bound && (n[2] + 1.0).abs() < bound));
+        let frame = frame(&scene, &camera, &options, backend);
+        let name = row.name;
+        assert!(frame.color.iter().all(|pixel| *pixel == expected), "{name}: {:?} is not {expected:?}", frame.color[0]);
+        assert!(frame.depth.unwrap().iter().all(|depth| (depth - 5.0).abs() <= 5.0 * 4.0 * E as f32), "{name}");
+        let (counts, weights) = (frame.count.unwrap(), frame.weight.unwrap());
+        for (pixel, n) in frame.normal.unwrap().into_iter().enumerate() {
+            let bits = row.fraction_bits(scene.surfels.len() as u64);
+            let bound = 2.0 * (row.error_bound)(counts[pixel].into(), weights[pixel].into(), bits) as f32;
+            assert!(n[0].abs() < bound && n[1].abs() < bound && (n[2] + 1.0).abs() < bound, "{name}: {n:?} at {pixel}");
+        }
     }
 }
 
 #[test]
 fn one_of_two_colours_comes_out_within_the_stated_bound() {
     let Some(gpu) = common::gpu() else { return };
+    let all = common::accumulators(&gpu);
     let backend = Backend::gpu(gpu);
+    for row in all {
+        check_two_colours(row, &backend);
+    }
+}
+
+fn check_two_colours(row: &Accumulator, backend: &Backend) {
     let camera = front(64);
     let mut surfels = plane(64, 5.0);
     let near = surfels.len();
@@ -157,54 +92,44 @@ fn one_of_two_colours_comes_out_within_the_stated_bound() {
     let (seen, hidden) = ([0.25, 0.5, 0.625, 1.0], [4.0, -3.0, 0.0, 1.0]);
     let colors = (0..surfels.len()).map(|k| if k < near { seen } else { hidden }).collect();
     let scene = Scene { origin: DVec3::ZERO, surfels, colors: Colors::Linear(colors), oriented: true, up: Up::Y };
-    let options = RenderOptions { shading: Shading::Unlit, ..options() };
-    let frame = frame(&scene, &camera, &options, &backend);
+    let options = RenderOptions { shading: Shading::Unlit, accumulator: row.name, ..options() };
+    let fraction_bits = row.fraction_bits(scene.surfels.len() as u64);
+    let frame = frame(&scene, &camera, &options, backend);
     let (weights, counts) = (frame.weight.unwrap(), frame.count.unwrap());
     for (pixel, color) in frame.color.iter().enumerate() {
         for k in 0..4 {
             let range = f64::from((seen[k] - hidden[k]).abs());
-            let bound = (ACCUMULATORS[0].error_bound)(counts[pixel].into(), weights[pixel].into());
+            let bound = (row.error_bound)(counts[pixel].into(), weights[pixel].into(), fraction_bits);
             let difference = f64::from((color[k] - seen[k]).abs());
-            assert!(difference <= bound * range, "{difference:e} over {:e} at {pixel}, channel {k}", bound * range);
+            let limit = bound * range;
+            assert!(difference <= limit, "{}: {difference:e} over {limit:e} at {pixel}, channel {k}", row.name);
         }
     }
-}
-
-/// `count` coincident disks over the whole image, with a kernel of weight 1 everywhere, of linear colour `value`; and
-/// two out of sight that stretch the colours' range to [0, 1].
-fn stack(count: usize, value: f32) -> (Scene, Camera, RenderOptions) {
-    let mut surfels = vec![Surfel::disk(Vec3::new(0.2, 0.1, 5.0), Vec3::NEG_Z, 20.0); count];
-    let mut colors = vec![[value, value, value, 1.0]; count];
-    for end in [0.0, 1.0] {
-        surfels.push(Surfel::disk(Vec3::new(0.0, 0.0, 90.0), Vec3::NEG_Z, 1.0));
-        colors.push([end, end, end, 1.0]);
-    }
-    let scene = Scene { origin: DVec3::ZERO, surfels, colors: Colors::Linear(colors), oriented: true, up: Up::Y };
-    (scene, front(8), RenderOptions { kernel: Kernel::Ellipse { a: 0.0, n: 3.0 }, ..options() })
 }
 
 #[test]
 fn sums_past_32_bits_are_exact() {
     let Some(gpu) = common::gpu() else { return };
-    // 5033.7 units of 2^-24 are rounded to 5034 each.
-    let (scene, camera, options) = stack(1000, (5033.7 * E) as f32);
+    // 5033.7 units are rounded to 5034 each.
+    let (scene, camera) = stack(1001, (5033.7 * UNIT) as f32);
+    let options = RenderOptions { kernel: Kernel::Ellipse { a: 0.0, n: 3.0, smooth: false }, ..options() };
     let sums = |sources: &Sources| {
         let device = stages(&scene, &camera, &options, &gpu, sources).unwrap();
-        let word = device.pixel.color_word;
-        (0..camera.pixels()).map(|k| (device.sum(k, 0).unwrap(), device.sum(k, word).unwrap())).collect::<Vec<_>>()
+        let sum = |pixel, channel| device.sum(pixel, channel).unwrap();
+        (0..camera.pixels()).map(|k| (sum(k, 0), sum(k, COLOR_CHANNEL), device.count(k).unwrap())).collect::<Vec<_>>()
     };
-    let exact = vec![(1000 << 24, 1000 * 5034); camera.pixels()];
-    assert_eq!(sums(&Sources::default()), exact);
+    let one = u64::from(ONE);
+    assert_eq!(sums(&Sources::default()), vec![(1001 * one, 1001 * 5034, 1001); camera.pixels()]);
     let broken = |from: &str, to: &str| sums(&Sources::default().replace("accumulator_fixed.wgsl", from, to).unwrap());
     let no_carry = broken("if (before + value < before)", "if (before + value < 0u)");
     assert!(
-        no_carry.iter().all(|sums| sums.0 == (1000 << 24) % (1 << 32)),
+        no_carry.iter().all(|sums| sums.0 == (1001 * one) % (1 << 32)),
         "the carry is not needed: {:?}",
         no_carry[0]
     );
     let truncated =
         broken("u32(round(f32(weight) * clamp(value, 0.0, 1.0)))", "u32(f32(weight) * clamp(value, 0.0, 1.0))");
-    assert!(truncated.iter().all(|sums| sums.1 == 1000 * 5033), "the rounding is not needed: {:?}", truncated[0]);
+    assert!(truncated.iter().all(|sums| sums.1 == 1001 * 5033), "the rounding is not needed: {:?}", truncated[0]);
 }
 
 #[test]
@@ -262,7 +187,7 @@ fn resolve_matches_its_twin_on_the_devices_own_sums() {
         ("resolve.wgsl", "back.a * (1.0 - front.a)", "back.a * (1.0001 - front.a)", 0),
         ("color_sums.wgsl", "view.color_low + view", "view.color_low * 1.0001 + view", 0),
         ("depth.wgsl", "* view.world", "* (view.world * 1.00001)", 2),
-        ("weight_map.wgsl", "weight / ONE", "weight / (ONE - 100.0)", 3),
+        ("accumulator_fixed.wgsl", "WEIGHT_CHANNEL) / ONE", "WEIGHT_CHANNEL) / (ONE - 6400.0)", 3),
     ] {
         let Some(gpu) = common::gpu() else { return };
         let broken = differences(Sources::default().replace(file, from, to).unwrap(), gpu);
@@ -274,26 +199,26 @@ fn resolve_matches_its_twin_on_the_devices_own_sums() {
 fn unmapped(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu) -> Vec<PixelSums> {
     let device = stages(scene, camera, options, gpu, &Sources::default()).unwrap();
     let (low, high) = scene.color_range();
-    let (relative, absolute) = options.epsilon.parts();
-    let channels = (device.pixel.normal_word - device.pixel.color_word) / 2;
+    // Of an opaque scene there is no sum of alpha.
+    let channels = if low[3] == high[3] { 3 } else { 4 };
     let of = |pixel: usize| {
-        let sum = |word: u32| device.sum(pixel, word).unwrap() as f64 * E;
+        let sum = |channel: u32| device.sum(pixel, channel).unwrap() as f64 * UNIT;
         let weight = sum(0);
         if weight == 0.0 {
             return PixelSums::ZERO;
         }
         let color = |k: u32| {
             let (low, high) = (f64::from(low[k as usize]), f64::from(high[k as usize]));
-            weight * low + if k < channels { (high - low) * sum(device.pixel.color_word + 2 * k) } else { 0.0 }
+            weight * low + if k < channels { (high - low) * sum(COLOR_CHANNEL + k) } else { 0.0 }
         };
-        let normal = |k: u32| 2.0 * sum(device.pixel.normal_word + 2 * k) - weight;
+        let normal = |k: u32| 2.0 * sum(device.pixel.normal_channel + k) - weight;
         let front = device.nearest_depth(pixel).unwrap();
         PixelSums {
             weight,
             color: [0, 1, 2, 3].map(color),
             normal: [0, 1, 2].map(normal),
-            depth: weight * front + (front * relative + absolute) * sum(device.pixel.depth_word),
-            count: device.count(pixel).unwrap(),
+            depth: weight * front + common::depth_span(&device.view, front) * sum(device.pixel.depth_channel),
+            count: device.count(pixel).unwrap() as u32,
             decision: 0.0,
         }
     };

@@ -10,16 +10,27 @@ use std::mem::{offset_of, size_of};
 
 use epsplat::gpu::Sources;
 use epsplat::gpu::kernel::{FILES, reflect};
-use epsplat::gpu::layout::{AWAY, Band, ONE, SUM_WORDS, Splat, View, WORKGROUP};
-use epsplat::scene::Surfel;
+use epsplat::gpu::layout::{AWAY, Band, Filter, ONE, QUEUE_START, Splat, TILE, View, WORKGROUP};
+use epsplat::passes::accumulate::accumulator;
+use epsplat::passes::variant::{COLOR_CHANNEL, PixelLayout, color_channels, files};
 use epsplat::scene::camera::MAX_SIDE;
+use epsplat::scene::options::LEAST_WEIGHT;
+use epsplat::scene::{SceneNeeds, Surfel};
 use naga::{AddressSpace, ArraySize, Expression, Literal, Module, ScalarKind, TypeInner};
 
-/// A type as host and device can compare it: so many scalars of four bytes of one kind.
+/// A type as host and device can compare it: so many scalars of one kind.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Shape {
     kind: ScalarKind,
+    /// Bytes of a scalar.
+    width: usize,
     scalars: usize,
+}
+
+impl Shape {
+    fn bytes(&self) -> usize {
+        self.width * self.scalars
+    }
 }
 
 trait Shaped {
@@ -28,13 +39,13 @@ trait Shaped {
 
 macro_rules! scalar {
     ($($ty:ty => $kind:ident),*) => {
-        $(impl Shaped for $ty { const SHAPE: Shape = Shape { kind: ScalarKind::$kind, scalars: 1 }; })*
+        $(impl Shaped for $ty { const SHAPE: Shape = Shape { kind: ScalarKind::$kind, width: size_of::<$ty>(), scalars: 1 }; })*
     };
 }
-scalar!(f32 => Float, u32 => Uint, i32 => Sint);
+scalar!(f32 => Float, u32 => Uint, i32 => Sint, u64 => Uint);
 
 impl<T: Shaped, const N: usize> Shaped for [T; N] {
-    const SHAPE: Shape = Shape { kind: T::SHAPE.kind, scalars: T::SHAPE.scalars * N };
+    const SHAPE: Shape = Shape { scalars: T::SHAPE.scalars * N, ..T::SHAPE };
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -89,13 +100,14 @@ fn mirrors() -> BTreeMap<&'static str, Struct> {
             epsilon_relative,
             epsilon_absolute,
             world,
-            padding_0,
-            padding_1,
-            padding_2,
+            epsilon_radius,
+            epsilon_deepest,
+            farthest,
         }),
         mirror!(Band { first_row, rows, padding_0, padding_1 }),
         mirror!(Splat { anchor_x, anchor_y, bounds_first, bounds_last, a, b, c, a_low }),
         mirror!(Surfel { center, s, t }),
+        mirror!(Filter { center_x, center_y, depth_low, depth_high, r_xx, r_xy, r_yy, gain }),
     ])
 }
 
@@ -105,7 +117,19 @@ enum Element {
     Plain(&'static [Shape]),
 }
 
-fn elements() -> BTreeMap<&'static str, Element> {
+/// What an accumulator keeps a sum in, and how many of them (twice, as packed ones hold two sums).
+fn sums_of(accumulator: &str) -> (&'static [Shape], u32) {
+    match accumulator {
+        "fixed" => (&[u32::SHAPE], 4),
+        "fixed32" | "cas" => (&[u32::SHAPE], 2),
+        "fixed64" => (&[u64::SHAPE], 2),
+        "packed64" => (&[u64::SHAPE], 1),
+        "float" => (&[f32::SHAPE], 2),
+        other => panic!("this test does not know the accumulator {other}"),
+    }
+}
+
+fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
     const WORD: &[Shape] = &[u32::SHAPE];
     BTreeMap::from([
         ("view", Element::Struct("View")),
@@ -113,10 +137,14 @@ fn elements() -> BTreeMap<&'static str, Element> {
         ("surfels", Element::Struct("Surfel")),
         ("splats", Element::Struct("Splat")),
         ("projected", Element::Struct("Splat")),
-        ("drawn", Element::Plain(WORD)),
+        ("filters", Element::Struct("Filter")),
+        ("projected_filters", Element::Struct("Filter")),
+        ("queue", Element::Plain(WORD)),
+        ("queued", Element::Plain(WORD)),
         ("nearest", Element::Plain(WORD)),
         ("visible", Element::Plain(WORD)),
-        ("sums", Element::Plain(WORD)),
+        ("sums", Element::Plain(sums_of(accumulator).0)),
+        ("overflows", Element::Plain(WORD)),
         ("image", Element::Plain(&[f32::SHAPE])),
         ("colors", Element::Plain(&[u32::SHAPE, <[f32; 4]>::SHAPE])),
         ("srgb_to_linear", Element::Plain(&[f32::SHAPE])),
@@ -126,7 +154,7 @@ fn elements() -> BTreeMap<&'static str, Element> {
 /// The shape of a type without structs; an error for what must not be shared.
 fn shape(module: &Module, ty: naga::Handle<naga::Type>) -> Result<Shape, String> {
     let one = |scalar: naga::Scalar| match scalar.width {
-        4 => Ok(Shape { kind: scalar.kind, scalars: 1 }),
+        width @ (4 | 8) => Ok(Shape { kind: scalar.kind, width: width.into(), scalars: 1 }),
         width => Err(format!("a scalar of {width} bytes")),
     };
     match module.types[ty].inner {
@@ -138,7 +166,7 @@ fn shape(module: &Module, ty: naga::Handle<naga::Type>) -> Result<Shape, String>
         TypeInner::Matrix { .. } => Err("a matrix".into()),
         TypeInner::Array { base, size: ArraySize::Constant(count), stride } => {
             let element = shape(module, base)?;
-            if stride as usize != element.scalars * 4 {
+            if stride as usize != element.bytes() {
                 return Err(format!("an array with gaps: stride {stride} for {} scalars", element.scalars));
             }
             Ok(Shape { scalars: element.scalars * count.get() as usize, ..element })
@@ -148,8 +176,8 @@ fn shape(module: &Module, ty: naga::Handle<naga::Type>) -> Result<Shape, String>
 }
 
 /// Differences between a module's bindings and the host's mirrors, in words.
-fn differences(module: &Module) -> Vec<String> {
-    let (mirrors, elements) = (mirrors(), elements());
+fn differences(module: &Module, accumulator: &str) -> Vec<String> {
+    let (mirrors, elements) = (mirrors(), elements(accumulator));
     let mut found = Vec::new();
     let bound = |space| matches!(space, AddressSpace::Uniform | AddressSpace::Storage { .. });
     for (_, variable) in module.global_variables.iter().filter(|(_, v)| bound(v.space)) {
@@ -222,10 +250,18 @@ fn compare(
     }
 }
 
+/// A module and one of the needs that it is made for.
+struct Made {
+    module: Module,
+    needs: SceneNeeds,
+}
+
 /// The different modules of all needs.
-fn modules(sources: &Sources) -> Vec<Module> {
-    let texts: BTreeSet<String> = common::all_needs().iter().map(|needs| sources.join(needs)).collect();
-    texts.iter().map(|text| reflect(text).unwrap_or_else(|e| panic!("{e}")).0).collect()
+fn modules(sources: &Sources) -> Vec<Made> {
+    let texts: BTreeMap<String, SceneNeeds> =
+        common::all_needs().into_iter().map(|needs| (sources.join(&files(&needs)), needs)).collect();
+    let made = |(text, needs): (String, _)| Made { module: reflect(&text).unwrap_or_else(|e| panic!("{e}")).0, needs };
+    texts.into_iter().map(made).collect()
 }
 
 #[test]
@@ -234,7 +270,7 @@ fn mirrors_have_no_gaps() {
         let mut next = 0;
         for member in &mirror.members {
             assert_eq!(member.offset, next, "{name}.{}", member.name);
-            next += member.shape.scalars * 4;
+            next += member.shape.bytes();
         }
         assert_eq!(next, mirror.size, "{name}");
     }
@@ -243,39 +279,53 @@ fn mirrors_have_no_gaps() {
 #[test]
 fn every_binding_has_the_hosts_layout() {
     let mut seen = BTreeSet::new();
-    for module in modules(&Sources::default()) {
-        assert_eq!(differences(&module), Vec::<String>::new());
+    for Made { module, needs } in modules(&Sources::default()) {
+        assert_eq!(differences(&module, needs.accumulator), Vec::<String>::new(), "{}", needs.accumulator);
         seen.extend(module.global_variables.iter().filter_map(|(_, v)| v.binding.and(v.name.clone())));
     }
-    let known: BTreeSet<String> = elements().keys().map(|name| (*name).to_owned()).collect();
+    let known: BTreeSet<String> = elements("fixed").keys().map(|name| (*name).to_owned()).collect();
     assert_eq!(seen, known, "buffers in WGSL, and those the host knows");
 }
 
 #[test]
 fn a_changed_layout_is_noticed() {
+    // The first needs have no light, so that no kernel uses the lights and the module stays valid.
     let needs = common::all_needs()[0];
+    assert!(!needs.lambert);
     let broken = |from: &str, to: &str| {
         let sources = Sources::default().replace("layout.wgsl", from, to).unwrap();
-        differences(&reflect(&sources.join(&needs)).unwrap().0).join("; ")
+        differences(&reflect(&sources.join(&files(&needs))).unwrap().0, needs.accumulator).join("; ")
     };
     let swapped =
         broken("    a: array<f32, 3>,\n    b: array<f32, 3>,\n", "    b: array<f32, 3>,\n    a: array<f32, 3>,\n");
     assert!(swapped.contains("Splat") && swapped.contains("\"a\""), "{swapped}");
-    // A field that no kernel uses, so that the module stays valid.
-    let renamed = broken("    padding_2: u32,\n}\n\n// The rows", "    padding_x: u32,\n}\n\n// The rows");
-    assert!(renamed.contains("View.padding_x exists in WGSL only"), "{renamed}");
-    assert!(renamed.contains("View.padding_2 exists in Rust only"), "{renamed}");
+    let renamed = broken("    light_count: u32,\n", "    light_number: u32,\n");
+    assert!(renamed.contains("View.light_number exists in WGSL only"), "{renamed}");
+    assert!(renamed.contains("View.light_count exists in Rust only"), "{renamed}");
+    let exchanged = broken(
+        "    light_count: u32,\n    width: u32,\n    height: u32,\n",
+        "    width: u32,\n    height: u32,\n    light_count: u32,\n",
+    );
+    assert!(exchanged.contains("\"width\"") && exchanged.contains("\"light_count\""), "{exchanged}");
     let longer = broken("    rows: u32,\n    padding_0: u32,\n", "    rows: u32,\n    padding_0: vec2<u32>,\n");
     assert!(longer.contains("Band"), "{longer}");
-    let retyped = broken("    padding_1: u32,\n    padding_2", "    padding_1: f32,\n    padding_2");
-    assert!(retyped.contains("padding_1") && retyped.contains("Float"), "{retyped}");
+    let retyped = broken("    light_count: u32,\n", "    light_count: f32,\n");
+    assert!(retyped.contains("light_count") && retyped.contains("Float"), "{retyped}");
+    // Sums of another kind than the accumulator's.
+    let wide = SceneNeeds { accumulator: "fixed64", ..needs };
+    let other = &reflect(&Sources::default().join(&files(&wide))).unwrap().0;
+    assert_eq!(differences(other, "packed64"), Vec::<String>::new());
+    for name in ["fixed", "float"] {
+        let sums = differences(other, name).join("; ");
+        assert!(sums.contains("sums holds"), "{sums}");
+    }
 }
 
 #[test]
 fn binding_numbers_are_unique_over_all_files() {
     let mut numbers: BTreeMap<u32, BTreeSet<String>> = BTreeMap::new();
     let mut names: BTreeMap<String, BTreeSet<u32>> = BTreeMap::new();
-    for module in modules(&Sources::default()) {
+    for Made { module, .. } in modules(&Sources::default()) {
         for (_, variable) in module.global_variables.iter() {
             if let (Some(binding), Some(name)) = (&variable.binding, &variable.name) {
                 assert_eq!(binding.group, 0, "{name}");
@@ -284,43 +334,64 @@ fn binding_numbers_are_unique_over_all_files() {
             }
         }
     }
-    assert!(numbers.len() >= 10);
+    assert!(numbers.len() >= 14);
     assert!(numbers.values().all(|names| names.len() == 1), "{numbers:?}");
     assert!(names.values().all(|numbers| numbers.len() == 1), "{names:?}");
 }
 
-fn constant(module: &Module, name: &str) -> f64 {
-    let (_, constant) = module
-        .constants
-        .iter()
-        .find(|(_, c)| c.name.as_deref() == Some(name))
-        .unwrap_or_else(|| panic!("no constant {name} in WGSL"));
+fn constant(module: &Module, name: &str) -> Option<f64> {
+    let (_, constant) = module.constants.iter().find(|(_, c)| c.name.as_deref() == Some(name))?;
     match module.global_expressions[constant.init] {
-        Expression::Literal(Literal::U32(value)) => f64::from(value),
-        Expression::Literal(Literal::F32(value)) => f64::from(value),
+        Expression::Literal(Literal::U32(value)) => Some(f64::from(value)),
+        Expression::Literal(Literal::F32(value)) => Some(f64::from(value)),
         ref other => panic!("{name} is {other:?}"),
     }
 }
 
 #[test]
 fn constants_agree() {
-    for module in modules(&Sources::default()) {
+    for Made { module, needs } in modules(&Sources::default()) {
         let constant = |name| constant(&module, name);
-        assert_eq!(constant("WORKGROUP"), f64::from(WORKGROUP));
-        assert_eq!(constant("SUM_WORDS"), f64::from(SUM_WORDS));
-        assert_eq!(constant("ONE"), f64::from(ONE));
-        assert_eq!(constant("AWAY"), f64::from(AWAY));
-        assert_eq!(constant("NOTHING"), f64::from(f32::INFINITY.to_bits()));
-        assert_eq!(constant("WEIGHT_WORD"), 0.0);
+        for (name, value) in [
+            ("WORKGROUP", WORKGROUP),
+            ("TILE", TILE),
+            ("QUEUE_START", QUEUE_START),
+            ("AWAY", AWAY),
+            ("NOTHING", f32::INFINITY.to_bits()),
+            ("WEIGHT_CHANNEL", 0),
+        ] {
+            assert_eq!(constant(name), Some(f64::from(value)), "{name}");
+        }
+        assert_eq!(constant("LEAST_WEIGHT"), Some(LEAST_WEIGHT));
+        let colors = color_channels(&needs) > 0;
+        assert_eq!(constant("COLOR_CHANNEL"), colors.then_some(f64::from(COLOR_CHANNEL)));
+        let one = match needs.accumulator {
+            "fixed" => Some(f64::from(ONE)),
+            "fixed64" => Some(40f64.exp2()),
+            _ => None,
+        };
+        assert_eq!(constant("ONE"), one, "{}", needs.accumulator);
         for entry in &module.entry_points {
-            assert_eq!(entry.workgroup_size, [WORKGROUP, 1, 1], "{}", entry.name);
+            let size = if entry.name.ends_with("_large") { [TILE, TILE, 1] } else { [WORKGROUP, 1, 1] };
+            assert_eq!(entry.workgroup_size, size, "{}", entry.name);
         }
     }
-    assert_eq!(ONE, 1 << 24);
+    // The least weight is a whole number of units, and the bits that follow from it are kept.
+    assert_eq!((f64::from(ONE) * LEAST_WEIGHT).fract(), 0.0);
     // A pixel's row fits beside the flag, its column below the row.
     assert_eq!((MAX_SIDE - 1) << 16 & AWAY, 0);
     const { assert!(MAX_SIDE - 1 <= 0xffff) };
     // The scale is stated once: no kernel repeats it as a number.
-    let repeated = FILES.iter().map(|(_, text)| text.matches("16777216").count()).sum::<usize>();
+    let repeated = FILES.iter().map(|(_, text)| text.matches(&ONE.to_string()).count()).sum::<usize>();
     assert_eq!(repeated, 1);
+}
+
+#[test]
+fn the_hosts_room_for_a_pixels_sums_is_the_devices() {
+    for needs in common::all_needs() {
+        let (channels, row) = (PixelLayout::of(&needs).channels, accumulator(needs.accumulator).unwrap());
+        let (shapes, halves) = sums_of(row.name);
+        let bytes = channels as usize * halves as usize * shapes[0].bytes() / 2;
+        assert_eq!(bytes, 4 * (channels * row.words) as usize, "{}", row.name);
+    }
 }

@@ -8,6 +8,7 @@ mod common;
 use epsplat::frame::Frame;
 use epsplat::gpu::Sources;
 use epsplat::metrics::compare;
+use epsplat::passes::accumulate::{ACCUMULATORS, accumulator};
 use epsplat::render::{Backend, render};
 use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Lens, Light, Maps, RenderOptions, Scene, Shading, Surfel, Up};
 use glam::{DVec3, Vec3};
@@ -54,14 +55,22 @@ fn camera(scene: &Scene, orthographic: bool) -> Camera {
 }
 
 fn options() -> impl Strategy<Value = RenderOptions> {
-    (0usize..3, prop_oneof![Just(3.0), Just(2.0), Just(1.7)], any::<bool>()).prop_map(|(epsilon, n, lit)| {
+    let ellipse =
+        prop_oneof![Just(3.0), Just(2.0), Just(1.7)].prop_map(|n| Kernel::Ellipse { a: 6.0, n, smooth: false });
+    let smooth = Kernel::Ellipse { a: 6.0, n: 3.0, smooth: true };
+    let others =
+        prop_oneof![Just(Kernel::Gaussian { sigma: 0.4 }), Just(smooth), Just(Kernel::Hat), Just(Kernel::Constant)];
+    let kernel = prop_oneof![ellipse, others];
+    (0usize..4, kernel, 0..ACCUMULATORS.len(), any::<bool>()).prop_map(|(epsilon, kernel, accumulator, lit)| {
+        let epsilons = [Epsilon::Relative(0.01), Epsilon::Absolute(0.05), Epsilon::Relative(0.0), Epsilon::Radius(0.5)];
         RenderOptions {
-            epsilon: [Epsilon::Relative(0.01), Epsilon::Absolute(0.05), Epsilon::Relative(0.0)][epsilon],
-            kernel: Kernel::Ellipse { a: 6.0, n },
+            epsilon: epsilons[epsilon],
+            kernel,
+            accumulator: ACCUMULATORS[accumulator].name,
             shading: if lit { Shading::Lambert } else { Shading::Unlit },
             lights: vec![Light::Headlight { intensity: 0.7 }, Light::Directional { toward: Vec3::Z, intensity: 0.3 }],
-            background: [0.0; 4],
             maps: Maps { depth: true, normal: true, weight: true, count: true, decision: false },
+            ..RenderOptions::default()
         }
     })
 }
@@ -97,7 +106,7 @@ fn dealt(scene: &Scene) -> Scene {
 }
 
 /// Runs the property on `cases` random scenes.
-fn agree(gpu: Option<&Backend>, cases: u32) -> Result<(), String> {
+fn agree(backend: Option<&Backend>, cases: u32) -> Result<(), String> {
     let config = Config { cases, failure_persistence: None, max_shrink_iters: 0, ..Config::default() };
     let strategy = (scene(), options(), any::<bool>());
     let outcome = TestRunner::new(config).run(&strategy, |(scene, options, orthographic)| {
@@ -105,20 +114,28 @@ fn agree(gpu: Option<&Backend>, cases: u32) -> Result<(), String> {
         let with_decision = RenderOptions { maps: Maps { decision: true, ..options.maps }, ..options.clone() };
         let (reference, _) = render(&scene, &camera, &with_decision, &Backend::Reference, &()).unwrap();
         check_maps(&reference)?;
-        let Some(gpu) = gpu else { return Ok(()) };
-        let (frame, _) = render(&scene, &camera, &options, gpu, &()).unwrap();
+        let Some(backend @ Backend::Gpu { gpu, .. }) = backend else { return Ok(()) };
+        let row = accumulator(options.accumulator).unwrap();
+        prop_assume!(row.check(gpu).is_ok());
+        let (frame, _) = render(&scene, &camera, &options, backend, &()).unwrap();
         check_maps(&frame)?;
         let comparison = compare(&frame, &reference).unwrap();
         let of =
             |map: &str| comparison.maps.iter().find(|m| m.map == map).and_then(|m| m.max_of_range_decided).unwrap();
         // Premultiplied sums are divided by a mean alpha of 1/255 and more, which scales the bound of 2 * 1.2e-5.
         let alpha = reference.color.iter().map(|c| c[3]).filter(|a| *a > 0.0).fold(1.0, f32::min);
-        prop_assert!(of("color") < 1e-4 / f64::from(alpha), "color {:?} alpha {}", comparison, alpha);
+        // A pixel that only rims reach has the rim's weight, of which an error of rho is the larger a share the smaller it
+        // is: the bound is for that of the paper's kernel, exp(-6).
+        let rim = (options.kernel.weight(1.0) / (-6f64).exp()).min(1.0);
+        prop_assert!(of("color") < 1e-4 / f64::from(alpha) / rim, "color {:?} alpha {}", comparison, alpha);
+        prop_assert!(of("alpha") < 1e-4 / rim, "alpha {:?}", comparison);
         prop_assert!(of("depth") < 1e-5, "depth {:?}", comparison);
         prop_assert!(of("weight") < 1e-5, "weight {:?}", comparison);
         prop_assert_eq!(of("count"), 0.0);
-        let (again, _) = render(&dealt(&scene), &camera, &options, gpu, &()).unwrap();
-        prop_assert!(frame == again, "the order of the surfels changed the image");
+        if row.deterministic {
+            let (again, _) = render(&dealt(&scene), &camera, &options, backend, &()).unwrap();
+            prop_assert!(frame == again, "the order of the surfels changed the image");
+        }
         Ok(())
     });
     outcome.map_err(|e| e.to_string())

@@ -8,24 +8,46 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use epsplat::gpu::Sources;
 use epsplat::gpu::device::STORAGE_BUFFERS;
-use epsplat::gpu::kernel::{FILES, STAGES, files, overrides, reflect};
-use epsplat::scene::RenderOptions;
+use epsplat::gpu::kernel::{FILES, reflect};
+use epsplat::passes::accumulate::{ACCUMULATORS, Features, accumulator};
+use epsplat::passes::variant::{COLOR_CHANNEL, PixelLayout, STAGES, color_channels, files, overrides};
+use epsplat::scene::{Kernel, KernelShape, RenderOptions, SceneNeeds};
 use naga::AddressSpace;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
 /// Storage buffers per stage that core WebGPU grants.
 const CORE_STORAGE_BUFFERS: usize = 8;
 
+/// What naga must be allowed for a kernel that uses `features`, one by one.
+fn capabilities(features: Features) -> Vec<Capabilities> {
+    match features {
+        Features::None => vec![],
+        Features::AtomicsU64 => vec![Capabilities::SHADER_INT64, Capabilities::SHADER_INT64_ATOMIC_ALL_OPS],
+        Features::AtomicsF32 => vec![Capabilities::SHADER_FLOAT32_ATOMIC],
+    }
+}
+
+fn is_valid(module: &naga::Module, capabilities: Capabilities) -> Result<(), String> {
+    let outcome = Validator::new(ValidationFlags::all(), capabilities).validate(module);
+    outcome.map(|_| ()).map_err(|e| e.into_inner().to_string())
+}
+
 #[test]
-fn every_combination_is_valid_without_any_feature() {
+fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
     let sources = Sources::default();
-    let texts: BTreeSet<String> = common::all_needs().iter().map(|needs| sources.join(needs)).collect();
-    assert!(texts.len() > 100, "{}", texts.len());
-    for text in &texts {
+    let texts: BTreeMap<String, SceneNeeds> =
+        common::all_needs().into_iter().map(|needs| (sources.join(&files(&needs)), needs)).collect();
+    assert!(texts.len() > 500, "{}", texts.len());
+    let mut without = BTreeSet::new();
+    for (text, needs) in &texts {
         let module = naga::front::wgsl::parse_str(text).unwrap_or_else(|e| panic!("{}", e.emit_to_string(text)));
-        Validator::new(ValidationFlags::all(), Capabilities::empty())
-            .validate(&module)
-            .unwrap_or_else(|e| panic!("{}", e.emit_to_string(text)));
+        let needed = capabilities(accumulator(needs.accumulator).unwrap().features);
+        let all = needed.iter().copied().collect::<Capabilities>();
+        is_valid(&module, all).unwrap_or_else(|e| panic!("{}: {e}", needs.accumulator));
+        for capability in needed {
+            assert!(is_valid(&module, all - capability).is_err(), "{} needs no {capability:?}", needs.accumulator);
+            without.insert(needs.accumulator);
+        }
         let entries: BTreeSet<&str> = module.entry_points.iter().map(|entry| entry.name.as_str()).collect();
         assert_eq!(entries, BTreeSet::from(STAGES));
         for (_, variable) in module.global_variables.iter() {
@@ -35,16 +57,19 @@ fn every_combination_is_valid_without_any_feature() {
         }
         assert!(!text.lines().any(|line| line.starts_with("enable") || line.starts_with("requires")));
     }
+    assert_eq!(without, BTreeSet::from(["fixed64", "float", "packed64"]));
+    // The default runs anywhere.
+    assert_eq!(ACCUMULATORS[0].features, Features::None);
 }
 
 #[test]
 fn an_invalid_kernel_or_one_with_a_feature_is_noticed() {
     let needs = common::all_needs()[0];
     let broken = Sources::default().replace("kernel_ellipse.wgsl", "exp(-KERNEL_A", "exp(-view").unwrap();
-    assert!(reflect(&broken.join(&needs)).is_err());
+    assert!(reflect(&broken.join(&files(&needs))).is_err());
     let wide =
         Sources::default().replace("kernel_ellipse.wgsl", "var power: f32;", "var power: f32; let w = 1lu;").unwrap();
-    let text = wide.join(&needs);
+    let text = wide.join(&files(&needs));
     let module = naga::front::wgsl::parse_str(&text).unwrap();
     assert!(Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module).is_err());
 }
@@ -67,12 +92,21 @@ fn every_file_is_known_and_reached() {
 #[test]
 fn host_and_kernels_agree_about_overrides() {
     let sources = Sources::default();
-    let options = RenderOptions::default();
     let mut declared_anywhere = BTreeSet::new();
     let mut set_anywhere = BTreeSet::new();
     for needs in common::all_needs() {
-        let module = reflect(&sources.join(&needs)).unwrap().0;
-        let set: BTreeSet<String> = overrides(&needs, &options).into_iter().map(|(name, _)| name.to_owned()).collect();
+        let module = reflect(&sources.join(&files(&needs))).unwrap().0;
+        let kernel = match needs.kernel {
+            KernelShape::Gaussian => Kernel::Gaussian { sigma: 0.4 },
+            KernelShape::Ellipse => Kernel::Ellipse { a: 6.0, n: 3.0, smooth: true },
+            KernelShape::Hat => Kernel::Hat,
+            KernelShape::Constant => Kernel::Constant,
+        };
+        assert_eq!(kernel.shape(), needs.kernel);
+        let options = RenderOptions { kernel, ..RenderOptions::default() };
+        let constants = overrides(&needs, &options, 24);
+        assert!(constants.iter().all(|(_, value)| value.is_finite()));
+        let set: BTreeSet<String> = constants.into_iter().map(|(name, _)| name.to_owned()).collect();
         for (_, declared) in module.overrides.iter() {
             let name = declared.name.clone().unwrap();
             assert!(declared.id.is_none(), "{name} is set by name");
@@ -89,7 +123,7 @@ fn storage_buffers_stay_within_core_limits() {
     let sources = Sources::default();
     let mut most = 0;
     for needs in common::all_needs() {
-        let (module, bindings, _) = reflect(&sources.join(&needs)).unwrap();
+        let (module, bindings, _) = reflect(&sources.join(&files(&needs))).unwrap();
         let stored: BTreeSet<&str> = module
             .global_variables
             .iter()
@@ -103,6 +137,39 @@ fn storage_buffers_stay_within_core_limits() {
         }
     }
     assert_eq!(most, STORAGE_BUFFERS as usize, "what an adapter is asked for is what the largest kernel uses");
+}
+
+#[test]
+fn the_channels_of_a_pixel_do_not_overlap() {
+    for needs in common::all_needs() {
+        let pixel = PixelLayout::of(&needs);
+        let ranges = |all: [(u32, u32); 5]| all.into_iter().flat_map(|(first, count)| first..first + count);
+        let of = |needed: bool, count: u32| if needed { count } else { 0 };
+        let sums: Vec<u32> = ranges([
+            (0, 1),
+            (COLOR_CHANNEL, color_channels(&needs)),
+            (pixel.normal_channel, of(needs.normal, 3)),
+            (pixel.depth_channel, of(needs.depth, 1)),
+            (pixel.count_channel, of(needs.count, 1)),
+        ])
+        .collect();
+        let image: Vec<u32> = ranges([
+            (0, 4),
+            (pixel.normal_image, of(needs.normal_map, 3)),
+            (pixel.depth_image, of(needs.depth, 1)),
+            (pixel.weight_image, of(needs.weight_map, 1)),
+            (pixel.count_image, of(needs.count, 1)),
+        ])
+        .collect();
+        for (places, room) in [(&sums, pixel.channels), (&image, pixel.image_words)] {
+            assert!(places.iter().all(|place| *place < room), "{places:?} of {room}, {:?}", needs.names());
+            assert_eq!(places.iter().collect::<BTreeSet<_>>().len(), places.len(), "{:?}", needs.names());
+        }
+        // At most one channel is there to make pairs whole, and one to start one.
+        assert!(pixel.channels as usize <= sums.len() + 2 && pixel.image_words as usize == image.len());
+        // What is added as a pair starts at an even channel, the colour's second at 2.
+        assert_eq!((pixel.channels % 2, pixel.normal_channel % 2, COLOR_CHANNEL), (0, 0, 1));
+    }
 }
 
 /// `fn name(parameters) -> result` of a file's functions, by name.
@@ -140,6 +207,21 @@ fn absent_parts_have_their_partners_signatures() {
             assert_eq!(partner.get(&function), Some(&signature), "{name} and {partners:?}");
         }
     }
+    // What stands for one another has one interface: functions of one file only are its own affair.
+    let alike = |prefix: &str, functions: &[&str]| {
+        let all: Vec<&str> = FILES.iter().map(|(name, _)| *name).filter(|name| name.starts_with(prefix)).collect();
+        assert!(all.len() >= 2, "{prefix}");
+        for function in functions {
+            let first = signatures(text_of(all[0])).remove(*function);
+            assert!(first.is_some(), "{} has no {function}", all[0]);
+            for name in &all {
+                assert_eq!(signatures(text_of(name)).get(*function), first.as_ref(), "{name}");
+            }
+        }
+    };
+    alike("accumulator_", &["quantise", "term", "add", "add_pair", "sum_at", "weight_at"]);
+    alike("kernel_", &["kernel_weight"]);
+    alike("epsilon", &["radius_of", "deepest_accepted", "farthest_accepted"]);
     let shared = ["homography", "intersect", "ray"];
     let (pinhole, orthographic) =
         (signatures(text_of("camera_pinhole.wgsl")), signatures(text_of("camera_orthographic.wgsl")));

@@ -5,17 +5,19 @@
 
 mod common;
 
+use common::UNIT;
 use common::bounds::{E, Precision};
 use common::enclosure::{Interval, Pixel, enclose};
 use common::scenes::{Case, cases, sphere, sphere_camera};
 use epsplat::gpu::layout::{self, AWAY};
 use epsplat::gpu::{Gpu, Sources};
 use epsplat::inspect::{Stages, stages};
-use epsplat::passes::footprint::intersect;
+use epsplat::passes::footprint::footprint;
 use epsplat::passes::project::{Splat, reference_all};
+use epsplat::passes::variant::COLOR_CHANNEL;
 use epsplat::passes::{accumulate, visibility};
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Epsilon, Kernel, Maps, Projection, RenderOptions, Shading};
+use epsplat::scene::{Epsilon, Kernel, LowPass, Maps, Projection, RenderOptions, Shading};
 
 fn options(kernel: Kernel) -> RenderOptions {
     RenderOptions {
@@ -26,7 +28,9 @@ fn options(kernel: Kernel) -> RenderOptions {
     }
 }
 
-const DEFAULT_KERNEL: Kernel = Kernel::Ellipse { a: 6.0, n: 3.0 };
+const WEIGHT_CHANNEL: u32 = 0;
+
+const DEFAULT_KERNEL: Kernel = Kernel::Ellipse { a: 6.0, n: 3.0, smooth: false };
 
 fn run(case: &Case, options: &RenderOptions, gpu: &Gpu, sources: &Sources) -> Stages {
     stages(&case.scene, &case.camera, options, gpu, sources).unwrap_or_else(|e| panic!("{}: {e}", case.name))
@@ -102,7 +106,7 @@ fn compare_splats(case: &Case, twins: &[Splat], device: &Stages) -> Findings {
         }
         for y in twin.first[1]..=twin.last[1] {
             for x in twin.first[0]..=twin.last[0] {
-                let Some(at) = intersect(twin, &case.camera, x, y) else { continue };
+                let Some((at, _)) = footprint(twin, &case.camera, LowPass::None, x, y) else { continue };
                 let inside = !empty && (first[0]..=last[0]).contains(&x) && (first[1]..=last[1]).contains(&y);
                 let bound = precision.record(twin, x, y, &at);
                 if at.hit(&case.camera) && !inside && at.rho2.sqrt() + bound.rho < 1.0 {
@@ -144,31 +148,34 @@ fn compare_nearest(case: &Case, enclosure: &[Pixel], device: &Stages) -> Finding
 fn compare_sums(case: &Case, enclosure: &[Pixel], device: &Stages) -> Findings {
     let mut findings = Findings::default();
     for (index, pixel) in enclosure.iter().enumerate() {
-        let sum = |word: u32| device.sum(index, word).unwrap() as f64 * E;
+        let sum = |channel: u32| device.sum(index, channel).unwrap() as f64 * UNIT;
         let layout = device.pixel;
         let mut check = |what: &str, interval: &Interval, value: f64| {
             if !interval.holds(value) {
                 findings.fail(format!("{}, pixel {index}, {what}: {value:e} outside {interval:?}", case.name));
             }
         };
-        check("weight", &pixel.weight, sum(0));
+        check("weight", &pixel.weight, sum(WEIGHT_CHANNEL));
         for k in 0..4 {
-            check("color", &pixel.color[k], sum(layout.color_word + 2 * k as u32));
+            check("color", &pixel.color[k], sum(COLOR_CHANNEL + k as u32));
         }
         for k in 0..3 {
-            check("normal", &pixel.normal[k], sum(layout.normal_word + 2 * k as u32));
+            check("normal", &pixel.normal[k], sum(layout.normal_channel + k as u32));
         }
-        let weight = sum(0);
+        let weight = sum(WEIGHT_CHANNEL);
+        let front = device.nearest_depth(index).unwrap();
         if weight > 0.0 {
-            let front = device.nearest_depth(index).unwrap();
-            let mean = sum(layout.depth_word) / weight;
-            // Relative(0.02) in `options`.
-            let depth = front + mean * 0.02 * front;
-            let blur = f64::from(pixel.count.1) / weight * E * 0.02 * front + 4.0 * E * front;
+            let mean = sum(layout.depth_channel) / weight;
+            let behind = common::depth_span(&device.view, front);
+            let depth = front + mean * behind;
+            let blur = f64::from(pixel.count.1) / weight * UNIT * behind + E * behind + 4.0 * E * front;
             let span = Interval { low: pixel.depth.low - blur, high: pixel.depth.high + blur };
             check("depth", &span, depth);
         }
-        let count = device.count(index).unwrap();
+        if (weight > 0.0) != front.is_finite() {
+            findings.fail(format!("{}, pixel {index}: weight {weight:e}, but depth {front:e}", case.name));
+        }
+        let count = device.count(index).unwrap() as u32;
         if !(pixel.count.0..=pixel.count.1).contains(&count) {
             findings.fail(format!("{}, pixel {index}: {count} fragments, not {:?}", case.name, pixel.count));
         }
@@ -181,7 +188,7 @@ fn compare_sums(case: &Case, enclosure: &[Pixel], device: &Stages) -> Findings {
 /// depth and weight are known to few digits less than f32 has.
 fn check_enclosure(case: &Case, options: &RenderOptions, twins: &[Splat], enclosure: &[Pixel]) {
     let height = case.camera.height;
-    let nearest = visibility::reference(twins.iter(), &case.camera, 0, height);
+    let nearest = visibility::reference(twins.iter(), &case.camera, LowPass::None, 0, height);
     let sums = accumulate::reference(twins.iter(), &case.scene, &case.camera, options, 0, &nearest);
     let (mut depths, mut weights, mut open) = (Vec::new(), Vec::new(), 0);
     for ((pixel, depth), sum) in enclosure.iter().zip(&nearest).zip(&sums) {
@@ -216,12 +223,14 @@ fn check_enclosure(case: &Case, options: &RenderOptions, twins: &[Splat], enclos
 fn scenes_hold_what_they_claim() {
     // The widest range of cosines and the edge-on disks are hit somewhere, or the bounds are not tried.
     let case = &cases()[0];
-    let twins = reference_all(&case.scene, &case.camera);
+    let twins = reference_all(&case.scene, &case.camera, &RenderOptions::default());
     let mut hit_below = [0usize; 6];
     for twin in &twins {
         let precision = Precision::of(twin, &case.scene, &case.camera);
         let pixels = (twin.first[1]..=twin.last[1]).flat_map(|y| (twin.first[0]..=twin.last[0]).map(move |x| (x, y)));
-        let hit = pixels.filter_map(|(x, y)| intersect(twin, &case.camera, x, y)).any(|at| at.hit(&case.camera));
+        let hit = pixels
+            .filter_map(|(x, y)| footprint(twin, &case.camera, LowPass::None, x, y))
+            .any(|(at, _)| at.hit(&case.camera));
         for (k, below) in [1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5].into_iter().enumerate() {
             hit_below[k] += usize::from(hit && precision.cosine < below);
         }
@@ -235,7 +244,7 @@ fn project_matches_its_twin() {
     let Some(gpu) = common::gpu() else { return };
     let options = options(DEFAULT_KERNEL);
     for case in cases() {
-        let twins = reference_all(&case.scene, &case.camera);
+        let twins = reference_all(&case.scene, &case.camera, &RenderOptions::default());
         let device = run(&case, &options, &gpu, &Sources::default());
         compare_splats(&case, &twins, &device).expect_none(case.name, 5000);
     }
@@ -247,7 +256,7 @@ fn a_broken_projection_is_noticed() {
     let options = options(DEFAULT_KERNEL);
     let all = cases();
     let noticed = |case: &Case, sources: Sources, name: &str| {
-        let twins = reference_all(&case.scene, &case.camera);
+        let twins = reference_all(&case.scene, &case.camera, &RenderOptions::default());
         compare_splats(case, &twins, &run(case, &options, &gpu, &sources)).expect_noticed(name);
     };
     let camera = "camera_pinhole.wgsl";
@@ -277,8 +286,8 @@ fn visibility_and_accumulate_match_their_twins() {
     for (index, case) in cases().into_iter().enumerate() {
         // Each form of the kernel's power is compiled by itself.
         let n = [3.0, 2.0, 4.0, 1.7][index % 4];
-        let options = options(Kernel::Ellipse { a: 6.0, n });
-        let twins = reference_all(&case.scene, &case.camera);
+        let options = options(Kernel::Ellipse { a: 6.0, n, smooth: false });
+        let twins = reference_all(&case.scene, &case.camera, &RenderOptions::default());
         let enclosure = enclose(&case.scene, &case.camera, &options, &twins);
         check_enclosure(&case, &options, &twins, &enclosure);
         let device = run(&case, &options, &gpu, &Sources::default());
@@ -292,7 +301,7 @@ fn a_broken_footprint_or_sum_is_noticed() {
     let Some(gpu) = common::gpu() else { return };
     let options = options(DEFAULT_KERNEL);
     let case = &cases()[0];
-    let twins = reference_all(&case.scene, &case.camera);
+    let twins = reference_all(&case.scene, &case.camera, &RenderOptions::default());
     let enclosure = enclose(&case.scene, &case.camera, &options, &twins);
     let sums = |file, from, to| compare_sums(case, &enclosure, &run(case, &options, &gpu, &broken(file, from, to)));
     let depths =
@@ -306,8 +315,12 @@ fn a_broken_footprint_or_sum_is_noticed() {
     sums("epsilon.wgsl", "view.epsilon_relative", "view.epsilon_relative * 1.05").expect_noticed("epsilon");
     sums("normal.wgsl", "normal * 0.5 + 0.5;", "normal * 0.5 + 0.50001;").expect_noticed("normal");
     sums("color_linear.wgsl", "color.rgb * color.a", "color.rgb * (color.a * 1.0001)").expect_noticed("premultiplied");
-    sums("depth.wgsl", "(depth - front) / (back - front)", "(depth - front) / (back - front) + 0.05")
-        .expect_noticed("depth");
+    sums(
+        "depth.wgsl",
+        "(depth - front) / (deepest_accepted(front) - front)",
+        "0.05 + (depth - front) / (deepest_accepted(front) - front)",
+    )
+    .expect_noticed("depth");
 }
 
 #[test]
@@ -333,8 +346,8 @@ fn the_frame_of_the_device_is_the_frame_of_the_twins() {
                 // The documented bound of the sums, of ranges of 1 (colour) and 2 (normal), and a few units of f32.
                 let weight = twin.weight.as_ref().unwrap()[pixel];
                 let count = twin.count.as_ref().unwrap()[pixel];
-                let sums =
-                    (accumulate::ACCUMULATORS[0].error_bound)(count.max(1.0).into(), weight.max(1e-3).into()) as f32;
+                let bound = accumulate::ACCUMULATORS[0].error_bound;
+                let sums = bound(count.max(1.0).into(), weight.max(1e-3).into(), 24) as f32;
                 let limit = 3.0 * sums + 1e-5;
                 assert!(
                     difference < limit,

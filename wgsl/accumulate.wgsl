@@ -15,8 +15,8 @@ struct Attributes {
     radius: f32,
 }
 
-fn blend(splat: Splat, attributes: Attributes, x: u32, y: u32) {
-    let fragment = footprint(splat, x, y);
+fn blend(splat: Splat, filter_: Filter, attributes: Attributes, x: u32, y: u32) {
+    let fragment = footprint(splat, filter_, x, y);
     if (!fragment.hit) {
         return;
     }
@@ -25,7 +25,7 @@ fn blend(splat: Splat, attributes: Attributes, x: u32, y: u32) {
     if (fragment.depth > farthest_accepted(front, attributes.radius)) {
         return;
     }
-    let weight = quantise(max(kernel_weight(fragment.rho2), LEAST_WEIGHT));
+    let weight = quantise(max(fragment.gain * kernel_weight(fragment.rho2), LEAST_WEIGHT));
     accumulate_color(pixel, weight, attributes.color);
     accumulate_normal(pixel, weight, attributes.normal);
     accumulate_depth(pixel, weight, fragment.depth, front);
@@ -47,10 +47,11 @@ fn accumulate(
     if (any(pixels.first > pixels.last) || is_large(splat)) {
         return;
     }
+    let filter_ = filter_of(index);
     let attributes = Attributes(color_of(index), normal_of(index, splat), radius_of(index));
     for (var y = pixels.first.y; y <= pixels.last.y; y++) {
         for (var x = pixels.first.x; x <= pixels.last.x; x++) {
-            blend(splat, attributes, x, y);
+            blend(splat, filter_, attributes, x, y);
         }
     }
 }
@@ -67,10 +68,11 @@ fn accumulate_large(
     }
     let splat = projected[index];
     let pixels = reach(splat);
+    let filter_ = filter_of(index);
     let attributes = Attributes(color_of(index), normal_of(index, splat), radius_of(index));
     for (var y = pixels.first.y + local.y; y <= pixels.last.y; y += TILE) {
         for (var x = pixels.first.x + local.x; x <= pixels.last.x; x += TILE) {
-            blend(splat, attributes, x, y);
+            blend(splat, filter_, attributes, x, y);
         }
     }
 }

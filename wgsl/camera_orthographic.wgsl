@@ -39,18 +39,22 @@ fn homography(
     let x = image_of(center[0], 0u);
     let y = image_of(center[1], 1u);
     let image = vec2<f32>(x.high, y.high);
-    if (p_z + sqrt(s.z * s.z + t.z * t.z) < view.near || h.away == 0.0) {
+    let slope = sqrt(s.z * s.z + t.z * t.z);
+    if (p_z + slope < view.near) {
         return h;
     }
     let focal = view.intrinsics.xy;
+    // Edge-on the rows vanish, and then u is set to 2: outside the disk.
+    let edge_on = h.away == 0.0;
+    let scale = select(1.0 / (h.away * focal), vec2<f32>(0.0), edge_on);
     // A centre farther out than this is no better an anchor for the pixels of the image, and whole numbers stay exact.
     let pixel = clamp(floor(image), vec2<f32>(-4194304.0), vec2<f32>(4194304.0));
     let offset = (image - pixel) + vec2<f32>(x.low, y.low) - 0.5;
-    let a = vec2<f32>(t.y, -t.x) / (h.away * focal);
-    let b = vec2<f32>(-s.y, s.x) / (h.away * focal);
+    let a = vec2<f32>(t.y, -t.x) * scale;
+    let b = vec2<f32>(-s.y, s.x) * scale;
     let c = s.z * a + t.z * b;
     h.anchor = vec2<i32>(pixel);
-    h.a = vec3<f32>(a, -dot(a, offset));
+    h.a = vec3<f32>(a, select(-dot(a, offset), 2.0, edge_on));
     h.b = vec3<f32>(b, -dot(b, offset));
     h.c = vec3<f32>(c, p_z - dot(c, offset));
     if (is_thin(a, b)) {
@@ -61,6 +65,12 @@ fn homography(
         h.a_low = rows.a_low;
         h.b = rows.b;
     }
+    h.centered = true;
+    h.offset = offset;
+    h.s_image = focal * s.xy;
+    h.t_image = focal * t.xy;
+    h.depth_low = p_z - slope;
+    h.depth_high = p_z + slope;
     let extent = focal * sqrt(s.xy * s.xy + t.xy * t.xy);
     h.low = image - extent;
     h.high = image + extent;
@@ -71,11 +81,16 @@ struct Fragment {
     hit: bool,
     depth: f32,
     rho2: f32,
+    gain: f32,
 }
 
 fn intersect(abc: vec3<f32>) -> Fragment {
     let rho2 = dot(abc.xy, abc.xy);
-    return Fragment(rho2 <= 1.0 && abc.z >= view.near, abc.z, rho2);
+    return Fragment(rho2 <= 1.0 && abc.z >= view.near, abc.z, rho2, 1.0);
+}
+
+fn plane_depth(abc: vec3<f32>, low: f32, high: f32) -> f32 {
+    return clamp(abc.z, low, high);
 }
 
 fn ray(x: u32, y: u32) -> vec3<f32> {

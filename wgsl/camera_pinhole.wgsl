@@ -102,6 +102,8 @@ fn homography(
     h.a_low *= scale;
     h.b *= scale;
     h.c *= scale;
+    h.depth_low /= scale;
+    h.depth_high /= scale;
     return h;
 }
 
@@ -121,11 +123,13 @@ fn scaled_homography(
     h.away = away;
     h.low = vec2<f32>(1.0);
     h.high = vec2<f32>(0.0);
-    if (p.z + slope < near || away == 0.0) {
+    if (p.z + slope < near) {
         return h;
     }
     let focal = view.intrinsics.xy;
-    let scale = vec3<f32>(1.0 / (away * focal), 1.0 / away);
+    // Edge-on the rows vanish, and then u is set to 2: outside the disk.
+    let edge_on = away == 0.0;
+    let scale = select(vec3<f32>(1.0 / (away * focal), 1.0 / away), vec3<f32>(0.0), edge_on);
     let a = cross(t, p) * scale;
     let b = cross(p, s) * scale;
     let c = normal * scale;
@@ -140,7 +144,7 @@ fn scaled_homography(
             // The centre of the splat relative to the centre of its pixel: the digits that make the image stable.
             let offset = (image - pixel) + vec2<f32>(x.low, y.low) - 0.5;
             h.anchor = vec2<i32>(pixel);
-            h.a = vec3<f32>(a.xy, -dot(a.xy, offset));
+            h.a = vec3<f32>(a.xy, select(-dot(a.xy, offset), 2.0 / p.z, edge_on));
             h.b = vec3<f32>(b.xy, -dot(b.xy, offset));
             h.c = vec3<f32>(c.xy, 1.0 / p.z - dot(c.xy, offset));
             if (is_thin(a.xy, b.xy)) {
@@ -154,6 +158,12 @@ fn scaled_homography(
             let ratio = p.xy / p.z;
             let s_x = s.xy - ratio * s.z;
             let t_x = t.xy - ratio * t.z;
+            h.centered = true;
+            h.offset = offset;
+            h.s_image = focal * s_x / p.z;
+            h.t_image = focal * t_x / p.z;
+            h.depth_low = p.z - slope;
+            h.depth_high = p.z + slope;
             let across = tangents(s_x.x, t_x.x, s.z, t.z, p.z, slope) * focal.x;
             let down = tangents(s_x.y, t_x.y, s.z, t.z, p.z, slope) * focal.y;
             h.low = image + vec2<f32>(across.x, down.x);
@@ -192,6 +202,8 @@ struct Fragment {
     depth: f32,
     // Squared radius on the unit disk.
     rho2: f32,
+    // Factor on the kernel's weight.
+    gain: f32,
 }
 
 // The intersection of the ray through d (relative to the anchor's centre) with the splat's disk, and its weight's rho.
@@ -199,7 +211,14 @@ fn intersect(abc: vec3<f32>) -> Fragment {
     let reached = dot(abc.xy, abc.xy) <= abc.z * abc.z && abc.z > 0.0;
     let depth = 1.0 / abc.z;
     let uv = abc.xy * depth;
-    return Fragment(reached && depth >= view.near, depth, min(dot(uv, uv), 1.0));
+    // Behind the camera rho is infinite.
+    let rho2 = select(3e38, dot(uv, uv), abc.z > 0.0);
+    return Fragment(reached && depth >= view.near, depth, select(rho2, min(rho2, 1.0), reached), 1.0);
+}
+
+// The depth of the splat's plane, held within [low, high].
+fn plane_depth(abc: vec3<f32>, low: f32, high: f32) -> f32 {
+    return 1.0 / clamp(abc.z, 1.0 / high, 1.0 / low);
 }
 
 // The world direction, of unit length, of the ray through the centre of the pixel.

@@ -42,7 +42,8 @@ fn project_surfel(index: u32) -> bool {
     let center = rotate(relative);
     let s = rotate_plain(s_world);
     let t = rotate_plain(t_world);
-    let h = homography(center, s, t, s_world, t_world);
+    var h = homography(center, s, t, s_world, t_world);
+    low_pass(index, &h);
 
     // Bounds are conservative: the margin covers the rounding of the extent, and `intersect` decides.
     let size = vec2<f32>(f32(view.width), f32(view.height));

@@ -15,8 +15,16 @@ struct Homography {
     // First and last point that the disk can reach, image coordinates; empty if low > high.
     low: vec2<f32>,
     high: vec2<f32>,
-    // > 0 if s x t points away from the viewer; 0 for a disk seen exactly edge-on, which covers nothing.
+    // > 0 if s x t points away from the viewer; 0 for a disk seen exactly edge-on, which itself covers nothing.
     away: f32,
+    // For the low-pass, where the splat's centre is an anchor: its place relative to the anchor's centre, the images of
+    // the half-axes there, pixels, and the range of depths on the disk.
+    centered: bool,
+    offset: vec2<f32>,
+    s_image: vec2<f32>,
+    t_image: vec2<f32>,
+    depth_low: f32,
+    depth_high: f32,
 }
 
 struct Rows {

@@ -19,8 +19,8 @@ fn clear(
     }
 }
 
-fn cover(splat: Splat, x: u32, y: u32) {
-    let fragment = footprint(splat, x, y);
+fn cover(splat: Splat, filter_: Filter, x: u32, y: u32) {
+    let fragment = footprint(splat, filter_, x, y);
     if (fragment.hit) {
         atomicMin(&nearest[pixel_index(x, y)], bitcast<u32>(fragment.depth));
     }
@@ -41,9 +41,10 @@ fn visibility(
         return;
     }
     let pixels = reach(splat);
+    let filter_ = filter_of(index);
     for (var y = pixels.first.y; y <= pixels.last.y; y++) {
         for (var x = pixels.first.x; x <= pixels.last.x; x++) {
-            cover(splat, x, y);
+            cover(splat, filter_, x, y);
         }
     }
 }
@@ -60,9 +61,10 @@ fn visibility_large(
     }
     let splat = projected[index];
     let pixels = reach(splat);
+    let filter_ = filter_of(index);
     for (var y = pixels.first.y + local.y; y <= pixels.last.y; y += TILE) {
         for (var x = pixels.first.x + local.x; x <= pixels.last.x; x += TILE) {
-            cover(splat, x, y);
+            cover(splat, filter_, x, y);
         }
     }
 }

@@ -10,7 +10,7 @@ use epsplat::passes::accumulate::accumulator;
 use epsplat::render::{Backend, Report, render};
 use epsplat::scene::camera::DEFAULT_FOV;
 use epsplat::scene::light::MAX_LIGHTS;
-use epsplat::scene::{Camera, Epsilon, Kernel, Lens, Light, Maps, RenderOptions, Scene, Shading, Up};
+use epsplat::scene::{Camera, Epsilon, Kernel, Lens, Light, LowPass, Maps, RenderOptions, Scene, Shading, Up};
 use epsplat::{Error, Result, io, surfels};
 use glam::DVec3;
 
@@ -74,6 +74,9 @@ pub struct Arguments {
     /// Blending kernel over the disk: gaussian[:SIGMA], ellipse:A,N[,smooth] (exp(-A rho^N)), hat or constant
     #[arg(long, default_value = "ellipse:6,3")]
     kernel: Kernel,
+    /// Filter for splats near a pixel in size or below
+    #[arg(long, value_enum, default_value_t = LowPassName::None)]
+    lowpass: LowPassName,
     /// How sums are kept on the device: fixed, fixed32, fixed64, packed64, float or cas (see the README)
     #[arg(long, value_name = "NAME", value_parser = parse_accumulator)]
     accumulator: Option<&'static str>,
@@ -102,6 +105,16 @@ enum BackendName {
     Gpu,
     /// The kernels' f64 twins on the processor
     Reference,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum LowPassName {
+    /// A pixel's centre lies in a disk or not
+    None,
+    /// Every splat reaches a pixel: no holes
+    Max,
+    /// Convolved with the pixel: no aliasing either
+    Ewa,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -197,6 +210,11 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
     Ok(RenderOptions {
         epsilon: arguments.epsilon,
         kernel: arguments.kernel,
+        low_pass: match arguments.lowpass {
+            LowPassName::None => LowPass::None,
+            LowPassName::Max => LowPass::Max,
+            LowPassName::Ewa => LowPass::Ewa,
+        },
         accumulator: arguments.accumulator.unwrap_or(default.accumulator),
         shading: match arguments.shading {
             ShadingName::Unlit => Shading::Unlit,

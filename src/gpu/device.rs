@@ -83,8 +83,8 @@ impl AdapterDescription {
     }
 }
 
-/// The most storage buffers a kernel uses (accumulate: splats, surfels, depths, sums, colours, the sRGB table, the queue,
-/// the overflow count).
+/// The most storage buffers a kernel uses (accumulate: splats, surfels, depths, sums, colours, the queue, the overflow
+/// count, filters).
 pub const STORAGE_BUFFERS: u32 = 8;
 
 /// Features that are used where an adapter has them: GPU times, and atomics of some accumulators.

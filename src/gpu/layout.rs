@@ -87,6 +87,21 @@ pub struct Splat {
     pub a_low: [f32; 3],
 }
 
+/// What a low-pass needs of a splat; see `wgsl/filter.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Filter {
+    pub center_x: f32,
+    pub center_y: f32,
+    pub depth_low: f32,
+    pub depth_high: f32,
+    pub r_xx: f32,
+    pub r_xy: f32,
+    pub r_yy: f32,
+    pub gain: f32,
+}
+
 /// x as the nearest f32 and the nearest f32 to what that leaves.
 fn split(x: f64) -> (f32, f32) {
     let high = x as f32;

@@ -18,20 +18,21 @@
 //!   its digits.
 //! - **fixed32**: the same in one word. B fraction bits, `32 - bits(min(surfels, 255))`, are at least 24 and let 255 full
 //!   weights (or all surfels there are) meet in a pixel; a sum that wraps is noticed and the frame rendered again with
-//!   `fixed`. `n 2^-B / w + 4 u`.
+//!   `fixed`. `n 2^-B / w + 5 u`.
 //! - **fixed64**: W = 2^40 w exactly, and W a, rounded as f32 and cut at 2^-40, in one u64: each term errs by a relative u
-//!   of itself, so the mean by u, whatever n: `5 u + n 2^-40 / w`.
+//!   of itself, so the mean by u, whatever n: `5 u + n 2^-40 / w`. It overflows after 2^24 full weights.
 //! - **packed64**: the terms of `fixed32`, two sums in the halves of one u64.
 //! - **float**, **cas**: f32 sums, by atomic add or by compare and exchange. A sum of n terms in any order errs by at most
 //!   `(n - 1) u` of itself, and so does the weight's: `2 n u + 4 u`. The order shows.
 
-use super::footprint::intersect;
+use super::footprint::footprint;
 use super::project::{Splat, SplatBuffer};
 use super::visibility::VisibilityBuffer;
 use super::{Recorder, Rows};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
+use crate::scene::options::LEAST_WEIGHT;
 use crate::scene::{Camera, RenderOptions, Scene};
 
 /// An accumulator: one row of the table below, one file `wgsl/accumulator_*.wgsl`.
@@ -81,7 +82,7 @@ pub const ACCUMULATORS: &[Accumulator] = &[
         words: 1,
         deterministic: true,
         features: Features::None,
-        error_bound: |n, w, bits| n * (-f64::from(bits)).exp2() / w + 4.0 * U,
+        error_bound: |n, w, bits| n * (-f64::from(bits)).exp2() / w + 5.0 * U,
     },
     Accumulator {
         name: "fixed64",
@@ -97,7 +98,7 @@ pub const ACCUMULATORS: &[Accumulator] = &[
         words: 1,
         deterministic: true,
         features: Features::AtomicsU64,
-        error_bound: |n, w, bits| n * (-f64::from(bits)).exp2() / w + 4.0 * U,
+        error_bound: |n, w, bits| n * (-f64::from(bits)).exp2() / w + 5.0 * U,
     },
     Accumulator {
         name: "float",
@@ -195,7 +196,7 @@ pub fn reference<'a>(
         for y in splat.first[1].max(first_row)..=splat.last[1].min(first_row + rows - 1) {
             let row = (y - first_row) as usize * width;
             for x in splat.first[0]..=splat.last[0] {
-                let Some(at) = intersect(splat, camera, x, y) else { continue };
+                let Some((at, gain)) = footprint(splat, camera, options.low_pass, x, y) else { continue };
                 let pixel = row + x as usize;
                 let back = nearest[pixel] * (1.0 + relative) + epsilon;
                 let sum = &mut sums[pixel];
@@ -205,7 +206,7 @@ pub fn reference<'a>(
                 if !(at.hit(camera) && at.depth <= back) {
                     continue;
                 }
-                let weight = options.kernel.weight(at.rho2);
+                let weight = (gain * options.kernel.weight(at.rho2)).max(LEAST_WEIGHT);
                 sum.weight += weight;
                 for (total, value) in sum.color.iter_mut().zip(color) {
                     *total += weight * value;

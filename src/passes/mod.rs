@@ -9,10 +9,11 @@
 //! | [`accumulate`] | splats, nearest depths | [`accumulate::AttributeBuffer`] |
 //! | [`resolve`] | sums | [`Frame`](crate::frame::Frame) |
 //!
-//! [`footprint`] is evaluated inside visibility and accumulate; [`variant`] says which kernels a render is made of.
+//! [`footprint`] is evaluated inside visibility and accumulate, with the [`lowpass`] that [`project`] prepared; [`variant`] says which kernels a render is made of.
 
 pub mod accumulate;
 pub mod footprint;
+pub mod lowpass;
 pub mod project;
 pub mod resolve;
 pub mod upload;

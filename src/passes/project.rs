@@ -13,13 +13,14 @@
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::lowpass::{self, Design, Filter};
 use super::upload::SurfelBuffer;
 use super::{Recorder, Rows};
 use crate::error::Result;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::kernel::{grid, workgroup_grid};
 use crate::gpu::layout;
-use crate::scene::{Camera, Projection, Scene, Surfel};
+use crate::scene::{Camera, LowPass, Projection, RenderOptions, Scene, Surfel};
 
 /// A projected surfel in f64: the twin of [`layout::Splat`], in world units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,6 +43,8 @@ pub struct Splat {
     pub away: bool,
     /// World space, unit, as the surfel has it.
     pub normal: DVec3,
+    /// The low-pass, if there is one.
+    pub filter: Option<Filter>,
 }
 
 /// A disk's homography and the extent of its image.
@@ -52,13 +55,15 @@ struct Projected {
     c: DVec3,
     low: DVec2,
     high: DVec2,
+    /// The centre relative to the anchor's and the half-axes' images, where the splat's centre is the anchor.
+    images: Option<[DVec2; 3]>,
 }
 
 /// Past this the centre is so far outside the image that it is no use as an anchor (exact in f32 too).
 const FARTHEST_ANCHOR: f64 = 4_194_304.0;
 
 /// The twin of `wgsl/project.wgsl` for one surfel; `None` if no pixel can be touched.
-pub fn reference(index: u32, surfel: &Surfel, origin: DVec3, camera: &Camera) -> Option<Splat> {
+pub fn reference(index: u32, surfel: &Surfel, origin: DVec3, camera: &Camera, design: &Design) -> Option<Splat> {
     let vector = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
     let relative = vector(surfel.center) - (camera.eye - origin);
     let (s_world, t_world) = (vector(surfel.s), vector(surfel.t));
@@ -67,13 +72,24 @@ pub fn reference(index: u32, surfel: &Surfel, origin: DVec3, camera: &Camera) ->
         Projection::Pinhole => p.dot(s.cross(t)),
         Projection::Orthographic => s.x * t.y - s.y * t.x,
     };
-    if p.z + slope(s, t) < camera.near || away == 0.0 {
+    if p.z + slope(s, t) < camera.near {
         return None;
     }
-    let projected = match camera.projection {
+    let mut projected = match camera.projection {
         Projection::Pinhole => pinhole(camera, p, s, t, away),
         Projection::Orthographic => orthographic(camera, p, s, t, away),
     };
+    let near = (p.z - slope(s, t)).max(camera.near);
+    let depths = [near, (p.z + slope(s, t)).max(near)];
+    let filter = projected.images.and_then(|[center, s, t]| lowpass::filter(design, center, s, t, depths));
+    if let Some(filter) = &filter {
+        let center = DVec2::new(projected.anchor[0] as f64, projected.anchor[1] as f64) + 0.5 + filter.center;
+        let (low, high) = (center - filter.extent, center + filter.extent);
+        // The disk itself shows only beside the filter of `max`.
+        let beside = design.low_pass == LowPass::Max;
+        projected.low = if beside { projected.low.min(low) } else { low };
+        projected.high = if beside { projected.high.max(high) } else { high };
+    }
     let margin = 0.01 + 1e-5 * (projected.low.abs() + projected.high.abs());
     let size = DVec2::new(camera.width.into(), camera.height.into());
     let first = (projected.low - margin - 0.5).ceil().max(DVec2::ZERO);
@@ -93,13 +109,15 @@ pub fn reference(index: u32, surfel: &Surfel, origin: DVec3, camera: &Camera) ->
         c: projected.c,
         away: away > 0.0,
         normal,
+        filter,
     })
 }
 
 /// All splats of a scene that may touch a pixel, in the order of the surfels.
-pub fn reference_all(scene: &Scene, camera: &Camera) -> Vec<Splat> {
+pub fn reference_all(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Splat> {
+    let design = Design::of(options);
     let surfels = scene.surfels.par_iter().enumerate();
-    surfels.filter_map(|(index, surfel)| reference(index as u32, surfel, scene.origin, camera)).collect()
+    surfels.filter_map(|(index, surfel)| reference(index as u32, surfel, scene.origin, camera, &design)).collect()
 }
 
 /// Half the disk's extent in depth.
@@ -110,7 +128,10 @@ fn slope(s: DVec3, t: DVec3) -> f64 {
 fn pinhole(camera: &Camera, p: DVec3, s: DVec3, t: DVec3, away: f64) -> Projected {
     let focal = DVec2::new(camera.fx, camera.fy);
     let principal = DVec2::new(camera.cx, camera.cy);
-    let (a, b, c) = (t.cross(p) / away, p.cross(s) / away, s.cross(t) / away);
+    // Edge-on the rows vanish, and then u is set to 2: outside the disk.
+    let edge_on = away == 0.0;
+    let scale = if edge_on { 0.0 } else { 1.0 / away };
+    let (a, b, c) = (t.cross(p) * scale, p.cross(s) * scale, s.cross(t) * scale);
     // d = ((x - cx)/fx, (y - cy)/fy, 1): columns of the homography per pixel.
     let per_pixel = |row: DVec3| row.truncate() / focal;
     let (a_xy, b_xy, c_xy) = (per_pixel(a), per_pixel(b), per_pixel(c));
@@ -119,15 +140,17 @@ fn pinhole(camera: &Camera, p: DVec3, s: DVec3, t: DVec3, away: f64) -> Projecte
     if p.z - slope >= camera.near && image.abs().max_element() < FARTHEST_ANCHOR {
         let pixel = image.floor();
         let offset = image - pixel - 0.5;
+        let image_of = |v: DVec3| focal * (v.truncate() - p.truncate() / p.z * v.z) / p.z;
         let across = tangents([s.x, s.z], [t.x, t.z], [p.x, p.z]) * camera.fx;
         let down = tangents([s.y, s.z], [t.y, t.z], [p.y, p.z]) * camera.fy;
         return Projected {
             anchor: [pixel.x as i64, pixel.y as i64],
-            a: a_xy.extend(-a_xy.dot(offset)),
+            a: a_xy.extend(if edge_on { 2.0 / p.z } else { -a_xy.dot(offset) }),
             b: b_xy.extend(-b_xy.dot(offset)),
             c: c_xy.extend(1.0 / p.z - c_xy.dot(offset)),
             low: image + DVec2::new(across.x, down.x),
             high: image + DVec2::new(across.y, down.y),
+            images: Some([offset, image_of(s), image_of(t)]),
         };
     }
     let anchor = [i64::from(camera.width / 2), i64::from(camera.height / 2)];
@@ -143,6 +166,7 @@ fn pinhole(camera: &Camera, p: DVec3, s: DVec3, t: DVec3, away: f64) -> Projecte
         c: c_xy.extend(c.dot(d)),
         low: DVec2::new(across.x, down.x) - 1.0,
         high: DVec2::new(across.y, down.y) + 1.0,
+        images: None,
     }
 }
 
@@ -196,17 +220,20 @@ fn orthographic(camera: &Camera, p: DVec3, s: DVec3, t: DVec3, away: f64) -> Pro
     let image = focal * p.truncate() + DVec2::new(camera.cx, camera.cy);
     let pixel = image.floor();
     let offset = image - pixel - 0.5;
-    let a = DVec2::new(t.y, -t.x) / (away * focal);
-    let b = DVec2::new(-s.y, s.x) / (away * focal);
+    let edge_on = away == 0.0;
+    let scale = if edge_on { DVec2::ZERO } else { 1.0 / (away * focal) };
+    let a = DVec2::new(t.y, -t.x) * scale;
+    let b = DVec2::new(-s.y, s.x) * scale;
     let c = s.z * a + t.z * b;
     let extent = focal * DVec2::new(s.x.hypot(t.x), s.y.hypot(t.y));
     Projected {
         anchor: [pixel.x as i64, pixel.y as i64],
-        a: a.extend(-a.dot(offset)),
+        a: a.extend(if edge_on { 2.0 } else { -a.dot(offset) }),
         b: b.extend(-b.dot(offset)),
         c: c.extend(p.z - c.dot(offset)),
         low: image - extent,
         high: image + extent,
+        images: Some([offset, focal * s.truncate(), focal * t.truncate()]),
     }
 }
 
@@ -226,6 +253,8 @@ pub struct SplatPage {
     pub splats: Buffer<layout::Splat>,
     /// Two counts, then the indices of the large splats.
     queue: Buffer<u32>,
+    /// Their low-pass filters, if there are any.
+    filters: Option<Buffer<layout::Filter>>,
     /// How many are large: they get a workgroup each.
     large: u64,
 }
@@ -238,16 +267,25 @@ pub fn record(recorder: &mut Recorder<'_>, surfels: SurfelBuffer) -> Result<Spla
     for page in &surfels.pages {
         let splats = Buffer::storage(gpu, "splats", page.surfels.len)?;
         let queue = Buffer::storage(gpu, "queue of large splats", page.surfels.len + u64::from(layout::QUEUE_START))?;
-        pages.push(SplatPage { splats, queue, large: 0 });
+        let filters = match recorder.variant.needs.low_pass {
+            LowPass::None => None,
+            _ => Some(Buffer::storage(gpu, "low-pass filters", page.surfels.len)?),
+        };
+        pages.push(SplatPage { splats, queue, filters, large: 0 });
     }
     recorder.timing.pass(
         gpu,
         "project",
         |_| {},
         |pass| {
-            for (page, SplatPage { splats, queue, .. }) in surfels.pages.iter().zip(&pages) {
-                let buffers =
-                    [("view", view), ("surfels", &page.surfels.raw), ("splats", &splats.raw), ("queue", &queue.raw)];
+            for (page, SplatPage { splats, queue, filters, .. }) in surfels.pages.iter().zip(&pages) {
+                let mut buffers = vec![
+                    ("view", view),
+                    ("surfels", &page.surfels.raw),
+                    ("splats", &splats.raw),
+                    ("queue", &queue.raw),
+                ];
+                buffers.extend(filters.as_ref().map(|filters| ("filters", &filters.raw)));
                 let (pipeline, group) = program.bind(gpu, "project", &buffers)?;
                 let (x, y) = grid(gpu, page.surfels.len)?;
                 pass.set_pipeline(pipeline);
@@ -289,6 +327,7 @@ impl SplatBuffer {
                     ("surfels", &page.surfels.raw),
                 ];
                 bound.extend_from_slice(buffers);
+                bound.extend(splats.filters.as_ref().map(|filters| ("projected_filters", &filters.raw)));
                 bound.extend(page.colors.as_ref().map(|colors| ("colors", colors)));
                 bound.extend(self.surfels.srgb_to_linear.as_ref().map(|table| ("srgb_to_linear", &table.raw)));
                 let mut dispatch = |kernel: &str, (x, y): (u32, u32)| -> Result<()> {

@@ -15,7 +15,7 @@ pub struct SurfelBuffer {
     /// Consecutive pages; every kernel sees one at a time.
     pub pages: Vec<SurfelPage>,
     /// The table that decodes 8-bit sRGB.
-    pub(crate) srgb_to_linear: Option<Buffer<f32>>,
+    pub(crate) srgb_to_linear: Option<Buffer<[[f32; 4]; 64]>>,
 }
 
 /// One page of a [`SurfelBuffer`].
@@ -45,9 +45,8 @@ impl SurfelBuffer {
         }
         let srgb_to_linear = match needs.color {
             ColorNeed::Srgb8 => {
-                let table = Buffer::storage(gpu, "sRGB table", 256)?;
-                table.write(gpu, &*SRGB8_TO_LINEAR, &())?;
-                Some(table)
+                let table = std::array::from_fn(|row| std::array::from_fn(|k| SRGB8_TO_LINEAR[4 * row + k]));
+                Some(Buffer::uniform(gpu, "sRGB table", &table)?)
             }
             _ => None,
         };

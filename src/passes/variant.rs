@@ -2,11 +2,12 @@
 //! [`SceneNeeds`] is the only key.
 
 use super::accumulate::{Accumulator, accumulator};
+use super::lowpass;
 use crate::error::Result;
 use crate::gpu::kernel::Program;
 use crate::gpu::layout::LARGE;
 use crate::gpu::{Gpu, Sources};
-use crate::scene::{ColorNeed, Kernel, KernelShape, Projection, RenderOptions, SceneNeeds};
+use crate::scene::{ColorNeed, Kernel, KernelShape, LowPass, Projection, RenderOptions, SceneNeeds};
 
 /// The entry points of the stages, in order.
 pub const STAGES: [&str; 7] =
@@ -75,6 +76,11 @@ pub fn files(needs: &SceneNeeds) -> Vec<&'static str> {
         pick(needs.count, "count.wgsl", "count_absent.wgsl"),
         pick(needs.lambert, "shade_lambert.wgsl", "shade_unlit.wgsl"),
     ];
+    match needs.low_pass {
+        LowPass::None => files.push("lowpass_none.wgsl"),
+        LowPass::Max => files.extend(["filter.wgsl", "lowpass_max.wgsl"]),
+        LowPass::Ewa => files.extend(["filter.wgsl", "lowpass_ewa.wgsl"]),
+    }
     match needs.color {
         ColorNeed::Constant => files.push("color_constant.wgsl"),
         ColorNeed::Srgb8 => files.extend(["color_srgb8.wgsl", "color_sums.wgsl"]),
@@ -168,6 +174,9 @@ pub fn overrides(needs: &SceneNeeds, options: &RenderOptions, fraction_bits: u32
             constants.extend([("KERNEL_A", a), ("KERNEL_N", n), ("KERNEL_STEP", step)]);
         }
         Kernel::Hat | Kernel::Constant => {}
+    }
+    if needs.low_pass == LowPass::Ewa {
+        constants.push(("FILTER_BLUR", lowpass::blur(options.kernel)));
     }
     constants
 }

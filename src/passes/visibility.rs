@@ -3,22 +3,28 @@
 //!
 //! On the device depths are positive f32, whose bits order as u32: an atomic min.
 
-use super::footprint::intersect;
+use super::footprint::footprint;
 use super::project::{Splat, SplatBuffer};
 use super::{Recorder, Rows};
 use crate::error::Result;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::kernel::grid;
-use crate::scene::Camera;
+use crate::scene::{Camera, LowPass};
 
 /// The twin: nearest depths of the rows `first_row..first_row + rows`, +inf where nothing is.
-pub fn reference<'a>(splats: impl Iterator<Item = &'a Splat>, camera: &Camera, first_row: u32, rows: u32) -> Vec<f64> {
+pub fn reference<'a>(
+    splats: impl Iterator<Item = &'a Splat>,
+    camera: &Camera,
+    low_pass: LowPass,
+    first_row: u32,
+    rows: u32,
+) -> Vec<f64> {
     let mut nearest = vec![f64::INFINITY; camera.width as usize * rows as usize];
     for splat in splats {
         for y in splat.first[1].max(first_row)..=splat.last[1].min(first_row + rows - 1) {
             let row = (y - first_row) as usize * camera.width as usize;
             for x in splat.first[0]..=splat.last[0] {
-                if let Some(hit) = intersect(splat, camera, x, y).filter(|i| i.hit(camera)) {
+                if let Some((hit, _)) = footprint(splat, camera, low_pass, x, y).filter(|(i, _)| i.hit(camera)) {
                     let pixel = &mut nearest[row + x as usize];
                     *pixel = pixel.min(hit.depth);
                 }

@@ -14,6 +14,6 @@ pub use camera::{Camera, Lens, Projection};
 pub use color::Colors;
 pub use light::Light;
 pub use needs::{ColorNeed, SceneNeeds};
-pub use options::{Epsilon, Kernel, KernelShape, Maps, RenderOptions, Shading};
+pub use options::{Epsilon, Kernel, KernelShape, LowPass, Maps, RenderOptions, Shading};
 pub use scene::{Bounds, Scene, Up};
 pub use surfel::Surfel;

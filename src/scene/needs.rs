@@ -1,6 +1,6 @@
 //! What a scene and its options need, computed once: the only variant key of the kernels.
 
-use super::{Camera, Colors, Epsilon, KernelShape, Projection, RenderOptions, Scene, Shading};
+use super::{Camera, Colors, Epsilon, KernelShape, LowPass, Projection, RenderOptions, Scene, Shading};
 
 /// Where a surfel's colour comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -22,6 +22,8 @@ pub struct SceneNeeds {
     pub accumulator: &'static str,
     /// The kernel's formula.
     pub kernel: KernelShape,
+    /// The filter for small splats.
+    pub low_pass: LowPass,
     /// Epsilon depends on the surfel's radius.
     pub epsilon_radius: bool,
     /// The colour source.
@@ -61,6 +63,7 @@ impl SceneNeeds {
             projection: camera.projection,
             accumulator: options.accumulator,
             kernel: options.kernel.shape(),
+            low_pass: options.low_pass,
             epsilon_radius: matches!(options.epsilon, Epsilon::Radius(_)),
             color,
             alpha: low[3] != high[3],
@@ -93,6 +96,8 @@ impl SceneNeeds {
             KernelShape::Constant => "kernel-constant",
         };
         let flags = [
+            (self.low_pass == LowPass::Max, "lowpass-max"),
+            (self.low_pass == LowPass::Ewa, "lowpass-ewa"),
             (self.epsilon_radius, "epsilon-radius"),
             (self.alpha, "alpha"),
             (self.normal, "normal"),

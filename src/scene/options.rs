@@ -36,8 +36,11 @@ impl FromStr for Epsilon {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self, Error> {
-        let bad =
-            || Error::Usage(format!("an epsilon is rel:E (fraction of depth) or abs:E (world units), not {text:?}"));
+        let bad = || {
+            Error::Usage(format!(
+                "an epsilon is rel:E (fraction of depth), abs:E (world units) or radius:K (times the surfel's), not {text:?}"
+            ))
+        };
         let (kind, value) = text.split_once(':').ok_or_else(bad)?;
         let value: f64 = value.parse().map_err(|_| bad())?;
         if !(value.is_finite() && value >= 0.0) {
@@ -152,6 +155,19 @@ impl FromStr for Kernel {
     }
 }
 
+/// What is done about splats that are near a pixel in size or below.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum LowPass {
+    /// Nothing: a pixel's centre lies in the disk or not.
+    #[default]
+    None,
+    /// The larger of the object-space kernel and a round one of 0.71 pixels (Botsch et al. 2005): no splat falls between
+    /// the pixels' centres.
+    Max,
+    /// The kernel convolved with a Gaussian of half a pixel (EWA, Zwicker et al. 2001): no aliasing either.
+    Ewa,
+}
+
 /// How a resolved pixel gets its colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Shading {
@@ -185,6 +201,8 @@ pub struct RenderOptions {
     pub epsilon: Epsilon,
     /// Blending kernel.
     pub kernel: Kernel,
+    /// Low-pass filter.
+    pub low_pass: LowPass,
     /// Name of the device's accumulator; see [`crate::passes::accumulate::ACCUMULATORS`].
     pub accumulator: &'static str,
     /// Shading model.
@@ -202,6 +220,7 @@ impl Default for RenderOptions {
         Self {
             epsilon: Epsilon::Relative(0.01),
             kernel: Kernel::Ellipse { a: 6.0, n: 3.0, smooth: false },
+            low_pass: LowPass::None,
             accumulator: "fixed",
             shading: Shading::Lambert,
             lights: vec![Light::Headlight { intensity: 1.0 }],

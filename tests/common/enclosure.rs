@@ -2,10 +2,11 @@
 //! bounds leave undecided (at a rim, at epsilon, at the near depth) may be in or out, all others must be as the twin
 //! says. No pixel is excused; how many are left undecided is counted.
 
-use epsplat::passes::footprint::intersect;
+use epsplat::passes::footprint::footprint;
 use epsplat::passes::project::Splat;
-use epsplat::scene::{Camera, Kernel, RenderOptions, Scene};
+use epsplat::scene::{Camera, Kernel, LowPass, RenderOptions, Scene};
 
+use super::UNIT;
 use super::bounds::{E, Precision};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,6 +45,8 @@ pub struct Pixel {
     pub normal: [Interval; 3],
     /// Mean depth, world units.
     pub depth: Interval,
+    /// Largest relative error of the depth of one of its fragments.
+    pub depth_error: f64,
 }
 
 impl Pixel {
@@ -53,13 +56,23 @@ impl Pixel {
     }
 }
 
-/// Relative error of a kernel weight at rho: WGSL grants exp 3 + 2 |x| units, and its argument takes three roundings.
-fn weight_error(kernel: Kernel, weight: f64) -> f64 {
-    let Kernel::Ellipse { n, .. } = kernel;
-    let exponent = -weight.ln();
-    // pow is exp2(y log2 x): its error grows with the logarithm, which is small where the weight is not.
-    let power = if [2.0, 3.0, 4.0].contains(&n) { 3.0 } else { 64.0 };
-    (3.0 + 2.0 * exponent) * 2.0 * E + power * exponent * E
+/// Absolute error of a kernel weight at rho: WGSL grants exp 3 + 2 |x| units and sqrt the error of `1 / inverseSqrt`, 5
+/// units; the argument of exp takes three roundings.
+fn weight_error(kernel: Kernel, rho: f64) -> f64 {
+    let exponential =
+        |exponent: f64, power: f64| (-exponent).exp() * ((3.0 + 2.0 * exponent) * 2.0 * E + power * exponent * E);
+    match kernel {
+        Kernel::Gaussian { sigma } => exponential(0.5 * (rho / sigma).powi(2), 3.0),
+        Kernel::Ellipse { a, n, smooth } => {
+            // pow is exp2(y log2 x): its error grows with the logarithm, which is small where the weight is not.
+            let power = if [2.0, 3.0, 4.0].contains(&n) { 3.0 } else { 64.0 };
+            let error = exponential(a * rho.powf(n), power);
+            // The step and 1 - step are rounded, the difference and the quotient too.
+            if smooth { (error + 5.0 * E) / (1.0 - (-a).exp()) } else { error }
+        }
+        Kernel::Hat => 11.0 * E,
+        Kernel::Constant => 0.0,
+    }
 }
 
 struct Candidate {
@@ -80,6 +93,7 @@ pub fn enclose(scene: &Scene, camera: &Camera, options: &RenderOptions, splats: 
         color: [Interval::ZERO; 4],
         normal: [Interval::ZERO; 3],
         depth: Interval { low: f64::INFINITY, high: f64::NEG_INFINITY },
+        depth_error: 0.0,
     };
     let mut pixels = vec![blank; camera.pixels()];
     let mut candidates = Vec::new();
@@ -90,7 +104,7 @@ pub fn enclose(scene: &Scene, camera: &Camera, options: &RenderOptions, splats: 
         // A pixel more on each side: what the twin's bounds leave out must be out for other reasons too.
         for y in splat.first[1].saturating_sub(1)..=(splat.last[1] + 1).min(height - 1) {
             for x in splat.first[0].saturating_sub(1)..=(splat.last[0] + 1).min(width - 1) {
-                let Some(at) = intersect(splat, camera, x, y) else { continue };
+                let Some((at, _)) = footprint(splat, camera, LowPass::None, x, y) else { continue };
                 let bound = precision.fragment(splat, x, y, &at);
                 let rho = at.rho2.sqrt();
                 let rho = Interval { low: (rho - bound.rho).max(0.0), high: rho + bound.rho };
@@ -124,24 +138,28 @@ fn accumulate(
     pixels: &mut [Pixel],
 ) {
     let (low, high) = scene.color_range();
-    let (relative, absolute) = options.epsilon.parts();
+    let (relative, absolute, of_radius) = options.epsilon.parts();
+    // Of the comparison with the farthest accepted depth: a radius takes eight more roundings.
+    let rounding = if of_radius > 0.0 { 12.0 * E } else { 4.0 * E };
     for candidate in candidates {
         let splat = &splats[candidate.splat];
         let pixel = &mut pixels[candidate.pixel];
-        let back = |front: f64| front * (1.0 + relative) + absolute;
-        if candidate.depth.low > back(pixel.nearest.high) * (1.0 + 4.0 * E) {
+        let epsilon = absolute + of_radius * f64::from(scene.surfels[splat.surfel as usize].radius());
+        let back = |front: f64| front * (1.0 + relative) + epsilon;
+        if candidate.depth.low > back(pixel.nearest.high) * (1.0 + rounding) {
             continue;
         }
         // What is nearest itself is accepted whatever its depth is.
-        let sure = candidate.sure && candidate.depth.high <= back(pixel.nearest.low) * (1.0 - 4.0 * E);
+        let sure = candidate.sure && candidate.depth.high <= back(pixel.nearest.low) * (1.0 - rounding);
         let weight_at = |rho: f64| options.kernel.weight(rho.min(1.0).powi(2));
-        let (least, most) = (weight_at(candidate.rho.high), weight_at(candidate.rho.low));
-        let least = if sure { least * (1.0 - weight_error(options.kernel, least)) } else { 0.0 };
-        let most = most * (1.0 + weight_error(options.kernel, most));
-        // Rounding to units of 2^-24, in f32, is one unit for the weight and one more for each term.
+        let error_at = |rho: f64| weight_error(options.kernel, rho.min(1.0));
+        let (near_rim, near_center) = (candidate.rho.high, candidate.rho.low);
+        let least = if sure { (weight_at(near_rim) - error_at(near_rim)).max(0.0) } else { 0.0 };
+        let most = weight_at(near_center) + error_at(near_center);
+        // Rounding to whole units is one unit for the weight and one more for each term; a term is rounded to f32 before.
         let add = |sum: &mut Interval, value: Interval, units: f64| {
-            let low = (least * (value.low - 4.0 * E).max(0.0) - units * E).max(0.0);
-            let high = most * (value.high + 4.0 * E).min(1.0) + units * E;
+            let low = (least * (value.low - 5.0 * E).max(0.0) - units * UNIT).max(0.0);
+            let high = most * (value.high + 5.0 * E).min(1.0) + units * UNIT;
             sum.add(if sure { low } else { 0.0 }, high);
         };
         add(&mut pixel.weight, Interval { low: 1.0, high: 1.0 }, 1.0);
@@ -164,6 +182,7 @@ fn accumulate(
         }
         pixel.depth.low = pixel.depth.low.min(candidate.depth.low);
         pixel.depth.high = pixel.depth.high.max(candidate.depth.high);
+        pixel.depth_error = pixel.depth_error.max(candidate.depth.relative_width());
         pixel.count.0 += u32::from(sure);
         pixel.count.1 += 1;
     }

@@ -6,8 +6,14 @@ pub mod bounds;
 pub mod enclosure;
 pub mod scenes;
 
+use epsplat::frame::Frame;
 use epsplat::gpu::Gpu;
-use epsplat::scene::{ColorNeed, Projection, SceneNeeds};
+use epsplat::gpu::layout::{ONE, View};
+use epsplat::passes::accumulate::{ACCUMULATORS, Accumulator};
+use epsplat::scene::{ColorNeed, KernelShape, LowPass, Projection, RenderOptions, SceneNeeds};
+
+/// What one unit in a sum of the accumulator `fixed` is of a full weight.
+pub const UNIT: f64 = 1.0 / ONE as f64;
 
 /// The adapter, or `None` with a line on stderr where there is none and none is required.
 pub fn gpu() -> Option<Gpu> {
@@ -23,8 +29,37 @@ pub fn gpu() -> Option<Gpu> {
     }
 }
 
-/// Every set of needs that a scene and its options can have.
+/// The accumulators that the adapter can run; of each other one a line on stderr.
+pub fn accumulators(gpu: &Gpu) -> Vec<&'static Accumulator> {
+    let able = |row: &&Accumulator| row.check(gpu).inspect_err(|why| eprintln!("skipped: {why}")).is_ok();
+    ACCUMULATORS.iter().filter(able).collect()
+}
+
+/// Every set of needs that a scene and its options can have, with the first accumulator and one kernel; and of each other
+/// accumulator, kernel and form of epsilon a dozen, others for each.
 pub fn all_needs() -> Vec<SceneNeeds> {
+    let shapes = [KernelShape::Gaussian, KernelShape::Ellipse, KernelShape::Hat, KernelShape::Constant];
+    let base = base_needs();
+    let mut all = base.clone();
+    let mut next = 0;
+    for row in ACCUMULATORS {
+        for kernel in shapes {
+            for epsilon_radius in [false, true] {
+                for _ in 0..12 {
+                    // A step that shares no factor with the number of needs, so that it comes to all of them.
+                    next = (next + 101) % base.len();
+                    let low_pass = [LowPass::None, LowPass::Max, LowPass::Ewa][next % 3];
+                    all.push(SceneNeeds { accumulator: row.name, kernel, epsilon_radius, low_pass, ..base[next] });
+                }
+            }
+        }
+    }
+    all
+}
+
+fn base_needs() -> Vec<SceneNeeds> {
+    let (scene, camera) = scenes::stack(1, 1.0);
+    let plain = SceneNeeds::of(&scene, &scene.color_range(), &camera, &RenderOptions::default());
     let mut all = Vec::new();
     for bits in 0..1u32 << 8 {
         let bit = |k: u32| bits >> k & 1 == 1;
@@ -38,6 +73,9 @@ pub fn all_needs() -> Vec<SceneNeeds> {
             let (depth, count, weight_map) = (bit(5), bit(6), bit(7));
             all.push(SceneNeeds {
                 projection,
+                accumulator: ACCUMULATORS[0].name,
+                kernel: KernelShape::Ellipse,
+                epsilon_radius: false,
                 color,
                 alpha,
                 normal,
@@ -47,11 +85,26 @@ pub fn all_needs() -> Vec<SceneNeeds> {
                 lambert,
                 normal_map,
                 weight_map,
-                decision: false,
+                ..plain
             });
         }
     }
     all
+}
+
+/// The frame's bits: equality of floats would take -0 for 0 and no NaN for itself.
+pub fn bits(frame: &Frame) -> Vec<u32> {
+    let maps = [&frame.depth, &frame.weight, &frame.count].into_iter().flatten().flatten();
+    let vectors = frame.color.iter().flatten().chain(frame.normal.iter().flatten().flatten());
+    vectors.chain(maps).map(|value| value.to_bits()).collect()
+}
+
+/// The length of the interval behind the nearest depth `front` in which the device measures depths, world units.
+pub fn depth_span(view: &View, front: f64) -> f64 {
+    let world = f64::from(view.world);
+    let epsilon = f64::from(view.epsilon_absolute).max(f64::from(view.epsilon_deepest));
+    let deepest = front * (1.0 + f64::from(view.epsilon_relative)) + epsilon * world;
+    deepest.min(f64::from(view.farthest) * world) - front
 }
 
 /// Seeded numbers: splitmix64 (Steele et al. 2014).

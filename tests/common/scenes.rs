@@ -2,7 +2,7 @@
 
 use epsplat::scene::camera::Lens;
 use epsplat::scene::{Camera, Colors, Projection, Scene, Surfel, Up};
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3, Vec3};
 
 use super::Random;
 
@@ -189,4 +189,43 @@ pub fn sphere_camera(size: u32, projection: Projection) -> Camera {
 /// The same through another lens.
 pub fn sphere_camera_with(size: u32, lens: Lens) -> Camera {
     Camera::look_at((size, size), lens, DVec3::new(1.2, 0.7, 2.4), DVec3::ZERO, None, Up::Y, 1e-5).unwrap()
+}
+
+/// The same scene with its surfels in another order.
+pub fn shuffled(scene: &Scene, seed: u64) -> Scene {
+    let mut order: Vec<usize> = (0..scene.surfels.len()).collect();
+    Random(seed).shuffle(&mut order);
+    let colors = match &scene.colors {
+        Colors::Constant(color) => Colors::Constant(*color),
+        Colors::Srgb8(codes) => Colors::Srgb8(order.iter().map(|&k| codes[k]).collect()),
+        Colors::Linear(colors) => Colors::Linear(order.iter().map(|&k| colors[k]).collect()),
+    };
+    Scene { surfels: order.iter().map(|&k| scene.surfels[k]).collect(), colors, ..scene.clone() }
+}
+
+/// Scenes with many fragments on a pixel, in both kinds of colour.
+pub fn crowded() -> Vec<(Scene, Camera)> {
+    let mut all = vec![(sphere(4000, 4.0), sphere_camera(96, Projection::Pinhole))];
+    all.extend(cases().into_iter().take(2).map(|case| (case.scene, case.camera)));
+    all
+}
+
+/// An orthographic camera that looks along +z from the origin, a unit a pixel.
+pub fn front(size: u32) -> Camera {
+    let half = f64::from(size) / 2.0;
+    let lens = Lens::OrthographicScale([1.0, 1.0, half, half]);
+    Camera::posed((size, size), lens, DVec3::ZERO, DMat3::IDENTITY, 1e-3).unwrap()
+}
+
+/// `count` coincident disks over the whole image, to be drawn with a kernel of weight 1 everywhere, of linear colour
+/// `value`; and two out of sight that stretch the colours' range to [0, 1].
+pub fn stack(count: usize, value: f32) -> (Scene, Camera) {
+    let mut surfels = vec![Surfel::disk(Vec3::new(0.2, 0.1, 5.0), Vec3::NEG_Z, 20.0); count];
+    let mut colors = vec![[value, value, value, 1.0]; count];
+    for end in [0.0, 1.0] {
+        surfels.push(Surfel::disk(Vec3::new(0.0, 0.0, 90.0), Vec3::NEG_Z, 1.0));
+        colors.push([end, end, end, 1.0]);
+    }
+    let scene = Scene { origin: DVec3::ZERO, surfels, colors: Colors::Linear(colors), oriented: true, up: Up::Y };
+    (scene, front(4))
 }

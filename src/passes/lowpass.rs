@@ -1,0 +1,160 @@
+//! The low-pass for splats near a pixel in size or below. Without one, a disk between the pixels' centres is not seen, and
+//! a far surface has holes and moire.
+//!
+//! Both filters are ellipses centred on the splat, `rho^2 = |R x|^2` for x pixels from its centre:
+//!
+//! - **max** (Botsch et al. 2005, section 4.2): a circle of radius [`RADIUS`], beside the disk; the smaller rho counts. A
+//!   splat then reaches the centre of the pixel that it lies in, so a surface sampled once a pixel has no holes.
+//! - **ewa** (Zwicker et al. 2001): the disk's affine image J at its centre, convolved with the pixel's Gaussian:
+//!   `Q = J J^T + blur I`, weight times `sqrt(|J J^T| / |Q|)`. Exact for a Gaussian kernel; other kernels are convolved as
+//!   the Gaussian of the same variance.
+//!
+//! A filtered fragment's depth is that of the disk's plane, held within the disk's own depths: where the filter takes over
+//! from the disk the two agree, and edge-on, where the plane runs away, the depth does not.
+
+use glam::DVec2;
+
+use super::footprint::Intersection;
+use super::project::Splat;
+use crate::scene::{Camera, Kernel, LowPass, Projection, RenderOptions};
+
+/// The radius of `max`, pixels: half a pixel's diagonal, and a little for rounding.
+pub const RADIUS: f64 = 0.7072;
+
+/// The standard deviation of the pixel's Gaussian in `ewa`, pixels.
+pub const PIXEL_SIGMA: f64 = 0.5;
+
+/// A splat's filter: the twin of [`crate::gpu::layout::Filter`], depths in world units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Filter {
+    /// The splat's centre relative to its anchor's centre, pixels.
+    pub center: DVec2,
+    /// The depths on the disk.
+    pub depths: [f64; 2],
+    /// R: `(r[0] x + r[1] y, r[2] y)`.
+    pub r: [f64; 3],
+    /// Half the extent of the filter, pixels.
+    pub extent: DVec2,
+    /// Factor on the kernel's weight.
+    pub gain: f64,
+}
+
+/// `(pixel's sigma / kernel's sigma)^2`, pixels squared: what is added to J J^T.
+pub fn blur(kernel: Kernel) -> f64 {
+    let sigma_2 = match kernel {
+        Kernel::Gaussian { sigma } => sigma * sigma,
+        // The variance along one axis, by the midpoint rule.
+        _ => {
+            let moment = |power: i32| {
+                let steps = 4096;
+                let at = |i: i32| (f64::from(i) + 0.5) / f64::from(steps);
+                (0..steps).map(|i| at(i).powi(power) * kernel.weight(at(i) * at(i))).sum::<f64>()
+            };
+            0.5 * moment(3) / moment(1)
+        }
+    };
+    PIXEL_SIGMA * PIXEL_SIGMA / sigma_2
+}
+
+/// A low-pass with its number, computed once a render.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Design {
+    /// Which.
+    pub low_pass: LowPass,
+    /// What `ewa` adds to J J^T, pixels squared.
+    pub blur: f64,
+}
+
+impl Design {
+    /// The low-pass of `options`.
+    pub fn of(options: &RenderOptions) -> Self {
+        let blur = if options.low_pass == LowPass::Ewa { blur(options.kernel) } else { 0.0 };
+        Self { low_pass: options.low_pass, blur }
+    }
+}
+
+/// The filter of a splat whose half-axes have the images `s` and `t`, pixels, about `center`.
+pub fn filter(design: &Design, center: DVec2, s: DVec2, t: DVec2, depths: [f64; 2]) -> Option<Filter> {
+    match design.low_pass {
+        LowPass::None => None,
+        LowPass::Max => {
+            let r = 1.0 / RADIUS;
+            Some(Filter { center, depths, r: [r, 0.0, r], extent: DVec2::splat(RADIUS), gain: 1.0 })
+        }
+        LowPass::Ewa => {
+            let blur = design.blur;
+            let (xx, yy) = (s.x * s.x + t.x * t.x + blur, s.y * s.y + t.y * t.y + blur);
+            let xy = s.x * s.y + t.x * t.y;
+            let area = s.perp_dot(t);
+            let determinant = area * area + blur * (s.length_squared() + t.length_squared()) + blur * blur;
+            let r_xx = (yy / determinant).sqrt();
+            Some(Filter {
+                center,
+                depths,
+                r: [r_xx, -r_xx * xy / yy, 1.0 / yy.sqrt()],
+                extent: DVec2::new(xx.sqrt(), yy.sqrt()),
+                gain: (area.abs() / determinant.sqrt()).max(1e-9),
+            })
+        }
+    }
+}
+
+/// A splat at a pixel as the low-pass shows it: the intersection, and the factor on its weight.
+///
+/// `plane` is the third row at the pixel: 1/z (pinhole) or z.
+pub fn filtered(
+    splat: &Splat,
+    camera: &Camera,
+    low_pass: LowPass,
+    disk: Option<Intersection>,
+    plane: f64,
+    (dx, dy): (f64, f64),
+) -> Option<(Intersection, f64)> {
+    let Some(filter) = &splat.filter else { return disk.map(|disk| (disk, 1.0)) };
+    let x = DVec2::new(dx, dy) - filter.center;
+    let rho2 = (filter.r[0] * x.x + filter.r[1] * x.y).powi(2) + (filter.r[2] * x.y).powi(2);
+    let [low, high] = filter.depths;
+    let depth = match camera.projection {
+        Projection::Pinhole => 1.0 / plane.clamp(1.0 / high, 1.0 / low),
+        Projection::Orthographic => plane.clamp(low, high),
+    };
+    let round = Intersection { depth, rho2 };
+    match (low_pass, disk) {
+        (LowPass::Max, Some(disk)) if rho2 > 1.0 || rho2 >= disk.rho2 => Some((disk, 1.0)),
+        _ => Some((round, filter.gain)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_blur_is_the_ratio_of_variances() {
+        assert!((blur(Kernel::Gaussian { sigma: 0.5 }) - 1.0).abs() < 1e-12);
+        // A disk of constant weight has variance 1/4 along each axis.
+        assert!((blur(Kernel::Constant) - 1.0).abs() < 1e-6);
+        // A cone: 3/20.
+        assert!((blur(Kernel::Hat) - 0.25 / 0.15).abs() < 5e-3);
+    }
+
+    #[test]
+    fn ewa_adds_the_pixels_variance_and_keeps_the_volume() {
+        let options = RenderOptions {
+            kernel: Kernel::Gaussian { sigma: 0.5 },
+            low_pass: LowPass::Ewa,
+            ..RenderOptions::default()
+        };
+        let (s, t) = (DVec2::new(3.0, 1.0), DVec2::new(-0.5, 2.0));
+        let Some(f) = filter(&Design::of(&options), DVec2::ZERO, s, t, [1.0, 1.0]) else { unreachable!() };
+        // R^T R is the inverse of J J^T + I.
+        let q = [s.x * s.x + t.x * t.x + 1.0, s.x * s.y + t.x * t.y, s.y * s.y + t.y * t.y + 1.0];
+        let inverse = [f.r[0] * f.r[0], f.r[0] * f.r[1], f.r[1] * f.r[1] + f.r[2] * f.r[2]];
+        assert!((inverse[0] * q[0] + inverse[1] * q[1] - 1.0).abs() < 1e-12);
+        assert!((inverse[0] * q[1] + inverse[1] * q[2]).abs() < 1e-12);
+        assert!((inverse[1] * q[1] + inverse[2] * q[2] - 1.0).abs() < 1e-12);
+        // The integral of a Gaussian goes with the root of its determinant.
+        let (before, after) = (s.perp_dot(t).abs(), (q[0] * q[2] - q[1] * q[1]).sqrt());
+        assert!((f.gain * after - before).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,239 @@
+//! Every accumulator, with every kernel and every form of epsilon, against the f64 reference: the stated bound of the sums
+//! and the derived uncertainty of the fragments' weights are all that a pixel may be off. And what happens to sums that
+//! do not fit.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use common::bits;
+use common::bounds::E;
+use common::enclosure::{Pixel, enclose};
+use common::scenes::{sphere, sphere_camera, stack};
+use epsplat::frame::Frame;
+use epsplat::gpu::layout::View;
+use epsplat::gpu::{Gpu, Sources};
+use epsplat::passes::accumulate::{ACCUMULATORS, Accumulator};
+use epsplat::passes::project::reference_all;
+use epsplat::render::{Backend, render};
+use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Maps, Projection, RenderOptions, Scene, Shading, Surfel};
+use glam::Vec3;
+
+const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
+const KERNELS: [&str; 5] = ["gaussian", "ellipse:6,3", "ellipse:6,3,smooth", "hat", "constant"];
+const EPSILONS: [Epsilon; 3] = [Epsilon::Relative(0.02), Epsilon::Absolute(0.05), Epsilon::Radius(0.4)];
+
+/// What a device's frame is compared with.
+struct Case {
+    name: String,
+    scene: Scene,
+    camera: Camera,
+    options: RenderOptions,
+    reference: Frame,
+    enclosure: Vec<Pixel>,
+    view: View,
+}
+
+/// A sphere of overlapping disks before three large, tilted ones that fill the image: some get an invocation each, some a
+/// workgroup.
+fn case(kernel: &str, epsilon: Epsilon, projection: Projection) -> Case {
+    let mut scene = sphere(2500, 2.0);
+    let camera = sphere_camera(96, projection);
+    let Colors::Srgb8(codes) = &mut scene.colors else { unreachable!() };
+    for k in 0..3u8 {
+        let back = -camera.rotation.row(2).as_vec3();
+        let tilt = Vec3::new(0.2, 0.1 * f32::from(k), -0.1);
+        scene.surfels.push(Surfel::disk(back * (-1.3 - 0.02 * f32::from(k)), back + tilt, 4.0));
+        codes.push([90 * k, 255 - 100 * k, 30, 255]);
+    }
+    let options = RenderOptions {
+        epsilon,
+        kernel: kernel.parse().unwrap(),
+        shading: Shading::Unlit,
+        maps: MAPS,
+        ..Default::default()
+    };
+    let (reference, _) = render(&scene, &camera, &options, &Backend::Reference, &()).unwrap();
+    let enclosure = enclose(&scene, &camera, &options, &reference_all(&scene, &camera, &options));
+    let view = View::new(&scene, &scene.bounds(), &scene.color_range(), &camera, &options);
+    Case { name: format!("{kernel}, {epsilon:?}, {projection:?}"), scene, camera, options, reference, enclosure, view }
+}
+
+fn cases() -> Vec<Case> {
+    let mut all = Vec::new();
+    for (k, kernel) in KERNELS.into_iter().enumerate() {
+        for (e, epsilon) in EPSILONS.into_iter().enumerate() {
+            let projection = [Projection::Pinhole, Projection::Orthographic][(k + e) % 2];
+            all.push(case(kernel, epsilon, projection));
+        }
+    }
+    all
+}
+
+/// What of a frame lies outside the bounds.
+#[derive(Default)]
+struct Findings {
+    covered: usize,
+    open: usize,
+    wrong: Vec<String>,
+    /// The largest share of a bound that was used up: colour, depth, normal, weight.
+    used: [f64; 4],
+}
+
+fn compare(case: &Case, row: &Accumulator, device: &Frame) -> Findings {
+    let mut findings = Findings::default();
+    let (low, high) = case.scene.color_range();
+    let fraction_bits = row.fraction_bits(case.scene.surfels.len() as u64);
+    let map = |map: &Option<Vec<f32>>, pixel: usize| f64::from(map.as_ref().unwrap()[pixel]);
+    for (pixel, known) in case.enclosure.iter().enumerate() {
+        let twin = &case.reference;
+        let (n, weight) = (map(&twin.count, pixel), map(&twin.weight, pixel));
+        if !known.decided() {
+            findings.open += 1;
+            continue;
+        }
+        if (map(&device.count, pixel), n) != (f64::from(known.count.0), f64::from(known.count.0)) {
+            findings.wrong.push(format!("count {} not {n} at {pixel}", map(&device.count, pixel)));
+        }
+        if n == 0.0 {
+            if device.color[pixel] != [0.0; 4] || map(&device.weight, pixel) != 0.0 {
+                findings.wrong.push(format!("{:?} where nothing is, at {pixel}", device.color[pixel]));
+            }
+            continue;
+        }
+        findings.covered += 1;
+        let mut check = |which: usize, difference: f64, bound: f64| {
+            findings.used[which] = findings.used[which].max(difference / bound);
+            if difference > bound || difference.is_nan() {
+                let map = ["colour", "depth", "normal", "weight"][which];
+                findings.wrong.push(format!("{map}: {difference:e} over {bound:e} at {pixel}"));
+            }
+        };
+        let sums = (row.error_bound)(n, weight, fraction_bits);
+        // The means move by no more than the weights do, as a share of their sum; attributes are mapped in f32.
+        let weights = (known.weight.high - known.weight.low) / weight;
+        let mean = sums + weights + 8.0 * E;
+        for k in 0..4 {
+            // A colour's value is rounded twice more, to units of its own size.
+            let range = f64::from(high[k]) - f64::from(low[k]);
+            let (a, b) = (f64::from(device.color[pixel][k]), f64::from(twin.color[pixel][k]));
+            check(0, (a - b).abs(), range * mean + 4.0 * E * b);
+        }
+        let front = known.nearest.low;
+        let depth = (map(&device.depth, pixel), map(&twin.depth, pixel));
+        let behind = common::depth_span(&case.view, front);
+        check(1, (depth.0 - depth.1).abs(), behind * mean + depth.1 * (known.depth_error + 4.0 * E));
+        let normals = [device, twin].map(|f| Vec3::from_array(f.normal.as_ref().unwrap()[pixel]).as_dvec3());
+        // Components have a range of 2; the mean is normalised, and a short one magnifies its error.
+        if known.normal.iter().any(|sum| (2.0 * sum.low / known.weight.high - 1.0).abs() > 0.6) {
+            check(2, (normals[0] - normals[1]).length(), 2.0 * 3f64.sqrt() * mean / 0.6 + 4.0 * E);
+        }
+        let width = known.weight.high - known.weight.low;
+        check(3, (map(&device.weight, pixel) - weight).abs(), width + weight * sums);
+    }
+    findings
+}
+
+/// Renders by `row`; a frame that fell back to another accumulator would show nothing about this one.
+fn run(case: &Case, row: &Accumulator, backend: &Backend) -> Findings {
+    let options = RenderOptions { accumulator: row.name, ..case.options.clone() };
+    let (frame, report) = render(&case.scene, &case.camera, &options, backend, &()).unwrap();
+    assert_eq!((report.accumulator, report.overflows), (row.name, 0), "{}", case.name);
+    compare(case, row, &frame)
+}
+
+#[test]
+fn every_accumulator_kernel_and_epsilon_matches_the_reference() {
+    let Some(gpu) = common::gpu() else { return };
+    let all = common::accumulators(&gpu);
+    let backend = Backend::gpu(gpu);
+    let cases = cases();
+    for row in all {
+        let mut used = [0f64; 4];
+        for case in &cases {
+            let findings = run(case, row, &backend);
+            let some: Vec<_> = findings.wrong.iter().take(5).collect();
+            assert!(some.is_empty(), "{}, {}: {} wrong: {some:#?}", row.name, case.name, findings.wrong.len());
+            assert!(findings.covered > 9000, "{}: {} covered", case.name, findings.covered);
+            assert!(findings.open < 90, "{}: {} open", case.name, findings.open);
+            used = std::array::from_fn(|k| used[k].max(findings.used[k]));
+        }
+        eprintln!("{}: at most {used:.2?} of the bounds of colour, depth, normal, weight", row.name);
+    }
+}
+
+fn broken(file: &str, from: &str, to: &str, gpu: Gpu) -> Backend {
+    Backend::Gpu { gpu: Box::new(gpu), sources: Sources::default().replace(file, from, to).unwrap() }
+}
+
+#[test]
+fn a_broken_accumulator_kernel_or_epsilon_is_noticed() {
+    let Some(gpu) = common::gpu() else { return };
+    let noticed = |case: &Case, row: &Accumulator, file: &str, from: &str, to: &str| {
+        let Some(gpu) = common::gpu() else { return };
+        let findings = run(case, row, &broken(file, from, to, gpu));
+        assert!(findings.wrong.len() >= 20, "{file} with {to}: only {} differences", findings.wrong.len());
+    };
+    let plain = case("ellipse:6,3", EPSILONS[0], Projection::Pinhole);
+    for row in common::accumulators(&gpu) {
+        noticed(&plain, row, row.file, "clamp(value, 0.0, 1.0)", "clamp(value * 1.0005, 0.0, 1.0)");
+        noticed(&plain, row, row.file, "sum_at(pixel, WEIGHT_CHANNEL)", "1.0005 * sum_at(pixel, WEIGHT_CHANNEL)");
+    }
+    let row = &ACCUMULATORS[0];
+    for (kernel, file, from, to) in [
+        ("gaussian", "kernel_gaussian.wgsl", "-KERNEL_FALL", "-1.0005 * KERNEL_FALL"),
+        ("ellipse:6,3,smooth", "kernel_ellipse.wgsl", "power) - KERNEL_STEP", "power)"),
+        ("ellipse:6,3,smooth", "accumulate.wgsl", ", LEAST_WEIGHT)", ", 0.0)"),
+        ("hat", "kernel_hat.wgsl", "sqrt(rho2)", "1.0005 * sqrt(rho2)"),
+        ("constant", "kernel_constant.wgsl", "return 1.0", "return 0.9995"),
+    ] {
+        noticed(&case(kernel, EPSILONS[0], Projection::Pinhole), row, file, from, to);
+    }
+    let radius = case("hat", EPSILONS[2], Projection::Pinhole);
+    let file = "epsilon_radius.wgsl";
+    noticed(&radius, row, file, "max(length(s), length(t))", "1.05 * max(length(s), length(t))");
+    noticed(&radius, row, file, "view.epsilon_radius * radius", "view.epsilon_deepest");
+    let absolute = case("hat", EPSILONS[1], Projection::Pinhole);
+    noticed(&absolute, row, "epsilon.wgsl", "view.epsilon_absolute", "1.05 * view.epsilon_absolute");
+}
+
+#[test]
+fn sums_that_do_not_fit_are_noticed_and_made_again() {
+    let Some(gpu) = common::gpu() else { return };
+    let all = common::accumulators(&gpu);
+    let backend = Backend::gpu(gpu);
+    let with = |accumulator| RenderOptions { kernel: Kernel::Constant, maps: MAPS, accumulator, ..Default::default() };
+    let exact = ACCUMULATORS[0].name;
+    // 255 full weights of 2^24 units fit 32 bits, 256 do not.
+    for (disks, fits) in [(200, true), (255, true), (256, false), (300, false), (100_000, false)] {
+        let (scene, camera) = stack(disks, 0.3);
+        let (expected, report) = render(&scene, &camera, &with(exact), &backend, &()).unwrap();
+        assert_eq!((report.accumulator, report.overflows), (exact, 0));
+        assert!(expected.count.as_ref().unwrap().iter().all(|count| *count == disks as f32));
+        assert!(expected.weight.as_ref().unwrap().iter().all(|weight| *weight == disks as f32));
+        for row in &all {
+            let (frame, report) = render(&scene, &camera, &with(row.name), &backend, &()).unwrap();
+            let name = format!("{}, {disks} disks", row.name);
+            if ["fixed32", "packed64"].contains(&row.name) && !fits {
+                assert!(report.overflows > 0, "{name}: no overflow");
+                assert_eq!(report.accumulator, exact, "{name}");
+                assert!(bits(&frame) == bits(&expected), "{name}: not what {exact} gives");
+                let Some(gpu) = common::gpu() else { return };
+                let blind = broken(row.file, "atomicAdd(&overflows, 1u);", "", gpu);
+                let (frame, report) = render(&scene, &camera, &with(row.name), &blind, &()).unwrap();
+                assert_eq!((report.accumulator, report.overflows), (row.name, 0), "{name}");
+                assert!(bits(&frame) != bits(&expected), "{name}: an overflow does not show");
+            } else {
+                assert_eq!((report.accumulator, report.overflows), (row.name, 0), "{name}");
+                assert!(frame.count == expected.count && frame.weight == expected.weight, "{name}");
+                let n = disks as f64;
+                // Every term is the same, so float's sums, of exact weights, err by what the sum of one colour does.
+                let bound = (row.error_bound)(n, n, row.fraction_bits(scene.surfels.len() as u64)) + 2.0 * E;
+                let color = |frame: &Frame| f64::from(frame.color[9][0]);
+                let apart = (color(&frame) - color(&expected)).abs();
+                let own = (ACCUMULATORS[0].error_bound)(n, n, 24);
+                assert!(apart <= bound + own, "{name}: {apart:e} over {bound:e}");
+            }
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! The order of the surfels, the schedule, pages and bands: accumulators that claim to do not show them, in any bit.
+//! Others may, within their bounds.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use common::scenes::{crowded, front, shuffled};
+use common::{Random, bits};
+use epsplat::frame::Frame;
+use epsplat::gpu::Sources;
+use epsplat::gpu::buffers::page_len;
+use epsplat::gpu::layout::Splat;
+use epsplat::inspect::stages;
+use epsplat::passes::accumulate::{ACCUMULATORS, Accumulator};
+use epsplat::render::{Backend, render};
+use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Maps, RenderOptions, Scene, Shading, Surfel, Up};
+use glam::{DVec3, Vec3};
+
+const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
+
+/// Half a unit in the last place of 1 in f32.
+const E: f64 = 1.0 / 16_777_216.0;
+
+fn options(accumulator: &'static str) -> RenderOptions {
+    RenderOptions { maps: MAPS, epsilon: Epsilon::Relative(0.02), accumulator, ..Default::default() }
+}
+
+/// All scenes for the default; for others the first, of 8-bit colours, and the last, of f32 and large splats.
+fn scenes(row: &Accumulator) -> Vec<(Scene, Camera)> {
+    let mut all = crowded();
+    if row.name != ACCUMULATORS[0].name {
+        all.remove(1);
+    }
+    all
+}
+
+/// Renders; a frame that fell back to another accumulator would show nothing about this one.
+fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Backend) -> Frame {
+    let (frame, report) = render(scene, camera, options, backend, &()).unwrap();
+    assert_eq!((report.accumulator, report.overflows), (options.accumulator, 0));
+    frame
+}
+
+#[test]
+fn order_and_repetition_do_not_change_a_bit() {
+    let Some(gpu) = common::gpu() else { return };
+    let all = common::accumulators(&gpu);
+    let backend = Backend::gpu(gpu);
+    for row in all.into_iter().filter(|row| row.deterministic) {
+        let (name, options) = (row.name, options(row.name));
+        for (scene, camera) in scenes(row) {
+            let first = bits(&frame(&scene, &camera, &options, &backend));
+            assert!(bits(&frame(&scene, &camera, &options, &backend)) == first, "{name}: a second run differs");
+            for seed in [5, 6] {
+                let other = frame(&shuffled(&scene, seed), &camera, &options, &backend);
+                assert!(bits(&other) == first, "{name}: order {seed} differs");
+            }
+            // The comparison sees every surfel moved by a unit in the last place.
+            let mut moved = scene.clone();
+            for surfel in &mut moved.surfels {
+                surfel.center[0] = surfel.center[0].next_up();
+            }
+            assert!(bits(&frame(&moved, &camera, &options, &backend)) != first, "{name}");
+        }
+        // And a sum in which the last fragment wins.
+        let Some(gpu) = common::gpu() else { return };
+        let sources = Sources::default();
+        let sources = ["atomicAdd(&sums[word], value)", ADD_TO_CHANNEL, "atomicAdd(&sums[pair], (u64"]
+            .into_iter()
+            .find_map(|add| sources.clone().replace(row.file, add, &add.replace("atomicAdd", "atomicExchange")).ok())
+            .unwrap_or_else(|| panic!("{} adds in another way than this test knows", row.file));
+        let careless = Backend::Gpu { gpu: Box::new(gpu), sources };
+        let (scene, camera) = crowded().remove(0);
+        let [one, other] = [&scene, &shuffled(&scene, 5)].map(|scene| {
+            let (frame, report) = render(scene, &camera, &options, &careless, &()).unwrap();
+            assert_eq!(report.accumulator, name);
+            bits(&frame)
+        });
+        assert!(one != other, "{name}: a sum that depends on the order was not noticed");
+    }
+}
+
+const ADD_TO_CHANNEL: &str = "atomicAdd(&sums[pixel * CHANNELS + channel], value)";
+
+#[test]
+fn pages_and_bands_do_not_change_a_bit() {
+    let Some(whole) = common::gpu() else { return };
+    let all = common::accumulators(&whole);
+    let whole = Backend::gpu(whole);
+    for row in all.into_iter().filter(|row| row.deterministic) {
+        let (name, options) = (row.name, options(row.name));
+        // 160 pixels of 12 sums, or of 10 words of the image: a row of the image a band, and some 200 surfels a page.
+        let one_row = 160 * 4 * u64::from(12 * row.words).max(10) + 700;
+        for limit in [one_row, 40_000] {
+            let Some(small) = common::gpu() else { return };
+            let small = small.with_buffer_limit(limit);
+            assert_eq!(small.buffer_limit(), limit);
+            let (scene, camera) = crowded().remove(1);
+            let refused = stages(&scene, &camera, &options, &small, &Sources::default());
+            assert!(refused.unwrap_err().to_string().contains("bands"));
+            assert!(page_len(&small, size_of::<Splat>()) < scene.surfels.len() as u64 / 2);
+            let small = Backend::gpu(small);
+            for (scene, camera) in scenes(row) {
+                let one = frame(&scene, &camera, &options, &whole);
+                let many = frame(&scene, &camera, &options, &small);
+                assert!(bits(&one) == bits(&many), "{name}: {limit} bytes a buffer give another image");
+            }
+        }
+    }
+}
+
+/// Disks of many sizes, tilts and colours over one another: thousands of fragments on a pixel.
+fn pile() -> (Scene, Camera) {
+    let mut random = Random(21);
+    let mut surfels = Vec::new();
+    let mut colors = Vec::new();
+    for _ in 0..3000 {
+        let mut at = |reach: f64| random.between(-reach, reach) as f32;
+        let center = Vec3::new(at(8.0), at(8.0), 50.0 + at(1.0));
+        let normal = Vec3::new(at(0.3), at(0.3), -1.0);
+        surfels.push(Surfel::disk(center, normal, 18.0 + at(8.0)));
+        colors.push([0.5 + at(0.5), 0.5 + at(0.5), 0.5 + at(0.5), 1.0]);
+    }
+    let scene = Scene { origin: DVec3::ZERO, surfels, colors: Colors::Linear(colors), oriented: true, up: Up::Y };
+    (scene, front(16))
+}
+
+/// What does not claim to be independent of the order may differ from run to run; its means stay within its bound.
+#[test]
+fn sums_that_show_the_order_stay_within_their_bounds() {
+    let Some(gpu) = common::gpu() else { return };
+    let all = common::accumulators(&gpu);
+    let backend = Backend::gpu(gpu);
+    let (scene, camera) = pile();
+    let with = |accumulator| RenderOptions {
+        shading: Shading::Unlit,
+        epsilon: Epsilon::Absolute(100.0),
+        kernel: Kernel::Gaussian { sigma: 0.5 },
+        ..options(accumulator)
+    };
+    let exact = frame(&scene, &camera, &with(ACCUMULATORS[0].name), &backend);
+    let (counts, weights) = (exact.count.as_ref().unwrap(), exact.weight.as_ref().unwrap());
+    let fewest = counts.iter().copied().fold(f32::INFINITY, f32::min);
+    assert!(fewest > 1000.0, "only {fewest} fragments on a pixel");
+    for row in all.into_iter().filter(|row| !row.deterministic) {
+        let runs: Vec<Frame> =
+            (0..6).map(|seed| frame(&shuffled(&scene, 40 + seed / 2), &camera, &with(row.name), &backend)).collect();
+        let repeated = runs.chunks_exact(2).any(|pair| bits(&pair[0]) != bits(&pair[1]));
+        let reordered = runs.iter().any(|run| bits(run) != bits(&runs[0]));
+        let words = |differ| if differ { "differ" } else { "happen not to differ" };
+        eprintln!("{}: repeated runs {}, reordered ones {}", row.name, words(repeated), words(reordered));
+        let mut used = 0f64;
+        for run in &runs {
+            assert_eq!(run.count, exact.count, "{}", row.name);
+            for pixel in 0..camera.pixels() {
+                let (n, w) = (counts[pixel].into(), weights[pixel].into());
+                // Both sides err, and both map back to a range of at most 1 in f32.
+                let bound = (row.error_bound)(n, w, 24) + (ACCUMULATORS[0].error_bound)(n, w, 24);
+                for k in 0..3 {
+                    let difference = f64::from((run.color[pixel][k] - exact.color[pixel][k]).abs());
+                    used = used.max(difference / bound);
+                    assert!(difference <= bound, "{}: {difference:e} over {bound:e} at {pixel}", row.name);
+                }
+                let weight = f64::from((run.weight.as_ref().unwrap()[pixel] - weights[pixel]).abs());
+                assert!(weight <= w * (n + 2.0) * E, "{}: weight at {pixel}", row.name);
+            }
+        }
+        eprintln!("{}: at most {used:.3} of the bound, {fewest} fragments and more on a pixel", row.name);
+    }
+}

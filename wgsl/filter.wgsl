@@ -1,0 +1,30 @@
+// What a low-pass needs of a splat beside its record. The filter is centred on the splat and elliptical: rho^2 = |R x|^2
+// for x pixels from the centre, R upper triangular. Layout mirrored in src/gpu/layout.rs.
+
+struct Filter {
+    // The splat's centre relative to the anchor's centre, pixels.
+    center_x: f32,
+    center_y: f32,
+    // The depths on the disk, device units: a filtered fragment stays among them.
+    depth_low: f32,
+    depth_high: f32,
+    r_xx: f32,
+    r_xy: f32,
+    r_yy: f32,
+    // Factor on the kernel's weight; 0 where there is no filter: disks that reach the near depth are large anyway.
+    gain: f32,
+}
+
+@group(0) @binding(15) var<storage, read_write> filters: array<Filter>;
+@group(0) @binding(16) var<storage, read> projected_filters: array<Filter>;
+
+fn filter_of(index: u32) -> Filter {
+    return projected_filters[index];
+}
+
+// Squared radius on the filter's ellipse.
+fn filter_rho2(filter_: Filter, d: vec2<f32>) -> f32 {
+    let x = d - vec2<f32>(filter_.center_x, filter_.center_y);
+    let r = vec2<f32>(filter_.r_xx * x.x + filter_.r_xy * x.y, filter_.r_yy * x.y);
+    return dot(r, r);
+}

@@ -1,0 +1,47 @@
+// The kernel convolved with the pixel's Gaussian in the image (Heckbert 1989; Zwicker et al. 2001): with J the half-axes'
+// images, the ellipse of J J^T becomes that of Q = J J^T + BLUR I, and the weight sinks by sqrt(|J J^T| / |Q|). Exact for
+// a Gaussian kernel under the affine image of the disk at its centre. Twin: src/passes/lowpass.rs.
+
+// (pixel's sigma / kernel's sigma)^2, pixels^2.
+override FILTER_BLUR: f32;
+
+fn low_pass(index: u32, h: ptr<function, Homography>) {
+    if (!(*h).centered) {
+        filters[index] = Filter(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+        return;
+    }
+    let s = (*h).s_image;
+    let t = (*h).t_image;
+    let xx = s.x * s.x + t.x * t.x + FILTER_BLUR;
+    let xy = s.x * s.y + t.x * t.y;
+    let yy = s.y * s.y + t.y * t.y + FILTER_BLUR;
+    // |Q| = |J|^2 + BLUR trace(J J^T) + BLUR^2, of which no term cancels.
+    let area = s.x * t.y - s.y * t.x;
+    let determinant = area * area + FILTER_BLUR * (dot(s, s) + dot(t, t)) + FILTER_BLUR * FILTER_BLUR;
+    // x^T Q^-1 x = (sqrt(yy / |Q|) (x - y xy / yy))^2 + y^2 / yy.
+    let r_xx = sqrt(yy / determinant);
+    let center = vec2<f32>((*h).anchor) + 0.5 + (*h).offset;
+    let extent = sqrt(vec2<f32>(xx, yy));
+    (*h).low = center - extent;
+    (*h).high = center + extent;
+    let low = max((*h).depth_low, view.near);
+    filters[index] = Filter(
+        (*h).offset.x,
+        (*h).offset.y,
+        low,
+        max((*h).depth_high, low),
+        r_xx,
+        -r_xx * xy / yy,
+        1.0 / sqrt(yy),
+        // Positive even edge-on: 0 says that there is no filter.
+        max(abs(area) / sqrt(determinant), 1e-9),
+    );
+}
+
+fn filtered(fragment: Fragment, abc: vec3<f32>, filter_: Filter, d: vec2<f32>) -> Fragment {
+    if (filter_.gain == 0.0) {
+        return fragment;
+    }
+    let rho2 = filter_rho2(filter_, d);
+    return Fragment(rho2 <= 1.0, plane_depth(abc, filter_.depth_low, filter_.depth_high), rho2, filter_.gain);
+}

@@ -1,0 +1,26 @@
+// The larger of the object-space kernel and a round screen-space one (Botsch et al. 2005, section 4.2): the smaller rho.
+// Twin: src/passes/lowpass.rs.
+
+// The circle about a pixel's corners: a splat reaches the centre of the pixel it lies in. See RADIUS in the twin.
+const FILTER_RADIUS: f32 = 0.7072;
+
+fn low_pass(index: u32, h: ptr<function, Homography>) {
+    if (!(*h).centered) {
+        filters[index] = Filter(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+        return;
+    }
+    let center = vec2<f32>((*h).anchor) + 0.5 + (*h).offset;
+    (*h).low = min((*h).low, center - FILTER_RADIUS);
+    (*h).high = max((*h).high, center + FILTER_RADIUS);
+    let r = 1.0 / FILTER_RADIUS;
+    let low = max((*h).depth_low, view.near);
+    filters[index] = Filter((*h).offset.x, (*h).offset.y, low, max((*h).depth_high, low), r, 0.0, r, 1.0);
+}
+
+fn filtered(fragment: Fragment, abc: vec3<f32>, filter_: Filter, d: vec2<f32>) -> Fragment {
+    let rho2 = filter_rho2(filter_, d);
+    if (filter_.gain == 0.0 || rho2 > 1.0 || rho2 >= fragment.rho2) {
+        return fragment;
+    }
+    return Fragment(true, plane_depth(abc, filter_.depth_low, filter_.depth_high), rho2, 1.0);
+}

@@ -1,0 +1,15 @@
+// No low-pass: a pixel's centre is in the disk or not. Same interface as filter.wgsl with lowpass_*.wgsl.
+
+struct Filter {
+    nothing: u32,
+}
+
+fn filter_of(index: u32) -> Filter {
+    return Filter(0u);
+}
+
+fn low_pass(index: u32, h: ptr<function, Homography>) {}
+
+fn filtered(fragment: Fragment, abc: vec3<f32>, filter_: Filter, d: vec2<f32>) -> Fragment {
+    return fragment;
+}

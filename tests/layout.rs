@@ -147,7 +147,7 @@ fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         ("overflows", Element::Plain(WORD)),
         ("image", Element::Plain(&[f32::SHAPE])),
         ("colors", Element::Plain(&[u32::SHAPE, <[f32; 4]>::SHAPE])),
-        ("srgb_to_linear", Element::Plain(&[f32::SHAPE])),
+        ("srgb_to_linear", Element::Plain(&[<[f32; 256]>::SHAPE])),
     ])
 }
 

@@ -5,6 +5,7 @@ mod chunks;
 mod color;
 
 use crate::io::fault::{self, Fault, reserve};
+use crate::io::values::one_line;
 use crate::io::{Points, Up};
 use crate::{Progress, Result};
 use las::reader::{LazParallelism, ReaderOptions};
@@ -62,7 +63,7 @@ fn of_las(error: las::Error) -> Fault {
         las::Error::InvalidFileSignature(_) => {
             Fault::Malformed("it is not a LAS file: it does not begin with 'LASF'".into())
         }
-        other => Fault::Malformed(other.to_string()),
+        other => Fault::Malformed(one_line(&other.to_string())),
     }
 }
 
@@ -72,7 +73,7 @@ fn early(fault: Fault) -> Fault {
             Fault::Malformed("the file ends early".into())
         }
         Fault::Io(error) if matches!(error.kind(), io::ErrorKind::InvalidData | io::ErrorKind::InvalidInput) => {
-            Fault::Malformed(error.to_string())
+            Fault::Malformed(one_line(&error.to_string()))
         }
         other => other,
     }

@@ -40,8 +40,9 @@ pub fn points(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
     };
     let camera = match Camera::framing(SIZE, Lens::Fov(45.0), &scene, Camera::default_near(&scene)) {
         Ok(camera) => camera,
-        // A camera must be within as much of the world's origin as points: what lies at that border is seen from beyond.
-        Err(error) if reach(&scene) > 0.1 * LARGEST_COORDINATE => {
+        // A camera must be within as much of the world's origin as points, and one that sees a scene end on is moved
+        // far from it: what lies near that border may be out of reach.
+        Err(error) if reach(&scene) > 1e-6 * LARGEST_COORDINATE => {
             return sentence(&error, None).map(|()| Outcome::Read);
         }
         Err(error) => return Err(format!("no camera frames the scene: {error}")),

@@ -15,6 +15,7 @@ use glam::{DMat3, DVec3};
 use serde::Deserialize;
 
 use crate::error::{Error, Result};
+use crate::io::values::one_line;
 use crate::scene::Lens;
 use crate::scene::camera::DEFAULT_FOV;
 
@@ -76,7 +77,7 @@ pub fn read(path: &Path) -> Result<CameraFile> {
 }
 
 fn parse(text: &str) -> std::result::Result<CameraFile, String> {
-    let raw: Raw = serde_json::from_str(text).map_err(|e| format!("not a camera: {e}"))?;
+    let raw: Raw = serde_json::from_str(text).map_err(|e| format!("not a camera: {}", one_line(&e.to_string())))?;
     let size = match (raw.width, raw.height) {
         (Some(width), Some(height)) => Some((width, height)),
         (None, None) => None,
@@ -144,6 +145,18 @@ mod tests {
         let Pose::Rigid(rotation, eye) = a.pose else { unreachable!() };
         assert_eq!(eye, DVec3::new(3.0, 4.0, 5.0));
         assert_eq!(rotation * DVec3::X, DVec3::Z);
+    }
+
+    #[test]
+    fn what_a_file_says_cannot_break_the_message() {
+        for name in ["a\\nb", "\u{85}", "\\u001b[2J", &"long".repeat(10_000)] {
+            let message = parse(&format!(r#"{{"{name}":1}}"#)).unwrap_err();
+            assert!(!message.chars().any(char::is_control) && message.len() < 400, "{message}");
+            assert!(
+                message.starts_with("not a camera: unknown field `") && message.contains(" at line 1 "),
+                "{message}"
+            );
+        }
     }
 
     #[test]

@@ -35,6 +35,17 @@ pub(super) fn shown(token: &[u8]) -> String {
     if text.chars().count() > 40 { text.chars().take(40).chain("...".chars()).collect() } else { text }
 }
 
+/// A parser's message, which may quote the file at any length: on one line, and without the middle of a long quotation.
+pub(super) fn one_line(message: &str) -> String {
+    /// Characters kept of the start, and of the end, where parsers say what they expected and on which line.
+    const KEPT: (usize, usize) = (80, 240);
+    let text: Vec<char> = message.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect();
+    match (text.get(..KEPT.0), text.len().checked_sub(KEPT.1).and_then(|from| text.get(from..))) {
+        (Some(start), Some(end)) if text.len() > KEPT.0 + KEPT.1 => start.iter().chain(&['.'; 3]).chain(end).collect(),
+        _ => text.into_iter().collect(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -50,6 +61,16 @@ mod tests {
         for other in ["", "x", "1,5", "0x10", "--1"] {
             assert_eq!(parse_number(other.as_bytes()), None, "{other}");
         }
+    }
+
+    #[test]
+    fn messages_are_one_short_line() {
+        assert_eq!(one_line("unknown field `a\nb\u{85}`"), "unknown field `a\u{fffd}b\u{fffd}`");
+        let whole = "é".repeat(320);
+        assert_eq!(one_line(&whole), whole);
+        let cut = one_line(&format!("begin{whole}end"));
+        assert!(cut.starts_with("beginé") && cut.contains("é...é") && cut.ends_with("éend"), "{cut}");
+        assert_eq!(cut.chars().count(), 323);
     }
 
     #[test]

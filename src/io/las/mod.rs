@@ -5,6 +5,7 @@ mod chunks;
 mod color;
 
 use crate::io::fault::{self, Fault, reserve};
+use crate::io::values::one_line;
 use crate::io::{Points, Up};
 use crate::{Progress, Result};
 use las::reader::{LazParallelism, ReaderOptions};
@@ -35,6 +36,10 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
         Ok((file, decoding, chunks::promised(&header), length))
     });
     let (file, decoding, promised, length) = opened.map_err(|fault| fault.of(path))?;
+    if promised == 0 {
+        // The decoder would still take the length of a chunk table for true, which nothing here vouches for.
+        return Ok(Points { up: Some(Up::Z), ..Points::default() });
+    }
     progress.begin(&format!("reading {}", fault::name(path)), promised);
     let points = surviving(|| decode(file, decoding, promised.min(length), progress));
     progress.end();
@@ -62,7 +67,7 @@ fn of_las(error: las::Error) -> Fault {
         las::Error::InvalidFileSignature(_) => {
             Fault::Malformed("it is not a LAS file: it does not begin with 'LASF'".into())
         }
-        other => Fault::Malformed(other.to_string()),
+        other => Fault::Malformed(one_line(&other.to_string())),
     }
 }
 
@@ -72,7 +77,7 @@ fn early(fault: Fault) -> Fault {
             Fault::Malformed("the file ends early".into())
         }
         Fault::Io(error) if matches!(error.kind(), io::ErrorKind::InvalidData | io::ErrorKind::InvalidInput) => {
-            Fault::Malformed(error.to_string())
+            Fault::Malformed(one_line(&error.to_string()))
         }
         other => other,
     }
@@ -134,4 +139,38 @@ fn withheld(block: &PointData) -> impl Iterator<Item = bool> {
         .raw_bytes()
         .chunks_exact(block.record_len().max(1))
         .map(move |record| record.get(15).is_some_and(|b| b & mask != 0))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use las::point::Format;
+    use las::{Builder, Writer};
+    use std::io::Cursor;
+
+    /// A LAZ file of no points.
+    fn compressed() -> Vec<u8> {
+        let mut builder = Builder::from((1, 4));
+        builder.point_format = Format::new(0).unwrap();
+        builder.point_format.is_compressed = true;
+        let writer = Writer::new(Cursor::new(Vec::new()), builder.into_header().unwrap()).unwrap();
+        writer.into_inner().unwrap().into_inner()
+    }
+
+    #[test]
+    fn a_file_of_no_points_may_have_any_chunk_table() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.laz");
+        let mut bytes = compressed();
+        let start = u32::from_le_bytes(*bytes[96..].first_chunk().unwrap()) as usize;
+        let table = u64::from_le_bytes(*bytes[start..].first_chunk().unwrap()) as usize;
+        // A count of chunks that would take 64 GiB, and the bytes that a decoder of it begins with.
+        bytes.truncate(table + 4);
+        bytes.extend([0xff; 4]);
+        bytes.extend([0x7f; 64]);
+        std::fs::write(&path, &bytes).unwrap();
+        let points = read(&path, &()).unwrap();
+        assert_eq!((points.positions.len(), points.up), (0, Some(Up::Z)));
+    }
 }

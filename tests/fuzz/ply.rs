@@ -1,0 +1,185 @@
+//! PLY files of random shape, in text and in both byte orders.
+
+use super::mutate::Grammar;
+use super::random::{Place, Random};
+use super::{Target, render};
+
+pub const TARGET: Target = Target {
+    name: "ply",
+    extension: "ply",
+    generate,
+    grammar: Grammar {
+        words: &[
+            "ply",
+            "format",
+            "ascii",
+            "binary_little_endian",
+            "binary_big_endian",
+            "1.0",
+            "element",
+            "vertex",
+            "face",
+            "property",
+            "list",
+            "char",
+            "uchar",
+            "short",
+            "ushort",
+            "int",
+            "uint",
+            "float",
+            "double",
+            "float64",
+            "x",
+            "y",
+            "z",
+            "nx",
+            "radius",
+            "red",
+            "alpha",
+            "\nproperty list uint double l\n",
+            "\nelement vertex 4294967295\n",
+            "\nelement ghost 18446744073709551615\n",
+            "\nend_header\n",
+            "comment",
+            "\r\n",
+            "\u{7}",
+            "\u{fffd}",
+        ],
+        separators: b"",
+        text: 1 << 12,
+        numbers: |_| Vec::new(),
+    },
+    execute: render::points,
+};
+
+const INTEGERS: [&str; 12] =
+    ["char", "int8", "uchar", "uint8", "short", "int16", "ushort", "uint16", "int", "int32", "uint", "uint32"];
+const REALS: [&str; 4] = ["float", "float32", "double", "float64"];
+
+/// How numbers are written.
+#[derive(Clone, Copy)]
+enum Encoding {
+    Ascii,
+    Little,
+    Big,
+}
+
+fn put(out: &mut Vec<u8>, encoding: Encoding, kind: &str, value: f64) {
+    macro_rules! bytes {
+        ($type:ty) => {
+            match encoding {
+                Encoding::Ascii => out.extend(format!("{} ", value as $type).bytes()),
+                Encoding::Little => out.extend((value as $type).to_le_bytes()),
+                Encoding::Big => out.extend((value as $type).to_be_bytes()),
+            }
+        };
+    }
+    match kind {
+        "char" | "int8" => bytes!(i8),
+        "uchar" | "uint8" => bytes!(u8),
+        "short" | "int16" => bytes!(i16),
+        "ushort" | "uint16" => bytes!(u16),
+        "int" | "int32" => bytes!(i32),
+        "uint" | "uint32" => bytes!(u32),
+        "float" | "float32" => bytes!(f32),
+        _ => bytes!(f64),
+    }
+}
+
+/// A property: its types (a list has two) and its name.
+type Property = (Option<&'static str>, &'static str, &'static str);
+
+fn scalar(random: &mut Random, name: &'static str) -> Property {
+    let kind = if random.one_in(3) { INTEGERS[random.below(12)] } else { REALS[random.below(4)] };
+    (None, kind, name)
+}
+
+fn vertex_properties(random: &mut Random) -> Vec<Property> {
+    let mut names = vec!["x", "y", "z"];
+    let groups: [&[&str]; 6] = [
+        &["nx", "ny", "nz"],
+        &["red", "green", "blue"],
+        &["red", "green", "blue", "alpha"],
+        &["radius"],
+        &["scale", "quality"],
+        &["normal_x", "normal_y", "normal_z", "r", "g", "b"],
+    ];
+    for group in groups {
+        if random.one_in(3) {
+            names.extend(group);
+        }
+    }
+    let one_color_type = random.one_in(2).then_some("uchar");
+    let mut properties: Vec<Property> = names
+        .into_iter()
+        .map(|name| match one_color_type {
+            Some(kind) if ["red", "green", "blue", "alpha", "r", "g", "b"].contains(&name) => (None, kind, name),
+            _ => scalar(random, name),
+        })
+        .collect();
+    if random.one_in(4) {
+        properties.push((Some(INTEGERS[random.below(12)]), INTEGERS[random.below(12)], "neighbours"));
+    }
+    for last in (1..properties.len()).rev() {
+        properties.swap(last, random.below(last + 1));
+    }
+    properties
+}
+
+fn generate(random: &mut Random) -> (Vec<u8>, usize) {
+    let (encoding, name) =
+        [(Encoding::Ascii, "ascii"), (Encoding::Little, "binary_little_endian"), (Encoding::Big, "binary_big_endian")]
+            [random.below(3)];
+    let line = random.pick(&["\n", "\n", "\r\n"]);
+    let points = random.count(60);
+    let faces: Vec<Property> = vec![(Some("uchar"), "int", "vertex_indices"), (None, "float", "flags")];
+    let mut elements = vec![("vertex", points, vertex_properties(random))];
+    if random.one_in(3) {
+        let at = random.below(2);
+        elements.insert(at, ("face", random.count(10), faces[random.below(2)..].to_vec()));
+    }
+    let mut out = format!("ply{line}format {name} 1.0{line}");
+    if random.one_in(3) {
+        out += &format!("comment made at random{line}obj_info {}{line}", random.bits());
+    }
+    for (name, count, properties) in &elements {
+        out += &format!("element {name} {count}{line}");
+        for (list, kind, name) in properties {
+            out += &match list {
+                Some(length) => format!("property list {length} {kind} {name}{line}"),
+                None => format!("property {kind} {name}{line}"),
+            };
+        }
+    }
+    let mut out = (out + "end_header" + line).into_bytes();
+    let place = Place::any(random);
+    for (_, count, properties) in elements {
+        for _ in 0..count {
+            let point = place.point(random);
+            for (list, kind, name) in &properties {
+                let mut length = 1;
+                if let Some(counter) = list {
+                    length = random.below(5);
+                    put(&mut out, encoding, counter, length as f64);
+                }
+                for _ in 0..length {
+                    let value = match *name {
+                        "x" => point[0],
+                        "y" => point[1],
+                        "z" => point[2],
+                        "red" | "green" | "blue" | "r" | "g" | "b" => random.between(0.0, 300.0),
+                        "radius" | "scale" if random.one_in(8) => place.point(random)[0],
+                        "radius" | "scale" => random.between(0.0, 0.2),
+                        _ => random.between(-1.0, 1.0),
+                    };
+                    put(&mut out, encoding, kind, value);
+                }
+            }
+            if matches!(encoding, Encoding::Ascii) {
+                out.extend(line.bytes());
+            }
+        }
+    }
+    (out, points)
+}

@@ -1,0 +1,108 @@
+//! What is done with points that were read, and what an image must be.
+
+use super::Outcome;
+use super::session::sentence;
+use epsplat::frame::Frame;
+use epsplat::io::Points;
+use epsplat::render::{Backend, render};
+use epsplat::scene::{Camera, Colors, Lens, Maps, RenderOptions, Scene, Shading};
+use epsplat::surfels::{LARGEST_COORDINATE, build};
+use epsplat::{Error, io};
+use std::path::Path;
+
+/// Scenes with more points are not drawn: a damaged file may hold as many as a small one can describe.
+const MOST_POINTS: usize = 2000;
+
+/// The image's width and height, pixels.
+pub const SIZE: (u32, u32) = (16, 16);
+
+/// Reads a file of points and draws them.
+pub fn points(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
+    let points = match (io::read(path, &()), valid) {
+        (Ok(points), _) => points,
+        (Err(error), Some(_)) => return Err(format!("a valid file is refused: {error}")),
+        (Err(error), None) => return sentence(&error, Some(path)).map(|()| Outcome::Refused),
+    };
+    let count = points.positions.len();
+    if let Some(valid) = valid.filter(|&valid| valid != count) {
+        return Err(format!("a valid file has {valid} points, of which {count} were read"));
+    }
+    check_lengths(&points)?;
+    if count > MOST_POINTS {
+        return Ok(Outcome::Read);
+    }
+    let usable = |p: &[f64; 3]| p.iter().all(|c| c.abs() <= LARGEST_COORDINATE);
+    let drawable = points.positions.iter().any(usable);
+    let (scene, _) = match build(vec![points], &()) {
+        Ok(built) => built,
+        Err(error @ Error::EmptyScene(_)) if !drawable => return sentence(&error, None).map(|()| Outcome::Read),
+        Err(error) => return Err(format!("{count} points make no scene: {error}")),
+    };
+    let camera = match Camera::framing(SIZE, Lens::Fov(45.0), &scene, Camera::default_near(&scene)) {
+        Ok(camera) => camera,
+        // A camera must be within as much of the world's origin as points, and one that sees a scene end on is moved
+        // far from it: what lies near that border may be out of reach.
+        Err(error) if reach(&scene) > 1e-6 * LARGEST_COORDINATE => {
+            return sentence(&error, None).map(|()| Outcome::Read);
+        }
+        Err(error) => return Err(format!("no camera frames the scene: {error}")),
+    };
+    draw(&scene, &camera, Shading::Lambert)?;
+    draw(&scene, &camera, Shading::Unlit)
+}
+
+/// The largest absolute coordinate or radius of a scene, world units.
+fn reach(scene: &Scene) -> f64 {
+    let bounds = scene.bounds();
+    let farthest = (scene.origin + bounds.min).abs().max((scene.origin + bounds.max).abs());
+    farthest.max_element().max(scene.largest_radius().into())
+}
+
+fn check_lengths(points: &Points) -> Result<(), String> {
+    let colors = points.colors.as_ref().map(|colors| match colors {
+        Colors::Constant(_) => usize::MAX,
+        Colors::Srgb8(codes) => codes.len(),
+        Colors::Linear(colors) => colors.len(),
+    });
+    let lengths = [points.normals.as_ref().map(Vec::len), points.radii.as_ref().map(Vec::len), colors];
+    if lengths.into_iter().flatten().all(|length| length == points.positions.len()) {
+        Ok(())
+    } else {
+        Err(format!("{} positions have attributes of other lengths: {lengths:?}", points.positions.len()))
+    }
+}
+
+/// Draws `scene` with the reference and looks at each pixel of each map.
+pub fn draw(scene: &Scene, camera: &Camera, shading: Shading) -> Result<Outcome, String> {
+    let maps = Maps { depth: true, normal: true, weight: true, count: true, decision: true };
+    let options = RenderOptions { maps, shading, ..RenderOptions::default() };
+    let (frame, _) = render(scene, camera, &options, &Backend::Reference, &())
+        .map_err(|error| format!("the scene cannot be drawn: {error}"))?;
+    check(&frame).map(|()| Outcome::Drawn)
+}
+
+fn check(frame: &Frame) -> Result<(), String> {
+    let missing = || "a map is missing".to_owned();
+    let depth = frame.depth.as_ref().ok_or_else(missing)?;
+    let normal = frame.normal.as_ref().ok_or_else(missing)?;
+    let weight = frame.weight.as_ref().ok_or_else(missing)?;
+    let count = frame.count.as_ref().ok_or_else(missing)?;
+    let decision = frame.decision.as_ref().ok_or_else(missing)?;
+    for (pixel, color) in frame.color.iter().enumerate() {
+        let (depth, normal) = (depth[pixel], normal[pixel]);
+        let (weight, count) = (weight[pixel], count[pixel]);
+        let values = [depth, weight, count, decision[pixel]];
+        let wrong = if color.iter().chain(&normal).chain(&values).any(|value| value.is_nan()) {
+            "a NaN"
+        } else if count > 0.0 && !(weight > 0.0 && depth.is_finite() && depth > 0.0) {
+            "fragments without weight or depth"
+        } else if count == 0.0 && (weight != 0.0 || depth != f32::INFINITY || *color != [0.0; 4] || normal != [0.0; 3])
+        {
+            "a background that is none"
+        } else {
+            continue;
+        };
+        return Err(format!("pixel {pixel} holds {wrong}: {color:?} {normal:?} {values:?}"));
+    }
+    Ok(())
+}

@@ -36,6 +36,7 @@
 pub mod error;
 pub mod frame;
 pub mod gpu;
+pub mod hardcases;
 pub mod inspect;
 pub mod io;
 pub mod metrics;

@@ -2,16 +2,31 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
-
+use epsplat::gpu::{Gpu, Sources};
+use epsplat::hardcases::{self, Verdict};
 use epsplat::metrics::compare;
+use epsplat::passes::accumulate;
 use epsplat::render::{Backend, render};
 use epsplat::scene::{Camera, Colors, Lens, Maps, RenderOptions, Scene, Surfel, Up};
 use glam::{DVec3, Vec3};
 
+/// The adapter, or `None` with a line on stderr where there is none and none is required.
+fn adapter() -> Option<Gpu> {
+    match Gpu::open(std::env::var("EPSPLAT_TEST_ADAPTER").ok().as_deref()) {
+        Ok(gpu) => Some(gpu),
+        Err(error) if std::env::var("EPSPLAT_REQUIRE_ADAPTER").is_ok_and(|v| v == "1") => {
+            panic!("EPSPLAT_REQUIRE_ADAPTER=1, but {error}")
+        }
+        Err(_) => {
+            eprintln!("skipped: no adapter");
+            None
+        }
+    }
+}
+
 /// Disks seen by a camera at the origin that looks along z; colours differ, so that every attribute is summed.
 fn check(name: &str, surfels: Vec<Surfel>, camera: &Camera, covered: f64) {
-    let Some(gpu) = common::gpu() else { return };
+    let Some(gpu) = adapter() else { return };
     let colors = Colors::Srgb8((0..surfels.len()).map(|i| [40 * (i as u8 % 6), 90, 200, 255]).collect());
     let scene = Scene { origin: DVec3::ZERO, surfels, colors, oriented: true, up: Up::Y };
     let maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
@@ -75,4 +90,77 @@ fn odd_image_sizes_work() {
         check("pinhole", disks.clone(), &pinhole(size), 1.0);
         check("orthographic", disks.clone(), &orthographic(size), 1.0);
     }
+}
+
+/// Every case with every accumulator that the adapter has.
+#[test]
+fn every_hard_case_passes_or_fails_as_expected() {
+    let Some(backend) = adapter().map(Backend::gpu) else { return };
+    let cases = hardcases::cases().unwrap();
+    let rows = hardcases::run(&cases, &hardcases::supported(&backend), &backend, &()).unwrap();
+    for row in &rows {
+        assert!(!row.failed(), "{} with {}: {row:#?}", row.case, row.accumulator);
+        if ["fixed", "fixed64"].contains(&row.accumulator) {
+            assert_eq!(row.verdict, Verdict::Pass, "{row:#?}");
+        }
+        assert_eq!(row.over_float, None, "{row:#?}");
+    }
+    // The reasons for failures are not there for show: somebody does fail.
+    assert!(rows.iter().any(|row| matches!(row.verdict, Verdict::ExpectedFailure(_))));
+}
+
+/// The controls: each kernel broken in one place must fail a case that was made for that place.
+#[test]
+fn a_broken_kernel_fails_a_hard_case() {
+    let Some(mut gpu) = adapter() else { return };
+    let cases = hardcases::cases().unwrap();
+    let broken = [
+        ("accumulator_fixed.wgsl", "atomicAdd(&sums[word + 1u], 1u);", "", "a million disks on a pixel"),
+        ("accumulator_fixed.wgsl", "= 1073741824.0;", "= 1048576.0;", "only the kernel's tail, smooth"),
+        ("double.wgsl", "bitcast<f32>(bitcast<u32>(x) ^ view.zero)", "x", "1/100 pixel"),
+        ("rows.wgsl", "(a - rows.a) + vec3<f32>(", "(a - a) + 0.0 * vec3<f32>(", "anisotropy 1000:1"),
+        ("camera_pinhole.wgsl", "vec2<f32>(min(extent.x, k), max(extent.y, k))", "extent", "through the camera plane"),
+        ("camera_pinhole.wgsl", "chord_1) + blur)", "chord_1) - 0.5)", "through the camera plane"),
+        ("project.wgsl", "d.low - view.eye_low[i]", "d.low", "UTM, millimetres"),
+        ("project.wgsl", "surfel.center[i] * view.unit", "surfel.center[i]", "coordinates of 1e12"),
+        ("visibility.wgsl", "atomicMin(", "atomicMax(", "intersecting sheets"),
+        (
+            "accumulate.wgsl",
+            "fragment.depth > farthest",
+            "fragment.depth * 1.000004 > farthest",
+            "sheets 3e-6 about epsilon",
+        ),
+        (
+            "accumulate.wgsl",
+            "max(kernel_weight(fragment.rho2), LEAST_WEIGHT)",
+            "kernel_weight(fragment.rho2)",
+            "only the kernel's tail, smooth",
+        ),
+        ("color_sums.wgsl", "view.color_low + view.color_span", "view.color_span", "negative colours"),
+        ("project.wgsl", "floor(h.high + margin - 0.5)", "floor(h.high + margin - 1.5)", "image edges and corners"),
+        ("camera_orthographic.wgsl", "h.away == 0.0", "abs(h.away) < 1e-3", "edge-on, askew, orthographic"),
+    ];
+    for (file, from, to, name) in broken {
+        let sources = Sources::default().replace(file, from, to).unwrap();
+        let backend = Backend::Gpu { gpu: Box::new(gpu), sources };
+        let case = cases.iter().find(|case| case.name == name).unwrap();
+        let truth = case.truth().unwrap();
+        let row = case.judge(&truth, accumulate::accumulator("fixed").unwrap(), &backend).unwrap();
+        assert!(row.failed(), "{name} did not notice {from:?} gone: {row:#?}");
+        let Backend::Gpu { gpu: back, .. } = backend else { unreachable!() };
+        gpu = *back;
+    }
+}
+
+#[test]
+fn the_list_is_complete_and_its_names_are_its_own() {
+    let cases = hardcases::cases().unwrap();
+    let mut names: Vec<_> = cases.iter().map(|case| case.name.as_str()).collect();
+    assert!(names.len() >= 60);
+    names.sort_unstable();
+    names.dedup();
+    assert_eq!(names.len(), cases.len());
+    assert!(cases.iter().all(|case| !case.about.is_empty() && !case.bound.is_empty()));
+    let million = cases.iter().find(|case| case.name == "a million disks on a pixel").unwrap();
+    assert_eq!(million.scene.surfels.len(), 1_000_000);
 }

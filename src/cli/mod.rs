@@ -3,6 +3,7 @@
 mod adapters;
 mod compare;
 mod generate;
+mod hardcases;
 mod info;
 mod progress;
 mod render;
@@ -32,6 +33,7 @@ enum Command {
     Generate(generate::Arguments),
     Info(info::Arguments),
     Adapters(adapters::Arguments),
+    Hardcases(hardcases::Arguments),
 }
 
 /// Runs the command line and says how it ended.
@@ -42,6 +44,7 @@ pub fn run() -> ExitCode {
         Command::Generate(arguments) => generate::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Adapters(arguments) => adapters::run(&arguments),
+        Command::Hardcases(arguments) => hardcases::run(&arguments),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,0 +1,126 @@
+//! `epsplat hardcases`: scenes that renderers like to get wrong, and how this adapter does.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use epsplat::gpu::Gpu;
+use epsplat::hardcases::{Row, Verdict, cases, run as run_cases, supported};
+use epsplat::passes::accumulate::accumulator;
+use epsplat::render::Backend;
+use epsplat::{Error, Result};
+use serde::Serialize;
+
+use super::progress::Bars;
+use super::{note, print, write_json};
+
+/// Render scenes that renderers like to get wrong, with every accumulator, and judge each image against the f64 reference.
+///
+/// One row a case and accumulator: errors as fractions of each map's range, of the map that used up most of its bound; how
+/// much of the bound that was (the bound is derived from the pixel's own fragments, and is that of `fixed`); pixels that
+/// only the reference (lost) or only the device (invented) covers; and the verdict.
+#[derive(Args)]
+#[command(after_help = "Example:\n  epsplat hardcases --accumulator fixed --json hardcases.json\n\n\
+    Exits with 1 if a row fails that was not expected to.")]
+pub struct Arguments {
+    /// The rows as JSON, to a file or - for stdout (then without the table)
+    #[arg(long, value_name = "FILE|-")]
+    json: Option<PathBuf>,
+    /// Only this accumulator; else all that the adapter has
+    #[arg(long, value_name = "NAME")]
+    accumulator: Option<String>,
+    /// Part of the adapter's name, as `epsplat adapters` lists them
+    #[arg(long, value_name = "SUBSTRING")]
+    adapter: Option<String>,
+    /// Only cases whose name contains this
+    #[arg(long, value_name = "SUBSTRING")]
+    case: Option<String>,
+}
+
+#[derive(Serialize)]
+struct Outcome<'a> {
+    adapter: &'a str,
+    passed: usize,
+    expected_failures: usize,
+    failed: usize,
+    rows: &'a [Row],
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let chosen = arguments.accumulator.as_deref().map(accumulator).transpose()?;
+    let mut cases = cases()?;
+    if let Some(part) = &arguments.case {
+        cases.retain(|case| case.name.contains(part.as_str()));
+        if cases.is_empty() {
+            return Err(Error::Usage(format!("no hard case's name contains {part:?}")));
+        }
+    }
+    let gpu = Gpu::open(arguments.adapter.as_deref())?;
+    if let Some(chosen) = chosen {
+        chosen.check(&gpu)?;
+    }
+    let name = gpu.adapter.name.clone();
+    note(&format!("rendering on {name} ({}, {})", gpu.adapter.api, gpu.adapter.kind));
+    let backend = Backend::gpu(gpu);
+    let accumulators = chosen.map_or_else(|| supported(&backend), |chosen| vec![chosen]);
+    let rows = run_cases(&cases, &accumulators, &backend, &Bars::new())?;
+
+    let failed = rows.iter().filter(|row| row.failed()).count();
+    let expected_failures = rows.iter().filter(|row| matches!(row.verdict, Verdict::ExpectedFailure(_))).count();
+    let passed = rows.len() - failed - expected_failures;
+    if arguments.json.as_deref() != Some(Path::new("-")) {
+        let mut text = table(&rows);
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "\n{passed} pass, {expected_failures} fail as expected, {failed} FAIL");
+        print(&text)?;
+    }
+    if let Some(path) = &arguments.json {
+        write_json(path, &Outcome { adapter: &name, passed, expected_failures, failed, rows: &rows })?;
+    }
+    if failed > 0 {
+        return Err(Error::Gpu { adapter: name, what: format!("{failed} of {} rows failed", rows.len()) });
+    }
+    Ok(())
+}
+
+fn table(rows: &[Row]) -> String {
+    let width = rows.iter().map(|row| row.case.len()).max().unwrap_or(0);
+    let mut text = format!(
+        "{:width$}  {:11}  {:>9}  {:>9}  {:>9}  {:>6}  {:6}  {:>13}  {:>7}  verdict\n",
+        "case", "accumulator", "max error", "rmse", "bound", "used", "map", "lost/invented", "excused",
+    );
+    for row in rows {
+        let (max, rmse, bound, used, map) =
+            row.worst().map_or((0.0, 0.0, 0.0, 0.0, "-"), |m| (m.max, m.rmse, m.bound, m.used, m.map));
+        let verdict = match &row.verdict {
+            Verdict::Pass => "pass".to_owned(),
+            Verdict::ExpectedFailure(reason) => format!("expected failure ({reason})"),
+            Verdict::Fail(what) => format!("FAIL ({what})"),
+        };
+        let mut notes = String::new();
+        let mut remark = |text: String| notes.push_str(&format!("; {text}"));
+        if let Some(of_smallest) = row.of_smallest {
+            remark(format!("colours err by up to {of_smallest:.1} of the smallest"));
+        }
+        if row.overflows > 0 {
+            remark("a sum wrapped, rendered with fixed".to_owned());
+        }
+        if row.nan > 0 {
+            remark(format!("{} NaN", row.nan));
+        }
+        if let Some(over) = &row.over_float {
+            remark(format!("rmse over that of f32 sums: {over}"));
+        }
+        let lost = format!("{}/{}", row.lost, row.invented);
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "{:width$}  {:11}  {max:>9.2e}  {rmse:>9.2e}  {bound:>9.2e}  {:>5.0}%  {map:6}  {lost:>13}  {:>6.2}%  {verdict}{notes}",
+            row.case,
+            row.accumulator,
+            100.0 * used,
+            100.0 * row.excused,
+        );
+    }
+    text
+}

@@ -1,0 +1,298 @@
+//! The bound on each pixel's error, derived from the pixel's own fragments: no number here was fitted to a result.
+//!
+//! With u = 2^-24, and for each fragment that [`Precision`] lets the device take for accepted:
+//!
+//! - **Weight**: rho errs by d, so w errs by at most `max |psi(rho +- d) - psi(rho)|` (psi falls with rho), and by what
+//!   WGSL allows its functions: exp(-x) errs by 3 + 2 x units in the last place, a square root by 4.5, a division by 2.5.
+//! - **Mean of an attribute** a: `sum dw (a - mean) / sum w` for wrong weights, at most the spread of the pixel's
+//!   attributes times `sum |dw| / sum w`; `sum w da / sum w` for wrong attributes; and the accumulator's own bound times
+//!   the range that it maps to [0, 1] (the scene's colours, 2 for normals, the accepted interval of depths).
+//! - **Colour** is then unpremultiplied and put over nothing: three more divisions and products of itself.
+//! - **Normal**: s x t errs by 6 u |s||t|, its normalisation, mapping and normalising the mean by 12 u; the mean's error is
+//!   divided by the mean's length.
+//!
+//! A pixel is **open** if these bounds leave it undecided whether some fragment belongs to it: there f32 may rightly
+//! decide otherwise, and the pixel is excused.
+
+use glam::{DVec3, Vec3};
+
+use super::precision::{E as U, Precision};
+use crate::passes::accumulate::Accumulator;
+use crate::passes::footprint::intersect;
+use crate::passes::project::{Splat, reference_all};
+use crate::scene::{Camera, Kernel, RenderOptions, Scene};
+
+/// What a division may err by, relative: WGSL grants 2.5 units in the last place.
+const DIVISION: f64 = 5.0 * U;
+
+/// What is known of a pixel's fragments before an accumulator is chosen. Sums are over accepted fragments.
+#[derive(Clone, Copy, Debug)]
+pub struct Pixel {
+    /// Some fragment may rightly be decided otherwise.
+    pub open: bool,
+    /// Accepted fragments.
+    pub count: u32,
+    /// Sum of weights.
+    pub weight: f64,
+    /// Sum of the weights' errors.
+    weight_error: f64,
+    /// Sum of weight times the depth's error, world units.
+    depth_error: f64,
+    /// Sum of weight times the normal's error.
+    normal_error: f64,
+    /// Sum of weight times premultiplied colour.
+    color: [f64; 4],
+    /// Sum of weight times normal.
+    normal: DVec3,
+    /// Smallest and largest premultiplied colour.
+    colors: [[f64; 4]; 2],
+    /// Smallest and largest normal.
+    normals: [DVec3; 2],
+    /// Smallest and largest depth, world units.
+    depths: [f64; 2],
+    /// Length of the interval that depths are summed in, world units.
+    interval: f64,
+}
+
+const NOTHING: Pixel = Pixel {
+    open: false,
+    count: 0,
+    weight: 0.0,
+    weight_error: 0.0,
+    depth_error: 0.0,
+    normal_error: 0.0,
+    color: [0.0; 4],
+    normal: DVec3::ZERO,
+    colors: [[f64::INFINITY; 4], [f64::NEG_INFINITY; 4]],
+    normals: [DVec3::INFINITY, DVec3::NEG_INFINITY],
+    depths: [f64::INFINITY, f64::NEG_INFINITY],
+    interval: 0.0,
+};
+
+/// Bounds on the absolute errors of one pixel's maps.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PixelBound {
+    /// Linear RGB, straight, and alpha.
+    pub color: [f64; 4],
+    /// World units.
+    pub depth: f64,
+    /// Of each component.
+    pub normal: f64,
+    /// Of the sum of weights.
+    pub weight: f64,
+}
+
+/// The range of the scene's premultiplied colours, which accumulators map to [0, 1].
+#[derive(Clone, Copy, Debug)]
+pub struct ColorRange {
+    /// Largest minus smallest, by channel.
+    pub span: [f64; 4],
+    /// Largest magnitude, by channel.
+    pub magnitude: [f64; 4],
+}
+
+impl ColorRange {
+    /// Of `scene`.
+    pub fn of(scene: &Scene) -> Self {
+        let (low, high) = scene.color_range();
+        let pair = |k: usize| (f64::from(low[k]), f64::from(high[k]));
+        Self {
+            span: std::array::from_fn(|k| pair(k).1 - pair(k).0),
+            magnitude: std::array::from_fn(|k| pair(k).0.abs().max(pair(k).1.abs())),
+        }
+    }
+}
+
+impl Pixel {
+    /// The bounds for sums by `accumulator` with `bits` fraction bits.
+    pub fn bound(&self, accumulator: &Accumulator, bits: u32, range: &ColorRange) -> PixelBound {
+        if self.count == 0 {
+            return PixelBound::default();
+        }
+        let sums = (accumulator.error_bound)(f64::from(self.count), self.weight, bits) + DIVISION;
+        let wrong_weights = self.weight_error / self.weight;
+        let mean = self.color.map(|c| c / self.weight);
+        let premultiplied: [f64; 4] = std::array::from_fn(|k| {
+            if range.span[k] == 0.0 {
+                return 0.0;
+            }
+            let spread = self.colors[1][k] - self.colors[0][k];
+            spread * wrong_weights + range.span[k] * (sums + 5.0 * U) + 2.0 * U * range.magnitude[k]
+        });
+        let alpha = mean[3] - premultiplied[3];
+        let color = std::array::from_fn(|k| {
+            if k == 3 {
+                return premultiplied[3] + 2.0 * U * mean[3];
+            }
+            let straight = (mean[k] / mean[3]).abs();
+            (premultiplied[k] + straight * premultiplied[3]) / alpha + straight * (2.0 * DIVISION + 4.0 * U)
+        });
+        let mean_normal = self.normal / self.weight;
+        let spread = (self.normals[1] - self.normals[0]).length();
+        let normal = spread * wrong_weights + self.normal_error / self.weight + 2.0 * sums + 6.0 * U;
+        let normal_length = mean_normal.length() - normal;
+        let farthest = self.depths[1].abs();
+        let depth = (self.depths[1] - self.depths[0]) * wrong_weights
+            + self.depth_error / self.weight
+            + self.interval * (sums + DIVISION + 4.0 * U)
+            + 4.0 * U * farthest;
+        PixelBound {
+            color,
+            depth,
+            // Where the mean is no longer than its error, it may point anywhere.
+            normal: if normal_length > 0.0 { 2.0 * normal / normal_length + 6.0 * U } else { 2.0 },
+            weight: self.weight_error + self.weight * (sums + 4.0 * U),
+        }
+    }
+}
+
+/// A fragment of the twin and how far the device may be from it.
+struct Fragment {
+    depth: f64,
+    /// World units.
+    depth_error: f64,
+    rho: f64,
+    rho_error: f64,
+}
+
+impl Fragment {
+    fn surely_hits(&self, camera: &Camera) -> bool {
+        self.rho + self.rho_error <= 1.0 && self.depth - self.depth_error >= camera.near * (1.0 + U)
+    }
+
+    fn may_hit(&self, camera: &Camera) -> bool {
+        // An error that is not a number knows nothing.
+        !(self.rho - self.rho_error > 1.0 || self.depth + self.depth_error < camera.near * (1.0 - U))
+    }
+}
+
+/// Calls `visit` for each fragment of each splat in the image.
+fn fragments(
+    splats: &[Splat],
+    scene: &Scene,
+    camera: &Camera,
+    mut visit: impl FnMut(usize, &Splat, &Surface, &Fragment),
+) {
+    for splat in splats {
+        let precision = Precision::of(splat, scene, camera);
+        let surface = Surface::of(splat, scene);
+        for y in splat.first[1]..=splat.last[1] {
+            for x in splat.first[0]..=splat.last[0] {
+                let Some(at) = intersect(splat, camera, x, y) else { continue };
+                let bound = precision.fragment(splat, x, y, &at);
+                let known = |error: f64| if error.is_nan() { f64::INFINITY } else { error };
+                let fragment = Fragment {
+                    depth: at.depth,
+                    depth_error: known(bound.depth * at.depth.abs()),
+                    rho: at.rho2.sqrt(),
+                    rho_error: known(bound.rho),
+                };
+                visit(y as usize * camera.width as usize + x as usize, splat, &surface, &fragment);
+            }
+        }
+    }
+}
+
+/// A surfel's attributes.
+struct Surface {
+    color: [f64; 4],
+    normal: DVec3,
+    normal_error: f64,
+    radius: f64,
+}
+
+impl Surface {
+    fn of(splat: &Splat, scene: &Scene) -> Self {
+        let index = splat.surfel as usize;
+        let [r, g, b, a] = scene.colors.linear(index).map(f64::from);
+        let surfel = &scene.surfels[index];
+        let (s, t) = (Vec3::from_array(surfel.s).as_dvec3(), Vec3::from_array(surfel.t).as_dvec3());
+        let skew = s.length() * t.length() / s.cross(t).length();
+        Self {
+            color: [r * a, g * a, b * a, a],
+            normal: if splat.away && !scene.oriented { -splat.normal } else { splat.normal },
+            normal_error: 6.0 * U * skew + 12.0 * U,
+            radius: f64::from(surfel.radius()),
+        }
+    }
+}
+
+/// What is known of each pixel of `scene` seen by `camera`.
+pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Pixel> {
+    let splats = reference_all(scene, camera);
+    let (relative, absolute, of_radius) = options.epsilon.parts();
+    // The nearest depth lies between these.
+    let mut low = vec![f64::INFINITY; camera.pixels()];
+    let mut high = vec![f64::INFINITY; camera.pixels()];
+    let mut front = vec![f64::INFINITY; camera.pixels()];
+    fragments(&splats, scene, camera, |pixel, _, _, f| {
+        if f.may_hit(camera) {
+            low[pixel] = low[pixel].min((f.depth - f.depth_error).max(camera.near * (1.0 - U)));
+        }
+        if f.surely_hits(camera) {
+            high[pixel] = high[pixel].min(f.depth + f.depth_error);
+        }
+        if f.rho <= 1.0 && f.depth >= camera.near {
+            front[pixel] = front[pixel].min(f.depth);
+        }
+    });
+    let deepest = f64::from(scene.largest_radius()) * of_radius + absolute;
+    let farthest = splats.iter().fold(0.0, |far: f64, splat| {
+        let surfel = &scene.surfels[splat.surfel as usize];
+        let center = Vec3::from_array(surfel.center).as_dvec3() - (camera.eye - scene.origin);
+        far.max((camera.rotation * center).z)
+    });
+    let farthest = (farthest + f64::from(scene.largest_radius())) * 1.001;
+    let mut pixels = vec![NOTHING; camera.pixels()];
+    fragments(&splats, scene, camera, |pixel, _, surface, f| {
+        let back = |front: f64| front * (1.0 + relative) + absolute + of_radius * surface.radius;
+        let rounding = 4.0 * U * f.depth.abs();
+        let may = f.may_hit(camera) && f.depth - f.depth_error - rounding <= back(high[pixel]);
+        let must = f.surely_hits(camera) && f.depth + f.depth_error + rounding <= back(low[pixel]);
+        let hits = f.rho <= 1.0 && f.depth >= camera.near && f.depth <= back(front[pixel]);
+        let known = &mut pixels[pixel];
+        known.open |= may != must;
+        if !hits {
+            return;
+        }
+        let weight = options.kernel.weight(f.rho * f.rho);
+        known.count += 1;
+        known.weight += weight;
+        known.weight_error += weight_error(options.kernel, f);
+        known.depth_error += weight * f.depth_error;
+        known.normal_error += weight * surface.normal_error;
+        known.normal += weight * surface.normal;
+        known.normals = [known.normals[0].min(surface.normal), known.normals[1].max(surface.normal)];
+        known.depths = [known.depths[0].min(f.depth), known.depths[1].max(f.depth)];
+        for (k, value) in surface.color.into_iter().enumerate() {
+            known.color[k] += weight * value;
+            known.colors[0][k] = known.colors[0][k].min(value);
+            known.colors[1][k] = known.colors[1][k].max(value);
+        }
+        let near = front[pixel];
+        known.interval = (near * relative + deepest).min(farthest - near).max(0.0);
+    });
+    pixels
+}
+
+/// The error of a fragment's weight.
+fn weight_error(kernel: Kernel, f: &Fragment) -> f64 {
+    let psi = |rho: f64| kernel.weight(rho * rho);
+    let weight = psi(f.rho);
+    let moved = (psi((f.rho - f.rho_error).max(0.0)) - weight).max(weight - psi((f.rho + f.rho_error).min(1.0)));
+    let exponential = |x: f64, power: f64| 2.0 * U * (3.0 + 2.0 * x) + x * power;
+    let root = 9.0 * U;
+    let evaluated = match kernel {
+        Kernel::Constant => 0.0,
+        Kernel::Hat => root + U,
+        Kernel::Gaussian { sigma } => weight * exponential(0.5 * f.rho * f.rho / (sigma * sigma), 3.0 * U),
+        Kernel::Ellipse { a, n, smooth } => {
+            // WGSL's pow is exp2(y log2 x), whose logarithm errs by 2^-21; the kernel has a root for 3, products for 2, 4.
+            let power = if [2.0, 4.0].contains(&n) { 3.0 * U } else { root.max(n * 8.0 * U) + 3.0 * U };
+            let step = if smooth { (-a).exp() } else { 0.0 };
+            let plain = weight * (1.0 - step) + step;
+            (plain * exponential(a * f.rho.powf(n), power) + 2.0 * U * step) / (1.0 - step) + DIVISION * weight
+        }
+    };
+    moved + evaluated
+}

@@ -1,0 +1,259 @@
+//! Hard numbers: a million fragments, far and tiny coordinates, depths and tolerances at their limits, colours of many
+//! decades, images of one pixel.
+
+use glam::DVec3;
+
+use super::HardCase;
+use super::cases::FRAGMENTS;
+use super::staging::{BOTH, Entry, Filling, Stage, build, fraction};
+use crate::error::Result;
+use crate::scene::{Epsilon, Kernel, Surfel};
+
+/// The cases.
+pub fn cases() -> Result<Vec<HardCase>> {
+    build(LIST)
+}
+
+/// What f32 sums cannot do.
+const SUMS: &str = "a sum of n terms in f32 errs by up to n 2^-24 of itself, and its roundings depend on the order";
+/// What one-word sums cannot do.
+const BITS: &str = "24 fraction bits, all that one word leaves where hundreds may meet, keep 14 of a weight of 1/1024";
+
+const WIDE: &str = "the accumulator's 2^-30 of the scene's range of colours over the mean weight";
+const DIGITS: &str =
+    "as in a scene of size one: positions are kept in f32 about the scene's origin, the eye in doubled";
+const EPSILON: &str = "no decision nearer than 3e-6 may fall otherwise; then as usual";
+
+macro_rules! entry {
+    ($name:literal, $about:literal, $bound:expr, $size:expr, $stage:expr, $fill:expr) => {
+        Entry { name: $name, about: $about, bound: $bound, size: $size, stage: $stage, fill: $fill, projections: BOTH }
+    };
+}
+
+const LIST: &[Entry] = &[
+    entry!(
+        "a million disks on a pixel",
+        "A million disks of half a pixel on one pixel: sums of a million terms, and of all on one address.",
+        "2^-30 over the mean weight, whatever their number",
+        (32, 32),
+        Stage::askew,
+        million
+    ),
+    entry!(
+        "depth ratio 1e7",
+        "Depths from two near depths to ten million times that, side by side in one image.",
+        FRAGMENTS,
+        (64, 48),
+        Stage::askew,
+        depth_ratio
+    ),
+    entry!(
+        "UTM, millimetres",
+        "Disks of millimetres in map coordinates of 6e6.",
+        DIGITS,
+        (64, 48),
+        |projection, size| Stage::placed(projection, size, DVec3::new(4.4e5, 6.26e6, 1200.5), 0.02),
+        rough
+    ),
+    entry!(
+        "coordinates of 1e-6",
+        "A scene of a millionth.",
+        DIGITS,
+        (64, 48),
+        |projection, size| Stage::placed(projection, size, DVec3::ZERO, 1e-6),
+        rough
+    ),
+    entry!(
+        "coordinates of 1e12",
+        "A scene of a million millions.",
+        DIGITS,
+        (64, 48),
+        |projection, size| Stage::placed(projection, size, DVec3::ZERO, 1e12),
+        rough
+    ),
+    entry!(
+        "sheets closer than epsilon",
+        "Two sheets half an epsilon apart are one surface.",
+        EPSILON,
+        (48, 48),
+        Stage::plain,
+        |stage| sheets(stage, |_| 2.005, 0.01)
+    ),
+    entry!(
+        "sheets 3e-6 about epsilon",
+        "Two sheets that are an epsilon apart but for 3e-6 of the depth: blended on the left, parted on the right.",
+        EPSILON,
+        (48, 48),
+        Stage::plain,
+        |stage| sheets(stage, |x| if x < 24.0 { 2.01 * (1.0 - 3e-6) } else { 2.01 * (1.0 + 3e-6) }, 0.01)
+    ),
+    entry!(
+        "sheets an epsilon apart",
+        "Two sheets exactly an epsilon apart: every pixel may rightly go either way, but none is lost, none is NaN.",
+        "none on values, as all pixels are within 1e-6 of a decision",
+        (48, 48),
+        Stage::plain,
+        |stage| sheets(stage, |_| 2.01, 1.0)
+    ),
+    entry!(
+        "sheets farther than epsilon",
+        "Of two sheets two epsilons apart only the nearer shows.",
+        EPSILON,
+        (48, 48),
+        Stage::plain,
+        |stage| sheets(stage, |_| 2.02, 0.01)
+    ),
+    entry!(
+        "equal depths",
+        "Two hundred overlapping disks in one plane, parallel to the image: no depth decides, all blend.",
+        FRAGMENTS,
+        (48, 48),
+        Stage::plain,
+        equal_depths
+    ),
+    entry!(
+        "epsilon without bound",
+        "An epsilon of 1e300 accepts every disk of two sheets, ten times as far the one as the other.",
+        "depths in units of 2^-30 of the scene's depth over the mean weight",
+        (48, 48),
+        Stage::askew,
+        unbounded
+    ),
+    entry!(
+        "only the kernel's tail, smooth",
+        "Every pixel is reached by four disks' rims alone, where the weight is at its floor of 1/1024.",
+        "2^-30 over weights of 1/1024: 2^-20 a fragment",
+        (32, 32),
+        Stage::askew,
+        |stage| tail(stage, Kernel::Ellipse { a: 6.0, n: 3.0, smooth: true })
+    ),
+    entry!(
+        "only the kernel's tail, hat",
+        "Every pixel is reached by four disks' rims alone, where the weight 1 - rho is 1/200.",
+        "the rounding of rho over a weight of 1/200",
+        (32, 32),
+        Stage::askew,
+        |stage| tail(stage, Kernel::Hat)
+    ),
+    entry!(
+        "colours of 1e5 beside 1e-5",
+        "A sheet whose right half has colours of 1e5 and 1e-5 side by side, the left of 1e-5 only.",
+        WIDE,
+        (48, 48),
+        Stage::askew,
+        high_dynamic_range
+    ),
+    entry!(
+        "negative colours",
+        "Colours between -3 and 2, which no display has but filters and attributes do.",
+        WIDE,
+        (48, 48),
+        Stage::askew,
+        |stage| Filling { colors: Some(colors(stage, |k, axis| 5.0 * fraction(k, axis) - 3.0)), ..rough(stage) }
+    ),
+    entry!(
+        "alpha of 1/255",
+        "Nearly transparent disks among opaque ones: the mean is divided by the mean alpha.",
+        "the range's 2^-30 over the mean weight, over the pixel's alpha",
+        (48, 48),
+        Stage::askew,
+        thin_alpha
+    ),
+    entry!("one pixel", "An image of one pixel.", FRAGMENTS, (1, 1), Stage::askew, rough),
+    entry!("17 by 3 pixels", "An image that fills no workgroup.", FRAGMENTS, (17, 3), Stage::askew, rough),
+    entry!(
+        "4097 by 1 pixels",
+        "One row, wider than a power of two; a pinhole sees its ends at a slant of 1:2000.",
+        FRAGMENTS,
+        (4097, 1),
+        Stage::askew,
+        |stage| Filling { excused: 0.02, ..Filling::of(stage.sheet(6.0, 0.0, |_, _| 3.0), (0.9, 1.0)) }
+    ),
+    entry!("1 by 300 pixels", "One column.", FRAGMENTS, (1, 300), Stage::askew, rough),
+];
+
+fn million(stage: &Stage) -> Filling {
+    let surfels = (0..1_000_000).map(|k| {
+        let (x, y) = (16.3 + 0.4 * fraction(k, 0), 16.3 + 0.4 * fraction(k, 1));
+        let z = 3.0 + 0.01 * fraction(k, 2);
+        let normal = DVec3::new(0.4 * (fraction(k, 3) - 0.5), 0.4 * (fraction(k, 4) - 0.5), -1.0);
+        stage.disk(stage.at(x, y, z), normal, 0.45 * stage.pixel(z))
+    });
+    Filling::of(surfels.collect(), (1.0 / 1024.0, 1.0 / 1024.0)).expect(&["float", "cas"], SUMS)
+}
+
+fn depth_ratio(stage: &Stage) -> Filling {
+    let near = 2.0 * super::staging::NEAR;
+    Filling {
+        excused: 0.02,
+        ..Filling::of(stage.sheet(4.0, 0.3, |x, _| near * 10f64.powf(7.0 * x / 64.0)), (0.9, 1.0))
+    }
+}
+
+/// A wavy sheet.
+fn rough(stage: &Stage) -> Filling {
+    Filling::of(stage.sheet(4.0, 0.4, |x, y| 3.0 + 0.1 * (0.3 * x).sin() * (0.2 * y).cos()), (0.99, 1.0))
+}
+
+/// A colour for each disk of [`rough`].
+fn colors(stage: &Stage, value: impl Fn(usize, usize) -> f64) -> Vec<[f32; 4]> {
+    let count = rough(stage).surfels.len();
+    (0..count).map(|k| [value(k, 3) as f32, value(k, 4) as f32, value(k, 5) as f32, 1.0]).collect()
+}
+
+fn sheets(stage: &Stage, behind: impl Fn(f64) -> f64, excused: f64) -> Filling {
+    let mut surfels = stage.sheet(4.0, 0.0, |_, _| 2.0);
+    surfels.extend(stage.sheet(4.0, 0.0, |x, _| behind(x)));
+    let mut filling = Filling { excused, ..Filling::of(surfels, (1.0, 1.0)) };
+    filling.options.epsilon = Epsilon::Absolute(0.01);
+    filling
+}
+
+fn equal_depths(stage: &Stage) -> Filling {
+    let disk = |k: usize| -> Surfel {
+        let center = stage.at(48.0 * fraction(k, 0), 48.0 * fraction(k, 1), 2.0);
+        stage.surfel(center, DVec3::X * (0.1 + 0.3 * fraction(k, 2)), DVec3::NEG_Y * (0.1 + 0.3 * fraction(k, 3)))
+    };
+    Filling::of((0..200).map(disk).collect(), (0.9, 1.0))
+}
+
+fn unbounded(stage: &Stage) -> Filling {
+    let mut surfels = stage.sheet(5.0, 0.3, |_, _| 3.0);
+    surfels.extend(stage.sheet(5.0, 0.3, |_, _| 30.0));
+    let mut filling = Filling::of(surfels, (1.0, 1.0));
+    filling.options.epsilon = Epsilon::Absolute(1e300);
+    filling
+}
+
+fn tail(stage: &Stage, kernel: Kernel) -> Filling {
+    let (width, height) = stage.size();
+    let mut surfels = Vec::new();
+    for k in 0..width * height * 4 {
+        let (x, y) = ((k / 4 % width) as f64 + 0.5, (k / 4 / width) as f64 + 0.5);
+        let (dx, dy) = [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)].get(k % 4).copied().unwrap_or_default();
+        // The next pixel's centre is 0.5125 pixels away: outside.
+        let center = stage.at(x + 0.4875 * dx, y + 0.4875 * dy, 3.0);
+        let normal = DVec3::NEG_Z;
+        surfels.push(stage.disk(center, normal, 0.49 * stage.pixel(3.0)));
+    }
+    Filling::of(surfels, (1.0, 1.0)).kernel(kernel).expect(&["fixed32", "packed64"], BITS)
+}
+
+fn high_dynamic_range(stage: &Stage) -> Filling {
+    let rough = rough(stage);
+    let columns = 48 / 4 + 2;
+    let value = |k: usize, axis: usize| {
+        let bright = k % columns > columns / 2 && k % 2 == 0;
+        ((if bright { 1e5 } else { 1e-5 }) * (1.0 + 3.0 * fraction(k, axis))) as f32
+    };
+    let color = |k: usize| [value(k, 3), value(k, 4), value(k, 5), 1.0];
+    Filling { colors: Some((0..rough.surfels.len()).map(color).collect()), smallest: Some(1e-5), ..rough }
+}
+
+fn thin_alpha(stage: &Stage) -> Filling {
+    let mut colors = colors(stage, fraction);
+    for (k, color) in colors.iter_mut().enumerate() {
+        color[3] = if k % 3 == 0 { 1.0 } else { 1.0 / 255.0 };
+    }
+    Filling { colors: Some(colors), ..rough(stage) }
+}

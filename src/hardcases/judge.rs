@@ -1,0 +1,317 @@
+//! One image of a case against its reference: errors, and the verdict.
+
+use serde::Serialize;
+
+use super::bounds::{ColorRange, PixelBound};
+use super::{HardCase, Truth};
+use crate::frame::Frame;
+use crate::metrics::DECISION_MARGIN;
+use crate::passes::accumulate::{ACCUMULATORS, Accumulator};
+use crate::render::Report;
+
+/// How a row ends.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(tag = "verdict", content = "reason", rename_all = "snake_case")]
+pub enum Verdict {
+    /// All that the case demands.
+    Pass,
+    /// Over the case's bound, as expected of this accumulator, and within the accumulator's own; why.
+    ExpectedFailure(String),
+    /// Anything else; what.
+    Fail(String),
+}
+
+/// The error of one map over the pixels that are not excused.
+#[derive(Clone, Debug, Serialize)]
+pub struct MapError {
+    /// color (RGB), alpha, depth, normal, weight or count.
+    pub map: &'static str,
+    /// What errors are fractions of: the range of the reference's values, or where they are nearly one (a range under
+    /// 1/1000 of the largest magnitude) that magnitude.
+    pub range: f64,
+    /// Largest error, as a fraction of the range.
+    pub max: f64,
+    /// Root of the mean squared error of all values of covered pixels, as a fraction of the range.
+    pub rmse: f64,
+    /// Root of the mean square of the values, as a fraction of the range.
+    pub rms: f64,
+    /// Largest bound of any pixel, as a fraction of the range.
+    pub bound: f64,
+    /// Largest error as a fraction of the same pixel's bound: over 1 it is exceeded.
+    pub used: f64,
+    /// The same for the bound of the row's own accumulator.
+    pub used_of_own: f64,
+}
+
+/// One case rendered with one accumulator.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// The case's name.
+    pub case: String,
+    /// What it is about.
+    pub about: &'static str,
+    /// What its bound is made of.
+    pub bound_is: &'static str,
+    /// The accumulator's name.
+    pub accumulator: &'static str,
+    /// How it ended.
+    #[serde(flatten)]
+    pub verdict: Verdict,
+    /// By map.
+    pub maps: Vec<MapError>,
+    /// Largest error of colours in units of the scene's smallest attribute, where that is given.
+    pub of_smallest: Option<f64>,
+    /// Pixels that the reference covers and the device does not; excused ones do not count.
+    pub lost: usize,
+    /// Pixels that the device covers and the reference does not; excused ones do not count.
+    pub invented: usize,
+    /// Values of any map that are NaN, excused pixels included.
+    pub nan: usize,
+    /// Share of pixels that are excused.
+    pub excused: f64,
+    /// Share of pixels that the reference covers.
+    pub covered: f64,
+    /// How often a one-word sum wrapped; if ever, the image is that of `fixed`.
+    pub overflows: u64,
+    /// Where `fixed` has a larger RMSE than f32 sums by more than one rounding of the output: the map, and both.
+    pub over_float: Option<String>,
+    /// Milliseconds of the device's render, with its compilation left out.
+    pub device_ms: f64,
+}
+
+impl Row {
+    /// The map with the largest part of its bound used up.
+    pub fn worst(&self) -> Option<&MapError> {
+        self.maps.iter().max_by(|a, b| a.used.total_cmp(&b.used))
+    }
+
+    /// The largest error of any map, as a fraction of its range.
+    pub fn max_error(&self) -> f64 {
+        self.maps.iter().map(|m| m.max).fold(0.0, f64::max)
+    }
+
+    /// The largest RMSE of any map, as a fraction of its range.
+    pub fn rmse(&self) -> f64 {
+        self.maps.iter().map(|m| m.rmse).fold(0.0, f64::max)
+    }
+
+    /// Whether it is neither a pass nor an expected failure.
+    pub fn failed(&self) -> bool {
+        matches!(self.verdict, Verdict::Fail(_))
+    }
+}
+
+/// Errors of one map while they are gathered.
+struct Gathered {
+    map: &'static str,
+    low: f64,
+    high: f64,
+    max: f64,
+    squares: f64,
+    values: f64,
+    count: f64,
+    bound: f64,
+    used: f64,
+    used_of_own: f64,
+}
+
+impl Gathered {
+    fn new(map: &'static str) -> Self {
+        Self {
+            map,
+            low: f64::INFINITY,
+            high: f64::NEG_INFINITY,
+            max: 0.0,
+            squares: 0.0,
+            values: 0.0,
+            count: 0.0,
+            bound: 0.0,
+            used: 0.0,
+            used_of_own: 0.0,
+        }
+    }
+
+    /// A value of the device beside the reference's, and the bounds of the case and of the accumulator.
+    fn add(&mut self, value: f32, truth: f32, bound: f64, own: f64) {
+        let (value, truth) = (f64::from(value), f64::from(truth));
+        let error = (value - truth).abs();
+        // Not a number, or infinite: the largest error there is.
+        let error = if error.is_finite() { error } else { f64::MAX.sqrt() };
+        self.low = self.low.min(truth);
+        self.high = self.high.max(truth);
+        self.max = self.max.max(error);
+        self.squares += error * error;
+        self.values += truth * truth;
+        self.count += 1.0;
+        self.bound = self.bound.max(bound);
+        // The reference is written as f32 too: half a unit in the last place.
+        let rounding = truth.abs() / 16_777_216.0;
+        let share = |bound: f64| if error > 0.0 { error / (bound + rounding) } else { 0.0 };
+        self.used = self.used.max(share(bound));
+        self.used_of_own = self.used_of_own.max(share(own));
+    }
+
+    fn finish(self) -> MapError {
+        let magnitude = self.low.abs().max(self.high.abs());
+        let range = self.high - self.low;
+        let range = if range > 1e-3 * magnitude { range } else { magnitude };
+        let of = |error: f64| if error == 0.0 { 0.0 } else { (error / range).min(f64::MAX) };
+        let root = |squares: f64| if self.count > 0.0 { (squares / self.count).sqrt() } else { 0.0 };
+        MapError {
+            map: self.map,
+            range: if self.count > 0.0 { range } else { 0.0 },
+            max: of(self.max),
+            rmse: of(root(self.squares)),
+            rms: of(root(self.values)),
+            bound: of(self.bound),
+            used: self.used,
+            used_of_own: self.used_of_own,
+        }
+    }
+}
+
+/// Judges `frame`, rendered with `accumulator`.
+pub fn judge(case: &HardCase, truth: &Truth, accumulator: &Accumulator, frame: &Frame, report: &Report) -> Row {
+    let range = ColorRange::of(&case.scene);
+    let exact = ACCUMULATORS.first().unwrap_or(accumulator);
+    let bits = accumulator.fraction_bits(case.scene.surfels.len() as u64);
+    let mut maps = ["color", "alpha", "depth", "normal", "weight", "count"].map(Gathered::new);
+    let (mut lost, mut invented, mut nan, mut excused, mut covered) = (0, 0, 0, 0, 0);
+    for (index, known) in truth.pixels.iter().enumerate() {
+        let (Some(here), Some(there)) = (Values::at(frame, index), Values::at(&truth.frame, index)) else { continue };
+        nan += here.all().iter().filter(|value| value.is_nan()).count();
+        covered += usize::from(there.weight > 0.0);
+        let decision = truth.frame.decision.as_ref().and_then(|map| map.get(index)).copied().unwrap_or(0.0);
+        if known.open || decision < DECISION_MARGIN {
+            excused += 1;
+            continue;
+        }
+        match (there.weight > 0.0, here.weight > 0.0) {
+            (true, false) => lost += 1,
+            (false, true) => invented += 1,
+            (false, false) => {}
+            (true, true) => gather(
+                &mut maps,
+                (&here, &there),
+                &known.bound(exact, bits, &range),
+                &known.bound(accumulator, bits, &range),
+            ),
+        }
+    }
+    let pixels = truth.pixels.len().max(1) as f64;
+    let of_smallest = case.smallest.and_then(|smallest| maps.first().map(|color| color.max / smallest));
+    let mut row = Row {
+        case: case.name.clone(),
+        about: case.about,
+        bound_is: case.bound,
+        accumulator: accumulator.name,
+        verdict: Verdict::Pass,
+        maps: maps.into_iter().map(Gathered::finish).collect(),
+        of_smallest,
+        lost,
+        invented,
+        nan,
+        excused: f64::from(excused) / pixels,
+        covered: covered as f64 / pixels,
+        overflows: report.overflows,
+        over_float: None,
+        device_ms: report.total_ms,
+    };
+    row.verdict = verdict(case, &row);
+    row
+}
+
+fn gather(maps: &mut [Gathered; 6], (here, there): (&Values, &Values), bound: &PixelBound, own: &PixelBound) {
+    let [color, alpha, depth, normal, weight, count] = maps;
+    let channels = here.color.iter().zip(&there.color).zip(bound.color.iter().zip(&own.color));
+    for (k, ((here, there), (bound, own))) in channels.enumerate() {
+        (if k == 3 { &mut *alpha } else { &mut *color }).add(*here, *there, *bound, *own);
+    }
+    for (here, there) in here.normal.iter().zip(&there.normal) {
+        normal.add(*here, *there, bound.normal, own.normal);
+    }
+    depth.add(here.depth, there.depth, bound.depth, own.depth);
+    weight.add(here.weight, there.weight, bound.weight, own.weight);
+    count.add(here.count, there.count, 0.0, 0.0);
+}
+
+/// The values of one pixel.
+struct Values {
+    color: [f32; 4],
+    depth: f32,
+    normal: [f32; 3],
+    weight: f32,
+    count: f32,
+}
+
+impl Values {
+    fn at(frame: &Frame, index: usize) -> Option<Self> {
+        let scalar = |map: &Option<Vec<f32>>| map.as_ref()?.get(index).copied();
+        Some(Self {
+            color: *frame.color.get(index)?,
+            depth: scalar(&frame.depth)?,
+            normal: *frame.normal.as_ref()?.get(index)?,
+            weight: scalar(&frame.weight)?,
+            count: scalar(&frame.count)?,
+        })
+    }
+
+    fn all(&self) -> [f32; 10] {
+        let ([r, g, b, a], [x, y, z]) = (self.color, self.normal);
+        [r, g, b, a, x, y, z, self.depth, self.weight, self.count]
+    }
+}
+
+fn verdict(case: &HardCase, row: &Row) -> Verdict {
+    let (least, most) = case.covered;
+    if !(least..=most).contains(&row.covered) {
+        return Verdict::Fail(format!("the reference covers {:.4} of the image, not {least} to {most}", row.covered));
+    }
+    if row.excused > case.excused {
+        return Verdict::Fail(format!("{:.4} of the pixels are excused, more than {}", row.excused, case.excused));
+    }
+    if row.nan > 0 {
+        return Verdict::Fail(format!("{} values are NaN", row.nan));
+    }
+    if row.lost + row.invented > 0 {
+        return Verdict::Fail(format!("{} pixels lost and {} invented", row.lost, row.invented));
+    }
+    let over = |used: fn(&MapError) -> f64| row.maps.iter().filter(move |m| used(m) > 1.0).map(|m| m.map);
+    let own: Vec<_> = over(|m| m.used_of_own).collect();
+    if !own.is_empty() {
+        return Verdict::Fail(format!("{} over the proven bound of {}", own.join(", "), row.accumulator));
+    }
+    let case_bound: Vec<_> = over(|m| m.used).collect();
+    if case_bound.is_empty() {
+        return Verdict::Pass;
+    }
+    match case.expected.iter().find(|expected| expected.accumulator == row.accumulator) {
+        Some(expected) => Verdict::ExpectedFailure(format!("{}: {}", case_bound.join(", "), expected.reason)),
+        None => Verdict::Fail(format!("{} over the case's bound", case_bound.join(", "))),
+    }
+}
+
+/// Notes in the row of `fixed` where f32 sums have a smaller RMSE, in any map, by more than one rounding of the output:
+/// `rmse(fixed) > rmse(float or cas) + 2^-24 rms(values)`. `rows` are those of one case.
+pub fn compare_rmse(rows: &mut [Row]) {
+    let rounding = 1.0 / 16_777_216.0;
+    let floats = |row: &&Row| ["float", "cas"].contains(&row.accumulator);
+    let worse = |fixed: &Row| {
+        let mut worse = Vec::new();
+        for float in rows.iter().filter(floats) {
+            for (here, there) in fixed.maps.iter().zip(&float.maps) {
+                if here.rmse > there.rmse + rounding * here.rms {
+                    worse.push(format!(
+                        "{} {:.3e} against {:.3e} of {}",
+                        here.map, here.rmse, there.rmse, float.accumulator
+                    ));
+                }
+            }
+        }
+        (!worse.is_empty()).then(|| worse.join("; "))
+    };
+    let found = rows.iter().find(|row| row.accumulator == "fixed").and_then(worse);
+    if let Some(row) = rows.iter_mut().find(|row| row.accumulator == "fixed") {
+        row.over_float = found;
+    }
+}

@@ -1,0 +1,149 @@
+//! Scenes that renderers like to get wrong, the bound that each one's errors must keep, and who is known not to.
+//!
+//! A case is rendered by the f64 reference and, with each accumulator, on the device. Its bound is derived pixel by pixel
+//! from the fragments that the reference blends there ([`bounds`]) and is that of the accumulator `fixed`; an accumulator
+//! that is expected to exceed it says why, and must still keep the bound of its own row in
+//! [`ACCUMULATORS`](crate::passes::accumulate::ACCUMULATORS). A verdict looks at:
+//!
+//! - every value of every map: none is NaN, and each differs from the reference by no more than its bound;
+//! - pixels that only one of the two covers, and counts of fragments: none differ;
+//! - excused pixels, where a fragment lies within [`DECISION_MARGIN`](crate::metrics::DECISION_MARGIN) of a decision, or
+//!   within its own derived error of one: no more than the case allows;
+//! - the part of the image that the reference covers, which shows that the case is what it says.
+//!
+//! Images are unlit: a light multiplies the errors of two maps that are judged by themselves.
+
+pub mod bounds;
+mod cases;
+mod extremes;
+mod judge;
+pub mod precision;
+mod staging;
+
+use serde::Serialize;
+
+pub use judge::{MapError, Row, Verdict, compare_rmse};
+
+use crate::error::{Error, Result};
+use crate::frame::Frame;
+use crate::passes::accumulate::{ACCUMULATORS, Accumulator};
+use crate::progress::Progress;
+use crate::render::{Backend, render};
+use crate::scene::{Camera, Maps, RenderOptions, Scene};
+
+/// An accumulator that is expected to exceed a case's bound.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Expected {
+    /// Its name.
+    pub accumulator: &'static str,
+    /// Why.
+    pub reason: &'static str,
+}
+
+/// A scene that is hard to render, and what is demanded of its image.
+#[derive(Clone, Debug)]
+pub struct HardCase {
+    /// A short name; orthographic twins end in `, orthographic`.
+    pub name: String,
+    /// What it is about, in one sentence.
+    pub about: &'static str,
+    /// What its bound is made of, in one sentence.
+    pub bound: &'static str,
+    /// The scene.
+    pub scene: Scene,
+    /// The camera.
+    pub camera: Camera,
+    /// The options, the accumulator apart.
+    pub options: RenderOptions,
+    /// Least and largest share of pixels that the reference covers.
+    pub covered: (f64, f64),
+    /// The largest share of pixels that may be excused.
+    pub excused: f64,
+    /// Who may exceed the bound.
+    pub expected: Vec<Expected>,
+    /// The smallest magnitude of an attribute, where colours span many decades: colour errors are told in units of it.
+    pub smallest: Option<f64>,
+}
+
+/// The list of cases.
+///
+/// # Errors
+/// None that a caller could cause: the cameras are built by functions that can fail.
+pub fn cases() -> Result<Vec<HardCase>> {
+    let mut all = cases::cases()?;
+    all.extend(extremes::cases()?);
+    Ok(all)
+}
+
+/// What a case's image should be: by the reference, and known to what error.
+pub struct Truth {
+    /// The f64 reference, with its map of decisions.
+    pub frame: Frame,
+    /// What is known of each pixel.
+    pub pixels: Vec<bounds::Pixel>,
+}
+
+/// Every map.
+const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
+
+impl HardCase {
+    /// Renders the reference and derives the bounds.
+    ///
+    /// # Errors
+    /// Those of [`render`].
+    pub fn truth(&self) -> Result<Truth> {
+        let options = RenderOptions { maps: Maps { decision: true, ..MAPS }, ..self.options.clone() };
+        let (frame, _) = render(&self.scene, &self.camera, &options, &Backend::Reference, &())?;
+        Ok(Truth { frame, pixels: bounds::pixels(&self.scene, &self.camera, &self.options) })
+    }
+
+    /// Renders with `accumulator` on `backend` and judges the image.
+    ///
+    /// # Errors
+    /// Those of [`render`].
+    pub fn judge(&self, truth: &Truth, accumulator: &'static Accumulator, backend: &Backend) -> Result<Row> {
+        let options = RenderOptions { accumulator: accumulator.name, maps: MAPS, ..self.options.clone() };
+        let (frame, report) = render(&self.scene, &self.camera, &options, backend, &())?;
+        Ok(judge::judge(self, truth, accumulator, &frame, &report))
+    }
+}
+
+/// The accumulators that the adapter of `backend` has; all of them for the reference, which ignores the choice.
+pub fn supported(backend: &Backend) -> Vec<&'static Accumulator> {
+    let fits = |row: &&Accumulator| match backend {
+        Backend::Gpu { gpu, .. } => row.check(gpu).is_ok(),
+        Backend::Reference => true,
+    };
+    ACCUMULATORS.iter().filter(fits).collect()
+}
+
+/// Renders and judges `cases` with `accumulators`: one row for each pair, case by case.
+///
+/// # Errors
+/// Those of [`render`], with the case's name.
+pub fn run(
+    cases: &[HardCase],
+    accumulators: &[&'static Accumulator],
+    backend: &Backend,
+    progress: &dyn Progress,
+) -> Result<Vec<Row>> {
+    progress.begin("hard cases", (cases.len() * accumulators.len()) as u64);
+    let mut rows = Vec::new();
+    for case in cases {
+        let truth = case.truth()?;
+        let first = rows.len();
+        for accumulator in accumulators {
+            rows.push(case.judge(&truth, accumulator, backend).map_err(|error| match error {
+                Error::Gpu { adapter, what } => {
+                    let what = format!("the case {}, accumulator {}: {what}", case.name, accumulator.name);
+                    Error::Gpu { adapter, what }
+                }
+                other => other,
+            })?);
+            progress.advance(1);
+        }
+        compare_rmse(rows.get_mut(first..).unwrap_or_default());
+    }
+    progress.end();
+    Ok(rows)
+}

@@ -1,0 +1,236 @@
+//! Where a case is staged: a camera, and surfels placed by where the camera sees them.
+
+use glam::{DMat3, DVec3};
+
+use super::{Expected, HardCase};
+use crate::error::Result;
+use crate::scene::{Camera, Colors, Kernel, Lens, Projection, RenderOptions, Scene, Shading, Surfel, Up};
+
+/// Part of `x` beyond a whole number, for the k-th of a sequence that fills [0, 1) evenly along each of six axes.
+pub fn fraction(k: usize, axis: usize) -> f64 {
+    // Fractions of square roots of primes and of the plastic number's powers: independent over the rationals.
+    const STEPS: [f64; 6] = [
+        0.754_877_666_246_692_7,
+        0.569_840_290_998_053_2,
+        0.414_213_562_373_095_1,
+        0.732_050_807_568_877_2,
+        0.236_067_977_499_789_8,
+        0.645_751_311_064_590_7,
+    ];
+    (0.5 + (k + 1) as f64 * STEPS.get(axis % 6).copied().unwrap_or(0.0)).fract()
+}
+
+/// A camera with a frame of its own: lengths are in units of `unit` world units, x right, y down, z forward.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    /// The camera.
+    pub camera: Camera,
+    /// The scene's origin, world units.
+    pub origin: DVec3,
+    /// World units of one unit.
+    pub unit: f64,
+}
+
+/// Height of an orthographic image, units: what a pinhole camera of 60 degrees sees at about the depth of most cases.
+const HEIGHT: f64 = 4.0;
+
+/// Depth below which nothing is drawn, units.
+pub const NEAR: f64 = 1e-3;
+
+impl Stage {
+    /// At the origin, looking along z.
+    pub fn plain(projection: Projection, size: (u32, u32)) -> Result<Self> {
+        Self::new(projection, size, DVec3::ZERO, DVec3::ZERO, DMat3::IDENTITY, 1.0)
+    }
+
+    /// Beside the origin, looking askew.
+    pub fn askew(projection: Projection, size: (u32, u32)) -> Result<Self> {
+        Self::placed(projection, size, DVec3::ZERO, 1.0)
+    }
+
+    /// The same in a scene about `origin`, `unit` world units large.
+    pub fn placed(projection: Projection, size: (u32, u32), origin: DVec3, unit: f64) -> Result<Self> {
+        let forward = DVec3::new(-0.22, 0.91, -0.35).normalize();
+        let right = forward.cross(DVec3::Z).normalize();
+        let rotation = DMat3::from_cols(right, forward.cross(right), forward).transpose();
+        Self::new(projection, size, origin, DVec3::new(0.31, -1.7, 0.9), rotation, unit)
+    }
+
+    fn new(
+        projection: Projection,
+        size: (u32, u32),
+        origin: DVec3,
+        eye: DVec3,
+        rotation: DMat3,
+        unit: f64,
+    ) -> Result<Self> {
+        let lens = match projection {
+            Projection::Pinhole => Lens::Fov(60.0),
+            Projection::Orthographic => Lens::OrthographicHeight(HEIGHT * unit),
+        };
+        let camera = Camera::posed(size, lens, origin + eye * unit, rotation, NEAR * unit)?;
+        Ok(Self { camera, origin, unit })
+    }
+
+    /// The point, in units of camera space, that the image shows at (x, y), pixels, at depth `z`.
+    pub fn at(&self, x: f64, y: f64, z: f64) -> DVec3 {
+        let (x, y) = ((x - self.camera.cx) / self.camera.fx, (y - self.camera.cy) / self.camera.fy);
+        match self.camera.projection {
+            Projection::Pinhole => DVec3::new(x * z, y * z, z),
+            Projection::Orthographic => DVec3::new(x / self.unit, y / self.unit, z),
+        }
+    }
+
+    /// The direction of the view ray through a point of camera space.
+    pub fn ray(&self, point: DVec3) -> DVec3 {
+        match self.camera.projection {
+            Projection::Pinhole => point.normalize(),
+            Projection::Orthographic => DVec3::Z,
+        }
+    }
+
+    /// The width of a pixel at depth `z`, units.
+    pub fn pixel(&self, z: f64) -> f64 {
+        match self.camera.projection {
+            Projection::Pinhole => z / self.camera.fx,
+            Projection::Orthographic => 1.0 / (self.camera.fx * self.unit),
+        }
+    }
+
+    /// Pixels of the image, across and down.
+    pub fn size(&self) -> (usize, usize) {
+        (self.camera.width as usize, self.camera.height as usize)
+    }
+
+    /// A surfel from its centre and half-axes in units of camera space.
+    pub fn surfel(&self, center: DVec3, s: DVec3, t: DVec3) -> Surfel {
+        let world = |v: DVec3| self.camera.rotation.transpose() * (v * self.unit);
+        Surfel {
+            center: (world(center) + (self.camera.eye - self.origin)).as_vec3().to_array(),
+            s: world(s).as_vec3().to_array(),
+            t: world(t).as_vec3().to_array(),
+        }
+    }
+
+    /// A round disk.
+    pub fn disk(&self, center: DVec3, normal: DVec3, radius: f64) -> Surfel {
+        let normal = normal.normalize();
+        let s = normal.any_orthonormal_vector();
+        self.surfel(center, s * radius, normal.cross(s) * radius)
+    }
+
+    /// A sheet of disks over the whole image, a grid of `spacing` pixels, at the depth `depth(x, y)` that the caller gives
+    /// for a place in the image, tilted one by one.
+    pub fn sheet(&self, spacing: f64, tilt: f64, depth: impl Fn(f64, f64) -> f64) -> Vec<Surfel> {
+        let (width, height) = self.size();
+        let (columns, rows) = ((width as f64 / spacing).ceil() as usize, (height as f64 / spacing).ceil() as usize);
+        let mut surfels = Vec::new();
+        for k in 0..(columns + 2) * (rows + 2) {
+            let x = ((k % (columns + 2)) as f64 - 0.5 + 0.3 * fraction(k, 0)) * spacing;
+            let y = ((k / (columns + 2)) as f64 - 0.5 + 0.3 * fraction(k, 1)) * spacing;
+            let z = depth(x, y);
+            let normal = DVec3::new(tilt * (fraction(k, 2) - 0.5), tilt * (fraction(k, 3) - 0.5), -1.0);
+            surfels.push(self.disk(self.at(x, y, z), normal, 1.2 * spacing * self.pixel(z)));
+        }
+        surfels
+    }
+}
+
+/// What a case puts on its stage.
+pub struct Filling {
+    /// The surfels.
+    pub surfels: Vec<Surfel>,
+    /// Linear colours; without any, varied ones in [0, 1].
+    pub colors: Option<Vec<[f32; 4]>>,
+    /// The options.
+    pub options: RenderOptions,
+    /// Least and largest share of pixels covered.
+    pub covered: (f64, f64),
+    /// Largest share of pixels excused.
+    pub excused: f64,
+    /// Expected failures.
+    pub expected: Vec<Expected>,
+    /// The smallest magnitude of an attribute, for high dynamic range.
+    pub smallest: Option<f64>,
+}
+
+/// Unlit, nothing behind the scene.
+pub fn options() -> RenderOptions {
+    RenderOptions { shading: Shading::Unlit, lights: Vec::new(), ..RenderOptions::default() }
+}
+
+impl Filling {
+    /// Of `surfels` that cover a share of the image between these.
+    pub fn of(surfels: Vec<Surfel>, covered: (f64, f64)) -> Self {
+        let (colors, expected) = (None, Vec::new());
+        Self { surfels, colors, options: options(), covered, excused: 0.01, expected, smallest: None }
+    }
+
+    /// With another kernel.
+    pub fn kernel(mut self, kernel: Kernel) -> Self {
+        self.options.kernel = kernel;
+        self
+    }
+
+    /// With `accumulators` that may exceed the bound.
+    pub fn expect(mut self, accumulators: &[&'static str], reason: &'static str) -> Self {
+        self.expected.extend(accumulators.iter().map(|&accumulator| Expected { accumulator, reason }));
+        self
+    }
+}
+
+/// A row of the lists of cases.
+pub struct Entry {
+    /// Name.
+    pub name: &'static str,
+    /// About.
+    pub about: &'static str,
+    /// What the bound is made of.
+    pub bound: &'static str,
+    /// Image size.
+    pub size: (u32, u32),
+    /// The stage.
+    pub stage: fn(Projection, (u32, u32)) -> Result<Stage>,
+    /// What is on it.
+    pub fill: fn(&Stage) -> Filling,
+    /// Which projections it makes sense for.
+    pub projections: &'static [Projection],
+}
+
+/// Both projections.
+pub const BOTH: &[Projection] = &[Projection::Pinhole, Projection::Orthographic];
+
+/// Builds the cases of a list.
+pub fn build(entries: &[Entry]) -> Result<Vec<HardCase>> {
+    let mut cases = Vec::new();
+    for entry in entries {
+        for &projection in entry.projections {
+            let stage = (entry.stage)(projection, entry.size)?;
+            let filling = (entry.fill)(&stage);
+            let twin = if projection == Projection::Orthographic { ", orthographic" } else { "" };
+            let varied = |k: usize| [0, 1, 2].map(|axis| fraction(k, 3 + axis) as f32);
+            let colors = filling
+                .colors
+                .unwrap_or_else(|| (0..filling.surfels.len()).map(varied).map(|[r, g, b]| [r, g, b, 1.0]).collect());
+            cases.push(HardCase {
+                name: format!("{}{twin}", entry.name),
+                about: entry.about,
+                bound: entry.bound,
+                scene: Scene {
+                    origin: stage.origin,
+                    surfels: filling.surfels,
+                    colors: Colors::Linear(colors),
+                    oriented: true,
+                    up: Up::Z,
+                },
+                camera: stage.camera,
+                options: filling.options,
+                covered: filling.covered,
+                excused: filling.excused,
+                expected: filling.expected,
+                smallest: filling.smallest,
+            });
+        }
+    }
+    Ok(cases)
+}

@@ -18,9 +18,9 @@ use glam::{DVec3, Vec3};
 
 use super::precision::{E as U, Precision};
 use crate::passes::accumulate::Accumulator;
-use crate::passes::footprint::intersect;
+use crate::passes::footprint::footprint;
 use crate::passes::project::{Splat, reference_all};
-use crate::scene::{Camera, Kernel, RenderOptions, Scene};
+use crate::scene::{Camera, Kernel, LowPass, RenderOptions, Scene};
 
 /// What a division may err by, relative: WGSL grants 2.5 units in the last place.
 const DIVISION: f64 = 5.0 * U;
@@ -178,7 +178,7 @@ fn fragments(
         let surface = Surface::of(splat, scene);
         for y in splat.first[1]..=splat.last[1] {
             for x in splat.first[0]..=splat.last[0] {
-                let Some(at) = intersect(splat, camera, x, y) else { continue };
+                let Some(at) = footprint(splat, camera, LowPass::None, x, y).map(|(at, _)| at) else { continue };
                 let bound = precision.fragment(splat, x, y, &at);
                 let known = |error: f64| if error.is_nan() { f64::INFINITY } else { error };
                 let fragment = Fragment {
@@ -219,7 +219,7 @@ impl Surface {
 
 /// What is known of each pixel of `scene` seen by `camera`.
 pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Pixel> {
-    let splats = reference_all(scene, camera);
+    let splats = reference_all(scene, camera, options);
     let (relative, absolute, of_radius) = options.epsilon.parts();
     // The nearest depth lies between these.
     let mut low = vec![f64::INFINITY; camera.pixels()];

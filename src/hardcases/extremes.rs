@@ -243,7 +243,7 @@ fn high_dynamic_range(stage: &Stage) -> Filling {
     let rough = rough(stage);
     let columns = 48 / 4 + 2;
     let value = |k: usize, axis: usize| {
-        let bright = k % columns > columns / 2 && k % 2 == 0;
+        let bright = k % columns > columns / 2 && k.is_multiple_of(2);
         ((if bright { 1e5 } else { 1e-5 }) * (1.0 + 3.0 * fraction(k, axis))) as f32
     };
     let color = |k: usize| [value(k, 3), value(k, 4), value(k, 5), 1.0];

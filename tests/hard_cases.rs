@@ -103,7 +103,8 @@ fn every_hard_case_passes_or_fails_as_expected() {
         if ["fixed", "fixed64"].contains(&row.accumulator) {
             assert_eq!(row.verdict, Verdict::Pass, "{row:#?}");
         }
-        assert_eq!(row.over_float, None, "{row:#?}");
+        let known = cases.iter().any(|case| case.name == row.case && case.float_wins.is_some());
+        assert!(row.over_float.is_none() || known, "{row:#?}");
     }
     // The reasons for failures are not there for show: somebody does fail.
     assert!(rows.iter().any(|row| matches!(row.verdict, Verdict::ExpectedFailure(_))));
@@ -119,9 +120,9 @@ fn a_broken_kernel_fails_a_hard_case() {
         ("accumulator_fixed.wgsl", "= 1073741824.0;", "= 1048576.0;", "only the kernel's tail, smooth"),
         ("double.wgsl", "bitcast<f32>(bitcast<u32>(x) ^ view.zero)", "x", "1/100 pixel"),
         ("rows.wgsl", "(a - rows.a) + vec3<f32>(", "(a - a) + 0.0 * vec3<f32>(", "anisotropy 1000:1"),
-        ("camera_pinhole.wgsl", "vec2<f32>(min(extent.x, k), max(extent.y, k))", "extent", "through the camera plane"),
-        ("camera_pinhole.wgsl", "chord_1) + blur)", "chord_1) - 0.5)", "through the camera plane"),
-        ("project.wgsl", "d.low - view.eye_low[i]", "d.low", "UTM, millimetres"),
+        ("camera_pinhole.wgsl", "vec2<f32>(min(extent.x, k), max(extent.y, k))", "extent", "across the near depth"),
+        ("camera_pinhole.wgsl", "chord_1) + blur)", "chord_1) - 0.5)", "across the near depth"),
+        ("project.wgsl", "d.low - view.eye_low[i]", "d.low", "UTM, a kilometre off"),
         ("project.wgsl", "surfel.center[i] * view.unit", "surfel.center[i]", "coordinates of 1e12"),
         ("visibility.wgsl", "atomicMin(", "atomicMax(", "intersecting sheets"),
         (
@@ -140,16 +141,20 @@ fn a_broken_kernel_fails_a_hard_case() {
         ("project.wgsl", "floor(h.high + margin - 0.5)", "floor(h.high + margin - 1.5)", "image edges and corners"),
         ("camera_orthographic.wgsl", "h.away == 0.0", "abs(h.away) < 1e-3", "edge-on, askew, orthographic"),
     ];
+    let mut unnoticed = Vec::new();
     for (file, from, to, name) in broken {
         let sources = Sources::default().replace(file, from, to).unwrap();
         let backend = Backend::Gpu { gpu: Box::new(gpu), sources };
         let case = cases.iter().find(|case| case.name == name).unwrap();
         let truth = case.truth().unwrap();
         let row = case.judge(&truth, accumulate::accumulator("fixed").unwrap(), &backend).unwrap();
-        assert!(row.failed(), "{name} did not notice {from:?} gone: {row:#?}");
+        if !row.failed() {
+            unnoticed.push(format!("{name}: {file}, {from:?}"));
+        }
         let Backend::Gpu { gpu: back, .. } = backend else { unreachable!() };
         gpu = *back;
     }
+    assert!(unnoticed.is_empty(), "{unnoticed:#?}");
 }
 
 #[test]

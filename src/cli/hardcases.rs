@@ -55,7 +55,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             return Err(Error::Usage(format!("no hard case's name contains {part:?}")));
         }
     }
-    let gpu = Gpu::open(arguments.adapter.as_deref())?;
+    let gpu = Gpu::open(arguments.adapter.as_deref()).map_err(|error| match error {
+        Error::NoAdapter(why) => Error::NoAdapter(format!("hard cases judge an adapter by the reference, but {why}")),
+        other => other,
+    })?;
     if let Some(chosen) = chosen {
         chosen.check(&gpu)?;
     }

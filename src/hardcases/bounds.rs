@@ -14,7 +14,7 @@
 //! A pixel is **open** if these bounds leave it undecided whether some fragment belongs to it: there f32 may rightly
 //! decide otherwise, and the pixel is excused.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 
 use super::precision::{E as U, Precision};
 use crate::passes::accumulate::Accumulator;
@@ -173,7 +173,9 @@ fn fragments(
     camera: &Camera,
     mut visit: impl FnMut(usize, &Splat, &Surface, &Fragment),
 ) {
-    for splat in splats {
+    // A disk seen exactly edge-on has no rows, and without a low-pass no fragment.
+    let edge_on = |splat: &&Splat| splat.a.truncate() == DVec2::ZERO && splat.b == DVec3::ZERO;
+    for splat in splats.iter().filter(|splat| !edge_on(splat)) {
         let precision = Precision::of(splat, scene, camera);
         let surface = Surface::of(splat, scene);
         for y in splat.first[1]..=splat.last[1] {
@@ -217,17 +219,42 @@ impl Surface {
     }
 }
 
+/// The two smallest depths that the fragments of a pixel may have, and whose the first is.
+#[derive(Clone, Copy)]
+struct Nearest {
+    surfel: u32,
+    first: f64,
+    second: f64,
+}
+
+impl Nearest {
+    const NOTHING: Self = Self { surfel: u32::MAX, first: f64::INFINITY, second: f64::INFINITY };
+
+    fn add(&mut self, surfel: u32, depth: f64) {
+        if depth < self.first {
+            *self = Self { surfel, first: depth, second: self.first };
+        } else {
+            self.second = self.second.min(depth);
+        }
+    }
+
+    /// The smallest of the others: a fragment is not too far behind itself, however little its depth is known.
+    fn beside(&self, surfel: u32) -> f64 {
+        if surfel == self.surfel { self.second } else { self.first }
+    }
+}
+
 /// What is known of each pixel of `scene` seen by `camera`.
 pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Pixel> {
     let splats = reference_all(scene, camera, options);
     let (relative, absolute, of_radius) = options.epsilon.parts();
     // The nearest depth lies between these.
-    let mut low = vec![f64::INFINITY; camera.pixels()];
+    let mut low = vec![Nearest::NOTHING; camera.pixels()];
     let mut high = vec![f64::INFINITY; camera.pixels()];
     let mut front = vec![f64::INFINITY; camera.pixels()];
-    fragments(&splats, scene, camera, |pixel, _, _, f| {
+    fragments(&splats, scene, camera, |pixel, splat, _, f| {
         if f.may_hit(camera) {
-            low[pixel] = low[pixel].min((f.depth - f.depth_error).max(camera.near * (1.0 - U)));
+            low[pixel].add(splat.surfel, (f.depth - f.depth_error).max(camera.near * (1.0 - U)));
         }
         if f.surely_hits(camera) {
             high[pixel] = high[pixel].min(f.depth + f.depth_error);
@@ -244,11 +271,11 @@ pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Pi
     });
     let farthest = (farthest + f64::from(scene.largest_radius())) * 1.001;
     let mut pixels = vec![NOTHING; camera.pixels()];
-    fragments(&splats, scene, camera, |pixel, _, surface, f| {
+    fragments(&splats, scene, camera, |pixel, splat, surface, f| {
         let back = |front: f64| front * (1.0 + relative) + absolute + of_radius * surface.radius;
         let rounding = 4.0 * U * f.depth.abs();
         let may = f.may_hit(camera) && f.depth - f.depth_error - rounding <= back(high[pixel]);
-        let must = f.surely_hits(camera) && f.depth + f.depth_error + rounding <= back(low[pixel]);
+        let must = f.surely_hits(camera) && f.depth + f.depth_error + rounding <= back(low[pixel].beside(splat.surfel));
         let hits = f.rho <= 1.0 && f.depth >= camera.near && f.depth <= back(front[pixel]);
         let known = &mut pixels[pixel];
         known.open |= may != must;

@@ -49,16 +49,29 @@ const LIST: &[Entry] = &[
         name: "through the camera plane",
         about: "A floor, a wall and random disks that reach from behind the camera to before it show their part in front.",
         bound: "records anchored in the image: 15 u of the rows' terms over the cosine",
-        size: (96, 80),
+        size: (72, 60),
         stage: Stage::plain,
         fill: through_the_camera_plane,
+        projections: BOTH,
+    },
+    Entry {
+        name: "across the near depth",
+        about: "Disks of all slants that a near depth of half the way to them cuts: the part in front shows, to its full width.",
+        bound: "records anchored in the image: 15 u of the rows' terms over the cosine",
+        size: (72, 60),
+        stage: |projection, size| {
+            let mut stage = Stage::plain(projection, size)?;
+            stage.camera.near = 0.5;
+            Ok(stage)
+        },
+        fill: across_the_near_depth,
         projections: BOTH,
     },
     Entry {
         name: "around the camera",
         about: "The camera in a box of six disks, and at the centre of a seventh that it sees exactly edge-on.",
         bound: "records anchored in the image: 15 u of the rows' terms over the cosine",
-        size: (96, 80),
+        size: (72, 60),
         stage: Stage::plain,
         fill: around_the_camera,
         projections: BOTH,
@@ -67,7 +80,7 @@ const LIST: &[Entry] = &[
         name: "inside a splat",
         about: "The camera a ten-thousandth above the disk that it stands on: depths from the near depth to the disk's rim.",
         bound: "records anchored in the image: 15 u of the rows' terms over the cosine",
-        size: (96, 80),
+        size: (72, 60),
         stage: Stage::plain,
         fill: inside_a_splat,
         projections: BOTH,
@@ -76,7 +89,7 @@ const LIST: &[Entry] = &[
         name: "one disk over all",
         about: "One disk of ten thousand pixels' radius that fills the image: one workgroup draws all of it.",
         bound: FRAGMENTS,
-        size: (128, 96),
+        size: (96, 80),
         stage: Stage::askew,
         fill: one_disk,
         projections: BOTH,
@@ -189,6 +202,16 @@ fn through_the_camera_plane(stage: &Stage) -> Filling {
     Filling::of(surfels, (0.7, 1.0))
 }
 
+fn across_the_near_depth(stage: &Stage) -> Filling {
+    let disk = |k: usize| {
+        let center = stage.at(72.0 * fraction(k, 0), 60.0 * fraction(k, 1), 0.5 + 0.3 * fraction(k, 2));
+        let normal = DVec3::new(fraction(k, 3) - 0.5, fraction(k, 4) - 0.5, 0.6 * (fraction(k, 5) - 0.5));
+        // Most of them reach across: the half extent in depth is the radius times the sine of the slant.
+        stage.disk(center, normal, 0.1 + 0.3 * fraction(k, 5))
+    };
+    Filling::of((0..100).map(disk).collect(), (0.3, 1.0))
+}
+
 fn around_the_camera(stage: &Stage) -> Filling {
     let mut surfels = Vec::new();
     for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
@@ -210,7 +233,7 @@ fn inside_a_splat(stage: &Stage) -> Filling {
 
 fn one_disk(stage: &Stage) -> Filling {
     let radius = 1e4 * stage.pixel(3.0);
-    Filling::of(vec![stage.disk(stage.at(70.0, 20.0, 3.0), DVec3::new(1e-3, 2e-3, -1.0), radius)], (1.0, 1.0))
+    Filling::of(vec![stage.disk(stage.at(50.0, 20.0, 3.0), DVec3::new(1e-3, 2e-3, -1.0), radius)], (1.0, 1.0))
 }
 
 fn centre_far_outside(stage: &Stage) -> Filling {

@@ -7,7 +7,7 @@ use super::HardCase;
 use super::cases::FRAGMENTS;
 use super::staging::{BOTH, Entry, Filling, Stage, build, fraction};
 use crate::error::Result;
-use crate::scene::{Epsilon, Kernel, Surfel};
+use crate::scene::{Epsilon, Kernel, Projection, Surfel};
 
 /// The cases.
 pub fn cases() -> Result<Vec<HardCase>> {
@@ -16,9 +16,6 @@ pub fn cases() -> Result<Vec<HardCase>> {
 
 /// What f32 sums cannot do.
 const SUMS: &str = "a sum of n terms in f32 errs by up to n 2^-24 of itself, and its roundings depend on the order";
-/// What one-word sums cannot do.
-const BITS: &str = "24 fraction bits, all that one word leaves where hundreds may meet, keep 14 of a weight of 1/1024";
-
 const WIDE: &str = "the accumulator's 2^-30 of the scene's range of colours over the mean weight";
 const DIGITS: &str =
     "as in a scene of size one: positions are kept in f32 about the scene's origin, the eye in doubled";
@@ -31,14 +28,16 @@ macro_rules! entry {
 }
 
 const LIST: &[Entry] = &[
-    entry!(
-        "a million disks on a pixel",
-        "A million disks of half a pixel on one pixel: sums of a million terms, and of all on one address.",
-        "2^-30 over the mean weight, whatever their number",
-        (32, 32),
-        Stage::askew,
-        million
-    ),
+    Entry {
+        name: "a million disks on a pixel",
+        about: "A million disks of half a pixel on one pixel: sums of a million terms, and all of them on one address.",
+        bound: "2^-30 over the mean weight, whatever their number",
+        size: (32, 32),
+        stage: Stage::askew,
+        fill: million,
+        // The sums of another projection are the same.
+        projections: &[Projection::Pinhole],
+    },
     entry!(
         "depth ratio 1e7",
         "Depths from two near depths to ten million times that, side by side in one image.",
@@ -53,6 +52,18 @@ const LIST: &[Entry] = &[
         DIGITS,
         (64, 48),
         |projection, size| Stage::placed(projection, size, DVec3::new(4.4e5, 6.26e6, 1200.5), 0.02),
+        rough
+    ),
+    entry!(
+        "UTM, a kilometre off",
+        "The same a kilometre from the scene's origin, where f32 has steps of 1/16 millimetre and the eye stands between.",
+        DIGITS,
+        (64, 48),
+        |projection, size| {
+            let mut stage = Stage::placed(projection, size, DVec3::new(4.4e5, 6.26e6, 1200.5), 0.02)?;
+            stage.camera.eye += DVec3::new(1_000.012_345, -300.054_321, 70.023_456);
+            Ok(stage)
+        },
         rough
     ),
     entry!(
@@ -125,7 +136,10 @@ const LIST: &[Entry] = &[
         "2^-30 over weights of 1/1024: 2^-20 a fragment",
         (32, 32),
         Stage::askew,
-        |stage| tail(stage, Kernel::Ellipse { a: 6.0, n: 3.0, smooth: true })
+        |stage| Filling {
+            float_wins: Some("a weight of 1/1024 keeps 20 of 30 fraction bits, 24 in f32"),
+            ..tail(stage, Kernel::Ellipse { a: 6.0, n: 3.0, smooth: true })
+        }
     ),
     entry!(
         "only the kernel's tail, hat",
@@ -236,7 +250,7 @@ fn tail(stage: &Stage, kernel: Kernel) -> Filling {
         let normal = DVec3::NEG_Z;
         surfels.push(stage.disk(center, normal, 0.49 * stage.pixel(3.0)));
     }
-    Filling::of(surfels, (1.0, 1.0)).kernel(kernel).expect(&["fixed32", "packed64"], BITS)
+    Filling::of(surfels, (1.0, 1.0)).kernel(kernel)
 }
 
 fn high_dynamic_range(stage: &Stage) -> Filling {
@@ -255,5 +269,7 @@ fn thin_alpha(stage: &Stage) -> Filling {
     for (k, color) in colors.iter_mut().enumerate() {
         color[3] = if k % 3 == 0 { 1.0 } else { 1.0 / 255.0 };
     }
-    Filling { colors: Some(colors), ..rough(stage) }
+    let float_wins =
+        Some("a colour premultiplied by 1/255 keeps 22 of 30 fraction bits, 24 in f32, and less under a rim");
+    Filling { colors: Some(colors), float_wins, ..rough(stage) }
 }

@@ -292,8 +292,9 @@ fn verdict(case: &HardCase, row: &Row) -> Verdict {
 }
 
 /// Notes in the row of `fixed` where f32 sums have a smaller RMSE, in any map, by more than one rounding of the output:
-/// `rmse(fixed) > rmse(float or cas) + 2^-24 rms(values)`. `rows` are those of one case.
-pub fn compare_rmse(rows: &mut [Row]) {
+/// `rmse(fixed) > rmse(float or cas) + 2^-24 rms(values)`. That is a failure unless the case has a reason for it. `rows`
+/// are those of one case.
+pub fn compare_rmse(case: &HardCase, rows: &mut [Row]) {
     let rounding = 1.0 / 16_777_216.0;
     let floats = |row: &&Row| ["float", "cas"].contains(&row.accumulator);
     let worse = |fixed: &Row| {
@@ -312,6 +313,67 @@ pub fn compare_rmse(rows: &mut [Row]) {
     };
     let found = rows.iter().find(|row| row.accumulator == "fixed").and_then(worse);
     if let Some(row) = rows.iter_mut().find(|row| row.accumulator == "fixed") {
-        row.over_float = found;
+        row.over_float = found.map(|what| match case.float_wins {
+            Some(reason) => format!("{what} ({reason})"),
+            None => {
+                if !row.failed() {
+                    row.verdict = Verdict::Fail(format!("a larger RMSE than f32 sums: {what}"));
+                }
+                what
+            }
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+    use super::*;
+    use crate::hardcases::{MAPS, cases};
+    use crate::render::{Backend, render};
+    use crate::scene::RenderOptions;
+
+    /// The reference judged by itself passes, and whatever is changed in it is noticed.
+    #[test]
+    fn each_fault_of_an_image_is_found() {
+        let cases = cases().unwrap();
+        let case = cases.iter().find(|case| case.name == "intersecting sheets").unwrap();
+        let truth = case.truth().unwrap();
+        let options = RenderOptions { maps: MAPS, ..case.options.clone() };
+        let (frame, report) = render(&case.scene, &case.camera, &options, &Backend::Reference, &()).unwrap();
+        let (exact, one_word) = (&ACCUMULATORS[0], &ACCUMULATORS[1]);
+        let row = judge(case, &truth, exact, &frame, &report);
+        assert_eq!((row.verdict, row.lost, row.invented, row.nan), (Verdict::Pass, 0, 0, 0));
+        let decided = truth.pixels.iter().position(|pixel| !pixel.open && pixel.count > 1).unwrap();
+        let verdict = |change: &dyn Fn(&mut Frame), accumulator| {
+            let mut changed = frame.clone();
+            change(&mut changed);
+            judge(case, &truth, accumulator, &changed, &report).verdict
+        };
+        let fails = |change: &dyn Fn(&mut Frame), word: &str| match verdict(change, exact) {
+            Verdict::Fail(what) => assert!(what.contains(word), "{what}"),
+            other => panic!("{word}: {other:?}"),
+        };
+        fails(&|f| f.color[decided][1] = f32::NAN, "NaN");
+        fails(&|f| f.weight.as_mut().unwrap()[decided] = 0.0, "1 pixels lost");
+        fails(&|f| f.color[decided][0] += 1e-3, "color");
+        fails(&|f| f.depth.as_mut().unwrap()[decided] *= 1.0001, "depth");
+        fails(&|f| f.count.as_mut().unwrap()[decided] += 1.0, "count");
+        // A failure is expected of one word, but within its own bound only.
+        assert!(matches!(verdict(&|f| f.color[decided][0] += 1e-2, one_word), Verdict::Fail(_)));
+        let bits = one_word.fraction_bits(case.scene.surfels.len() as u64);
+        let range = ColorRange::of(&case.scene);
+        let bounds = |pixel: &crate::hardcases::bounds::Pixel| {
+            (pixel.bound(exact, bits, &range).color[0], pixel.bound(one_word, bits, &range).color[0])
+        };
+        let worse = |pixel: &crate::hardcases::bounds::Pixel| {
+            let (case, own) = bounds(pixel);
+            !pixel.open && own > 3.0 * case
+        };
+        let rim = truth.pixels.iter().position(worse).unwrap();
+        let between = 1.5 * bounds(&truth.pixels[rim]).0;
+        let change = |f: &mut Frame| f.color[rim][0] += between as f32;
+        assert!(matches!(verdict(&change, one_word), Verdict::ExpectedFailure(_)));
+        assert!(matches!(verdict(&change, exact), Verdict::Fail(_)));
     }
 }

@@ -41,8 +41,9 @@ pub fn points(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
     let camera = match Camera::framing(SIZE, Lens::Fov(45.0), &scene, Camera::default_near(&scene)) {
         Ok(camera) => camera,
         // A camera must be within as much of the world's origin as points, and one that sees a scene end on is moved
-        // far from it: what lies near that border may be out of reach.
-        Err(error) if reach(&scene) > 1e-6 * LARGEST_COORDINATE => {
+        // far from it: what lies near that border may be out of reach. Nor can a camera keep a distance that is lost
+        // in the digits of its place.
+        Err(error) if reach(&scene) > 1e-6 * LARGEST_COORDINATE || size(&scene) < 1e-12 * reach(&scene) => {
             return sentence(&error, None).map(|()| Outcome::Read);
         }
         Err(error) => return Err(format!("no camera frames the scene: {error}")),
@@ -56,6 +57,12 @@ fn reach(scene: &Scene) -> f64 {
     let bounds = scene.bounds();
     let farthest = (scene.origin + bounds.min).abs().max((scene.origin + bounds.max).abs());
     farthest.max_element().max(scene.largest_radius().into())
+}
+
+/// The size by which a scene is framed, world units.
+fn size(scene: &Scene) -> f64 {
+    let extent = scene.bounds().extent().length();
+    if extent > 0.0 { extent } else { scene.largest_radius().into() }
 }
 
 fn check_lengths(points: &Points) -> Result<(), String> {

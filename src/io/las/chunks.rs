@@ -112,14 +112,25 @@ impl Scheme {
         let (mut record, mut layers) = (0, 0);
         for item in 0..usize::from(items) {
             let (kind, size) = (u16_at(34 + 6 * item)?, u64::from(u16_at(36 + 6 * item)?));
-            record += size;
-            layers += match kind {
-                10 => 9,      // coordinates, flags, intensity, angle, user data, source, time
-                11 | 13 => 1, // colour; wave packet
-                12 => 2,      // colour and near infrared
-                14 => size,   // extra bytes: one each
-                _ => 0,
+            // Where a size is not the kind's own, the decoder would look for layers elsewhere than they are checked.
+            let (own_size, own_layers) = match kind {
+                0 => (size, 0),     // extra bytes
+                6 => (20, 0),       // point of formats 0 to 5
+                7 => (8, 0),        // time
+                8 => (6, 0),        // colour
+                9 => (29, 0),       // wave packet
+                10 => (30, 9),      // coordinates, flags, intensity, angle, user data, source, time
+                11 => (6, 1),       // colour
+                12 => (8, 2),       // colour and near infrared
+                13 => (29, 1),      // wave packet
+                14 => (size, size), // extra bytes: one layer each
+                _ => return None,
             };
+            if size != own_size {
+                return None;
+            }
+            record += size;
+            layers += own_layers;
         }
         let chunk = Some(chunk).filter(|&chunk| chunk != 0 && chunk != u32::MAX);
         Some(Self { compressor: u16_at(0)?, chunk, record, layers })
@@ -215,4 +226,29 @@ fn read_u64(file: &mut impl Read) -> Result<u64, Fault> {
     let mut bytes = [0; 8];
     file.read_exact(&mut bytes)?;
     Ok(u64::from_le_bytes(bytes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The data of a LASzip record with these items: kinds and sizes.
+    fn record(items: &[(u16, u16)]) -> Vec<u8> {
+        let mut data = vec![0; 32];
+        data[0] = 3;
+        data[12..16].copy_from_slice(&50_000u32.to_le_bytes());
+        data.extend((items.len() as u16).to_le_bytes());
+        data.extend(items.iter().flat_map(|&(kind, size)| [kind, size, 3]).flat_map(u16::to_le_bytes));
+        data
+    }
+
+    #[test]
+    fn items_have_the_size_of_their_kind() {
+        let scheme = Scheme::parse(&record(&[(10, 30), (12, 8), (14, 5)]));
+        assert!(scheme.is_some_and(|scheme| (scheme.record, scheme.layers) == (43, 16)));
+        assert!(Scheme::parse(&record(&[(6, 20), (7, 8), (8, 6), (0, 5)])).is_some());
+        for item in [(11, 30), (10, 29), (6, 30), (12, 6), (5, 8), (15, 1)] {
+            assert!(Scheme::parse(&record(&[item])).is_none(), "{item:?}");
+        }
+    }
 }

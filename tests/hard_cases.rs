@@ -133,7 +133,7 @@ fn a_broken_kernel_fails_a_hard_case() {
         ),
         (
             "accumulate.wgsl",
-            "max(kernel_weight(fragment.rho2), LEAST_WEIGHT)",
+            "max(fragment.gain * kernel_weight(fragment.rho2), LEAST_WEIGHT)",
             "kernel_weight(fragment.rho2)",
             "only the kernel's tail, smooth",
         ),

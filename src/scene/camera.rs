@@ -97,6 +97,9 @@ pub const MAX_PIXELS: u64 = 1 << 27;
 /// The largest coordinate, scale or depth of a camera, and the inverse of the smallest: the device computes in f32.
 const LARGEST: f64 = 1e18;
 
+/// How far from the origin a camera may stand: a narrow lens sees a whole scene of the largest coordinates.
+const FARTHEST: f64 = 1e28;
+
 /// Rejects image sizes that no backend can hold.
 pub fn check_size(width: u32, height: u32) -> Result<()> {
     if width == 0 || height == 0 || width > MAX_SIDE || height > MAX_SIDE {
@@ -121,9 +124,9 @@ impl Camera {
         near: f64,
     ) -> Result<Self> {
         let forward = target - eye;
-        if forward == DVec3::ZERO || !forward.abs().cmple(DVec3::splat(2.0 * LARGEST)).all() {
+        if forward == DVec3::ZERO || !forward.abs().cmple(DVec3::splat(2.0 * FARTHEST)).all() {
             return Err(Error::Usage(format!(
-                "the camera's eye and target must be apart from each other and within {LARGEST:e} of the origin"
+                "the camera's eye and target must be apart from each other and within {FARTHEST:e} of the origin"
             )));
         }
         let forward = unit(forward);
@@ -150,8 +153,8 @@ impl Camera {
         check_size(width, height)?;
         let (projection, [fx, fy, cx, cy]) = lens.intrinsics(width, height)?;
         let skew = (rotation * rotation.transpose() - DMat3::IDENTITY).to_cols_array();
-        if !eye.abs().cmple(DVec3::splat(LARGEST)).all() {
-            return Err(Error::Usage(format!("the camera's eye must be within {LARGEST:e} of the origin")));
+        if !eye.abs().cmple(DVec3::splat(FARTHEST)).all() {
+            return Err(Error::Usage(format!("the camera's eye must be within {FARTHEST:e} of the origin")));
         }
         // Poses come from text with few decimals; what is nearly a rotation is made one. NaN must fail too, so the
         // comparisons are for the good case.

@@ -260,7 +260,7 @@ fn a_broken_projection_is_noticed() {
         compare_splats(case, &twins, &run(case, &options, &gpu, &sources)).expect_noticed(name);
     };
     let camera = "camera_pinhole.wgsl";
-    let shift = broken(camera, "-dot(a.xy, offset));\n", "-dot(a.xy, offset + 1e-4));\n");
+    let shift = broken(camera, "select(-dot(a.xy, offset),", "select(-dot(a.xy, offset + 1e-4),");
     noticed(&all[0], shift, "a row moved by 1e-4 pixels");
     noticed(&all[0], broken(camera, "1.0 / p.z - dot", "1.00001 / p.z - dot"), "depth longer by 1e-5");
     let plain =

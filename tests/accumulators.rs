@@ -7,12 +7,12 @@
 mod common;
 
 use common::bits;
-use common::bounds::E;
 use common::enclosure::{Pixel, enclose};
 use common::scenes::{sphere, sphere_camera, stack};
 use epsplat::frame::Frame;
 use epsplat::gpu::layout::View;
 use epsplat::gpu::{Gpu, Sources};
+use epsplat::hardcases::precision::E;
 use epsplat::passes::accumulate::{ACCUMULATORS, Accumulator};
 use epsplat::passes::project::reference_all;
 use epsplat::render::{Backend, render};

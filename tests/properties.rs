@@ -5,15 +5,17 @@
 
 mod common;
 
+use std::cell::Cell;
+
 use epsplat::frame::Frame;
 use epsplat::gpu::Sources;
-use epsplat::metrics::compare;
+use epsplat::hardcases::{HardCase, judge};
 use epsplat::passes::accumulate::{ACCUMULATORS, accumulator};
 use epsplat::render::{Backend, render};
 use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Lens, Light, Maps, RenderOptions, Scene, Shading, Surfel, Up};
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
-use proptest::test_runner::{Config, TestRunner};
+use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 
 const SIZE: (u32, u32) = (48, 37);
 
@@ -61,13 +63,13 @@ fn options() -> impl Strategy<Value = RenderOptions> {
     let others =
         prop_oneof![Just(Kernel::Gaussian { sigma: 0.4 }), Just(smooth), Just(Kernel::Hat), Just(Kernel::Constant)];
     let kernel = prop_oneof![ellipse, others];
-    (0usize..4, kernel, 0..ACCUMULATORS.len(), any::<bool>()).prop_map(|(epsilon, kernel, accumulator, lit)| {
+    (0usize..4, kernel, 0..ACCUMULATORS.len()).prop_map(|(epsilon, kernel, accumulator)| {
         let epsilons = [Epsilon::Relative(0.01), Epsilon::Absolute(0.05), Epsilon::Relative(0.0), Epsilon::Radius(0.5)];
         RenderOptions {
             epsilon: epsilons[epsilon],
             kernel,
             accumulator: ACCUMULATORS[accumulator].name,
-            shading: if lit { Shading::Lambert } else { Shading::Unlit },
+            shading: Shading::Unlit,
             lights: vec![Light::Headlight { intensity: 0.7 }, Light::Directional { toward: Vec3::Z, intensity: 0.3 }],
             maps: Maps { depth: true, normal: true, weight: true, count: true, decision: false },
             ..RenderOptions::default()
@@ -105,40 +107,81 @@ fn dealt(scene: &Scene) -> Scene {
     Scene { surfels: order.iter().map(|&i| scene.surfels[i]).collect(), colors, ..scene.clone() }
 }
 
-/// Runs the property on `cases` random scenes.
+/// What the light makes of an unlit frame, in f64; and the bound on what f32 makes of it. The ray is normalised from
+/// nine products and sums, the cosine has three more, and each light one.
+fn lit(unlit: &Frame, camera: &Camera, lights: &[Light], pixel: usize) -> ([f64; 3], [f64; 3]) {
+    let (x, y) = (pixel % unlit.width as usize, pixel / unlit.width as usize);
+    let normal = Vec3::from_array(unlit.normal.as_ref().unwrap()[pixel]).as_dvec3();
+    let toward_eye = -camera.ray(x as f64 + 0.5, y as f64 + 0.5).normalize();
+    let (mut irradiance, mut intensities) = (0.0, 0.0);
+    for light in lights {
+        let (cosine, intensity) = match *light {
+            Light::Headlight { intensity } => (normal.dot(toward_eye).abs(), intensity),
+            Light::Directional { toward, intensity } => (normal.dot(toward.as_dvec3()).max(0.0), intensity),
+        };
+        irradiance += cosine * f64::from(intensity);
+        intensities += f64::from(intensity);
+    }
+    let color = unlit.color[pixel].map(f64::from);
+    let bound = 32.0 * (-24f64).exp2() * intensities;
+    (std::array::from_fn(|k| color[k] * irradiance), std::array::from_fn(|k| color[k].abs() * bound))
+}
+
+/// Runs the property on `cases` random scenes. They are the same every time; `EPSPLAT_PROPERTY_SEED` draws others.
 fn agree(backend: Option<&Backend>, cases: u32) -> Result<(), String> {
     let config = Config { cases, failure_persistence: None, max_shrink_iters: 0, ..Config::default() };
     let strategy = (scene(), options(), any::<bool>());
-    let outcome = TestRunner::new(config).run(&strategy, |(scene, options, orthographic)| {
-        let camera = camera(&scene, orthographic);
-        let with_decision = RenderOptions { maps: Maps { decision: true, ..options.maps }, ..options.clone() };
-        let (reference, _) = render(&scene, &camera, &with_decision, &Backend::Reference, &()).unwrap();
-        check_maps(&reference)?;
+    let number = std::env::var("EPSPLAT_PROPERTY_SEED").map_or(1u64, |text| text.parse().expect("a seed is a number"));
+    let mut seed = [0; 32];
+    seed[..8].copy_from_slice(&number.to_le_bytes());
+    let random = TestRng::from_seed(RngAlgorithm::ChaCha, &seed);
+    // Large disks seen nearly edge-on leave much of a small image undecided, so not all can be few; 30 seeds gave 0.02 to 0.09.
+    let excused = Cell::new(0.0);
+    let outcome = TestRunner::new_with_rng(config, random).run(&strategy, |(scene, options, orthographic)| {
+        let case = HardCase {
+            name: "random".into(),
+            about: "a random scene",
+            bound: "of its fragments",
+            camera: camera(&scene, orthographic),
+            scene,
+            options,
+            covered: (0.0, 1.0),
+            excused: 1.0,
+            expected: Vec::new(),
+            smallest: None,
+            float_wins: None,
+        };
+        let (scene, camera, options) = (&case.scene, &case.camera, &case.options);
+        let truth = case.truth().unwrap();
+        check_maps(&truth.frame)?;
         let Some(backend @ Backend::Gpu { gpu, .. }) = backend else { return Ok(()) };
         let row = accumulator(options.accumulator).unwrap();
         prop_assume!(row.check(gpu).is_ok());
-        let (frame, _) = render(&scene, &camera, &options, backend, &()).unwrap();
+        let (frame, report) = render(scene, camera, options, backend, &()).unwrap();
         check_maps(&frame)?;
-        let comparison = compare(&frame, &reference).unwrap();
-        let of =
-            |map: &str| comparison.maps.iter().find(|m| m.map == map).and_then(|m| m.max_of_range_decided).unwrap();
-        // Premultiplied sums are divided by a mean alpha of 1/255 and more, which scales the bound of 2 * 1.2e-5.
-        let alpha = reference.color.iter().map(|c| c[3]).filter(|a| *a > 0.0).fold(1.0, f32::min);
-        // A pixel that only rims reach has the rim's weight, of which an error of rho is the larger a share the smaller it
-        // is: the bound is for that of the paper's kernel, exp(-6).
-        let rim = (options.kernel.weight(1.0) / (-6f64).exp()).min(1.0);
-        prop_assert!(of("color") < 1e-4 / f64::from(alpha) / rim, "color {:?} alpha {}", comparison, alpha);
-        prop_assert!(of("alpha") < 1e-4 / rim, "alpha {:?}", comparison);
-        prop_assert!(of("depth") < 1e-5, "depth {:?}", comparison);
-        prop_assert!(of("weight") < 1e-5, "weight {:?}", comparison);
-        prop_assert_eq!(of("count"), 0.0);
+        let judged = judge(&case, &truth, row, &frame, &report);
+        excused.set(excused.get() + judged.excused / f64::from(cases));
+        prop_assert_eq!((judged.nan, judged.lost, judged.invented), (0, 0, 0));
+        for map in &judged.maps {
+            prop_assert!(map.used_of_own <= 1.0, "{} over the bound of {}: {:?}", map.map, row.name, map);
+        }
         if row.deterministic {
-            let (again, _) = render(&dealt(&scene), &camera, &options, backend, &()).unwrap();
+            let (again, _) = render(&dealt(scene), camera, options, backend, &()).unwrap();
             prop_assert!(frame == again, "the order of the surfels changed the image");
+            let lambert = RenderOptions { shading: Shading::Lambert, ..options.clone() };
+            let (shaded, _) = render(scene, camera, &lambert, backend, &()).unwrap();
+            for (pixel, color) in shaded.color.iter().enumerate() {
+                let (expected, bound) = lit(&frame, camera, &options.lights, pixel);
+                for k in 0..3 {
+                    let error = (f64::from(color[k]) - expected[k]).abs();
+                    prop_assert!(error <= bound[k], "light errs by {error}, the bound is {}", bound[k]);
+                }
+            }
         }
         Ok(())
     });
-    outcome.map_err(|e| e.to_string())
+    outcome.map_err(|e| e.to_string())?;
+    if excused.get() < 0.15 { Ok(()) } else { Err(format!("{} of all pixels were excused", excused.get())) }
 }
 
 #[test]

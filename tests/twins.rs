@@ -1,4 +1,4 @@
-//! Each kernel against its f64 twin, within the bounds of `tests/common/bounds.rs`; and each comparison against a kernel
+//! Each kernel against its f64 twin, within the bounds of `src/hardcases/precision.rs`; and each comparison against a kernel
 //! that is broken a little, which it must notice.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
@@ -6,11 +6,11 @@
 mod common;
 
 use common::UNIT;
-use common::bounds::{E, Precision};
 use common::enclosure::{Interval, Pixel, enclose};
 use common::scenes::{Case, cases, sphere, sphere_camera};
 use epsplat::gpu::layout::{self, AWAY};
 use epsplat::gpu::{Gpu, Sources};
+use epsplat::hardcases::precision::{E, Precision};
 use epsplat::inspect::{Stages, stages};
 use epsplat::passes::footprint::footprint;
 use epsplat::passes::project::{Splat, reference_all};

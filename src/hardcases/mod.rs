@@ -23,7 +23,7 @@ mod staging;
 
 use serde::Serialize;
 
-pub use judge::{MapError, Row, Verdict, compare_rmse};
+pub use judge::{MapError, Row, Verdict, compare_rmse, judge};
 
 use crate::error::{Error, Result};
 use crate::frame::Frame;
@@ -107,7 +107,7 @@ impl HardCase {
     pub fn judge(&self, truth: &Truth, accumulator: &'static Accumulator, backend: &Backend) -> Result<Row> {
         let options = RenderOptions { accumulator: accumulator.name, maps: MAPS, ..self.options.clone() };
         let (frame, report) = render(&self.scene, &self.camera, &options, backend, &())?;
-        Ok(judge::judge(self, truth, accumulator, &frame, &report))
+        Ok(judge(self, truth, accumulator, &frame, &report))
     }
 }
 

@@ -7,7 +7,7 @@ use epsplat::passes::project::Splat;
 use epsplat::scene::{Camera, Kernel, LowPass, RenderOptions, Scene};
 
 use super::UNIT;
-use super::bounds::{E, Precision};
+use epsplat::hardcases::precision::{E, Precision};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {

@@ -10,6 +10,7 @@ use crate::gpu::layout::{Splat, View};
 use crate::gpu::timing::Timing;
 use crate::gpu::{Gpu, Sources};
 use crate::passes::accumulate::AttributeBuffer;
+use crate::passes::project::SplatBuffer;
 use crate::passes::upload::SurfelBuffer;
 use crate::passes::variant::{PixelLayout, Variant};
 use crate::passes::visibility::VisibilityBuffer;
@@ -74,13 +75,13 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
         )));
     };
     let view = View::new(scene, &scene.bounds(), &color_range, camera, options);
+    let uniform = Buffer::uniform(gpu, "view", &view)?;
     let timing = Timing::new(gpu, 4)?;
-    let mut recorder =
-        Recorder { gpu, program: &program, view: Buffer::uniform(gpu, "view", &view)?, variant: &variant, timing };
-    let surfels = SurfelBuffer::upload(gpu, scene, &needs, &())?;
-    let projected = project::record(&mut recorder, surfels)?;
-    let nearest = VisibilityBuffer::new(&recorder, rows.pixels)?;
-    let sums = AttributeBuffer::new(&recorder, rows.pixels)?;
+    let mut recorder = Recorder { gpu, program: &program, view: &uniform, variant: &variant, timing };
+    let projected = SplatBuffer::new(gpu, SurfelBuffer::upload(gpu, scene, &needs, &())?, needs.low_pass)?;
+    project::record(&mut recorder, &projected)?;
+    let nearest = VisibilityBuffer::new(gpu, rows.pixels)?;
+    let sums = AttributeBuffer::new(gpu, &variant, rows.pixels)?;
     visibility::record(&mut recorder, &projected, rows, &nearest)?;
     accumulate::record(&mut recorder, &projected, rows, &nearest, &sums)?;
     let mut splats = Vec::with_capacity(scene.surfels.len());

@@ -35,7 +35,7 @@ fn is_large(splat: Splat) -> bool {
 
 // The queue of large splats, as project.wgsl wrote it.
 @group(0) @binding(13) var<storage, read> queued: array<u32>;
-const QUEUE_START: u32 = 2u;
+const QUEUE_START: u32 = 5u;
 const TILE: u32 = 16u;
 
 // The splat of this workgroup, or none (a number that is no index).
@@ -54,6 +54,11 @@ fn footprint(splat: Splat, filter_: Filter, x: u32, y: u32) -> Fragment {
         splat.c[0] * d.x + (splat.c[1] * d.y + splat.c[2]),
     );
     return filtered(intersect(abc), abc, filter_, d);
+}
+
+// Pixels of the band; its buffers may have room for more.
+fn band_pixels() -> u32 {
+    return band.rows * view.width;
 }
 
 // The pixel's place in the band's buffers.

@@ -2,8 +2,12 @@
 
 @group(0) @binding(2) var<storage, read> surfels: array<Surfel>;
 @group(0) @binding(3) var<storage, read_write> splats: array<Splat>;
-// Word 0 counts the large splats, word 1 all that are in view; from QUEUE_START on, the large ones' indices.
+// Word 0 counts the large splats, word 1 all that are in view; three words from QUEUE_GRID on are the grid of workgroups
+// that draws the large ones, and from QUEUE_START on come their indices.
 @group(0) @binding(4) var<storage, read_write> queue: array<atomic<u32>>;
+
+const QUEUE_GRID: u32 = 2u;
+const MOST_GROUPS: u32 = 65535u;
 
 var<workgroup> group_drawn: atomic<u32>;
 
@@ -89,4 +93,14 @@ fn project(
     if (local == 0u) {
         atomicAdd(&queue[1], atomicLoad(&group_drawn));
     }
+}
+
+// After all surfels: a workgroup for each large splat, in rows that no adapter finds too long.
+@compute @workgroup_size(1)
+fn arrange() {
+    let large = atomicLoad(&queue[0]);
+    let rows = (large + MOST_GROUPS - 1u) / MOST_GROUPS;
+    atomicStore(&queue[QUEUE_GRID], (large + max(rows, 1u) - 1u) / max(rows, 1u));
+    atomicStore(&queue[QUEUE_GRID + 1u], rows);
+    atomicStore(&queue[QUEUE_GRID + 2u], 1u);
 }

@@ -26,7 +26,7 @@ fn resolve(
     @builtin(local_invocation_index) local: u32,
 ) {
     let pixel = linear_index(workgroup, workgroups, local);
-    if (pixel >= arrayLength(&visible)) {
+    if (pixel >= band_pixels()) {
         return;
     }
     let x = pixel % view.width;

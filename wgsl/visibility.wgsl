@@ -14,7 +14,7 @@ fn clear(
     @builtin(local_invocation_index) local: u32,
 ) {
     let pixel = linear_index(workgroup, workgroups, local);
-    if (pixel < arrayLength(&nearest)) {
+    if (pixel < band_pixels()) {
         atomicStore(&nearest[pixel], NOTHING);
     }
 }

@@ -25,12 +25,23 @@ impl<T: Pod> Buffer<T> {
         Self::create(gpu, what, len, wgpu::BufferUsages::STORAGE, gpu.buffer_limit())
     }
 
+    /// The same, which may also hold the arguments of indirect dispatches.
+    pub fn indirect(gpu: &Gpu, what: &str, len: u64) -> Result<Self> {
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
+        Self::create(gpu, what, len, usage, gpu.buffer_limit())
+    }
+
     /// A uniform of one element.
     pub fn uniform(gpu: &Gpu, what: &str, value: &T) -> Result<Self> {
         let limit = gpu.limits.max_uniform_buffer_binding_size;
         let buffer = Self::create(gpu, what, 1, wgpu::BufferUsages::UNIFORM, limit)?;
-        gpu.queue.write_buffer(&buffer.raw, 0, bytemuck::bytes_of(value));
+        buffer.set(gpu, value);
         Ok(buffer)
+    }
+
+    /// Overwrites the first element.
+    pub fn set(&self, gpu: &Gpu, value: &T) {
+        gpu.queue.write_buffer(&self.raw, 0, bytemuck::bytes_of(value));
     }
 
     fn create(gpu: &Gpu, what: &str, len: u64, usage: wgpu::BufferUsages, limit: u64) -> Result<Self> {
@@ -85,32 +96,61 @@ impl<T: Pod> Buffer<T> {
 
     /// The first `len` elements.
     pub fn read(&self, gpu: &Gpu, len: u64) -> Result<Vec<T>> {
-        let bytes = len.min(self.len) * size_of::<T>() as u64;
+        let len = len.min(self.len);
         let mut values: Vec<T> = Vec::with_capacity(len as usize);
-        let step = PIECE / size_of::<T>() as u64 * size_of::<T>() as u64;
+        let readback = Readback::new(gpu, len * size_of::<T>() as u64, size_of::<T>() as u64);
+        readback.visit(gpu, self, len, |_, bytes| {
+            // A mapped range need not be aligned for T, so elements are copied bytewise.
+            values.extend(bytes.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned::<T>));
+        })?;
+        Ok(values)
+    }
+}
+
+/// Memory that both the device and the host see, through which buffers are read back in pieces.
+pub(crate) struct Readback {
+    staging: wgpu::Buffer,
+    step: u64,
+}
+
+impl Readback {
+    /// For reads of up to `bytes`, in pieces of whole records of `record` bytes.
+    pub(crate) fn new(gpu: &Gpu, bytes: u64, record: u64) -> Self {
+        let step = bytes.min((PIECE / record).max(1) * record).next_multiple_of(4).max(4);
         let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("readback"),
-            size: bytes.min(step).next_multiple_of(4).max(4),
+            size: step,
             usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
+        Self { staging, step }
+    }
+
+    /// Calls `piece` with the place and the bytes of each piece of the first `len` elements of `buffer`.
+    pub(crate) fn visit<T: Pod>(
+        &self,
+        gpu: &Gpu,
+        buffer: &Buffer<T>,
+        len: u64,
+        mut piece: impl FnMut(u64, &[u8]),
+    ) -> Result<()> {
+        let bytes = len.min(buffer.len) * size_of::<T>() as u64;
         let mut offset = 0;
         while offset < bytes {
-            let size = (bytes - offset).min(step);
+            let size = (bytes - offset).min(self.step);
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
-            encoder.copy_buffer_to_buffer(&self.raw, offset, &staging, 0, size);
+            encoder.copy_buffer_to_buffer(&buffer.raw, offset, &self.staging, 0, size);
             gpu.queue.submit([encoder.finish()]);
-            let slice = staging.slice(..size);
+            let slice = self.staging.slice(..size);
             slice.map_async(wgpu::MapMode::Read, |_| {});
             gpu.wait()?;
             let view = slice.get_mapped_range().map_err(|e| gpu.error(format!("reading back failed: {e}")))?;
-            // A mapped range need not be aligned for T, so elements are copied bytewise.
-            values.extend(view.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned::<T>));
+            piece(offset, &view);
             drop(view);
-            staging.unmap();
+            self.staging.unmap();
             offset += size;
         }
-        Ok(values)
+        Ok(())
     }
 }
 

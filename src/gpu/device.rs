@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex};
 
 use serde::Serialize;
 
+use super::kernel::Programs;
 use super::layout::{TILE, WORKGROUP};
 use crate::error::{Error, Result};
 
@@ -121,6 +122,7 @@ pub struct Gpu {
     pub limits: wgpu::Limits,
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
+    pub(crate) programs: Programs,
     failure: Arc<Mutex<Option<String>>>,
 }
 
@@ -169,7 +171,7 @@ impl Gpu {
                 slot.get_or_insert_with(|| format!("the device was lost ({reason:?}): {message}"));
             }
         });
-        Ok(Self { adapter, limits, device, queue, failure })
+        Ok(Self { adapter, limits, device, queue, programs: Programs::default(), failure })
     }
 
     /// The same device with smaller buffers, of at most `bytes` each: scenes and images are cut into more pages and bands

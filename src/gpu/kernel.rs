@@ -1,7 +1,8 @@
 //! WGSL: named files are joined into one module per set of needs, bindings are found by name, overrides set by name.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::device::Gpu;
 use super::layout::WORKGROUP;
@@ -106,6 +107,34 @@ pub fn reflect(text: &str) -> std::result::Result<(naga::Module, Bindings, Vec<S
     Ok((module, bindings, overrides))
 }
 
+/// Programs by their text and constants: what was compiled once for a device is not compiled again.
+#[derive(Default)]
+pub(crate) struct Programs(Mutex<HashMap<ProgramKey, Arc<Program>>>);
+
+/// A module's text, and its constants by name as bits.
+type ProgramKey = (String, Vec<(&'static str, u64)>);
+
+impl Programs {
+    /// The entry points `stages` of the module `text`; see [`Program::compile`].
+    pub(crate) fn get(
+        &self,
+        gpu: &Gpu,
+        text: String,
+        stages: &[&str],
+        constants: &[(&'static str, f64)],
+    ) -> Result<Arc<Program>> {
+        let key = (text, constants.iter().map(|&(name, value)| (name, value.to_bits())).collect());
+        // A poisoned lock means that another thread panicked while it compiled; the map itself is whole.
+        let mut programs = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(program) = programs.get(&key) {
+            return Ok(Arc::clone(program));
+        }
+        let program = Arc::new(Program::compile(gpu, key.0.clone(), stages, constants)?);
+        programs.insert(key, Arc::clone(&program));
+        Ok(program)
+    }
+}
+
 /// The compiled kernels of a render.
 pub struct Program {
     pipelines: BTreeMap<String, wgpu::ComputePipeline>,
@@ -146,13 +175,16 @@ impl Program {
         Ok(Self { pipelines, bindings })
     }
 
-    /// Binds `buffers` by name for `stage`: each of the stage's variables must be among them, others are ignored.
-    pub(crate) fn bind(
+    /// Dispatches `stage` over `grid` with `buffers` bound by name: each of the stage's variables must be among them,
+    /// others are ignored.
+    pub(crate) fn dispatch(
         &self,
         gpu: &Gpu,
+        pass: &mut wgpu::ComputePass<'_>,
         stage: &str,
         buffers: &[(&str, &wgpu::Buffer)],
-    ) -> Result<(&wgpu::ComputePipeline, wgpu::BindGroup)> {
+        grid: Grid<'_>,
+    ) -> Result<()> {
         let (Some(pipeline), Some(variables)) = (self.pipelines.get(stage), self.bindings.get(stage)) else {
             return Err(gpu.error(format!("there is no kernel {stage}")));
         };
@@ -169,8 +201,25 @@ impl Program {
             layout: &pipeline.get_bind_group_layout(0),
             entries: &entries,
         });
-        Ok((pipeline, group))
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, &group, &[]);
+        match grid {
+            Grid::Of((x, y)) => pass.dispatch_workgroups(x, y, 1),
+            Grid::In(buffer, at) => pass.dispatch_workgroups_indirect(buffer, at),
+        }
+        Ok(())
     }
+}
+
+/// Buffers by the names of the variables they are bound to.
+pub(crate) type Bound<'a> = Vec<(&'a str, &'a wgpu::Buffer)>;
+
+/// The workgroups of a dispatch.
+pub(crate) enum Grid<'a> {
+    /// In x and y.
+    Of((u32, u32)),
+    /// As the device wrote them at this byte of a buffer.
+    In(&'a wgpu::Buffer, u64),
 }
 
 /// The 2-D grid of workgroups for `invocations`, within the adapter's limit per dimension.

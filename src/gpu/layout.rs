@@ -13,8 +13,15 @@ pub const WORKGROUP: u32 = 64;
 /// Splats whose bounds hold more pixels than this get a workgroup each instead of an invocation.
 pub const LARGE: u32 = 1024;
 
-/// Words at the start of a page's queue of large splats: how many there are, and how many splats are in view at all.
-pub const QUEUE_START: u32 = 2;
+/// Words at the start of a page's queue of large splats: how many there are, how many splats are in view at all, and
+/// the grid of workgroups that draws the large ones.
+pub const QUEUE_START: u32 = 5;
+
+/// Word of the queue at which that grid starts.
+pub const QUEUE_GRID: u32 = 2;
+
+/// The most workgroups per dimension that every adapter grants.
+pub const MOST_GROUPS: u32 = 65_535;
 
 /// The most pixels that one invocation may visit for one splat: llvmpipe ends loops after 65,535 rounds.
 pub const MOST_ROUNDS: u32 = 32_768;

@@ -27,6 +27,7 @@
 
 use super::footprint::footprint;
 use super::project::{Splat, SplatBuffer};
+use super::variant::Variant;
 use super::visibility::VisibilityBuffer;
 use super::{Recorder, Rows};
 use crate::error::{Error, Result};
@@ -237,17 +238,17 @@ fn decision(rho: f64, depth: f64, back: f64, near: f64) -> f64 {
 pub struct AttributeBuffer {
     /// [`Variant::sum_words`](super::variant::Variant::sum_words) a pixel.
     pub sums: Buffer<u32>,
-    /// How often a one-word sum wrapped since the buffer was made.
+    /// How often a one-word sum wrapped in this frame.
     overflows: Buffer<u32>,
 }
 
 impl AttributeBuffer {
     /// Room for `pixels`.
-    pub fn new(recorder: &Recorder<'_>, pixels: u64) -> Result<Self> {
-        let words = pixels * u64::from(recorder.variant.sum_words());
+    pub fn new(gpu: &Gpu, variant: &Variant, pixels: u64) -> Result<Self> {
+        let words = pixels * u64::from(variant.sum_words());
         Ok(Self {
-            sums: Buffer::storage(recorder.gpu, "weighted sums", words)?,
-            overflows: Buffer::storage(recorder.gpu, "overflow count", 1)?,
+            sums: Buffer::storage(gpu, "weighted sums", words)?,
+            overflows: Buffer::storage(gpu, "overflow count", 1)?,
         })
     }
 
@@ -265,9 +266,14 @@ pub fn record(
     visible: &VisibilityBuffer,
     buffer: &AttributeBuffer,
 ) -> Result<()> {
+    let words = recorder.variant.sum_words();
     let buffers = [("visible", &visible.nearest.raw), ("sums", &buffer.sums.raw), ("overflows", &buffer.overflows.raw)];
     splats.dispatch(recorder, ("accumulate", "accumulate_large"), rows, &buffers, |encoder| {
-        encoder.clear_buffer(&buffer.sums.raw, 0, None);
+        let bytes = rows.pixels * u64::from(words) * 4;
+        encoder.clear_buffer(&buffer.sums.raw, 0, Some(bytes));
+        if rows.first == 0 {
+            encoder.clear_buffer(&buffer.overflows.raw, 0, None);
+        }
     })
 }
 

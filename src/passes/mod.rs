@@ -34,7 +34,7 @@ pub struct Recorder<'a> {
     /// Its kernels for this render.
     pub program: &'a Program,
     /// The view uniform.
-    pub view: Buffer<View>,
+    pub view: &'a Buffer<View>,
     /// What they were made of.
     pub variant: &'a Variant,
     /// Time per pass.

@@ -18,8 +18,8 @@ use super::upload::SurfelBuffer;
 use super::{Recorder, Rows};
 use crate::error::Result;
 use crate::gpu::buffers::Buffer;
-use crate::gpu::kernel::{grid, workgroup_grid};
-use crate::gpu::layout;
+use crate::gpu::kernel::{Bound, Grid, grid};
+use crate::gpu::{Gpu, layout};
 use crate::scene::{Camera, LowPass, Projection, RenderOptions, Scene, Surfel};
 
 /// A projected surfel in f64: the twin of [`layout::Splat`], in world units.
@@ -239,73 +239,90 @@ fn orthographic(camera: &Camera, p: DVec3, s: DVec3, t: DVec3, away: f64) -> Pro
 
 /// Splats in device memory, page for page as the surfels, whose attributes later stages still read.
 pub struct SplatBuffer {
-    /// The surfels they came from.
+    /// The surfels they come from.
     pub surfels: SurfelBuffer,
     /// A page of splats for each page of surfels.
     pub pages: Vec<SplatPage>,
-    /// Splats that may touch a pixel of the image.
-    pub drawn: u64,
 }
 
 /// One page of a [`SplatBuffer`].
 pub struct SplatPage {
     /// The records.
     pub splats: Buffer<layout::Splat>,
-    /// Two counts, then the indices of the large splats.
+    /// Counts and a grid, then the indices of the large splats, which get a workgroup each.
     queue: Buffer<u32>,
     /// Their low-pass filters, if there are any.
     filters: Option<Buffer<layout::Filter>>,
-    /// How many are large: they get a workgroup each.
-    large: u64,
 }
 
-/// Records the projection of every page, and waits for the counts.
-pub fn record(recorder: &mut Recorder<'_>, surfels: SurfelBuffer) -> Result<SplatBuffer> {
+/// Records the projection of every page.
+pub fn record(recorder: &mut Recorder<'_>, buffer: &SplatBuffer) -> Result<()> {
     let (gpu, program) = (recorder.gpu, recorder.program);
     let view = &recorder.view.raw;
-    let mut pages = Vec::with_capacity(surfels.pages.len());
-    for page in &surfels.pages {
-        let splats = Buffer::storage(gpu, "splats", page.surfels.len)?;
-        let queue = Buffer::storage(gpu, "queue of large splats", page.surfels.len + u64::from(layout::QUEUE_START))?;
-        let filters = match recorder.variant.needs.low_pass {
-            LowPass::None => None,
-            _ => Some(Buffer::storage(gpu, "low-pass filters", page.surfels.len)?),
-        };
-        pages.push(SplatPage { splats, queue, filters, large: 0 });
-    }
     recorder.timing.pass(
         gpu,
         "project",
-        |_| {},
+        |encoder| {
+            for page in &buffer.pages {
+                encoder.clear_buffer(&page.queue.raw, 0, Some(u64::from(layout::QUEUE_START) * 4));
+            }
+        },
         |pass| {
-            for (page, SplatPage { splats, queue, filters, .. }) in surfels.pages.iter().zip(&pages) {
+            for (surfels, page) in buffer.surfels.pages.iter().zip(&buffer.pages) {
                 let mut buffers = vec![
                     ("view", view),
-                    ("surfels", &page.surfels.raw),
-                    ("splats", &splats.raw),
-                    ("queue", &queue.raw),
+                    ("surfels", &surfels.surfels.raw),
+                    ("splats", &page.splats.raw),
+                    ("queue", &page.queue.raw),
                 ];
-                buffers.extend(filters.as_ref().map(|filters| ("filters", &filters.raw)));
-                let (pipeline, group) = program.bind(gpu, "project", &buffers)?;
-                let (x, y) = grid(gpu, page.surfels.len)?;
-                pass.set_pipeline(pipeline);
-                pass.set_bind_group(0, &group, &[]);
-                pass.dispatch_workgroups(x, y, 1);
+                buffers.extend(page.filters.as_ref().map(|filters| ("filters", &filters.raw)));
+                program.dispatch(gpu, pass, "project", &buffers, Grid::Of(grid(gpu, surfels.surfels.len)?))?;
+                program.dispatch(gpu, pass, "arrange", &buffers, Grid::Of((1, 1)))?;
             }
             Ok(())
         },
-    )?;
-    let mut drawn = 0;
-    for page in &mut pages {
-        if let [large, in_view] = page.queue.read(gpu, layout::QUEUE_START.into())?[..] {
-            page.large = large.into();
-            drawn += u64::from(in_view);
-        }
-    }
-    Ok(SplatBuffer { surfels, pages, drawn })
+    )
 }
 
 impl SplatBuffer {
+    /// Room for the splats of `surfels`.
+    pub fn new(gpu: &Gpu, surfels: SurfelBuffer, low_pass: LowPass) -> Result<Self> {
+        let mut pages = Vec::with_capacity(surfels.pages.len());
+        for page in &surfels.pages {
+            let len = page.surfels.len;
+            pages.push(SplatPage {
+                splats: Buffer::storage(gpu, "splats", len)?,
+                queue: Buffer::indirect(gpu, "queue of large splats", len + u64::from(layout::QUEUE_START))?,
+                filters: match low_pass {
+                    LowPass::None => None,
+                    _ => Some(Buffer::storage(gpu, "low-pass filters", len)?),
+                },
+            });
+        }
+        Ok(Self { surfels, pages })
+    }
+
+    /// Splats that may touch a pixel of the image. Waits for the projection.
+    pub fn drawn(&self, gpu: &Gpu) -> Result<u64> {
+        let mut drawn = 0;
+        for page in &self.pages {
+            drawn += page.queue.read(gpu, 2)?.get(1).copied().map_or(0, u64::from);
+        }
+        Ok(drawn)
+    }
+
+    /// What a stage over the splats of page `index` may bind, beside its own `buffers`.
+    pub(crate) fn bindings<'a>(&'a self, index: usize, buffers: &[(&'a str, &'a wgpu::Buffer)]) -> Bound<'a> {
+        let (surfels, page) = (&self.surfels.pages[index], &self.pages[index]);
+        let mut bound =
+            vec![("projected", &page.splats.raw), ("queued", &page.queue.raw), ("surfels", &surfels.surfels.raw)];
+        bound.extend_from_slice(buffers);
+        bound.extend(page.filters.as_ref().map(|filters| ("projected_filters", &filters.raw)));
+        bound.extend(surfels.colors.as_ref().map(|colors| ("colors", colors)));
+        bound.extend(self.surfels.srgb_to_linear.as_ref().map(|table| ("srgb_to_linear", &table.raw)));
+        bound
+    }
+
     /// Records `stage` over the splats of every page: an invocation each, and of `large` a workgroup each.
     pub(crate) fn dispatch(
         &self,
@@ -316,31 +333,14 @@ impl SplatBuffer {
         before: impl FnOnce(&mut wgpu::CommandEncoder),
     ) -> Result<()> {
         let (gpu, program) = (recorder.gpu, recorder.program);
-        let view = &recorder.view.raw;
+        let mut own = vec![("view", &recorder.view.raw), ("band", &rows.uniform.raw)];
+        own.extend_from_slice(buffers);
         recorder.timing.pass(gpu, stage, before, |pass| {
-            for (page, splats) in self.surfels.pages.iter().zip(&self.pages) {
-                let mut bound = vec![
-                    ("view", view),
-                    ("band", &rows.uniform.raw),
-                    ("projected", &splats.splats.raw),
-                    ("queued", &splats.queue.raw),
-                    ("surfels", &page.surfels.raw),
-                ];
-                bound.extend_from_slice(buffers);
-                bound.extend(splats.filters.as_ref().map(|filters| ("projected_filters", &filters.raw)));
-                bound.extend(page.colors.as_ref().map(|colors| ("colors", colors)));
-                bound.extend(self.surfels.srgb_to_linear.as_ref().map(|table| ("srgb_to_linear", &table.raw)));
-                let mut dispatch = |kernel: &str, (x, y): (u32, u32)| -> Result<()> {
-                    let (pipeline, group) = program.bind(gpu, kernel, &bound)?;
-                    pass.set_pipeline(pipeline);
-                    pass.set_bind_group(0, &group, &[]);
-                    pass.dispatch_workgroups(x, y, 1);
-                    Ok(())
-                };
-                dispatch(stage, grid(gpu, splats.splats.len)?)?;
-                if splats.large > 0 {
-                    dispatch(large, workgroup_grid(gpu, splats.large)?)?;
-                }
+            for (index, page) in self.pages.iter().enumerate() {
+                let bound = self.bindings(index, &own);
+                program.dispatch(gpu, pass, stage, &bound, Grid::Of(grid(gpu, page.splats.len)?))?;
+                let at = u64::from(layout::QUEUE_GRID) * 4;
+                program.dispatch(gpu, pass, large, &bound, Grid::In(&page.queue.raw, at))?;
             }
             Ok(())
         })

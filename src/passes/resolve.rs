@@ -1,14 +1,17 @@
 //! Stage 4: sums become the image: divide by the weight (paper 000, section 5.4), shade, put over the background.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::accumulate::{AttributeBuffer, PixelSums};
+use super::variant::Variant;
 use super::visibility::VisibilityBuffer;
 use super::{Recorder, Rows};
 use crate::error::Result;
 use crate::frame::Frame;
-use crate::gpu::buffers::Buffer;
-use crate::gpu::kernel::grid;
+use crate::gpu::Gpu;
+use crate::gpu::buffers::{Buffer, Readback};
+use crate::gpu::kernel::{Grid, grid};
 use crate::scene::{Camera, Light, RenderOptions, Shading};
 
 /// The twin: resolves `sums`, which start at row `first_row` of the image, into `frame`, which holds just their rows.
@@ -77,13 +80,16 @@ fn over(front: [f64; 4], back: [f64; 4]) -> [f64; 4] {
 pub struct ImageBuffer {
     /// [`PixelLayout::image_words`](super::variant::PixelLayout::image_words) a pixel.
     pub image: Buffer<f32>,
+    readback: Readback,
 }
 
 impl ImageBuffer {
     /// Room for `pixels`.
-    pub fn new(recorder: &Recorder<'_>, pixels: u64) -> Result<Self> {
-        let words = pixels * u64::from(recorder.variant.pixel.image_words);
-        Ok(Self { image: Buffer::storage(recorder.gpu, "image", words)? })
+    pub fn new(gpu: &Gpu, variant: &Variant, pixels: u64) -> Result<Self> {
+        let record = u64::from(variant.pixel.image_words);
+        let image = Buffer::storage(gpu, "image", pixels * record)?;
+        let readback = Readback::new(gpu, pixels * record * 4, record * 4);
+        Ok(Self { image, readback })
     }
 }
 
@@ -109,12 +115,7 @@ pub fn record(
                 ("sums", &sums.sums.raw),
                 ("image", &buffer.image.raw),
             ];
-            let (pipeline, group) = program.bind(gpu, "resolve", &buffers)?;
-            let (x, y) = grid(gpu, visible.nearest.len)?;
-            pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, &group, &[]);
-            pass.dispatch_workgroups(x, y, 1);
-            Ok(())
+            program.dispatch(gpu, pass, "resolve", &buffers, Grid::Of(grid(gpu, rows.pixels)?))
         },
     )
 }
@@ -122,15 +123,22 @@ pub fn record(
 /// Reads resolved rows back into `frame`.
 pub fn read_back(recorder: &Recorder<'_>, rows: &Rows, buffer: &ImageBuffer, frame: &mut Frame) -> Result<()> {
     let layout = recorder.variant.pixel;
-    let words = layout.image_words as usize;
-    let values = buffer.image.read(recorder.gpu, rows.pixels * words as u64)?;
+    let record = layout.image_words as usize * 4;
     let start = rows.first as usize * frame.width as usize;
-    for (pixel, value) in values.chunks_exact(words).enumerate() {
-        let pixel = start + pixel;
-        frame.color[pixel] = [value[0], value[1], value[2], value[3]];
+    buffer.readback.visit(recorder.gpu, &buffer.image, rows.pixels * record as u64 / 4, |offset, bytes| {
+        let first = start + offset as usize / record;
+        let pixels = bytes.len() / record;
+        // Word `word` of each pixel on, in a map of N values a pixel.
+        fn copy<const N: usize>(map: &mut [[f32; N]], bytes: &[u8], record: usize, word: u32) {
+            let at = word as usize * 4;
+            map.par_iter_mut().zip(bytes.par_chunks_exact(record)).with_min_len(1 << 14).for_each(|(value, bytes)| {
+                *value = bytemuck::pod_read_unaligned(&bytes[at..at + 4 * N]);
+            });
+        }
+        let range = first..first + pixels;
+        copy(&mut frame.color[range.clone()], bytes, record, 0);
         if let Some(map) = &mut frame.normal {
-            let at = layout.normal_image as usize;
-            map[pixel] = [value[at], value[at + 1], value[at + 2]];
+            copy(&mut map[range.clone()], bytes, record, layout.normal_image);
         }
         let maps = [
             (&mut frame.depth, layout.depth_image),
@@ -139,9 +147,8 @@ pub fn read_back(recorder: &Recorder<'_>, rows: &Rows, buffer: &ImageBuffer, fra
         ];
         for (map, word) in maps {
             if let Some(map) = map {
-                map[pixel] = value[word as usize];
+                copy(bytemuck::cast_slice_mut::<f32, [f32; 1]>(&mut map[range.clone()]), bytes, record, word);
             }
         }
-    }
-    Ok(())
+    })
 }

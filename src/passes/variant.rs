@@ -1,6 +1,8 @@
 //! Which kernels a render is made of: the files that are joined, the numbers that are set, and the room a pixel takes.
 //! [`SceneNeeds`] is the only key.
 
+use std::sync::Arc;
+
 use super::accumulate::{Accumulator, accumulator};
 use super::lowpass;
 use crate::error::Result;
@@ -10,8 +12,8 @@ use crate::gpu::{Gpu, Sources};
 use crate::scene::{ColorNeed, Kernel, KernelShape, LowPass, Projection, RenderOptions, SceneNeeds};
 
 /// The entry points of the stages, in order.
-pub const STAGES: [&str; 7] =
-    ["project", "clear", "visibility", "visibility_large", "accumulate", "accumulate_large", "resolve"];
+pub const STAGES: [&str; 8] =
+    ["project", "arrange", "clear", "visibility", "visibility_large", "accumulate", "accumulate_large", "resolve"];
 
 /// A render's kernels, before they are compiled.
 #[derive(Clone, Debug)]
@@ -34,9 +36,9 @@ impl Variant {
         Ok(Self { needs: *needs, accumulator, pixel: PixelLayout::of(needs), constants })
     }
 
-    /// Compiles them.
-    pub fn compile(&self, gpu: &Gpu, sources: &Sources) -> Result<Program> {
-        Program::compile(gpu, sources.join(&files(&self.needs)), &STAGES, &self.constants)
+    /// The compiled kernels; `gpu` keeps them.
+    pub fn compile(&self, gpu: &Gpu, sources: &Sources) -> Result<Arc<Program>> {
+        gpu.programs.get(gpu, sources.join(&files(&self.needs)), &STAGES, &self.constants)
     }
 
     /// u32 words of a pixel's sums.

@@ -7,8 +7,9 @@ use super::footprint::footprint;
 use super::project::{Splat, SplatBuffer};
 use super::{Recorder, Rows};
 use crate::error::Result;
+use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
-use crate::gpu::kernel::grid;
+use crate::gpu::kernel::{Grid, grid};
 use crate::scene::{Camera, LowPass};
 
 /// The twin: nearest depths of the rows `first_row..first_row + rows`, +inf where nothing is.
@@ -42,8 +43,8 @@ pub struct VisibilityBuffer {
 
 impl VisibilityBuffer {
     /// Room for `pixels`.
-    pub fn new(recorder: &Recorder<'_>, pixels: u64) -> Result<Self> {
-        Ok(Self { nearest: Buffer::storage(recorder.gpu, "nearest depths", pixels)? })
+    pub fn new(gpu: &Gpu, pixels: u64) -> Result<Self> {
+        Ok(Self { nearest: Buffer::storage(gpu, "nearest depths", pixels)? })
     }
 }
 
@@ -56,12 +57,8 @@ pub fn record(recorder: &mut Recorder<'_>, splats: &SplatBuffer, rows: &Rows, bu
         "visibility",
         |_| {},
         |pass| {
-            let (pipeline, group) = program.bind(gpu, "clear", &buffers)?;
-            let (x, y) = grid(gpu, buffer.nearest.len)?;
-            pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, &group, &[]);
-            pass.dispatch_workgroups(x, y, 1);
-            Ok(())
+            let bound = [("view", &recorder.view.raw), ("band", &rows.uniform.raw), buffers[0]];
+            program.dispatch(gpu, pass, "clear", &bound, Grid::Of(grid(gpu, rows.pixels)?))
         },
     )?;
     splats.dispatch(recorder, ("visibility", "visibility_large"), rows, &buffers, |_| {})

@@ -6,7 +6,7 @@ use bytemuck::Pod;
 use crate::error::{Error, Result};
 use crate::gpu::buffers::Buffer;
 use crate::gpu::kernel::{grid, reflect};
-use crate::gpu::layout::{Splat, View};
+use crate::gpu::layout::{ONE, ONE_WIDE, Splat, View};
 use crate::gpu::timing::Timing;
 use crate::gpu::{Gpu, Sources};
 use crate::passes::accumulate::AttributeBuffer;
@@ -29,6 +29,8 @@ pub struct Stages {
     pub sums: Vec<u32>,
     /// Where each sum lies.
     pub pixel: PixelLayout,
+    /// Units of a weight of 1 in the sums of the accumulator `fixed`.
+    pub one: f64,
     /// The uniform that the kernels saw.
     pub view: View,
 }
@@ -40,11 +42,16 @@ impl Stages {
         Some(f64::from(f32::from_bits(*bits)) * f64::from(self.view.world))
     }
 
-    /// The sum of `channel` at `pixel` by the accumulator `fixed`, in units of 2^-30. `None` past the end.
+    /// The sum of `channel` at `pixel` by the accumulator `fixed`, in units of `1 / one`. `None` past the end.
     pub fn sum(&self, pixel: usize, channel: u32) -> Option<u64> {
         let at = pixel.checked_mul(self.pixel.channels as usize)?.checked_add(channel as usize)?.checked_mul(2)?;
         let (low, high) = (self.sums.get(at)?, self.sums.get(at + 1)?);
         Some(u64::from(*high) << 32 | u64::from(*low))
+    }
+
+    /// The same where a weight of 1 is 1.
+    pub fn value(&self, pixel: usize, channel: u32) -> Option<f64> {
+        Some(self.sum(pixel, channel)? as f64 / self.one)
     }
 
     /// The fragments accepted at `pixel`, by the accumulator `fixed`. `None` if they were not counted.
@@ -93,6 +100,7 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
         nearest: nearest.nearest.read(gpu, rows.pixels)?,
         sums: sums.sums.read(gpu, rows.pixels * u64::from(variant.sum_words()))?,
         pixel: variant.pixel,
+        one: if needs.wide_sums { ONE_WIDE as f64 } else { ONE.into() },
         view,
     })
 }

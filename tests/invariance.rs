@@ -202,7 +202,7 @@ fn unmapped(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu) 
     // Of an opaque scene there is no sum of alpha.
     let channels = if low[3] == high[3] { 3 } else { 4 };
     let of = |pixel: usize| {
-        let sum = |channel: u32| device.sum(pixel, channel).unwrap() as f64 * UNIT;
+        let sum = |channel: u32| device.value(pixel, channel).unwrap();
         let weight = sum(0);
         if weight == 0.0 {
             return PixelSums::ZERO;

@@ -11,7 +11,7 @@ use std::mem::{offset_of, size_of};
 use epsplat::gpu::Sources;
 use epsplat::gpu::kernel::{FILES, reflect};
 use epsplat::gpu::layout::{
-    AWAY, Band, Filter, MOST_GROUPS, ONE, QUEUE_GRID, QUEUE_START, Splat, TILE, View, WORKGROUP,
+    AWAY, Band, Filter, MOST_GROUPS, ONE, ONE_WIDE, QUEUE_GRID, QUEUE_START, Splat, TILE, View, WORKGROUP,
 };
 use epsplat::passes::accumulate::accumulator;
 use epsplat::passes::variant::{COLOR_CHANNEL, PixelLayout, color_channels, files};
@@ -370,8 +370,8 @@ fn constants_agree() {
         let colors = color_channels(&needs) > 0;
         assert_eq!(constant("COLOR_CHANNEL"), colors.then_some(f64::from(COLOR_CHANNEL)));
         let one = match needs.accumulator {
-            "fixed" => Some(f64::from(ONE)),
-            "fixed64" => Some(40f64.exp2()),
+            "fixed" if !needs.wide_sums => Some(f64::from(ONE)),
+            "fixed" | "fixed64" => Some(ONE_WIDE as f64),
             _ => None,
         };
         assert_eq!(constant("ONE"), one, "{}", needs.accumulator);

@@ -149,7 +149,6 @@ fn agree(backend: Option<&Backend>, cases: u32) -> Result<(), String> {
             excused: 1.0,
             expected: Vec::new(),
             smallest: None,
-            float_wins: None,
         };
         let (scene, camera, options) = (&case.scene, &case.camera, &case.options);
         let truth = case.truth().unwrap();

@@ -148,7 +148,7 @@ fn compare_nearest(case: &Case, enclosure: &[Pixel], device: &Stages) -> Finding
 fn compare_sums(case: &Case, enclosure: &[Pixel], device: &Stages) -> Findings {
     let mut findings = Findings::default();
     for (index, pixel) in enclosure.iter().enumerate() {
-        let sum = |channel: u32| device.sum(index, channel).unwrap() as f64 * UNIT;
+        let sum = |channel: u32| device.value(index, channel).unwrap();
         let layout = device.pixel;
         let mut check = |what: &str, interval: &Interval, value: f64| {
             if !interval.holds(value) {

@@ -25,7 +25,7 @@ fn blend(splat: Splat, filter_: Filter, attributes: Attributes, x: u32, y: u32) 
     if (fragment.depth > farthest_accepted(front, attributes.radius)) {
         return;
     }
-    let weight = quantise(max(fragment.gain * kernel_weight(fragment.rho2), LEAST_WEIGHT));
+    let weight = quantise(clamp(fragment.gain * kernel_weight(fragment.rho2), LEAST_WEIGHT, 1.0));
     accumulate_color(pixel, weight, attributes.color);
     accumulate_normal(pixel, weight, attributes.normal);
     accumulate_depth(pixel, weight, fragment.depth, front);

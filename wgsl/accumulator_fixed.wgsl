@@ -1,4 +1,4 @@
-// Sums in fixed point: 30 fractional bits a term, two words a sum (low, high) with an exact carry.
+// Sums in fixed point: a term fills a word, a sum has two (low, high) with an exact carry.
 // Error bound: src/passes/accumulate.rs.
 
 override CHANNELS: u32;
@@ -8,8 +8,8 @@ override CHANNELS: u32;
 alias Term = u32;
 const COUNT_ONE: Term = 1u;
 
-// The units of a weight of 1: 2^30.
-const ONE: f32 = 1073741824.0;
+// The units of a weight of 1: 2^32 - 2^10.
+const ONE: f32 = 4294966272.0;
 
 fn quantise(weight: f32) -> Term {
     return u32(round(weight * ONE));

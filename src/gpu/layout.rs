@@ -29,8 +29,12 @@ pub const MOST_ROUNDS: u32 = 32_768;
 /// Invocations of a workgroup that draws a large splat: a square of 16.
 pub const TILE: u32 = 16;
 
-/// Units of a weight of 1 in the sums of the accumulator `fixed`: 2^30.
-pub const ONE: u32 = 1 << 30;
+/// Units of a weight of 1 in the sums of the accumulator `fixed`: as many as a word holds, of which f32 and the least
+/// weight keep every digit.
+pub const ONE: u32 = u32::MAX - 1023;
+
+/// The same where terms may be small, and of the accumulator `fixed64`: 2^40.
+pub const ONE_WIDE: u64 = 1 << 40;
 
 /// Bit of [`Splat::bounds_last`] that says that s x t points away from the viewer.
 pub const AWAY: u32 = 1 << 31;

@@ -292,9 +292,9 @@ fn verdict(case: &HardCase, row: &Row) -> Verdict {
 }
 
 /// Notes in the row of `fixed` where f32 sums have a smaller RMSE, in any map, by more than one rounding of the output:
-/// `rmse(fixed) > rmse(float or cas) + 2^-24 rms(values)`. That is a failure unless the case has a reason for it. `rows`
-/// are those of one case.
-pub fn compare_rmse(case: &HardCase, rows: &mut [Row]) {
+/// `rmse(fixed) > rmse(float or cas) + 2^-24 rms(values)`. That is a failure. `rows` are those
+/// of one case.
+pub fn compare_rmse(rows: &mut [Row]) {
     let rounding = 1.0 / 16_777_216.0;
     let floats = |row: &&Row| ["float", "cas"].contains(&row.accumulator);
     let worse = |fixed: &Row| {
@@ -313,15 +313,10 @@ pub fn compare_rmse(case: &HardCase, rows: &mut [Row]) {
     };
     let found = rows.iter().find(|row| row.accumulator == "fixed").and_then(worse);
     if let Some(row) = rows.iter_mut().find(|row| row.accumulator == "fixed") {
-        row.over_float = found.map(|what| match case.float_wins {
-            Some(reason) => format!("{what} ({reason})"),
-            None => {
-                if !row.failed() {
-                    row.verdict = Verdict::Fail(format!("a larger RMSE than f32 sums: {what}"));
-                }
-                what
-            }
-        });
+        if let (Some(what), false) = (&found, row.failed()) {
+            row.verdict = Verdict::Fail(format!("a larger RMSE than f32 sums: {what}"));
+        }
+        row.over_float = found;
     }
 }
 

@@ -152,8 +152,6 @@ pub struct Filling {
     pub expected: Vec<Expected>,
     /// The smallest magnitude of an attribute, for high dynamic range.
     pub smallest: Option<f64>,
-    /// Why f32 sums may be more exact.
-    pub float_wins: Option<&'static str>,
 }
 
 /// What one-word sums cannot do, in any image with a pixel that only a disk's rim reaches.
@@ -176,7 +174,6 @@ impl Filling {
             excused: 0.01,
             expected: Vec::new(),
             smallest: None,
-            float_wins: None,
         };
         filling.expect(&["fixed32", "packed64"], BITS)
     }
@@ -244,7 +241,6 @@ pub fn build(entries: &[Entry]) -> Result<Vec<HardCase>> {
                 excused: filling.excused,
                 expected: filling.expected,
                 smallest: filling.smallest,
-                float_wins: filling.float_wins,
             });
         }
     }

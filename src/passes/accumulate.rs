@@ -8,14 +8,17 @@
 //! weight w then errs by at most [`Accumulator::error_bound`], as a fraction of the attribute's range, beside the errors
 //! of the fragments themselves. Let u = 2^-24, the rounding of one f32 operation.
 //!
-//! - **fixed**: W = round(2^30 w), and W a is rounded to f32 and then to an integer. Integer addition is associative: the
-//!   sums, and so the image, do not depend on the order of the surfels, on pages, or on the schedule. Sums have 64 bits in
-//!   two words: `before = atomicAdd(low, x)`; if that wrapped, `atomicAdd(high, 1)`. They overflow after 2^34 full weights.
+//! - **fixed**: W = round(F w) with F = 2^32 - 2^10, so that a term fills a word, and W a is rounded to f32 and then to
+//!   an integer. Integer addition is associative: the sums, and so the image, do not depend on the order of the surfels,
+//!   on pages, or on the schedule. Sums have 64 bits in two words: `before = atomicAdd(low, x)`; if that wrapped,
+//!   `atomicAdd(high, 1)`. They overflow after 2^32 full weights.
 //!   A term errs by a relative u of itself, which moves the mean by at most u, and by half a unit, which moves it by
 //!   `n / (2 sum W)`; rounding the weights moves it by as much again, times the spread of the attributes, which is at most
-//!   1: `n 2^-30 / w`. Reading two sums, dividing, and mapping back are four f32 operations: `5 u` in all. With 30 bits
-//!   rather than 24 a carry is needed for every fourth full weight, which is still rare, and the tail of a kernel keeps
-//!   its digits.
+//!   1: `n / (F w)`. Reading two sums, dividing, and mapping back are four f32 operations: `5 u` in all. A carry for each
+//!   full weight is still rarer than fragments, whose weights are mostly small, and was not measurable in frame times;
+//!   and the rim of the paper's kernel, exp(-6), keeps 23 bits. Where weights may be smaller still, or alphas differ
+//!   ([`SceneNeeds::wide_sums`](crate::scene::SceneNeeds::wide_sums)), terms are those of `fixed64` in two words, which
+//!   takes two additions for most.
 //! - **fixed32**: the same in one word. B fraction bits, `32 - bits(min(surfels, 255))`, are at least 24 and let 255 full
 //!   weights (or all surfels there are) meet in a pixel; a sum that wraps is noticed and the frame rendered again with
 //!   `fixed`. `n 2^-B / w + 5 u`.
@@ -33,6 +36,7 @@ use super::{Recorder, Rows};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
+use crate::gpu::layout::ONE;
 use crate::scene::options::LEAST_WEIGHT;
 use crate::scene::{Camera, RenderOptions, Scene};
 
@@ -67,6 +71,9 @@ pub enum Features {
 /// The rounding of one f32 operation.
 const U: f64 = 1.0 / 16_777_216.0;
 
+/// The file of `fixed` where terms may be small.
+pub const WIDE_FILE: &str = "accumulator_fixed_wide.wgsl";
+
 /// Every accumulator; the first is the default.
 pub const ACCUMULATORS: &[Accumulator] = &[
     Accumulator {
@@ -75,7 +82,7 @@ pub const ACCUMULATORS: &[Accumulator] = &[
         words: 2,
         deterministic: true,
         features: Features::None,
-        error_bound: |n, w, _| n * (-30f64).exp2() / w + 5.0 * U,
+        error_bound: |n, w, _| n / (ONE as f64 * w) + 5.0 * U,
     },
     Accumulator {
         name: "fixed32",

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::accumulate::{Accumulator, accumulator};
+use super::accumulate::{Accumulator, WIDE_FILE, accumulator};
 use super::lowpass;
 use crate::error::Result;
 use crate::gpu::kernel::Program;
@@ -69,7 +69,7 @@ pub fn files(needs: &SceneNeeds) -> Vec<&'static str> {
             KernelShape::Hat => "kernel_hat.wgsl",
             KernelShape::Constant => "kernel_constant.wgsl",
         },
-        accumulator(needs.accumulator).map_or("", |row| row.file),
+        if needs.wide_sums { WIDE_FILE } else { accumulator(needs.accumulator).map_or("", |row| row.file) },
         "resolve.wgsl",
         pick(needs.normal, "normal.wgsl", "normal_absent.wgsl"),
         pick(needs.normal_map, "normal_map.wgsl", "normal_map_absent.wgsl"),

@@ -20,6 +20,9 @@ pub struct SceneNeeds {
     pub projection: Projection,
     /// How sums are kept on the device, by name.
     pub accumulator: &'static str,
+    /// The accumulator is `fixed` and terms may be small: alphas differ, so that means are divided by a small mean alpha;
+    /// or a fragment's weight may be less than [`SMALL_WEIGHT`]. Then terms keep 40 bits.
+    pub wide_sums: bool,
     /// The kernel's formula.
     pub kernel: KernelShape,
     /// The filter for small splats.
@@ -48,6 +51,14 @@ pub struct SceneNeeds {
     pub decision: bool,
 }
 
+/// Terms of at least this weight keep 23 of the 32 bits that `fixed` has, as f32 would.
+pub const SMALL_WEIGHT: f64 = 1.0 / 512.0;
+
+fn may_be_small(options: &RenderOptions) -> bool {
+    // The convolution with the pixel lowers the weight of splats below it.
+    options.kernel.weight(1.0) < SMALL_WEIGHT || options.low_pass == LowPass::Ewa
+}
+
 impl SceneNeeds {
     /// The needs of `scene` under `options`; `color_range` is [`Scene::color_range`].
     pub fn of(scene: &Scene, color_range: &([f32; 4], [f32; 4]), camera: &Camera, options: &RenderOptions) -> Self {
@@ -62,6 +73,7 @@ impl SceneNeeds {
         Self {
             projection: camera.projection,
             accumulator: options.accumulator,
+            wide_sums: options.accumulator == "fixed" && (low[3] != high[3] || may_be_small(options)),
             kernel: options.kernel.shape(),
             low_pass: options.low_pass,
             epsilon_radius: matches!(options.epsilon, Epsilon::Radius(_)),
@@ -98,6 +110,7 @@ impl SceneNeeds {
         let flags = [
             (self.low_pass == LowPass::Max, "lowpass-max"),
             (self.low_pass == LowPass::Ewa, "lowpass-ewa"),
+            (self.wide_sums, "wide-sums"),
             (self.epsilon_radius, "epsilon-radius"),
             (self.alpha, "alpha"),
             (self.normal, "normal"),

@@ -48,7 +48,11 @@ pub fn all_needs() -> Vec<SceneNeeds> {
                     // A step that shares no factor with the number of needs, so that it comes to all of them.
                     next = (next + 101) % base.len();
                     let low_pass = [LowPass::None, LowPass::Max, LowPass::Ewa][next % 3];
-                    all.push(SceneNeeds { accumulator: row.name, kernel, epsilon_radius, low_pass, ..base[next] });
+                    let accumulator = row.name;
+                    all.push(SceneNeeds { accumulator, kernel, epsilon_radius, low_pass, ..base[next] });
+                    if accumulator == ACCUMULATORS[0].name {
+                        all.push(SceneNeeds { wide_sums: true, kernel, epsilon_radius, low_pass, ..base[next] });
+                    }
                 }
             }
         }
@@ -73,6 +77,7 @@ fn base_needs() -> Vec<SceneNeeds> {
             all.push(SceneNeeds {
                 projection,
                 accumulator: ACCUMULATORS[0].name,
+                wide_sums: false,
                 kernel: KernelShape::Ellipse,
                 epsilon_radius: false,
                 color,

@@ -45,6 +45,7 @@ pub mod progress;
 pub mod render;
 pub mod scene;
 pub mod surfels;
+pub mod truth;
 
 pub use error::{Error, Result};
 pub use progress::Progress;

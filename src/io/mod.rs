@@ -5,12 +5,14 @@ pub mod camera;
 pub mod exr;
 mod fault;
 pub mod las;
+pub mod mesh;
 pub mod obj;
 pub mod ply;
 pub mod png;
 pub mod points;
 mod values;
 
+pub use mesh::Mesh;
 pub use points::{Points, Up};
 
 use crate::{Error, Progress, Result};

@@ -1,6 +1,6 @@
 //! Stage 4: sums become the image: divide by the weight (paper 000, section 5.4), shade, put over the background.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::accumulate::{AttributeBuffer, PixelSums};
@@ -25,10 +25,7 @@ pub fn reference(sums: &[PixelSums], camera: &Camera, options: &RenderOptions, f
             let alpha = mean[3];
             let straight = DVec3::new(mean[0], mean[1], mean[2]) / if alpha > 0.0 { alpha } else { f64::INFINITY };
             normal = unit_or_zero(DVec3::from_array(sum.normal) / sum.weight);
-            let shaded = match options.shading {
-                Shading::Unlit => straight,
-                Shading::Lambert => straight * irradiance(normal, camera, options, x, y),
-            };
+            let shaded = shade(straight, normal, camera, options, DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5));
             color = over([shaded.x, shaded.y, shaded.z, alpha], background);
             depth = sum.depth / sum.weight;
         }
@@ -53,11 +50,19 @@ fn unit_or_zero(mean: DVec3) -> DVec3 {
     if mean.length_squared() > 1e-12 { mean.normalize() } else { DVec3::ZERO }
 }
 
-/// Sum of intensity times cosine over the lights at pixel (x, y): the headlight lights both sides, a directional light
+/// The linear colour that a surface of colour `straight` and unit `normal` has at the image point `at`, pixels.
+pub(crate) fn shade(straight: DVec3, normal: DVec3, camera: &Camera, options: &RenderOptions, at: DVec2) -> DVec3 {
+    match options.shading {
+        Shading::Unlit => straight,
+        Shading::Lambert => straight * irradiance(normal, camera, &options.lights, at),
+    }
+}
+
+/// Sum of intensity times cosine over the lights at an image point: the headlight lights both sides, a directional light
 /// the side the normal is on.
-fn irradiance(normal: DVec3, camera: &Camera, options: &RenderOptions, x: u32, y: u32) -> f64 {
-    let toward_eye = -camera.ray(f64::from(x) + 0.5, f64::from(y) + 0.5).normalize();
-    let lights = options.lights.iter().map(|light| match *light {
+fn irradiance(normal: DVec3, camera: &Camera, lights: &[Light], at: DVec2) -> f64 {
+    let toward_eye = -camera.ray(at.x, at.y).normalize();
+    let lights = lights.iter().map(|light| match *light {
         Light::Headlight { intensity } => f64::from(intensity) * normal.dot(toward_eye).abs(),
         Light::Directional { toward, intensity } => f64::from(intensity) * normal.dot(toward.as_dvec3()).max(0.0),
     });
@@ -65,7 +70,7 @@ fn irradiance(normal: DVec3, camera: &Camera, options: &RenderOptions, x: u32, y
 }
 
 /// Straight alpha over straight alpha.
-fn over(front: [f64; 4], back: [f64; 4]) -> [f64; 4] {
+pub(crate) fn over(front: [f64; 4], back: [f64; 4]) -> [f64; 4] {
     let behind = back[3] * (1.0 - front[3]);
     let alpha = front[3] + behind;
     if alpha > 0.0 {

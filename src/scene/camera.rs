@@ -184,13 +184,26 @@ impl Camera {
         self.rotation * (world - self.eye)
     }
 
-    /// The unnormalised world direction from the eye through the image point (x, y), pixels: camera-space z is 1.
+    /// The unnormalised world direction of the ray through the image point (x, y), pixels: camera-space z is 1. It starts
+    /// at [`ray_start`](Self::ray_start).
     pub fn ray(&self, x: f64, y: f64) -> DVec3 {
         let camera = match self.projection {
             Projection::Pinhole => DVec3::new((x - self.cx) / self.fx, (y - self.cy) / self.fy, 1.0),
             Projection::Orthographic => DVec3::Z,
         };
         self.rotation.transpose() * camera
+    }
+
+    /// The world point where the ray of the image point (x, y), pixels, has camera-space z = 0: the eye of a pinhole
+    /// camera, in an orthographic one the image point itself.
+    pub fn ray_start(&self, x: f64, y: f64) -> DVec3 {
+        match self.projection {
+            Projection::Pinhole => self.eye,
+            Projection::Orthographic => {
+                let camera = DVec3::new((x - self.cx) / self.fx, (y - self.cy) / self.fy, 0.0);
+                self.eye + self.rotation.transpose() * camera
+            }
+        }
     }
 
     /// Pixels of the image.

@@ -1,13 +1,13 @@
-//! Wavefront OBJ: the vertices of a mesh as points, with normals and radii from its faces.
+//! Wavefront OBJ: the vertices of a mesh as points, with normals and radii from its faces; or its triangles as they are.
 
 mod source;
 mod triangles;
 
 use crate::io::fault::{self, Fault};
-use crate::io::{Points, Up};
+use crate::io::{Mesh, Points, Up};
 use crate::scene::Colors;
 use crate::{Progress, Result};
-use source::Source;
+use source::{Lines, Source};
 use std::fs::File;
 use std::io::{self, BufReader};
 use std::path::Path;
@@ -30,16 +30,35 @@ use triangles::Triangles;
 /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where
 /// a number is none or a face names a vertex or normal that does not exist.
 pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
+    read_with(path, progress, points)
+}
+
+/// Reads the triangles of an OBJ file, those of all groups and materials as one mesh, with every `v` line a vertex.
+///
+/// Polygons are fanned into triangles. Corners have the `vn` they name where every corner of the file names one, else the
+/// mesh is faceted. Colours are read as by [`read`], and lines, points, curves and materials are passed over too. A file
+/// without faces is a mesh without triangles, and no error here.
+///
+/// # Errors
+///
+/// As [`read`].
+pub fn read_mesh(path: &Path, progress: &dyn Progress) -> Result<Mesh> {
+    read_with(path, progress, mesh)
+}
+
+/// Opens the file and makes of its lines and faces what is asked for.
+fn read_with<T>(path: &Path, progress: &dyn Progress, make: impl Fn(Lines, &[tobj::Model]) -> T) -> Result<T> {
     let in_file = |fault: Fault| fault.of(path);
     let file = File::open(path).map_err(Fault::Io).map_err(in_file)?;
     let length = file.metadata().map_err(Fault::Io).map_err(in_file)?.len();
     progress.begin(&format!("reading {}", fault::name(path)), length);
-    let points = read_mesh(Source::new(BufReader::with_capacity(1 << 18, file), progress));
+    let parsed = parse(Source::new(BufReader::with_capacity(1 << 18, file), progress));
+    let made = parsed.map(|(lines, models)| make(lines, &models));
     progress.end();
-    points.map_err(in_file)
+    made.map_err(in_file)
 }
 
-fn read_mesh<R: io::BufRead>(mut source: Source<'_, R>) -> Result<Points, Fault> {
+fn parse<R: io::BufRead>(mut source: Source<'_, R>) -> Result<(Lines, Vec<tobj::Model>), Fault> {
     let options = tobj::LoadOptions {
         triangulate: true,
         ignore_points: true,
@@ -57,16 +76,32 @@ fn read_mesh<R: io::BufRead>(mut source: Source<'_, R>) -> Result<Points, Fault>
             other => format!("line {}: {other}", lines.count),
         })
     })?;
-    let mut triangles = Triangles::new(&lines.positions);
-    for tobj::Model { mesh, .. } in &models {
+    Ok((lines, models))
+}
+
+/// Each triangle's vertices, by their number in the file, and the normals its corners name, if every corner of the file
+/// names one.
+fn faces<'a>(lines: &Lines, models: &'a [tobj::Model]) -> impl Iterator<Item = Face> + use<'a> {
+    let named = lines.every_corner_has_a_normal;
+    models.iter().flat_map(move |tobj::Model { mesh, .. }| {
         let number =
             |index: &u32| mesh.positions.get(3 * *index as usize).map_or(usize::MAX, |number| *number as usize);
         let normal = |index: &u32| mesh.normals.get(3 * *index as usize..)?.first_chunk().copied();
         let mut normals = mesh.normal_indices.as_chunks::<3>().0.iter();
-        for corners in mesh.indices.as_chunks::<3>().0 {
-            let named = normals.next().filter(|_| lines.every_corner_has_a_normal);
-            triangles.add(corners.each_ref().map(number), named.map(|named| named.each_ref().map(normal)));
-        }
+        mesh.indices.as_chunks::<3>().0.iter().map(move |corners| {
+            let named = normals.next().filter(|_| named);
+            (corners.each_ref().map(number), named.map(|named| named.each_ref().map(normal)))
+        })
+    })
+}
+
+/// The numbers of three vertices, and the normals of the corners.
+type Face = ([usize; 3], Option<[Option<[f64; 3]>; 3]>);
+
+fn points(lines: Lines, models: &[tobj::Model]) -> Points {
+    let mut triangles = Triangles::new(&lines.positions);
+    for (corners, normals) in faces(&lines, models) {
+        triangles.add(corners, normals);
     }
     let has_faces = models.iter().any(|model| !model.mesh.indices.is_empty());
     let (face_normals, radii) = triangles.finish();
@@ -75,11 +110,26 @@ fn read_mesh<R: io::BufRead>(mut source: Source<'_, R>) -> Result<Points, Fault>
     } else {
         Some(lines.normals).filter(|normals| !normals.is_empty() && normals.len() == lines.positions.len())
     };
-    Ok(Points {
+    Points {
         positions: lines.positions,
         normals,
         radii: has_faces.then_some(radii),
         colors: (!lines.colors.is_empty()).then_some(Colors::Linear(lines.colors)),
         up: Some(Up::Y),
-    })
+    }
+}
+
+fn mesh(lines: Lines, models: &[tobj::Model]) -> Mesh {
+    let (mut triangles, mut normals) = (Vec::new(), Vec::new());
+    for (corners, named) in faces(&lines, models) {
+        // The parser refuses a face whose vertex does not exist, so every number is one of `positions`.
+        triangles.push(corners.map(|corner| u32::try_from(corner).unwrap_or(u32::MAX)));
+        normals.extend(named.map(|named| named.map(|n| n.map_or([0.0; 3], |n| n.map(|c| c as f32)))));
+    }
+    Mesh {
+        normals: (!normals.is_empty() && normals.len() == triangles.len()).then_some(normals),
+        triangles,
+        positions: lines.positions,
+        colors: (!lines.colors.is_empty()).then_some(Colors::Linear(lines.colors)),
+    }
 }

@@ -18,30 +18,29 @@ fn fraction(bits: u64) -> f64 {
     (bits >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// Point `index` of `count` on the unit sphere, and its normal (Swinbank and Purser 2006, with points at the middles of
-/// bands of equal area).
-pub(super) fn sphere(index: u64, count: u64) -> (DVec3, DVec3) {
+/// Point `index` of `count` on the unit sphere (Swinbank and Purser 2006, with points at the middles of bands of equal
+/// area).
+pub(super) fn sphere(index: u64, count: u64) -> DVec3 {
     // 1 - z, so that the polar radius sqrt((1 - z)(1 + z)) loses no digits near the poles.
     let below_pole = (2.0 * index as f64 + 1.0) / count as f64;
     let polar = (below_pole * (2.0 - below_pole)).sqrt();
     let (sin, cos) = (TAU * fraction(index.wrapping_mul(GOLDEN))).sin_cos();
-    let point = DVec3::new(polar * cos, polar * sin, 1.0 - below_pole);
-    (point, point)
+    DVec3::new(polar * cos, polar * sin, 1.0 - below_pole)
 }
 
-/// Point `index` of `count` on the torus, and its normal.
+/// Point `index` of `count` on the torus.
 ///
 /// The minor angle v takes equal steps of area: the part of the area up to v is (v + e sin v) / tau with
 /// e = minor / major. The major angle takes index * m / count turns with the whole number m nearest to
 /// count / phi, so that the lattice closes where v comes round.
-pub(super) fn torus(index: u64, count: u64) -> (DVec3, DVec3) {
+pub(super) fn torus(index: u64, count: u64) -> DVec3 {
     let minor_angle = angle_at_area(TAU * ((index as f64 + 0.5) / count as f64));
     let step = ((u128::from(count) * u128::from(GOLDEN) + (1 << 63)) >> 64) as u64;
     let turn = u128::from(index) * u128::from(step) % u128::from(count);
     let (major_sin, major_cos) = (TAU * (turn as f64 / count as f64)).sin_cos();
     let (minor_sin, minor_cos) = minor_angle.sin_cos();
     let normal = DVec3::new(minor_cos * major_cos, minor_cos * major_sin, minor_sin);
-    (DVec3::new(TORUS_MAJOR * major_cos, TORUS_MAJOR * major_sin, 0.0) + TORUS_MINOR * normal, normal)
+    DVec3::new(TORUS_MAJOR * major_cos, TORUS_MAJOR * major_sin, 0.0) + TORUS_MINOR * normal
 }
 
 /// The v in [0, tau] with v + e sin v = `area`.

@@ -53,6 +53,49 @@ impl Shape {
             Self::Plane | Self::Checkerboard => 4.0,
         }
     }
+
+    /// The signed distance of a point from the surface, which for the squares goes on beyond its edges: world units,
+    /// positive on the side that normals point to.
+    pub fn distance(self, p: DVec3) -> f64 {
+        match self {
+            Self::Sphere => p.length() - 1.0,
+            Self::Torus => (p.truncate().length() - TORUS_MAJOR).hypot(p.z) - TORUS_MINOR,
+            Self::Plane | Self::Checkerboard => p.z,
+        }
+    }
+
+    /// The outward unit normal at a point of the surface, to about 1e-15: the gradient of [`distance`](Self::distance).
+    pub fn normal(self, p: DVec3) -> DVec3 {
+        match self {
+            Self::Sphere => p.normalize(),
+            Self::Torus => {
+                let from_axis = p.truncate().length();
+                (p.truncate() * ((from_axis - TORUS_MAJOR) / from_axis)).extend(p.z).normalize()
+            }
+            Self::Plane | Self::Checkerboard => DVec3::Z,
+        }
+    }
+
+    /// The colour at a point of the surface, 8-bit sRGB.
+    pub fn color(self, p: DVec3) -> [u8; 3] {
+        let code = |value: f64| (value * 255.0).round() as u8;
+        match self {
+            Self::Plane => [200, 160, 90],
+            Self::Checkerboard => {
+                let square = |c: f64| ((c + 1.0) * 0.5 * f64::from(CHECKER_SQUARES)) as u32;
+                if (square(p.x) + square(p.y)) % 2 == 0 { [255; 3] } else { [0; 3] }
+            }
+            // Bands along x, y and z of different widths: smooth, but with detail at several scales and directions.
+            Self::Sphere | Self::Torus => {
+                let band = |c: f64, bands: f64, shift: f64| 0.5 + 0.5 * (PI * bands * c + shift).sin();
+                [
+                    code(0.2 + 0.7 * band(p.z, 6.0, 0.0)),
+                    code(0.2 + 0.5 * band(p.x, 3.0, 1.0) + 0.2 * band(p.y, 11.0, 0.0)),
+                    code(0.2 + 0.5 * band(p.y, 4.0, 2.0) + 0.2 * band(p.x + p.z, 9.0, 0.5)),
+                ]
+            }
+        }
+    }
 }
 
 impl FromStr for Shape {
@@ -102,16 +145,16 @@ impl Iterator for Samples {
         }
         let index = self.next;
         self.next += 1;
-        let (position, normal) = match self.shape {
+        let position = match self.shape {
             Shape::Sphere => lattice::sphere(index, self.count),
             Shape::Torus => lattice::torus(index, self.count),
-            Shape::Plane | Shape::Checkerboard => (lattice::square(index, self.count), DVec3::Z),
+            Shape::Plane | Shape::Checkerboard => lattice::square(index, self.count),
         };
         Some(Sample {
             position: position.to_array(),
-            normal: normal.as_vec3().to_array(),
+            normal: self.shape.normal(position).as_vec3().to_array(),
             radius: self.radius,
-            color: color(self.shape, position),
+            color: self.shape.color(position),
         })
     }
 
@@ -128,27 +171,6 @@ impl Iterator for Samples {
 
 impl ExactSizeIterator for Samples {}
 
-/// sRGB codes at a point of the surface.
-fn color(shape: Shape, p: DVec3) -> [u8; 3] {
-    let code = |value: f64| (value * 255.0).round() as u8;
-    match shape {
-        Shape::Plane => [200, 160, 90],
-        Shape::Checkerboard => {
-            let square = |c: f64| ((c + 1.0) * 0.5 * f64::from(CHECKER_SQUARES)) as u32;
-            if (square(p.x) + square(p.y)) % 2 == 0 { [255; 3] } else { [0; 3] }
-        }
-        // Bands along x, y and z of different widths: smooth, but with detail at several scales and directions.
-        Shape::Sphere | Shape::Torus => {
-            let band = |c: f64, bands: f64, shift: f64| 0.5 + 0.5 * (PI * bands * c + shift).sin();
-            [
-                code(0.2 + 0.7 * band(p.z, 6.0, 0.0)),
-                code(0.2 + 0.5 * band(p.x, 3.0, 1.0) + 0.2 * band(p.y, 11.0, 0.0)),
-                code(0.2 + 0.5 * band(p.y, 4.0, 2.0) + 0.2 * band(p.x + p.z, 9.0, 0.5)),
-            ]
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
@@ -156,15 +178,6 @@ mod tests {
     use crate::scene::Bounds;
     use crate::surfels::neighbours::NeighbourSearch;
     use crate::surfels::positions::DistinctPositions;
-
-    /// Signed distance from the unbounded surface.
-    fn distance(shape: Shape, p: DVec3) -> f64 {
-        match shape {
-            Shape::Sphere => p.length() - 1.0,
-            Shape::Torus => (p.truncate().length() - TORUS_MAJOR).hypot(p.z) - TORUS_MINOR,
-            Shape::Plane | Shape::Checkerboard => p.z,
-        }
-    }
 
     #[test]
     fn samples_lie_on_the_surface_with_its_normal() {
@@ -176,13 +189,12 @@ mod tests {
                 assert_eq!(samples.clone().count() as u64, count);
                 for sample in samples {
                     let p = DVec3::from_array(sample.position);
-                    assert!(distance(shape, p).abs() < 1e-14 && p.abs().max_element() <= 1.4 + 1e-15);
+                    assert!(shape.distance(p).abs() < 1e-14 && p.abs().max_element() <= 1.4 + 1e-15);
                     let normal = DVec3::from_array(sample.normal.map(f64::from));
                     assert!((normal.length() - 1.0).abs() < 1e-6);
                     let step = 1e-6;
-                    let slope = DVec3::AXES.map(|axis| {
-                        (distance(shape, p + axis * step) - distance(shape, p - axis * step)) / (2.0 * step)
-                    });
+                    let slope = DVec3::AXES
+                        .map(|axis| (shape.distance(p + axis * step) - shape.distance(p - axis * step)) / (2.0 * step));
                     assert!(DVec3::from_array(slope).distance(normal) < 1e-6, "{shape:?} {p}");
                 }
             }

@@ -57,10 +57,7 @@ fn torus_crossings(start: DVec3, direction: DVec3) -> Vec<f64> {
     for t in &mut crossings {
         for _ in 0..3 {
             let p = start + direction * *t;
-            let from_axis = p.truncate().length();
-            let from_ring = (from_axis - TORUS_MAJOR).hypot(p.z);
-            let normal = (p.truncate() * ((from_axis - TORUS_MAJOR) / from_axis)).extend(p.z) / from_ring;
-            let step = (from_ring - TORUS_MINOR) / normal.dot(direction);
+            let step = Shape::Torus.distance(p) / Shape::Torus.normal(p).dot(direction);
             // Near a grazing point the step means nothing, and the bracketed root is the better answer.
             if step.is_nan() || step.abs() > 1e-6 {
                 break;
@@ -107,10 +104,6 @@ mod tests {
     use super::super::generate;
     use super::*;
 
-    fn on_torus(p: DVec3) -> f64 {
-        (p.truncate().length() - TORUS_MAJOR).hypot(p.z) - TORUS_MINOR
-    }
-
     #[test]
     fn convex_shapes_are_met_at_the_samples_that_face_the_eye() {
         for shape in [Shape::Sphere, Shape::Plane, Shape::Checkerboard] {
@@ -150,19 +143,20 @@ mod tests {
                 }
                 let t = depth_along_ray(Shape::Torus, eye, direction).unwrap();
                 let truth = eye.distance(p);
-                assert!(on_torus(eye + direction * t).abs() < 1e-13 * (1.0 + truth), "{eye} {p}");
+                assert!(Shape::Torus.distance(eye + direction * t).abs() < 1e-13 * (1.0 + truth), "{eye} {p}");
                 assert!(t < truth + 1e-12 * (1.0 + truth));
                 if t < truth - 1e-9 {
                     behind += 1;
                 }
                 // Sphere tracing with the signed distance cannot step over the surface: it agrees on what comes first.
-                let inside = on_torus(eye) < 0.0;
+                let inside = Shape::Torus.distance(eye) < 0.0;
                 let mut traced = 0.0;
                 for _ in 0..5000 {
-                    traced += on_torus(eye + direction * traced) * if inside { -1.0 } else { 1.0 };
+                    traced += Shape::Torus.distance(eye + direction * traced) * if inside { -1.0 } else { 1.0 };
                 }
                 assert!(
-                    (traced - t).abs() < 1e-9 || traced < t + 1e-9 && on_torus(eye + direction * traced).abs() > 1e-12
+                    (traced - t).abs() < 1e-9
+                        || traced < t + 1e-9 && Shape::Torus.distance(eye + direction * traced).abs() > 1e-12
                 );
             }
         }

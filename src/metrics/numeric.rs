@@ -3,7 +3,8 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::error::{Error, Result};
+use super::{ColorError, largest_difference, same_size};
+use crate::error::Result;
 use crate::frame::Frame;
 
 /// Fragments nearer than this (relative) to a decision may rightly be decided otherwise in f32; their pixels are
@@ -49,21 +50,11 @@ pub struct MapError {
 
 /// Compares `a` with `b`, which must have the same size.
 pub fn compare(a: &Frame, b: &Frame) -> Result<Comparison> {
-    if (a.width, a.height) != (b.width, b.height) {
-        return Err(Error::Usage(format!(
-            "the images differ in size: {}x{} and {}x{}",
-            a.width, a.height, b.width, b.height
-        )));
-    }
+    same_size(a, b)?;
     let pixels = a.color.len();
-    let worst_in_pixel: Vec<f64> = a.color.par_iter().zip(&b.color).map(|(a, b)| largest_difference(a, b)).collect();
-    let values = a.color.iter().zip(&b.color).flat_map(|(a, b)| a.iter().zip(b));
-    let squared: f64 = values.map(|(a, b)| difference(*a, *b).powi(2)).sum();
-    let rmse = (squared / (4 * pixels) as f64).sqrt();
+    let values = |color: &[f32; 4]| color.map(f64::from);
+    let color = ColorError::of(a.color.par_iter().zip(&b.color).map(|(a, b)| (values(a), values(b))));
     let uncovered = a.color.iter().zip(&b.color).filter(|(a, b)| (a[3] > 0.0) != (b[3] > 0.0)).count();
-    let mut sorted = worst_in_pixel;
-    sorted.sort_by(f64::total_cmp);
-    let rank = ((pixels as f64 * 0.999).ceil() as usize).clamp(1, pixels);
 
     let decision = b.decision.as_ref().or(a.decision.as_ref());
     let excused: Option<Vec<bool>> = decision.map(|map| map.iter().map(|d| *d < DECISION_MARGIN).collect());
@@ -85,28 +76,14 @@ pub fn compare(a: &Frame, b: &Frame) -> Result<Comparison> {
     maps.extend(scalar("weight", &a.weight, &b.weight));
     maps.extend(scalar("count", &a.count, &b.count));
     Ok(Comparison {
-        max_abs: sorted.last().copied().unwrap_or(0.0),
-        rmse,
-        psnr_db: (rmse > 0.0).then(|| -20.0 * rmse.log10()),
+        max_abs: color.max_abs,
+        rmse: color.rmse,
+        psnr_db: color.psnr_db,
         coverage_mismatch: uncovered as f64 / pixels as f64,
-        percentile_99_9: sorted[rank - 1],
+        percentile_99_9: color.percentile_99_9,
         maps,
         excused: excused.map(|excused| excused.iter().filter(|e| **e).count() as f64 / pixels as f64),
     })
-}
-
-/// The absolute difference. A value that is not finite against any other counts as the largest f32: it must neither pass
-/// for equality nor make the other measures meaningless.
-fn difference(a: f32, b: f32) -> f64 {
-    if a == b {
-        return 0.0;
-    }
-    let difference = (f64::from(a) - f64::from(b)).abs();
-    if difference.is_finite() { difference } else { f32::MAX.into() }
-}
-
-fn largest_difference<const N: usize>(a: &[f32; N], b: &[f32; N]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| difference(*a, *b)).fold(0.0, f64::max)
 }
 
 fn map_error<const N: usize>(map: &'static str, a: &[[f32; N]], b: &[[f32; N]], excused: Option<&[bool]>) -> MapError {

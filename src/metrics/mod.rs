@@ -1,0 +1,79 @@
+//! Error measures: of one image against another ([`numeric`]), and of a render against the surface that its surfels stand
+//! for ([`reconstruction`](mod@reconstruction)).
+
+pub mod numeric;
+pub mod reconstruction;
+mod ssim;
+
+use rayon::prelude::*;
+
+pub use numeric::{Comparison, DECISION_MARGIN, MapError, compare};
+pub use reconstruction::{DepthError, NormalError, Reconstruction, reconstruction};
+
+use crate::error::{Error, Result};
+use crate::frame::Frame;
+
+/// The error of colours against others, over all values.
+struct ColorError {
+    max_abs: f64,
+    rmse: f64,
+    psnr_db: Option<f64>,
+    percentile_99_9: f64,
+}
+
+impl ColorError {
+    /// Of pairs of pixels of four values each.
+    fn of(pixels: impl ParallelIterator<Item = ([f64; 4], [f64; 4])>) -> Self {
+        let in_pixel = |(a, b): ([f64; 4], [f64; 4])| {
+            let squared: f64 = a.iter().zip(&b).map(|(a, b)| difference(*a, *b).powi(2)).sum();
+            (squared, largest_difference(&a, &b))
+        };
+        let (squared, worst): (Vec<f64>, Vec<f64>) = pixels.map(in_pixel).unzip();
+        let rmse = (squared.iter().sum::<f64>() / (4 * squared.len()).max(1) as f64).sqrt();
+        let worst = Sorted::new(worst);
+        Self {
+            max_abs: worst.percentile(1.0).unwrap_or(0.0),
+            rmse,
+            psnr_db: (rmse > 0.0).then(|| -20.0 * rmse.log10()),
+            percentile_99_9: worst.percentile(0.999).unwrap_or(0.0),
+        }
+    }
+}
+
+/// Errors in ascending order.
+struct Sorted(Vec<f64>);
+
+impl Sorted {
+    fn new(mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        Self(values)
+    }
+
+    /// The least value that this share of them does not exceed (nearest rank); None for no values.
+    fn percentile(&self, share: f64) -> Option<f64> {
+        let rank = (self.0.len() as f64 * share).ceil() as usize;
+        self.0.get(rank.max(1) - 1).copied()
+    }
+}
+
+fn same_size(a: &Frame, b: &Frame) -> Result<()> {
+    if (a.width, a.height) == (b.width, b.height) {
+        return Ok(());
+    }
+    Err(Error::Usage(format!("the images differ in size: {}x{} and {}x{}", a.width, a.height, b.width, b.height)))
+}
+
+/// The absolute difference. A value that is not finite against any other counts as the largest f32: it must neither pass
+/// for equality nor make the other measures meaningless.
+fn difference<T: Into<f64>>(a: T, b: T) -> f64 {
+    let (a, b) = (a.into(), b.into());
+    if a == b {
+        return 0.0;
+    }
+    let difference = (a - b).abs();
+    if difference.is_finite() { difference } else { f32::MAX.into() }
+}
+
+fn largest_difference<T: Copy + Into<f64>, const N: usize>(a: &[T; N], b: &[T; N]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| difference(*a, *b)).fold(0.0, f64::max)
+}

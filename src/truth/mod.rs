@@ -1,0 +1,195 @@
+//! What a surface looks like when no splat is asked: ray casting, the ground truth of reconstruction errors.
+//!
+//! Rays and hits are f64. An analytic [`Shape`] is met by its formula, a mesh by each triangle, found through a tree of
+//! boxes ([`triangles`]). Only the first surface on a ray is shaded: there are no layers of transparency, as in a render.
+
+pub mod triangles;
+
+use std::path::Path;
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+pub use self::triangles::TriangleTree;
+use crate::error::{Error, Result};
+use crate::frame::Frame;
+use crate::io::{self, Mesh};
+use crate::passes::resolve::{over, shade};
+use crate::progress::Progress;
+use crate::scene::color::SRGB8_TO_LINEAR;
+use crate::scene::{Camera, RenderOptions};
+use crate::surfels::analytic::{Shape, depth_along_ray};
+
+/// A surface that rays can meet.
+#[derive(Clone)]
+pub enum Surface {
+    /// One with a formula.
+    Analytic(Shape),
+    /// Triangles.
+    Mesh(TriangleTree),
+}
+
+/// Where a ray meets a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Along the ray, in units of its direction's length; for a camera's ray this is the depth.
+    pub distance: f64,
+    /// Unit normal in world space, on the side that the surface says.
+    pub normal: DVec3,
+    /// Linear RGB, straight alpha.
+    pub color: [f32; 4],
+}
+
+/// The side of the grid of samples in a pixel when none is chosen: 16 samples.
+pub const DEFAULT_GRID: u32 = 4;
+
+/// The largest side of that grid.
+const LARGEST_GRID: u32 = 64;
+
+/// Surfaces that follow each other on a ray by less than this part of the depth and the surface's size are one: a ray
+/// through an edge meets both of its triangles.
+const SAME_SURFACE: f64 = 1e-9;
+
+impl Surface {
+    /// Reads the triangles of an OBJ file; see [`io::obj::read_mesh`].
+    ///
+    /// # Errors
+    ///
+    /// As that, and [`Error::Malformed`] for a file of another extension.
+    pub fn read(path: &Path, progress: &dyn Progress) -> Result<Self> {
+        if !path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj")) {
+            return Err(Error::malformed(path, "only OBJ files are read as surfaces; convert it to one"));
+        }
+        Self::mesh(&io::obj::read_mesh(path, progress)?)
+    }
+
+    /// The triangles of a mesh; see [`TriangleTree::new`].
+    pub fn mesh(mesh: &Mesh) -> Result<Self> {
+        Ok(Self::Mesh(TriangleTree::new(mesh)?))
+    }
+
+    /// The first hit at a distance greater than `beyond`, which is not negative. All three in world units, the distance
+    /// in units of the direction's length. Distances err by about 1e-12 of the distance and the surface's size.
+    pub fn first_hit(&self, start: DVec3, direction: DVec3, beyond: f64) -> Option<Hit> {
+        match self {
+            Self::Analytic(shape) => {
+                let from = start + direction * beyond;
+                let further = depth_along_ray(*shape, from, direction)?;
+                let p = from + direction * further;
+                let [r, g, b] = shape.color(p).map(|code| SRGB8_TO_LINEAR[usize::from(code)]);
+                Some(Hit { distance: beyond + further, normal: shape.normal(p), color: [r, g, b, 1.0] })
+            }
+            Self::Mesh(triangles) => triangles.first_hit(start, direction, beyond),
+        }
+    }
+
+    /// About half its diameter, world units.
+    fn size(&self) -> f64 {
+        match self {
+            Self::Analytic(_) => 1.0,
+            Self::Mesh(triangles) => triangles.radius(),
+        }
+    }
+}
+
+/// An image of a surface as it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Truth {
+    /// - `color`: the mean over the pixel's samples, premultiplied, over the background; linear RGB, straight alpha. Each
+    ///   sample is shaded as [`crate::passes::resolve`] shades a pixel, with the ray through the sample.
+    /// - `depth`: camera-space z of the first surface on the ray through the pixel's centre, world units; +inf for none.
+    /// - `normal`: the unit normal there, in world space, on the side that the surface says; 0 for none.
+    ///
+    /// All are f64 results rounded to f32. There are no other maps.
+    pub frame: Frame,
+    /// The share of the pixel's samples that meet the surface, in [0, 1].
+    pub coverage: Vec<f32>,
+    /// Camera-space z of the next surface behind the first on the ray through the pixel's centre, whichever side it
+    /// shows, world units; +inf for none.
+    pub second_depth: Vec<f32>,
+}
+
+/// What one pixel sees.
+struct Pixel {
+    color: [f32; 4],
+    depth: f32,
+    normal: [f32; 3],
+    coverage: f32,
+    second_depth: f32,
+}
+
+impl Truth {
+    /// Casts `grid` x `grid` rays through each pixel, at the centres of as many equal squares, and one through its
+    /// centre; a second goes on from the first surface. What is nearer than the camera's near depth is not seen. Of the
+    /// options shading, lights and background are used.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] for a grid of none or more than 64 x 64 samples.
+    pub fn cast(
+        surface: &Surface,
+        camera: &Camera,
+        options: &RenderOptions,
+        grid: u32,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        if !(1..=LARGEST_GRID).contains(&grid) {
+            return Err(Error::Usage(format!(
+                "a pixel is sampled by 1x1 to {LARGEST_GRID}x{LARGEST_GRID} rays, not {grid}x{grid}"
+            )));
+        }
+        progress.begin("casting rays", camera.height.into());
+        let row = |y: u32| {
+            let row: Vec<Pixel> = (0..camera.width).map(|x| pixel(surface, camera, options, grid, x, y)).collect();
+            progress.advance(1);
+            row
+        };
+        let pixels: Vec<Pixel> = (0..camera.height).into_par_iter().flat_map_iter(row).collect();
+        progress.end();
+        let frame = Frame {
+            width: camera.width,
+            height: camera.height,
+            color: pixels.iter().map(|pixel| pixel.color).collect(),
+            depth: Some(pixels.iter().map(|pixel| pixel.depth).collect()),
+            normal: Some(pixels.iter().map(|pixel| pixel.normal).collect()),
+            weight: None,
+            count: None,
+            decision: None,
+        };
+        Ok(Self {
+            frame,
+            coverage: pixels.iter().map(|pixel| pixel.coverage).collect(),
+            second_depth: pixels.iter().map(|pixel| pixel.second_depth).collect(),
+        })
+    }
+}
+
+fn pixel(surface: &Surface, camera: &Camera, options: &RenderOptions, grid: u32, x: u32, y: u32) -> Pixel {
+    let corner = DVec2::new(x.into(), y.into());
+    let see = |at: DVec2, beyond: f64| surface.first_hit(camera.ray_start(at.x, at.y), camera.ray(at.x, at.y), beyond);
+    let (mut hits, mut light, mut alpha) = (0, DVec3::ZERO, 0.0);
+    for sample in 0..grid * grid {
+        let place = DVec2::new((sample % grid).into(), (sample / grid).into());
+        let at = corner + (place + 0.5) / f64::from(grid);
+        if let Some(hit) = see(at, camera.near) {
+            let [r, g, b, opacity] = hit.color.map(f64::from);
+            hits += 1;
+            light += opacity * shade(DVec3::new(r, g, b), hit.normal, camera, options, at);
+            alpha += opacity;
+        }
+    }
+    let samples = f64::from(grid * grid);
+    let straight = light / if alpha > 0.0 { alpha } else { f64::INFINITY };
+    let color = over([straight.x, straight.y, straight.z, alpha / samples], options.background.map(f64::from));
+    let center = corner + 0.5;
+    let first = see(center, camera.near);
+    let second = first.and_then(|hit| see(center, hit.distance + SAME_SURFACE * (hit.distance + surface.size())));
+    let depth = |hit: Option<Hit>| hit.map_or(f32::INFINITY, |hit| hit.distance as f32);
+    Pixel {
+        color: color.map(|c| c as f32),
+        depth: depth(first),
+        normal: first.map_or([0.0; 3], |hit| hit.normal.as_vec3().to_array()),
+        coverage: (f64::from(hits) / samples) as f32,
+        second_depth: depth(second),
+    }
+}

@@ -1,0 +1,268 @@
+//! Where a ray first meets a triangle mesh.
+//!
+//! The mesh is moved and scaled into the unit ball. A tree of boxes in f32 (the crate obvhs) finds candidates: boxes are
+//! padded by more than the rounding of its ray test, so it misses none. Each candidate is then decided in f64 with the edge
+//! functions of Woop, Benthin and Wald 2013, in coordinates across the ray. Two triangles see their common edge by the
+//! same two points, so no ray slips between them.
+
+use std::time::Duration;
+
+use glam::{DVec2, DVec3, Vec3A};
+use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::builder::build_bvh2;
+use obvhs::ray::{Ray, RayHit};
+
+use super::Hit;
+use crate::error::{Error, Result};
+use crate::io::Mesh;
+use crate::scene::color::DEFAULT_COLOR;
+use crate::scene::{Bounds, Colors};
+
+/// How much a box is larger than its triangle on each side, in radii of the mesh. A ray starts within 2 radii of the
+/// centre and is followed for 3: its f32 origin, direction and box distances err by less than 2e-6 of a radius.
+const PADDING: f32 = 8e-6;
+
+/// The distance of a ray's f32 start from its point nearest to the mesh's centre, radii.
+const STAND_OFF: f64 = 2.0;
+
+/// The triangles of a mesh in a tree of boxes.
+#[derive(Clone)]
+pub struct TriangleTree {
+    tree: Bvh2,
+    triangles: Vec<Triangle>,
+    /// The middle of the mesh, world coordinates.
+    center: DVec3,
+    /// Half the diagonal of its bounds, world units.
+    radius: f64,
+}
+
+/// One that has an area.
+#[derive(Clone, Debug)]
+struct Triangle {
+    /// In units of the mesh's radius, relative to its centre.
+    corners: [DVec3; 3],
+    /// Of the triangle, unit.
+    normal: DVec3,
+    /// Of its corners, unit or zero; all zero without.
+    normals: [DVec3; 3],
+    /// Of its corners: linear RGB, straight alpha.
+    colors: [[f32; 4]; 3],
+}
+
+impl TriangleTree {
+    /// Builds the tree. Triangles without an area or with a coordinate that is not finite are left out: no ray meets them.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] if a triangle names a vertex that does not exist, or there are not as many colours as vertices or
+    /// corner normals as triangles.
+    pub fn new(mesh: &Mesh) -> Result<Self> {
+        let vertices = mesh.positions.len();
+        let named = mesh.triangles.as_flattened().iter().all(|&vertex| (vertex as usize) < vertices);
+        let colored = match &mesh.colors {
+            Some(Colors::Srgb8(colors)) => colors.len() == vertices,
+            Some(Colors::Linear(colors)) => colors.len() == vertices,
+            Some(Colors::Constant(_)) | None => true,
+        };
+        let oriented = mesh.normals.as_ref().is_none_or(|normals| normals.len() == mesh.triangles.len());
+        if !(named && colored && oriented && u32::try_from(mesh.triangles.len()).is_ok()) {
+            return Err(Error::Usage(
+                "a mesh has fewer than 2^32 triangles, each names three of its vertices, and its colours and normals are \
+                 as many as its vertices and triangles"
+                    .into(),
+            ));
+        }
+        let corner = |vertex: u32| DVec3::from(mesh.positions[vertex as usize]);
+        let finite = |triangle: &[u32; 3]| triangle.iter().all(|&vertex| corner(vertex).is_finite());
+        let used = mesh.triangles.iter().filter(|triangle| finite(triangle)).flatten();
+        let bounds = used.fold(Bounds::EMPTY, |bounds, &vertex| bounds.with_point(corner(vertex)));
+        let (center, radius) = (bounds.center(), 0.5 * bounds.extent().length());
+        let color = |vertex: u32| mesh.colors.as_ref().map_or(DEFAULT_COLOR, |colors| colors.linear(vertex as usize));
+        let mut triangles = Vec::new();
+        for (index, vertices) in mesh.triangles.iter().enumerate().filter(|(_, triangle)| finite(triangle)) {
+            let corners = vertices.map(|vertex| (corner(vertex) - center) / radius);
+            let [a, b, c] = corners;
+            let Some(normal) = (b - a).cross(c - a).try_normalize() else { continue };
+            let unit = |n: [f32; 3]| DVec3::from(n.map(f64::from)).normalize_or_zero();
+            let normals = mesh.normals.as_ref().map_or([DVec3::ZERO; 3], |normals| normals[index].map(unit));
+            triangles.push(Triangle { corners, normal, normals, colors: vertices.map(color) });
+        }
+        let boxes: Vec<Aabb> = triangles.iter().map(padded_box).collect();
+        // The builder takes no empty list in all of its steps.
+        let tree = if boxes.is_empty() {
+            Bvh2::default()
+        } else {
+            build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut Duration::default())
+        };
+        Ok(Self { tree, triangles, center, radius })
+    }
+
+    /// Half the diagonal of the mesh's bounds, world units; 0 for none.
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// Triangles that have an area.
+    pub fn len(&self) -> usize {
+        self.triangles.len()
+    }
+
+    /// No triangle has an area.
+    pub fn is_empty(&self) -> bool {
+        self.triangles.is_empty()
+    }
+
+    /// The first hit at a distance greater than `beyond`; see [`Surface::first_hit`](super::Surface::first_hit).
+    pub(super) fn first_hit(&self, start: DVec3, direction: DVec3, beyond: f64) -> Option<Hit> {
+        let line = Line::new((start - self.center) / self.radius, direction)?;
+        let along = |distance: f64| distance * direction.length() / self.radius - line.shift;
+        let after = along(beyond);
+        let f32_start = line.nearest - line.direction * STAND_OFF;
+        let ray = Ray::new_inf(f32_start.as_vec3().into(), line.direction.as_vec3().into());
+        let mut first: Option<(f64, usize, DVec3)> = None;
+        self.tree.ray_traverse(ray, &mut RayHit::none(), |_, entry| {
+            let index = self.tree.primitive_indices[entry] as usize;
+            let Some((t, weights)) = line.meets(&self.triangles[index].corners) else { return f32::INFINITY };
+            if t <= after || first.is_some_and(|(nearest, ..)| t >= nearest) {
+                return f32::INFINITY;
+            }
+            first = Some((t, index, weights));
+            // The padding of the boxes outweighs this rounding, so no nearer triangle is left out.
+            (t + STAND_OFF) as f32
+        });
+        let (t, index, weights) = first?;
+        let triangle = &self.triangles[index];
+        Some(Hit {
+            distance: (t + line.shift) * self.radius / direction.length(),
+            normal: triangle.normal_at(weights),
+            color: triangle.color_at(weights),
+        })
+    }
+}
+
+fn padded_box(triangle: &Triangle) -> Aabb {
+    let points = triangle.corners.map(|corner| Vec3A::from(corner.as_vec3()));
+    let tight = Aabb::from_points(&points);
+    Aabb::new(tight.min - PADDING, tight.max + PADDING)
+}
+
+impl Triangle {
+    /// The corners' normals, interpolated; the triangle's own where they are missing or cancel.
+    fn normal_at(&self, weights: DVec3) -> DVec3 {
+        let [a, b, c] = self.normals;
+        (a * weights.x + b * weights.y + c * weights.z).try_normalize().unwrap_or(self.normal)
+    }
+
+    /// Interpolated premultiplied, as splats are blended.
+    fn color_at(&self, weights: DVec3) -> [f32; 4] {
+        let mut sum = [0.0; 4];
+        for (color, weight) in self.colors.iter().zip(weights.to_array()) {
+            let [r, g, b, alpha] = color.map(f64::from);
+            let covers = weight * alpha;
+            sum = [sum[0] + covers * r, sum[1] + covers * g, sum[2] + covers * b, sum[3] + covers];
+        }
+        let [r, g, b, alpha] = sum;
+        if alpha > 0.0 { [r / alpha, g / alpha, b / alpha, alpha].map(|c| c as f32) } else { [0.0; 4] }
+    }
+}
+
+/// A ray's line, in units of the mesh's radius about its centre.
+struct Line {
+    /// Its point nearest to the centre: a far eye costs no digits but those of the distance.
+    nearest: DVec3,
+    /// Unit.
+    direction: DVec3,
+    /// The distance from the ray's start to `nearest`.
+    shift: f64,
+    /// Two directions across.
+    across: [DVec3; 2],
+}
+
+impl Line {
+    /// None where it cannot meet the unit ball.
+    fn new(start: DVec3, direction: DVec3) -> Option<Self> {
+        let direction = direction.try_normalize()?;
+        let shift = -start.dot(direction);
+        let nearest = start + direction * shift;
+        // The corners of the bounds may lie on the ball.
+        let reaches = nearest.length_squared() <= 1.0 + 1e-6;
+        let (right, down) = direction.any_orthonormal_pair();
+        reaches.then_some(Self { nearest, direction, shift, across: [right, down] })
+    }
+
+    /// Where it meets the triangle, relative to `nearest`, and the weights of the corners there.
+    fn meets(&self, corners: &[DVec3; 3]) -> Option<(f64, DVec3)> {
+        let corners = corners.map(|corner| corner - self.nearest);
+        let [a, b, c] = corners.map(|corner| DVec2::new(corner.dot(self.across[0]), corner.dot(self.across[1])));
+        let edges = DVec3::new(b.perp_dot(c), c.perp_dot(a), a.perp_dot(b));
+        let inside = edges.cmpge(DVec3::ZERO).all() || edges.cmple(DVec3::ZERO).all();
+        let sum = edges.element_sum();
+        if !inside || sum == 0.0 {
+            return None;
+        }
+        let weights = edges / sum;
+        let [a, b, c] = corners.map(|corner| corner.dot(self.direction));
+        Some((weights.dot(DVec3::new(a, b, c)), weights))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    /// Numbers in [-1, 1): the fractions of multiples of square roots.
+    fn vectors(root: f64) -> impl Iterator<Item = DVec3> {
+        let number = move |k: u32| 2.0 * (f64::from(k) * root.sqrt()).fract() - 1.0;
+        (1..).map(move |k| DVec3::new(number(7 * k), number(7 * k + 3), number(11 * k + 5)))
+    }
+
+    #[test]
+    fn the_tree_finds_what_looking_at_every_triangle_finds() {
+        // Large ones and some below the rounding of f32, across each other, some flat along an axis: boxes without thickness.
+        let (at, across) = (vectors(2.0), vectors(3.0));
+        let mut mesh = Mesh::default();
+        for (k, (at, across)) in at.zip(across).take(400).enumerate() {
+            let size = [1.0, 0.1, 1e-4, 1e-7][k % 4];
+            let turned = DVec3::new(across.y, -across.z, across.x);
+            let flat = if k % 3 == 0 { DVec3::new(1.0, 1.0, 0.0) } else { DVec3::ONE };
+            let first = mesh.positions.len() as u32;
+            mesh.positions.extend([at, at + size * across * flat, at + size * turned * flat].map(|p| p.to_array()));
+            mesh.triangles.push([first, first + 1, first + 2]);
+        }
+        let tree = TriangleTree::new(&mesh).unwrap();
+        assert_eq!((tree.len(), tree.is_empty()), (400, false));
+        let mut met = 0;
+        for (k, target) in vectors(7.0).take(4000).enumerate() {
+            // A third run along an axis, as those of an orthographic camera do, another third to the middle of a triangle.
+            let triangle = mesh.triangles[k % 400].map(|vertex| DVec3::from(mesh.positions[vertex as usize]));
+            let middle = triangle.iter().sum::<DVec3>() / 3.0;
+            let eye = if k % 5 == 0 { DVec3::new(1e5, 2e5, -1e5) } else { 4.0 * vectors(5.0).nth(k % 50).unwrap() };
+            let (start, direction) = match k % 3 {
+                0 => (middle - 3.0 * DVec3::AXES[k % 9 / 3], DVec3::AXES[k % 9 / 3]),
+                1 => (eye, middle - eye),
+                _ => (eye, target - eye),
+            };
+            let mut beyond = 0.0;
+            for _ in 0..3 {
+                let line = Line::new((start - tree.center) / tree.radius, direction);
+                let distance = |t: f64, shift: f64| (t + shift) * tree.radius / direction.length();
+                let hits = line.iter().flat_map(|line| {
+                    let all = tree.triangles.iter().filter_map(|triangle| line.meets(&triangle.corners));
+                    all.map(|(t, _)| distance(t, line.shift))
+                });
+                let expected = hits.filter(|&t| t > beyond).fold(f64::INFINITY, f64::min);
+                let found = tree.first_hit(start, direction, beyond).map_or(f64::INFINITY, |hit| hit.distance);
+                assert_eq!(found, expected, "ray {k}");
+                if !found.is_finite() {
+                    break;
+                }
+                met += 1;
+                beyond = found * (1.0 + 1e-12);
+            }
+        }
+        assert!(met > 5000, "{met}");
+    }
+}

@@ -105,7 +105,8 @@ fn difference(a: f32, b: f32) -> f64 {
     if difference.is_finite() { difference } else { f32::MAX.into() }
 }
 
-fn largest_difference<const N: usize>(a: &[f32; N], b: &[f32; N]) -> f64 {
+/// The largest absolute difference of two pixels' values.
+pub(crate) fn largest_difference<const N: usize>(a: &[f32; N], b: &[f32; N]) -> f64 {
     a.iter().zip(b).map(|(a, b)| difference(*a, *b)).fold(0.0, f64::max)
 }
 

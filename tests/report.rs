@@ -107,8 +107,12 @@ fn study() -> Study {
     });
     Study {
         name: "What exact sums cost".into(),
-        about: "The time of each way to add fragments, on scenes from sparse to dense, and how far each is from the f64 reference.".into(),
-        command: "epsplat bench benches/accumulators.toml --out report --runs 9 --adapter llvmpipe --backend gpu --backend raster".into(),
+        about: "The time of each way to add fragments, from sparse scenes to dense ones, \
+                and its distance from the f64 reference."
+            .into(),
+        command: "epsplat bench benches/accumulators.toml --out report --runs 9 --adapter llvmpipe \
+                  --backend gpu --backend raster"
+            .into(),
         date: "2025-03-01".into(),
         machine: Machine {
             adapter: "llvmpipe (LLVM 15.0.6, 256 bits)".into(),
@@ -351,6 +355,7 @@ fn a_browser_shows_the_page_on_a_phone_and_on_a_desk() {
     let study = study();
     let (folder, page) = written(&study);
     let out = folder.path().join("new/report");
+    // For a person who wants to look at it.
     if let Some(keep) = std::env::var_os("EPSPLAT_KEEP_REPORT") {
         write(Path::new(&keep), &study).unwrap();
     }

@@ -105,8 +105,9 @@ pub(super) fn section(cases: &[Case<'_>]) -> String {
         ),
     };
     format!(
-        "<section><h2>Which to use</h2>{sentence}<div class=\"scroll\"><table class=\"choice\"><thead><tr><th>RMSE at most</th>\
-         <th>the fastest</th><th class=\"n\">ms</th><th class=\"n\">× raster</th><th class=\"n\">its RMSE</th></tr></thead>{rows}\
+        "<section><h2>Which to use</h2>{sentence}<div class=\"scroll\"><table class=\"choice\"><thead><tr>\
+         <th>RMSE at most</th><th>the fastest</th><th class=\"n\">ms</th><th class=\"n\">× raster</th>\
+         <th class=\"n\">its RMSE</th></tr></thead>{rows}\
          </table></div></section>"
     )
 }
@@ -129,7 +130,8 @@ fn rows(case: &Case<'_>) -> String {
         let (limit, config, time) = (limit.name(), escape(&m.config), significant(m.total_ms.median, 3));
         let (ratio, error) = (optional(m.ratio_to_raster, 3), optional(m.numeric_error(), 2));
         format!(
-            "<tr><td>{limit}</td><td>{config}</td><td class=\"n\">{time}</td><td class=\"n\">{ratio}</td><td class=\"n\">{error}</td></tr>"
+            "<tr><td>{limit}</td><td>{config}</td><td class=\"n\">{time}</td><td class=\"n\">{ratio}</td>\
+             <td class=\"n\">{error}</td></tr>"
         )
     };
     let rows: String = answers(case).iter().map(row).collect();

@@ -125,7 +125,10 @@ mod tests {
         let table = table(&[plain, full]);
         let lines: Vec<&str> = table.split_terminator("\r\n").collect();
         assert_eq!(lines.len(), 3);
-        assert!(lines[0].ends_with("kept,total_ms_median,total_ms_mad,total_ms_min,total_ms_max,pass_project_ms_median,pass_project_ms_mad,pass_project_ms_min,pass_project_ms_max,reconstruction_ssim"));
+        assert!(lines[0].ends_with(
+            "kept,total_ms_median,total_ms_mad,total_ms_min,total_ms_max,pass_project_ms_median,\
+             pass_project_ms_mad,pass_project_ms_min,pass_project_ms_max,reconstruction_ssim"
+        ));
         assert!(
             lines[1].starts_with(",\"a, b\",") && lines[1].ends_with(",false,0.0,0.0,0.0,0.0,,,,,"),
             "{}",

@@ -103,7 +103,8 @@ impl Scale {
         }
         let (from, to) = (tick(10f64.powi(self.low)), tick(10f64.powi(self.high)));
         format!(
-            r#"<svg class="scale" viewBox="0 0 460 40" role="img" aria-label="Colours of the difference: 0 is black, then from {from} (dark violet) to {to} (light yellow)">{body}</svg>"#
+            "<svg class=\"scale\" viewBox=\"0 0 460 40\" role=\"img\" aria-label=\"Colours of the difference: 0 is black, \
+             then from {from} (dark violet) to {to} (light yellow)\">{body}</svg>"
         )
     }
 }

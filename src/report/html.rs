@@ -107,6 +107,7 @@ fn figure(set: &ImageSet, map: Option<&Map>, scale: Scale) -> Result<String> {
     let class = if map.is_some() { "pair" } else { "pair alone" };
     let config = escape(&set.config);
     Ok(format!(
-        "<figure><div class=\"{class}\">{image}{heat}</div><figcaption><strong>{config}</strong>: {said}.{shrunk}</figcaption></figure>"
+        "<figure><div class=\"{class}\">{image}{heat}</div><figcaption><strong>{config}</strong>: {said}.{shrunk}\
+         </figcaption></figure>"
     ))
 }

@@ -200,13 +200,16 @@ impl Plot {
 
     /// A name at a point. Names give way to everything that was drawn before them.
     pub fn name(&mut self, point: (f64, f64), name: &str) {
-        let longest = if self.inside.right < INSIDE.right { LONGEST_CURVE_NAME } else { LONGEST_NAME };
+        let of_curve = self.inside.right < INSIDE.right;
+        let longest = if of_curve { LONGEST_CURVE_NAME } else { LONGEST_NAME };
         let mut text: String = name.chars().take(longest).collect();
         if text.len() < name.len() {
             text.push('…');
         }
         let (x, y) = self.place(point);
-        let (area, joined) = labels::place(text.chars().count(), (x, y), &INSIDE, &self.taken);
+        // The name of a curve stands to the right of its end, where no curve is.
+        let bounds = if of_curve { Area { left: x, ..INSIDE } } else { INSIDE };
+        let (area, joined) = labels::place(text.chars().count(), (x, y), &bounds, &self.taken);
         let middle = (area.left + area.right) / 2.0;
         // The text is anchored on the side of its point, so that it does not stray if its font is narrower.
         let (anchor, at) = if area.left >= x {
@@ -229,7 +232,9 @@ impl Plot {
     pub fn finish(self, class: &str, id: &str, title: &str, description: &str) -> String {
         let (title, description) = (escape(title), escape(description));
         format!(
-            r#"<svg class="plot {class}" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-labelledby="{id}-title {id}-desc"><title id="{id}-title">{title}</title><desc id="{id}-desc">{description}</desc>{}</svg>"#,
+            "<svg class=\"plot {class}\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" \
+             aria-labelledby=\"{id}-title {id}-desc\"><title id=\"{id}-title\">{title}</title>\
+             <desc id=\"{id}-desc\">{description}</desc>{}</svg>",
             self.body
         )
     }

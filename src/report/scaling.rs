@@ -116,8 +116,8 @@ pub(super) fn section(measurements: &[Measurement], families: &Families) -> Stri
         return String::new();
     }
     format!(
-        "<section><h2>How time grows</h2><p>Both scales are logarithmic: where a curve rises by a decade in a decade, time is \
-         proportional. Bars are one median absolute deviation.</p>{}<div class=\"plots\">{figures}</div></section>",
+        "<section><h2>How time grows</h2><p>Both scales are logarithmic: where a curve rises by a decade in a decade, \
+         time is proportional. Bars are one median absolute deviation.</p>{}<div class=\"plots\">{figures}</div></section>",
         families.legend()
     )
 }
@@ -149,10 +149,16 @@ fn figure(measurements: &[Measurement], quantity: &Quantity, families: &Families
     }
     // A name stands at the end of its curve; what must be alike is added only if a configuration has several curves.
     let named = |config: &str| curves.keys().filter(|(other, _)| *other == config).count();
-    for ((config, alike), curve) in &curves {
-        let name = if named(config) > 1 { format!("{config}, {alike}") } else { (*config).to_owned() };
+    // From the top down, so that names that make room for each other keep the order of their curves.
+    let end = |curve: &[(f64, &Measurement)]| {
         let (value, m) = curve[curve.len() - 1];
-        plot.name((value, m.total_ms.median), &name);
+        (value, m.total_ms.median)
+    };
+    let mut down: Vec<_> = curves.iter().collect();
+    down.sort_by(|a, b| end(b.1).1.total_cmp(&end(a.1).1));
+    for ((config, alike), curve) in down {
+        let name = if named(config) > 1 { format!("{config}, {alike}") } else { (*config).to_owned() };
+        plot.name(end(curve), &name);
     }
     let title = quantity.title;
     let ends: Vec<String> = curves

@@ -131,7 +131,8 @@ pub(super) fn section(measurements: &[Measurement], families: &Families) -> Stri
     let tables: String = scenes(measurements).into_iter().map(|(scene, rows)| table(scene, &rows, families)).collect();
     format!(
         "<section><h2>All numbers</h2><p>The fastest first. Bold: no other configuration beats it in both time and RMSE. \
-         × raster: how many times as fast as the fastest raster configuration with an equal or smaller RMSE. Errors are over linear RGBA.</p>{tables}</section>"
+         × raster: how many times as fast as the fastest raster configuration with an equal or smaller RMSE. \
+         Errors are over linear RGBA.</p>{tables}</section>"
     )
 }
 

@@ -43,6 +43,7 @@ pub mod metrics;
 pub mod passes;
 pub mod progress;
 pub mod render;
+pub mod report;
 pub mod scene;
 pub mod surfels;
 pub mod truth;

@@ -11,20 +11,23 @@ use crate::scene::color::{linear_to_srgb, srgb_to_linear};
 
 /// Writes the colour; values are clamped to [0, 1].
 pub fn write(path: &Path, frame: &Frame) -> Result<()> {
+    let bytes = srgb_bytes(&frame.color);
+    write_whole(path, |file| encode(file, frame.width, frame.height, &bytes).map_err(std::io::Error::other))
+}
+
+/// Linear colours as sRGB codes, four bytes each.
+pub(crate) fn srgb_bytes(color: &[[f32; 4]]) -> Vec<u8> {
     let byte = |v: f64| (v * 255.0).round() as u8;
-    let bytes: Vec<u8> = frame
-        .color
-        .iter()
-        .flat_map(|&[r, g, b, a]| {
-            let [r, g, b] = [r, g, b].map(|c| byte(linear_to_srgb(c.into())));
-            [r, g, b, byte(f64::from(a).clamp(0.0, 1.0))]
-        })
-        .collect();
-    write_whole(path, |file| {
-        image::codecs::png::PngEncoder::new(file)
-            .write_image(&bytes, frame.width, frame.height, image::ExtendedColorType::Rgba8)
-            .map_err(std::io::Error::other)
-    })
+    let codes = |&[r, g, b, a]: &[f32; 4]| {
+        let [r, g, b] = [r, g, b].map(|c| byte(linear_to_srgb(c.into())));
+        [r, g, b, byte(f64::from(a).clamp(0.0, 1.0))]
+    };
+    color.iter().flat_map(codes).collect()
+}
+
+/// Encodes four bytes a pixel.
+pub(crate) fn encode(out: impl std::io::Write, width: u32, height: u32, rgba: &[u8]) -> image::ImageResult<()> {
+    image::codecs::png::PngEncoder::new(out).write_image(rgba, width, height, image::ExtendedColorType::Rgba8)
 }
 
 /// Reads the colour back to linear light.

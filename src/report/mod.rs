@@ -1,0 +1,47 @@
+//! The results of a benchmark study as files: a table for programs (`results.csv`), the same for programs that read
+//! JSON (`results.json`), and a page for people (`index.html`) that needs no network and no script.
+//!
+//! The page answers in this order: which configuration to use, what each speed costs in error ([`pareto`]), all numbers,
+//! how time grows ([`scaling`]), and where in the image the errors are ([`heatmap`]).
+
+mod case;
+mod choice;
+mod csv;
+mod family;
+pub mod heatmap;
+mod html;
+mod labels;
+pub mod pareto;
+mod picture;
+mod plot;
+mod results;
+pub mod scaling;
+mod tables;
+mod text;
+
+use std::io::Write;
+use std::path::Path;
+
+pub use self::results::{ImageSet, Machine, Measurement, Numeric, Study, Summary};
+use crate::io::atomic::write_whole;
+use crate::{Error, Result};
+
+/// Writes `results.csv`, `results.json` and `index.html` into the folder `dir`, which is created if it is missing. Each
+/// file appears whole or not at all.
+///
+/// # Errors
+///
+/// [`Error::Write`] if a file or the folder cannot be written, [`Error::Usage`] if an image and its reference differ in
+/// size.
+pub fn write(dir: &Path, study: &Study) -> Result<()> {
+    let page = html::page(study)?;
+    let mut json = serde_json::to_string_pretty(&study.measurements).map_err(|e| Error::write(dir, e.into()))?;
+    json.push('\n');
+    std::fs::create_dir_all(dir).map_err(|e| Error::write(dir, e))?;
+    // The page is last, because it links to the others.
+    for (name, text) in [("results.csv", csv::table(&study.measurements)), ("results.json", json), ("index.html", page)]
+    {
+        write_whole(&dir.join(name), |file| file.write_all(text.as_bytes()))?;
+    }
+    Ok(())
+}

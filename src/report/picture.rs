@@ -1,0 +1,97 @@
+//! Pictures inside the page: PNG as data URIs, not larger than a page needs.
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+
+use super::text::escape;
+use crate::error::{Error, Result};
+use crate::frame::Frame;
+use crate::io::png;
+
+/// Larger pictures are shrunk by a whole factor, or a study of many would make a page that no phone opens.
+const LARGEST_SIDE: u32 = 1024;
+
+/// A grid of values, row by row from the top.
+pub(super) struct Grid<T> {
+    pub width: u32,
+    pub height: u32,
+    pub values: Vec<T>,
+}
+
+/// By how much a picture of this size is shrunk.
+pub(super) fn shrink_factor(width: u32, height: u32) -> u32 {
+    width.max(height).div_ceil(LARGEST_SIDE).max(1)
+}
+
+/// Reduces each block of pixels to one; blocks at the right and bottom edge may be smaller.
+pub(super) fn shrink<T: Copy>(width: u32, height: u32, values: &[T], reduce: impl Fn(&[T]) -> T) -> Grid<T> {
+    let factor = shrink_factor(width, height) as usize;
+    if factor == 1 {
+        return Grid { width, height, values: values.to_vec() };
+    }
+    let mut block = Vec::with_capacity(factor * factor);
+    let (columns, rows) = (width as usize, height as usize);
+    let mut small = Vec::new();
+    for top in (0..rows).step_by(factor) {
+        for left in (0..columns).step_by(factor) {
+            let right = (left + factor).min(columns);
+            block.clear();
+            for row in top..(top + factor).min(rows) {
+                block.extend_from_slice(&values[row * columns + left..row * columns + right]);
+            }
+            small.push(reduce(&block));
+        }
+    }
+    Grid { width: width.div_ceil(factor as u32), height: height.div_ceil(factor as u32), values: small }
+}
+
+/// The colour of a frame, sRGB.
+pub(super) fn of_frame(frame: &Frame, alt: &str) -> Result<String> {
+    let small = shrink(frame.width, frame.height, &frame.color, mean);
+    image(small.width, small.height, &png::srgb_bytes(&small.values), alt)
+}
+
+/// The mean of linear colours with straight alpha, each weighted by its alpha.
+fn mean(block: &[[f32; 4]]) -> [f32; 4] {
+    let alpha: f32 = block.iter().map(|color| color[3]).sum();
+    if alpha <= 0.0 {
+        return [0.0; 4];
+    }
+    let [r, g, b] = [0, 1, 2].map(|c| block.iter().map(|color| color[c] * color[3]).sum::<f32>() / alpha);
+    [r, g, b, alpha / block.len() as f32]
+}
+
+/// An `img` element of sRGB bytes, four a pixel.
+pub(super) fn image(width: u32, height: u32, rgba: &[u8], alt: &str) -> Result<String> {
+    let mut bytes = Vec::new();
+    png::encode(&mut bytes, width, height, rgba)
+        .map_err(|e| Error::Usage(format!("an image of {width}x{height} cannot be shown on the page: {e}")))?;
+    let (data, alt) = (STANDARD.encode(&bytes), escape(alt));
+    Ok(format!(r#"<img src="data:image/png;base64,{data}" width="{width}" height="{height}" alt="{alt}"/>"#))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_pictures_are_kept_and_large_ones_shrunk_in_blocks() {
+        assert_eq!(
+            [shrink_factor(1, 1), shrink_factor(1024, 10), shrink_factor(1025, 10), shrink_factor(5000, 9)],
+            [1, 1, 2, 5]
+        );
+        let values: Vec<u32> = (0..1025 * 3).collect();
+        let largest = |block: &[u32]| block.iter().copied().max().unwrap_or(0);
+        let small = shrink(1025, 3, &values, largest);
+        assert_eq!((small.width, small.height, small.values.len()), (513, 2, 513 * 2));
+        assert_eq!((small.values[0], small.values[512]), (1026, 1025 + 1024));
+        assert_eq!(small.values.last(), Some(&(1025 * 3 - 1)));
+        assert_eq!(shrink(2, 1, &[4, 5], largest).values, [4, 5]);
+    }
+
+    #[test]
+    fn transparent_pixels_do_not_darken_their_neighbours() {
+        assert_eq!(mean(&[[1.0, 0.5, 0.0, 1.0], [0.0; 4]]), [1.0, 0.5, 0.0, 0.5]);
+        assert_eq!(mean(&[[9.0, 9.0, 9.0, 0.0]]), [0.0; 4]);
+    }
+}

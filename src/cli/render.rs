@@ -216,6 +216,7 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
             LowPassName::Ewa => LowPass::Ewa,
         },
         accumulator: arguments.accumulator.unwrap_or(default.accumulator),
+        raster: None,
         shading: match arguments.shading {
             ShadingName::Unlit => Shading::Unlit,
             ShadingName::Lambert => Shading::Lambert,

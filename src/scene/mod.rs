@@ -6,6 +6,7 @@ pub mod framing;
 pub mod light;
 pub mod needs;
 pub mod options;
+pub mod raster;
 #[expect(clippy::module_inception, reason = "the file is named for the type it holds")]
 pub mod scene;
 pub mod surfel;
@@ -15,5 +16,6 @@ pub use color::Colors;
 pub use light::Light;
 pub use needs::{ColorNeed, SceneNeeds};
 pub use options::{Epsilon, Kernel, KernelShape, LowPass, Maps, RenderOptions, Shading};
+pub use raster::{BlendFormat, Raster, RasterDepth};
 pub use scene::{Bounds, Scene, Up};
 pub use surfel::Surfel;

@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use super::Light;
+use super::{Light, Raster};
 use crate::error::Error;
 
 /// The depth tolerance: a fragment counts as the visible surface if `z <= nearest + epsilon` (paper 000, section 5.3).
@@ -205,6 +205,8 @@ pub struct RenderOptions {
     pub low_pass: LowPass,
     /// Name of the device's accumulator; see [`crate::passes::accumulate::ACCUMULATORS`].
     pub accumulator: &'static str,
+    /// Sums by the rasteriser instead, on a GPU.
+    pub raster: Option<Raster>,
     /// Shading model.
     pub shading: Shading,
     /// Lights of the Lambert model.
@@ -222,6 +224,7 @@ impl Default for RenderOptions {
             kernel: Kernel::Ellipse { a: 6.0, n: 3.0, smooth: false },
             low_pass: LowPass::None,
             accumulator: "fixed",
+            raster: None,
             shading: Shading::Lambert,
             lights: vec![Light::Headlight { intensity: 1.0 }],
             background: [0.0; 4],

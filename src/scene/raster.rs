@@ -1,0 +1,90 @@
+//! The rasteriser's path, with which compute is compared.
+
+use std::str::FromStr;
+
+use crate::error::Error;
+
+/// Sums by the rasteriser's blender instead of in storage buffers; see `passes::raster`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Raster {
+    /// What sums are kept in.
+    pub format: BlendFormat,
+    /// How the visible surface is told.
+    pub depth: RasterDepth,
+}
+
+/// The format of the blended targets, four channels each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum BlendFormat {
+    /// 8 bits, sums end at [`BlendFormat::MOST_WEIGHTS_8`] full weights.
+    Rgba8Unorm,
+    /// 11 significant bits.
+    Rgba16Float,
+    /// 24 significant bits; not every adapter blends it.
+    Rgba32Float,
+}
+
+impl BlendFormat {
+    /// Every format by name.
+    pub const ALL: [(Self, &'static str); 3] =
+        [(Self::Rgba8Unorm, "rgba8unorm"), (Self::Rgba16Float, "rgba16float"), (Self::Rgba32Float, "rgba32float")];
+
+    /// Full weights that a sum of 8 bits holds: terms are divided by it, which costs three of the bits.
+    pub const MOST_WEIGHTS_8: u32 = 8;
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        Self::ALL.iter().find(|(format, _)| *format == self).map_or("", |(_, name)| name)
+    }
+}
+
+/// How the rasteriser's path tells which fragments belong to the visible surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum RasterDepth {
+    /// Each fragment writes its own depth, and compares it with the nearest in the shader: what compute does.
+    Exact,
+    /// The rasteriser interpolates and compares depths, which the visibility pass moves away by epsilon along the
+    /// camera's axis (Botsch et al. 2005).
+    Offset,
+    /// The same, moved along the view ray (paper 000, section 5.3).
+    Ray,
+}
+
+impl RasterDepth {
+    /// Every way by name.
+    pub const ALL: [(Self, &'static str); 3] = [(Self::Exact, "exact"), (Self::Offset, "offset"), (Self::Ray, "ray")];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        Self::ALL.iter().find(|(depth, _)| *depth == self).map_or("", |(_, name)| name)
+    }
+}
+
+fn named<T: Copy>(all: &[(T, &'static str)], what: &str, text: &str) -> Result<T, Error> {
+    all.iter().find(|(_, name)| *name == text).map(|(value, _)| *value).ok_or_else(|| {
+        let names = all.iter().map(|(_, name)| *name).collect::<Vec<_>>().join(", ");
+        Error::Usage(format!("{what} is one of {names}, not {text:?}"))
+    })
+}
+
+impl FromStr for BlendFormat {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        named(&Self::ALL, "a blend format", text)
+    }
+}
+
+impl FromStr for RasterDepth {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        named(&Self::ALL, "a raster depth", text)
+    }
+}
+
+impl Default for Raster {
+    fn default() -> Self {
+        Self { format: BlendFormat::Rgba16Float, depth: RasterDepth::Exact }
+    }
+}

@@ -19,10 +19,10 @@ use crate::passes::resolve::ImageBuffer;
 use crate::passes::upload::SurfelBuffer;
 use crate::passes::variant::{PixelLayout, Variant};
 use crate::passes::visibility::VisibilityBuffer;
-use crate::passes::{Recorder, Rows, accumulate, project, resolve, visibility};
+use crate::passes::{Recorder, Rows, accumulate, project, raster, resolve, visibility};
 use crate::progress::Progress;
 use crate::scene::light::MAX_LIGHTS;
-use crate::scene::{Bounds, Camera, RenderOptions, Scene, SceneNeeds};
+use crate::scene::{Bounds, Camera, Raster, RenderOptions, Scene, SceneNeeds};
 
 /// Who renders.
 pub enum Backend {
@@ -47,11 +47,11 @@ impl Backend {
 /// What a render did.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// `gpu` or `reference`.
+    /// `gpu` (compute kernels), `raster` (the rasteriser) or `reference`.
     pub backend: &'static str,
     /// The adapter's name; of the reference, the processor threads.
     pub adapter: String,
-    /// How sums were kept; the reference adds in f64.
+    /// How sums were kept: an accumulator, the rasteriser's format, or the reference's `f64`.
     pub accumulator: &'static str,
     /// How often a sum of the accumulator that was asked for wrapped. If ever, the frame was rendered again with `fixed`,
     /// and `total_ms` holds both.
@@ -106,10 +106,17 @@ struct PixelBuffers {
     size: (u32, u32),
     pixel: PixelLayout,
     bands: Vec<Rows>,
-    nearest: VisibilityBuffer,
-    sums: AttributeBuffer,
+    sums: Sums,
     image: ImageBuffer,
     view: Buffer<View>,
+}
+
+/// Where the nearest depths and the weighted sums are kept.
+enum Sums {
+    /// In storage buffers, by the compute kernels, a band at a time.
+    Storage(VisibilityBuffer, AttributeBuffer),
+    /// In textures, by the rasteriser, the whole image at once.
+    Targets(Raster, raster::Targets),
 }
 
 impl<'a> Renderer<'a> {
@@ -154,7 +161,10 @@ impl<'a> Renderer<'a> {
     ) -> Result<(Frame, Report)> {
         let needs = SceneNeeds::of(self.scene, &self.color_range, camera, self.options);
         let variant = Variant::of(&needs, self.options, self.scene.surfels.len() as u64)?;
-        variant.accumulator.check(gpu)?;
+        match needs.raster {
+            Some(raster) => raster::check(gpu, raster, &needs, camera)?,
+            None => variant.accumulator.check(gpu)?,
+        }
         let program = variant.compile(gpu, sources)?;
         let splats = match self.splats.take() {
             Some(splats) => splats,
@@ -178,16 +188,28 @@ impl<'a> Renderer<'a> {
         let mut recorder = Recorder { gpu, program: &program, view: &pixels.view, variant: &variant, timing };
         let mut frame = Frame::new(camera, &self.options.maps);
         project::record(&mut recorder, &splats)?;
+        if let (Sums::Targets(options, targets), Some(first)) = (&pixels.sums, pixels.bands.first()) {
+            raster::record(&mut recorder, *options, &splats, first, targets)?;
+        }
         for rows in &pixels.bands {
-            visibility::record(&mut recorder, &splats, rows, &pixels.nearest)?;
-            accumulate::record(&mut recorder, &splats, rows, &pixels.nearest, &pixels.sums)?;
-            resolve::record(&mut recorder, rows, &pixels.nearest, &pixels.sums, &pixels.image)?;
+            let sums = match &pixels.sums {
+                Sums::Storage(nearest, sums) => {
+                    visibility::record(&mut recorder, &splats, rows, nearest)?;
+                    accumulate::record(&mut recorder, &splats, rows, nearest, sums)?;
+                    vec![("visible", nearest.nearest.bound()), ("sums", sums.sums.bound())]
+                }
+                Sums::Targets(_, targets) => targets.bindings(),
+            };
+            resolve::record(&mut recorder, rows, sums, &pixels.image)?;
             resolve::read_back(&recorder, rows, &pixels.image, &mut frame)?;
             progress.advance(rows.count.into());
         }
         progress.end();
         let total_ms = start.elapsed().as_secs_f64() * 1e3;
-        let overflows = pixels.sums.overflows(gpu)?;
+        let overflows = match &pixels.sums {
+            Sums::Storage(_, sums) => sums.overflows(gpu)?,
+            Sums::Targets(..) => 0,
+        };
         if overflows > 0 {
             // The device's memory is free again before the second try.
             drop((pixels, splats));
@@ -198,9 +220,9 @@ impl<'a> Renderer<'a> {
         let clock = if recorder.timing.on_device() { "timestamps" } else { "wall" };
         let passes = recorder.timing.finish(gpu)?;
         let report = Report {
-            backend: "gpu",
+            backend: if needs.raster.is_some() { "raster" } else { "gpu" },
             adapter: gpu.adapter.name.clone(),
-            accumulator: variant.accumulator.name,
+            accumulator: needs.raster.map_or(variant.accumulator.name, |raster| raster.format.name()),
             overflows: 0,
             surfels: self.scene.surfels.len() as u64,
             splats_drawn: splats.drawn(gpu)?,
@@ -224,12 +246,15 @@ impl PixelBuffers {
     fn new(gpu: &Gpu, renderer: &Renderer<'_>, camera: &Camera, variant: &Variant) -> Result<Self> {
         let bands = bands(gpu, camera, variant)?;
         let most = bands.iter().map(|rows| rows.pixels).max().unwrap_or(0);
+        let sums = match variant.needs.raster {
+            None => Sums::Storage(VisibilityBuffer::new(gpu, most)?, AttributeBuffer::new(gpu, variant, most)?),
+            Some(raster) => Sums::Targets(raster, raster::Targets::new(gpu, raster, variant.pixel, camera)?),
+        };
         Ok(Self {
             size: (camera.width, camera.height),
             pixel: variant.pixel,
             bands,
-            nearest: VisibilityBuffer::new(gpu, most)?,
-            sums: AttributeBuffer::new(gpu, variant, most)?,
+            sums,
             image: ImageBuffer::new(gpu, variant, most)?,
             view: Buffer::uniform(gpu, "view", &renderer.view(camera))?,
         })

@@ -5,31 +5,21 @@
 
 @group(0) @binding(7) var<storage, read> visible: array<u32>;
 
-// 2^-10: see LEAST_WEIGHT in src/scene/options.rs.
-const LEAST_WEIGHT: f32 = 0.0009765625;
-
-struct Attributes {
-    color: vec4<f32>,
-    normal: vec3<f32>,
-    // Device units; 0 where epsilon does not depend on it.
-    radius: f32,
+fn front_at(pixel: u32) -> f32 {
+    return bitcast<f32>(visible[pixel]);
 }
 
-fn blend(splat: Splat, filter_: Filter, attributes: Attributes, x: u32, y: u32) {
+fn add_fragment(splat: Splat, filter_: Filter, attributes: Attributes, x: u32, y: u32) {
     let fragment = footprint(splat, filter_, x, y);
     if (!fragment.hit) {
         return;
     }
     let pixel = pixel_index(x, y);
-    let front = bitcast<f32>(visible[pixel]);
+    let front = front_at(pixel);
     if (fragment.depth > farthest_accepted(front, attributes.radius)) {
         return;
     }
-    let weight = quantise(clamp(fragment.gain * kernel_weight(fragment.rho2), LEAST_WEIGHT, 1.0));
-    accumulate_color(pixel, weight, attributes.color);
-    accumulate_normal(pixel, weight, attributes.normal);
-    accumulate_depth(pixel, weight, fragment.depth, front);
-    accumulate_count(pixel);
+    blend(pixel, fragment, front, attributes);
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -48,10 +38,10 @@ fn accumulate(
         return;
     }
     let filter_ = filter_of(index);
-    let attributes = Attributes(color_of(index), normal_of(index, splat), radius_of(index));
+    let attributes = attributes_of(index, splat);
     for (var y = pixels.first.y; y <= pixels.last.y; y++) {
         for (var x = pixels.first.x; x <= pixels.last.x; x++) {
-            blend(splat, filter_, attributes, x, y);
+            add_fragment(splat, filter_, attributes, x, y);
         }
     }
 }
@@ -69,10 +59,10 @@ fn accumulate_large(
     let splat = projected[index];
     let pixels = reach(splat);
     let filter_ = filter_of(index);
-    let attributes = Attributes(color_of(index), normal_of(index, splat), radius_of(index));
+    let attributes = attributes_of(index, splat);
     for (var y = pixels.first.y + local.y; y <= pixels.last.y; y += TILE) {
         for (var x = pixels.first.x + local.x; x <= pixels.last.x; x += TILE) {
-            blend(splat, filter_, attributes, x, y);
+            add_fragment(splat, filter_, attributes, x, y);
         }
     }
 }

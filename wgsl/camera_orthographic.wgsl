@@ -96,3 +96,16 @@ fn plane_depth(abc: vec3<f32>, low: f32, high: f32) -> f32 {
 fn ray(x: u32, y: u32) -> vec3<f32> {
     return view.rotation[2].xyz;
 }
+
+// For the rasteriser's depth test; see camera_pinhole.wgsl.
+fn depth_of(c: f32) -> f32 {
+    return clamp(c, view.near, view.farthest);
+}
+
+fn depth_order(z: f32) -> f32 {
+    return 1.0 - z * depth_scale();
+}
+
+fn along_axis(image: vec2<f32>) -> f32 {
+    return 1.0;
+}

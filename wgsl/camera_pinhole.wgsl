@@ -226,3 +226,19 @@ fn ray(x: u32, y: u32) -> vec3<f32> {
     let image = (vec2<f32>(f32(x), f32(y)) + 0.5 - view.intrinsics.zw) / view.intrinsics.xy;
     return normalize(image.x * view.rotation[0].xyz + image.y * view.rotation[1].xyz + view.rotation[2].xyz);
 }
+
+// For the rasteriser's depth test (raster_offset.wgsl): the depth from the value of row c; a measure of depth that is
+// linear over the image of a plane, in [0, 1] and largest in front; and the cosine between the ray through an image
+// point and the camera's axis.
+fn depth_of(c: f32) -> f32 {
+    return 1.0 / max(c, 1.0 / view.farthest);
+}
+
+fn depth_order(z: f32) -> f32 {
+    return min(view.near / z, 1.0);
+}
+
+fn along_axis(image: vec2<f32>) -> f32 {
+    let d = (image - view.intrinsics.zw) / view.intrinsics.xy;
+    return inverseSqrt(1.0 + dot(d, d));
+}

@@ -56,6 +56,11 @@ fn footprint(splat: Splat, filter_: Filter, x: u32, y: u32) -> Fragment {
     return filtered(intersect(abc), abc, filter_, d);
 }
 
+// Depths times this power of two lie in (0, 1).
+fn depth_scale() -> f32 {
+    return 0.5 * bitcast<f32>(0x7f000000u - (bitcast<u32>(view.farthest) & 0x7f800000u));
+}
+
 // Pixels of the band; its buffers may have room for more.
 fn band_pixels() -> u32 {
     return band.rows * view.width;

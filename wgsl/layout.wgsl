@@ -73,6 +73,9 @@ struct Splat {
 
 const AWAY: u32 = 0x80000000u;
 
+// The nearest depth where nothing is: +inf.
+const NOTHING: u32 = 0x7f800000u;
+
 // The channel of a pixel's sums that holds the weight.
 const WEIGHT_CHANNEL: u32 = 0u;
 

@@ -33,7 +33,7 @@ fn resolve(
     let y = pixel / view.width + band.first_row;
     let out = pixel * IMAGE_WORDS;
     let weight = sum_at(pixel, WEIGHT_CHANNEL);
-    let front = bitcast<f32>(visible[pixel]);
+    let front = front_at(pixel);
     if (weight == 0.0) {
         write_color(out, view.background);
         write_normal(out, vec3<f32>(0.0));

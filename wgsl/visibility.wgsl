@@ -4,8 +4,6 @@
 @group(0) @binding(5) var<storage, read> projected: array<Splat>;
 @group(0) @binding(6) var<storage, read_write> nearest: array<atomic<u32>>;
 
-const NOTHING: u32 = 0x7f800000u; // +inf
-
 // Before the splats: one invocation a pixel.
 @compute @workgroup_size(WORKGROUP)
 fn clear(

@@ -39,6 +39,11 @@ impl<T: Pod> Buffer<T> {
         Ok(buffer)
     }
 
+    /// All of it, as a binding.
+    pub(crate) fn bound(&self) -> wgpu::BindingResource<'_> {
+        self.raw.as_entire_binding()
+    }
+
     /// Overwrites the first element.
     pub fn set(&self, gpu: &Gpu, value: &T) {
         gpu.queue.write_buffer(&self.raw, 0, bytemuck::bytes_of(value));

@@ -33,6 +33,8 @@ pub struct AdapterDescription {
     pub atomics_u64: bool,
     /// f32 atomic add in storage buffers.
     pub atomics_f32: bool,
+    /// Blending into targets of 32-bit floats.
+    pub blends_f32: bool,
     /// Subgroup operations.
     pub subgroups: bool,
     /// It has all that rendering needs.
@@ -62,6 +64,7 @@ impl AdapterDescription {
             timestamps: features.contains(wgpu::Features::TIMESTAMP_QUERY),
             atomics_u64: features.contains(wgpu::Features::SHADER_INT64 | wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS),
             atomics_f32: features.contains(wgpu::Features::SHADER_FLOAT32_ATOMIC),
+            blends_f32: features.contains(wgpu::Features::FLOAT32_BLENDABLE),
             subgroups: features.contains(wgpu::Features::SUBGROUP),
             usable: compute
                 && limits.max_storage_buffers_per_shader_stage >= STORAGE_BUFFERS
@@ -88,11 +91,12 @@ impl AdapterDescription {
 /// count, filters).
 pub const STORAGE_BUFFERS: u32 = 8;
 
-/// Features that are used where an adapter has them: GPU times, and atomics of some accumulators.
+/// Features that are used where an adapter has them: GPU times, atomics of some accumulators, and a format of blending.
 const OPTIONAL_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
     .union(wgpu::Features::SHADER_INT64)
     .union(wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS)
-    .union(wgpu::Features::SHADER_FLOAT32_ATOMIC);
+    .union(wgpu::Features::SHADER_FLOAT32_ATOMIC)
+    .union(wgpu::Features::FLOAT32_BLENDABLE);
 
 /// What to do about a missing adapter.
 pub const INSTALL_HINT: &str = "install a Vulkan driver (on Debian or Ubuntu without a GPU: \

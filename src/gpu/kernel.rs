@@ -1,7 +1,7 @@
 //! WGSL: named files are joined into one module per set of needs, bindings are found by name, overrides set by name.
 
 use std::borrow::Cow;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::device::Gpu;
@@ -24,6 +24,8 @@ pub const FILES: &[(&str, &str)] = wgsl![
     "accumulator_fixed_wide.wgsl",
     "accumulator_float.wgsl",
     "accumulator_packed64.wgsl",
+    "accumulator_raster.wgsl",
+    "blend.wgsl",
     "camera_orthographic.wgsl",
     "camera_pinhole.wgsl",
     "color_constant.wgsl",
@@ -34,6 +36,7 @@ pub const FILES: &[(&str, &str)] = wgsl![
     "count_absent.wgsl",
     "depth.wgsl",
     "depth_absent.wgsl",
+    "depth_whole.wgsl",
     "double.wgsl",
     "epsilon.wgsl",
     "epsilon_radius.wgsl",
@@ -52,6 +55,12 @@ pub const FILES: &[(&str, &str)] = wgsl![
     "normal_map.wgsl",
     "normal_map_absent.wgsl",
     "project.wgsl",
+    "raster.wgsl",
+    "raster_exact.wgsl",
+    "raster_offset.wgsl",
+    "raster_targets_1.wgsl",
+    "raster_targets_2.wgsl",
+    "raster_targets_3.wgsl",
     "resolve.wgsl",
     "rows.wgsl",
     "shade_lambert.wgsl",
@@ -116,12 +125,13 @@ pub(crate) struct Programs(Mutex<HashMap<ProgramKey, Arc<Program>>>);
 type ProgramKey = (String, Vec<(&'static str, u64)>);
 
 impl Programs {
-    /// The entry points `stages` of the module `text`; see [`Program::compile`].
+    /// The entry points `stages` of the module `text`, and `draws`, which follow from the text.
     pub(crate) fn get(
         &self,
         gpu: &Gpu,
         text: String,
         stages: &[&str],
+        draws: &[Draw],
         constants: &[(&'static str, f64)],
     ) -> Result<Arc<Program>> {
         let key = (text, constants.iter().map(|&(name, value)| (name, value.to_bits())).collect());
@@ -130,22 +140,34 @@ impl Programs {
         if let Some(program) = programs.get(&key) {
             return Ok(Arc::clone(program));
         }
-        let program = Arc::new(Program::compile(gpu, key.0.clone(), stages, constants)?);
+        let program = Arc::new(Program::compile(gpu, key.0.clone(), stages, draws, constants)?);
         programs.insert(key, Arc::clone(&program));
         Ok(program)
     }
 }
 
+/// A render pipeline to compile: the rasteriser's part of a program.
+pub(crate) struct Draw {
+    pub(crate) name: &'static str,
+    pub(crate) vertex: &'static str,
+    pub(crate) fragment: &'static str,
+    pub(crate) targets: Vec<wgpu::ColorTargetState>,
+    pub(crate) depth: Option<wgpu::DepthStencilState>,
+    /// Set beside the program's constants.
+    pub(crate) constant: Option<(&'static str, f64)>,
+}
+
 /// The compiled kernels of a render.
 pub struct Program {
     pipelines: BTreeMap<String, wgpu::ComputePipeline>,
+    draws: BTreeMap<String, wgpu::RenderPipeline>,
     bindings: Bindings,
 }
 
 impl Program {
-    /// Compiles the entry points `stages` of the module `text`. Of `constants` those are set that it declares.
-    pub fn compile(gpu: &Gpu, text: String, stages: &[&str], constants: &[(&str, f64)]) -> Result<Self> {
-        let (_, bindings, declared) =
+    /// Compiles the entry points `stages` of the module `text`, and `draws`. Of `constants` those are set that it declares.
+    fn compile(gpu: &Gpu, text: String, stages: &[&str], draws: &[Draw], constants: &[(&str, f64)]) -> Result<Self> {
+        let (_, mut bindings, declared) =
             reflect(&text).map_err(|e| gpu.error(format!("a kernel is not valid WGSL: {e}")))?;
         let constants: Vec<_> =
             constants.iter().copied().filter(|(name, _)| declared.iter().any(|d| d == name)).collect();
@@ -170,38 +192,80 @@ impl Program {
             });
             pipelines.insert(stage.to_owned(), pipeline);
         }
+        let mut drawn = BTreeMap::new();
+        for draw in draws {
+            let extra = draw.constant.filter(|(name, _)| declared.iter().any(|d| d == name));
+            let constants: Vec<_> = constants.iter().copied().chain(extra).collect();
+            let compilation_options = wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() };
+            let targets: Vec<_> = draw.targets.iter().cloned().map(Some).collect();
+            let pipeline = gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some(draw.name),
+                layout: None,
+                vertex: wgpu::VertexState {
+                    module: &module,
+                    entry_point: Some(draw.vertex),
+                    compilation_options: compilation_options.clone(),
+                    buffers: &[],
+                },
+                primitive: wgpu::PrimitiveState {
+                    topology: wgpu::PrimitiveTopology::TriangleStrip,
+                    ..Default::default()
+                },
+                depth_stencil: draw.depth.clone(),
+                multisample: Default::default(),
+                fragment: Some(wgpu::FragmentState {
+                    module: &module,
+                    entry_point: Some(draw.fragment),
+                    compilation_options,
+                    targets: &targets,
+                }),
+                multiview_mask: None,
+                cache: None,
+            });
+            let of = |entry: &str| bindings.get(entry).cloned().unwrap_or_default();
+            let both: BTreeSet<_> = of(draw.vertex).into_iter().chain(of(draw.fragment)).collect();
+            bindings.insert(draw.name.to_owned(), both.into_iter().collect());
+            drawn.insert(draw.name.to_owned(), pipeline);
+        }
         if let Some(error) = pollster::block_on(guard.pop()) {
             return Err(gpu.error(format!("the driver refused a kernel: {error}")));
         }
-        Ok(Self { pipelines, bindings })
+        Ok(Self { pipelines, draws: drawn, bindings })
     }
 
-    /// Dispatches `stage` over `grid` with `buffers` bound by name: each of the stage's variables must be among them,
-    /// others are ignored.
+    /// What `stage` binds of `bound`, by name: each of its variables must be among them, others are ignored.
+    fn group(
+        &self,
+        gpu: &Gpu,
+        stage: &str,
+        layout: &wgpu::BindGroupLayout,
+        bound: &[(&str, wgpu::BindingResource<'_>)],
+    ) -> Result<wgpu::BindGroup> {
+        let variables = self.bindings.get(stage).map_or(&[][..], Vec::as_slice);
+        let mut entries = Vec::with_capacity(variables.len());
+        for (name, binding) in variables {
+            let (_, resource) = bound
+                .iter()
+                .find(|(given, _)| given == name)
+                .ok_or_else(|| gpu.error(format!("the kernel {stage} needs a buffer {name}")))?;
+            entries.push(wgpu::BindGroupEntry { binding: *binding, resource: resource.clone() });
+        }
+        Ok(gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(stage), layout, entries: &entries }))
+    }
+
+    /// Dispatches `stage` over `grid`.
     pub(crate) fn dispatch(
         &self,
         gpu: &Gpu,
         pass: &mut wgpu::ComputePass<'_>,
         stage: &str,
-        buffers: &[(&str, &wgpu::Buffer)],
+        bound: &[(&str, wgpu::BindingResource<'_>)],
         grid: Grid<'_>,
     ) -> Result<()> {
-        let (Some(pipeline), Some(variables)) = (self.pipelines.get(stage), self.bindings.get(stage)) else {
+        let Some(pipeline) = self.pipelines.get(stage) else {
             return Err(gpu.error(format!("there is no kernel {stage}")));
         };
-        let mut entries = Vec::with_capacity(variables.len());
-        for (name, binding) in variables {
-            let (_, buffer) = buffers
-                .iter()
-                .find(|(given, _)| given == name)
-                .ok_or_else(|| gpu.error(format!("the kernel {stage} needs a buffer {name}")))?;
-            entries.push(wgpu::BindGroupEntry { binding: *binding, resource: buffer.as_entire_binding() });
-        }
-        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some(stage),
-            layout: &pipeline.get_bind_group_layout(0),
-            entries: &entries,
-        });
+        let group = self.group(gpu, stage, &pipeline.get_bind_group_layout(0), bound)?;
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, &group, &[]);
         match grid {
@@ -212,8 +276,29 @@ impl Program {
     }
 }
 
-/// Buffers by the names of the variables they are bound to.
-pub(crate) type Bound<'a> = Vec<(&'a str, &'a wgpu::Buffer)>;
+impl Program {
+    /// Draws `instances` quads by the pipeline `name`.
+    pub(crate) fn draw(
+        &self,
+        gpu: &Gpu,
+        pass: &mut wgpu::RenderPass<'_>,
+        name: &str,
+        bound: &[(&str, wgpu::BindingResource<'_>)],
+        instances: u32,
+    ) -> Result<()> {
+        let Some(pipeline) = self.draws.get(name) else {
+            return Err(gpu.error(format!("there is no pipeline {name}")));
+        };
+        let group = self.group(gpu, name, &pipeline.get_bind_group_layout(0), bound)?;
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, &group, &[]);
+        pass.draw(0..4, 0..instances);
+        Ok(())
+    }
+}
+
+/// Buffers and textures by the names of the variables they are bound to.
+pub(crate) type Bound<'a> = Vec<(&'a str, wgpu::BindingResource<'a>)>;
 
 /// The workgroups of a dispatch.
 pub(crate) enum Grid<'a> {

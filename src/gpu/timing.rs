@@ -63,6 +63,37 @@ impl Timing {
         });
         record(&mut pass)?;
         drop(pass);
+        self.submit(gpu, stage, encoder)
+    }
+
+    /// Records a render pass into `targets` and `depth` that counts as `stage`, and submits it.
+    pub(crate) fn draw(
+        &mut self,
+        gpu: &Gpu,
+        stage: &'static str,
+        targets: &[Option<wgpu::RenderPassColorAttachment<'_>>],
+        depth: Option<wgpu::RenderPassDepthStencilAttachment<'_>>,
+        record: impl FnOnce(&mut wgpu::RenderPass<'_>) -> Result<()>,
+    ) -> Result<()> {
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let first = 2 * self.stages.len() as u32;
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some(stage),
+            color_attachments: targets,
+            depth_stencil_attachment: depth,
+            timestamp_writes: self.queries.as_ref().map(|(set, _)| wgpu::RenderPassTimestampWrites {
+                query_set: set,
+                beginning_of_pass_write_index: Some(first),
+                end_of_pass_write_index: Some(first + 1),
+            }),
+            ..Default::default()
+        });
+        record(&mut pass)?;
+        drop(pass);
+        self.submit(gpu, stage, encoder)
+    }
+
+    fn submit(&mut self, gpu: &Gpu, stage: &'static str, encoder: wgpu::CommandEncoder) -> Result<()> {
         self.stages.push(stage);
         let start = Instant::now();
         gpu.queue.submit([encoder.finish()]);

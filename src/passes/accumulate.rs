@@ -274,7 +274,8 @@ pub fn record(
     buffer: &AttributeBuffer,
 ) -> Result<()> {
     let words = recorder.variant.sum_words();
-    let buffers = [("visible", &visible.nearest.raw), ("sums", &buffer.sums.raw), ("overflows", &buffer.overflows.raw)];
+    let buffers =
+        [("visible", visible.nearest.bound()), ("sums", buffer.sums.bound()), ("overflows", buffer.overflows.bound())];
     splats.dispatch(recorder, ("accumulate", "accumulate_large"), rows, &buffers, |encoder| {
         let bytes = rows.pixels * u64::from(words) * 4;
         encoder.clear_buffer(&buffer.sums.raw, 0, Some(bytes));

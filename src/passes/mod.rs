@@ -15,6 +15,7 @@ pub mod accumulate;
 pub mod footprint;
 pub mod lowpass;
 pub mod project;
+pub mod raster;
 pub mod resolve;
 pub mod upload;
 pub mod variant;

@@ -258,7 +258,7 @@ pub struct SplatPage {
 /// Records the projection of every page.
 pub fn record(recorder: &mut Recorder<'_>, buffer: &SplatBuffer) -> Result<()> {
     let (gpu, program) = (recorder.gpu, recorder.program);
-    let view = &recorder.view.raw;
+    let view = recorder.view.bound();
     recorder.timing.pass(
         gpu,
         "project",
@@ -270,12 +270,12 @@ pub fn record(recorder: &mut Recorder<'_>, buffer: &SplatBuffer) -> Result<()> {
         |pass| {
             for (surfels, page) in buffer.surfels.pages.iter().zip(&buffer.pages) {
                 let mut buffers = vec![
-                    ("view", view),
-                    ("surfels", &surfels.surfels.raw),
-                    ("splats", &page.splats.raw),
-                    ("queue", &page.queue.raw),
+                    ("view", view.clone()),
+                    ("surfels", surfels.surfels.bound()),
+                    ("splats", page.splats.bound()),
+                    ("queue", page.queue.bound()),
                 ];
-                buffers.extend(page.filters.as_ref().map(|filters| ("filters", &filters.raw)));
+                buffers.extend(page.filters.as_ref().map(|filters| ("filters", filters.bound())));
                 program.dispatch(gpu, pass, "project", &buffers, Grid::Of(grid(gpu, surfels.surfels.len)?))?;
                 program.dispatch(gpu, pass, "arrange", &buffers, Grid::Of((1, 1)))?;
             }
@@ -312,14 +312,17 @@ impl SplatBuffer {
     }
 
     /// What a stage over the splats of page `index` may bind, beside its own `buffers`.
-    pub(crate) fn bindings<'a>(&'a self, index: usize, buffers: &[(&'a str, &'a wgpu::Buffer)]) -> Bound<'a> {
+    pub(crate) fn bindings<'a>(&'a self, index: usize, buffers: &[(&'a str, wgpu::BindingResource<'a>)]) -> Bound<'a> {
         let (surfels, page) = (&self.surfels.pages[index], &self.pages[index]);
-        let mut bound =
-            vec![("projected", &page.splats.raw), ("queued", &page.queue.raw), ("surfels", &surfels.surfels.raw)];
+        let mut bound = vec![
+            ("projected", page.splats.bound()),
+            ("queued", page.queue.bound()),
+            ("surfels", surfels.surfels.bound()),
+        ];
         bound.extend_from_slice(buffers);
-        bound.extend(page.filters.as_ref().map(|filters| ("projected_filters", &filters.raw)));
-        bound.extend(surfels.colors.as_ref().map(|colors| ("colors", colors)));
-        bound.extend(self.surfels.srgb_to_linear.as_ref().map(|table| ("srgb_to_linear", &table.raw)));
+        bound.extend(page.filters.as_ref().map(|filters| ("projected_filters", filters.bound())));
+        bound.extend(surfels.colors.as_ref().map(|colors| ("colors", colors.as_entire_binding())));
+        bound.extend(self.surfels.srgb_to_linear.as_ref().map(|table| ("srgb_to_linear", table.bound())));
         bound
     }
 
@@ -329,11 +332,11 @@ impl SplatBuffer {
         recorder: &mut Recorder<'_>,
         (stage, large): (&'static str, &'static str),
         rows: &Rows,
-        buffers: &[(&str, &wgpu::Buffer)],
+        buffers: &[(&str, wgpu::BindingResource<'_>)],
         before: impl FnOnce(&mut wgpu::CommandEncoder),
     ) -> Result<()> {
         let (gpu, program) = (recorder.gpu, recorder.program);
-        let mut own = vec![("view", &recorder.view.raw), ("band", &rows.uniform.raw)];
+        let mut own = vec![("view", recorder.view.bound()), ("band", rows.uniform.bound())];
         own.extend_from_slice(buffers);
         recorder.timing.pass(gpu, stage, before, |pass| {
             for (index, page) in self.pages.iter().enumerate() {

@@ -3,15 +3,14 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::accumulate::{AttributeBuffer, PixelSums};
+use super::accumulate::PixelSums;
 use super::variant::Variant;
-use super::visibility::VisibilityBuffer;
 use super::{Recorder, Rows};
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::{Buffer, Readback};
-use crate::gpu::kernel::{Grid, grid};
+use crate::gpu::kernel::{Bound, Grid, grid};
 use crate::scene::{Camera, Light, RenderOptions, Shading};
 
 /// The twin: resolves `sums`, which start at row `first_row` of the image, into `frame`, which holds just their rows.
@@ -98,30 +97,16 @@ impl ImageBuffer {
     }
 }
 
-/// Records the pass over `rows`.
-pub fn record(
-    recorder: &mut Recorder<'_>,
-    rows: &Rows,
-    visible: &VisibilityBuffer,
-    sums: &AttributeBuffer,
-    buffer: &ImageBuffer,
-) -> Result<()> {
+/// Records the pass over `rows` of the sums that `bound` binds.
+pub fn record(recorder: &mut Recorder<'_>, rows: &Rows, bound: Bound<'_>, buffer: &ImageBuffer) -> Result<()> {
     let (gpu, program) = (recorder.gpu, recorder.program);
-    let view = &recorder.view.raw;
+    let own = [("view", recorder.view.bound()), ("band", rows.uniform.bound()), ("image", buffer.image.bound())];
+    let bound: Bound<'_> = own.into_iter().chain(bound).collect();
     recorder.timing.pass(
         gpu,
         "resolve",
         |_| {},
-        |pass| {
-            let buffers = [
-                ("view", view),
-                ("band", &rows.uniform.raw),
-                ("visible", &visible.nearest.raw),
-                ("sums", &sums.sums.raw),
-                ("image", &buffer.image.raw),
-            ];
-            program.dispatch(gpu, pass, "resolve", &buffers, Grid::Of(grid(gpu, rows.pixels)?))
-        },
+        |pass| program.dispatch(gpu, pass, "resolve", &bound, Grid::Of(grid(gpu, rows.pixels)?)),
     )
 }
 

@@ -4,14 +4,22 @@
 use std::sync::Arc;
 
 use super::accumulate::{Accumulator, WIDE_FILE, accumulator};
-use super::lowpass;
+use super::{lowpass, raster};
 use crate::error::Result;
 use crate::gpu::kernel::Program;
 use crate::gpu::layout::LARGE;
 use crate::gpu::{Gpu, Sources};
-use crate::scene::{ColorNeed, Kernel, KernelShape, LowPass, Projection, RenderOptions, SceneNeeds};
+use crate::scene::{ColorNeed, Kernel, KernelShape, LowPass, Projection, RasterDepth, RenderOptions, SceneNeeds};
 
-/// The entry points of the stages, in order.
+/// The entry points that a render with `needs` dispatches, in order.
+pub fn stages(needs: &SceneNeeds) -> &'static [&'static str] {
+    match needs.raster {
+        None => &STAGES,
+        Some(_) => &["project", "arrange", "resolve"],
+    }
+}
+
+/// The entry points of the stages on compute kernels alone.
 pub const STAGES: [&str; 8] =
     ["project", "arrange", "clear", "visibility", "visibility_large", "accumulate", "accumulate_large", "resolve"];
 
@@ -38,12 +46,13 @@ impl Variant {
 
     /// The compiled kernels; `gpu` keeps them.
     pub fn compile(&self, gpu: &Gpu, sources: &Sources) -> Result<Arc<Program>> {
-        gpu.programs.get(gpu, sources.join(&files(&self.needs)), &STAGES, &self.constants)
+        let draws = self.needs.raster.map_or_else(Vec::new, |raster| raster::draws(raster, self.pixel));
+        gpu.programs.get(gpu, sources.join(&files(&self.needs)), stages(&self.needs), &draws, &self.constants)
     }
 
-    /// u32 words of a pixel's sums.
+    /// u32 words of a pixel's sums in storage; the rasteriser's are in textures.
     pub fn sum_words(&self) -> u32 {
-        self.pixel.channels * self.accumulator.words
+        if self.needs.raster.is_some() { 0 } else { self.pixel.channels * self.accumulator.words }
     }
 }
 
@@ -60,8 +69,7 @@ pub fn files(needs: &SceneNeeds) -> Vec<&'static str> {
         },
         "project.wgsl",
         "footprint.wgsl",
-        "visibility.wgsl",
-        "accumulate.wgsl",
+        "blend.wgsl",
         pick(needs.epsilon_radius, "epsilon_radius.wgsl", "epsilon.wgsl"),
         match needs.kernel {
             KernelShape::Gaussian => "kernel_gaussian.wgsl",
@@ -69,15 +77,34 @@ pub fn files(needs: &SceneNeeds) -> Vec<&'static str> {
             KernelShape::Hat => "kernel_hat.wgsl",
             KernelShape::Constant => "kernel_constant.wgsl",
         },
-        if needs.wide_sums { WIDE_FILE } else { accumulator(needs.accumulator).map_or("", |row| row.file) },
         "resolve.wgsl",
         pick(needs.normal, "normal.wgsl", "normal_absent.wgsl"),
         pick(needs.normal_map, "normal_map.wgsl", "normal_map_absent.wgsl"),
-        pick(needs.depth, "depth.wgsl", "depth_absent.wgsl"),
         pick(needs.weight_map, "weight_map.wgsl", "weight_map_absent.wgsl"),
         pick(needs.count, "count.wgsl", "count_absent.wgsl"),
         pick(needs.lambert, "shade_lambert.wgsl", "shade_unlit.wgsl"),
     ];
+    let depth = match needs.raster {
+        None => {
+            let row = accumulator(needs.accumulator).map_or("", |row| row.file);
+            files.extend(["visibility.wgsl", "accumulate.wgsl", pick(needs.wide_sums, WIDE_FILE, row)]);
+            "depth.wgsl"
+        }
+        Some(raster) => {
+            files.extend(["raster.wgsl", "accumulator_raster.wgsl", raster::targets_file(needs)]);
+            match raster.depth {
+                RasterDepth::Exact => {
+                    files.push("raster_exact.wgsl");
+                    "depth.wgsl"
+                }
+                RasterDepth::Offset | RasterDepth::Ray => {
+                    files.push("raster_offset.wgsl");
+                    "depth_whole.wgsl"
+                }
+            }
+        }
+    };
+    files.push(pick(needs.depth, depth, "depth_absent.wgsl"));
     match needs.low_pass {
         LowPass::None => files.push("lowpass_none.wgsl"),
         LowPass::Max => files.extend(["filter.wgsl", "lowpass_max.wgsl"]),
@@ -176,6 +203,10 @@ pub fn overrides(needs: &SceneNeeds, options: &RenderOptions, fraction_bits: u32
             constants.extend([("KERNEL_A", a), ("KERNEL_N", n), ("KERNEL_STEP", step)]);
         }
         Kernel::Hat | Kernel::Constant => {}
+    }
+    if let Some(raster) = needs.raster {
+        constants.push(("BLEND_SCALE", raster::blend_scale(raster.format)));
+        constants.push(("ALONG_RAY", u32::from(raster.depth == RasterDepth::Ray).into()));
     }
     if needs.low_pass == LowPass::Ewa {
         constants.push(("FILTER_BLUR", lowpass::blur(options.kernel)));

@@ -51,13 +51,13 @@ impl VisibilityBuffer {
 /// Records the pass over `rows`.
 pub fn record(recorder: &mut Recorder<'_>, splats: &SplatBuffer, rows: &Rows, buffer: &VisibilityBuffer) -> Result<()> {
     let (gpu, program) = (recorder.gpu, recorder.program);
-    let buffers = [("nearest", &buffer.nearest.raw)];
+    let buffers = [("nearest", buffer.nearest.bound())];
     recorder.timing.pass(
         gpu,
         "visibility",
         |_| {},
         |pass| {
-            let bound = [("view", &recorder.view.raw), ("band", &rows.uniform.raw), buffers[0]];
+            let bound = [("view", recorder.view.bound()), ("band", rows.uniform.bound()), buffers[0].clone()];
             program.dispatch(gpu, pass, "clear", &bound, Grid::Of(grid(gpu, rows.pixels)?))
         },
     )?;

@@ -1,6 +1,8 @@
 //! What a scene and its options need, computed once: the only variant key of the kernels.
 
-use super::{Camera, Colors, Epsilon, KernelShape, LowPass, Projection, RenderOptions, Scene, Shading};
+use super::{
+    Camera, Colors, Epsilon, KernelShape, LowPass, Projection, Raster, RasterDepth, RenderOptions, Scene, Shading,
+};
 
 /// Where a surfel's colour comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -23,6 +25,8 @@ pub struct SceneNeeds {
     /// The accumulator is `fixed` and terms may be small: alphas differ, so that means are divided by a small mean alpha;
     /// or a fragment's weight may be less than [`SMALL_WEIGHT`]. Then terms keep 40 bits.
     pub wide_sums: bool,
+    /// Sums are the rasteriser's.
+    pub raster: Option<Raster>,
     /// The kernel's formula.
     pub kernel: KernelShape,
     /// The filter for small splats.
@@ -73,7 +77,10 @@ impl SceneNeeds {
         Self {
             projection: camera.projection,
             accumulator: options.accumulator,
-            wide_sums: options.accumulator == "fixed" && (low[3] != high[3] || may_be_small(options)),
+            wide_sums: options.raster.is_none()
+                && options.accumulator == "fixed"
+                && (low[3] != high[3] || may_be_small(options)),
+            raster: options.raster,
             kernel: options.kernel.shape(),
             low_pass: options.low_pass,
             epsilon_radius: matches!(options.epsilon, Epsilon::Radius(_)),
@@ -107,6 +114,11 @@ impl SceneNeeds {
             KernelShape::Hat => "kernel-hat",
             KernelShape::Constant => "kernel-constant",
         };
+        let raster = self.raster.map(|raster| match raster.depth {
+            RasterDepth::Exact => "raster-exact",
+            RasterDepth::Offset => "raster-offset",
+            RasterDepth::Ray => "raster-ray",
+        });
         let flags = [
             (self.low_pass == LowPass::Max, "lowpass-max"),
             (self.low_pass == LowPass::Ewa, "lowpass-ewa"),
@@ -124,6 +136,7 @@ impl SceneNeeds {
         ];
         [projection, kernel, color]
             .into_iter()
+            .chain(raster)
             .chain(flags.into_iter().filter(|(on, _)| *on).map(|(_, name)| name))
             .collect()
     }

@@ -1,0 +1,40 @@
+// Sums by the rasteriser's blender, four channels a target: a fragment's terms are gathered, then returned at once. What
+// blending makes of them depends on the format, and on the order. Bounds: src/passes/raster.rs.
+
+// What terms are multiplied with, so that the sums of formats that end at 1 do not.
+override BLEND_SCALE: f32;
+
+alias Term = f32;
+const COUNT_ONE: Term = 1.0;
+
+var<private> terms: array<f32, 12>;
+
+fn quantise(weight: f32) -> Term {
+    return weight;
+}
+
+fn term(weight: Term, value: f32) -> Term {
+    return weight * clamp(value, 0.0, 1.0);
+}
+
+fn add(pixel: u32, channel: u32, value: Term) {
+    terms[channel] = value;
+}
+
+fn add_pair(pixel: u32, channel: u32, first: Term, second: Term) {
+    add(pixel, channel, first);
+    add(pixel, channel + 1u, second);
+}
+
+fn four_terms(first: u32) -> vec4<f32> {
+    return BLEND_SCALE * vec4<f32>(terms[first], terms[first + 1u], terms[first + 2u], terms[first + 3u]);
+}
+
+fn sum_at(pixel: u32, channel: u32) -> f32 {
+    let place = vec2<u32>(pixel % view.width, pixel / view.width + band.first_row);
+    return target_at(place, channel / 4u)[channel % 4u] / BLEND_SCALE;
+}
+
+fn weight_at(pixel: u32) -> f32 {
+    return sum_at(pixel, WEIGHT_CHANNEL);
+}

@@ -1,0 +1,24 @@
+// What an accepted fragment adds to its pixel's sums, whoever keeps them: the attribute pass of compute (accumulate.wgsl)
+// or of the rasteriser (raster.wgsl). Twin: src/passes/accumulate.rs.
+
+// 2^-10: see LEAST_WEIGHT in src/scene/options.rs.
+const LEAST_WEIGHT: f32 = 0.0009765625;
+
+struct Attributes {
+    color: vec4<f32>,
+    normal: vec3<f32>,
+    // Device units; 0 where epsilon does not depend on it.
+    radius: f32,
+}
+
+fn attributes_of(index: u32, splat: Splat) -> Attributes {
+    return Attributes(color_of(index), normal_of(index, splat), radius_of(index));
+}
+
+fn blend(pixel: u32, fragment: Fragment, front: f32, attributes: Attributes) {
+    let weight = quantise(clamp(fragment.gain * kernel_weight(fragment.rho2), LEAST_WEIGHT, 1.0));
+    accumulate_color(pixel, weight, attributes.color);
+    accumulate_normal(pixel, weight, attributes.normal);
+    accumulate_depth(pixel, weight, fragment.depth, front);
+    accumulate_count(pixel);
+}

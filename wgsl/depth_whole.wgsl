@@ -1,0 +1,18 @@
+// Depth where the nearest one is not known while summing: as a fraction of the farthest there is, so that its error is
+// that of the scene's depth, not of epsilon. Twin: src/passes/accumulate.rs, src/passes/resolve.rs.
+
+override DEPTH_CHANNEL: u32;
+override DEPTH_IMAGE: u32;
+
+fn accumulate_depth(pixel: u32, weight: Term, depth: f32, front: f32) {
+    add(pixel, DEPTH_CHANNEL, term(weight, depth / view.farthest));
+}
+
+fn write_depth(out: u32, pixel: u32, weight: f32, front: f32) {
+    image[out + DEPTH_IMAGE] = sum_at(pixel, DEPTH_CHANNEL) / weight * view.farthest * view.world;
+}
+
+// +inf.
+fn write_no_depth(out: u32) {
+    image[out + DEPTH_IMAGE] = bitcast<f32>(NOTHING ^ view.zero);
+}

@@ -1,0 +1,15 @@
+// The blended sums of up to four channels.
+
+@group(0) @binding(8) var sums_0: texture_2d<f32>;
+
+struct Targets {
+    @location(0) sums_0: vec4<f32>,
+}
+
+fn targets() -> Targets {
+    return Targets(four_terms(0u));
+}
+
+fn target_at(place: vec2<u32>, index: u32) -> vec4<f32> {
+    return textureLoad(sums_0, place, 0);
+}

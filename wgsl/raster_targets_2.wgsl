@@ -1,0 +1,24 @@
+// The blended sums of up to eight channels.
+
+@group(0) @binding(8) var sums_0: texture_2d<f32>;
+@group(0) @binding(17) var sums_1: texture_2d<f32>;
+
+struct Targets {
+    @location(0) sums_0: vec4<f32>,
+    @location(1) sums_1: vec4<f32>,
+}
+
+fn targets() -> Targets {
+    return Targets(four_terms(0u), four_terms(4u));
+}
+
+fn target_at(place: vec2<u32>, index: u32) -> vec4<f32> {
+    switch index {
+        case 0u: {
+            return textureLoad(sums_0, place, 0);
+        }
+        default: {
+            return textureLoad(sums_1, place, 0);
+        }
+    }
+}

@@ -63,6 +63,14 @@ pub enum Error {
         /// What it reported.
         what: String,
     },
+    /// A benchmark study ran to its end, but its configurations did not do what it says they do.
+    #[error("the study {name} failed: {what}")]
+    Study {
+        /// The study's name.
+        name: String,
+        /// Which configuration on which scene, and in what.
+        what: String,
+    },
 }
 
 impl Error {

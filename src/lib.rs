@@ -33,6 +33,7 @@
 //! # Ok::<(), epsplat::Error>(())
 //! ```
 
+pub mod bench;
 pub mod error;
 pub mod frame;
 pub mod gpu;

@@ -74,6 +74,15 @@ pub struct Report {
     pub needs: Vec<&'static str>,
 }
 
+/// Device memory of a render, bytes: its buffers and textures, and what the host reads frames through.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DeviceBytes {
+    /// Of the surfels and their splats.
+    pub splats: u64,
+    /// Of the pixels: nearest depths, sums, image.
+    pub pixels: u64,
+}
+
 /// Renders `scene` once.
 ///
 /// # Errors
@@ -98,6 +107,7 @@ pub struct Renderer<'a> {
     color_range: ([f32; 4], [f32; 4]),
     splats: Option<SplatBuffer>,
     pixels: Option<PixelBuffers>,
+    held: DeviceBytes,
 }
 
 /// The buffers of a frame's pixels.
@@ -138,7 +148,16 @@ impl<'a> Renderer<'a> {
             return Err(Error::Usage("the decision map is made by the reference backend only".into()));
         }
         let (bounds, color_range) = (scene.bounds(), scene.color_range());
-        Ok(Self { scene, options, backend, bounds, color_range, splats: None, pixels: None })
+        Ok(Self {
+            scene,
+            options,
+            backend,
+            bounds,
+            color_range,
+            splats: None,
+            pixels: None,
+            held: DeviceBytes::default(),
+        })
     }
 
     /// One frame.
@@ -150,6 +169,11 @@ impl<'a> Renderer<'a> {
             Backend::Gpu { gpu, sources } => self.on_gpu(gpu, sources, camera, progress),
             Backend::Reference => Ok(reference::frame(self.scene, camera, self.options, progress)),
         }
+    }
+
+    /// Device memory that the last frame was rendered with; none for the reference.
+    pub fn device_bytes(&self) -> DeviceBytes {
+        self.held
     }
 
     fn on_gpu(
@@ -181,6 +205,7 @@ impl<'a> Renderer<'a> {
                 PixelBuffers::new(gpu, self, camera, &variant)?
             }
         };
+        self.held = DeviceBytes { splats: splats.bytes(), pixels: pixels.bytes() };
         progress.begin("rendering rows", camera.height.into());
         let start = Instant::now();
         pixels.view.set(gpu, &self.view(camera));
@@ -214,7 +239,9 @@ impl<'a> Renderer<'a> {
             // The device's memory is free again before the second try.
             drop((pixels, splats));
             let exact = RenderOptions { accumulator: ACCUMULATORS[0].name, ..self.options.clone() };
-            let (frame, report) = Renderer::new(self.scene, &exact, self.backend)?.frame(camera, progress)?;
+            let mut again = Renderer::new(self.scene, &exact, self.backend)?;
+            let (frame, report) = again.frame(camera, progress)?;
+            self.held = again.held;
             return Ok((frame, Report { overflows, total_ms: report.total_ms + total_ms, ..report }));
         }
         let clock = if recorder.timing.on_device() { "timestamps" } else { "wall" };
@@ -258,6 +285,15 @@ impl PixelBuffers {
             image: ImageBuffer::new(gpu, variant, most)?,
             view: Buffer::uniform(gpu, "view", &renderer.view(camera))?,
         })
+    }
+
+    fn bytes(&self) -> u64 {
+        let sums = match &self.sums {
+            Sums::Storage(nearest, sums) => nearest.nearest.bytes() + sums.bytes(),
+            Sums::Targets(_, targets) => targets.bytes,
+        };
+        let uniforms = self.view.bytes() + self.bands.iter().map(|rows| rows.uniform.bytes()).sum::<u64>();
+        sums + self.image.bytes() + uniforms
     }
 }
 

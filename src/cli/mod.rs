@@ -1,6 +1,7 @@
 //! One file per subcommand; no maths.
 
 mod adapters;
+mod bench;
 mod compare;
 mod generate;
 mod hardcases;
@@ -34,6 +35,7 @@ enum Command {
     Info(info::Arguments),
     Adapters(adapters::Arguments),
     Hardcases(hardcases::Arguments),
+    Bench(bench::Arguments),
 }
 
 /// Runs the command line and says how it ended.
@@ -45,6 +47,7 @@ pub fn run() -> ExitCode {
         Command::Info(arguments) => info::run(&arguments),
         Command::Adapters(arguments) => adapters::run(&arguments),
         Command::Hardcases(arguments) => hardcases::run(&arguments),
+        Command::Bench(arguments) => bench::run(&arguments),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -44,6 +44,11 @@ impl<T: Pod> Buffer<T> {
         self.raw.as_entire_binding()
     }
 
+    /// Device memory that it takes, bytes.
+    pub fn bytes(&self) -> u64 {
+        self.raw.size()
+    }
+
     /// Overwrites the first element.
     pub fn set(&self, gpu: &Gpu, value: &T) {
         gpu.queue.write_buffer(&self.raw, 0, bytemuck::bytes_of(value));
@@ -129,6 +134,11 @@ impl Readback {
             mapped_at_creation: false,
         });
         Self { staging, step }
+    }
+
+    /// Memory that it takes, bytes.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.staging.size()
     }
 
     /// Calls `piece` with the place and the bytes of each piece of the first `len` elements of `buffer`.

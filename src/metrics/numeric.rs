@@ -30,6 +30,12 @@ pub struct Comparison {
     /// [`DECISION_MARGIN`] of a decision.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub excused: Option<f64>,
+    /// [`rmse`](Self::rmse) over the pixels that are not excused; only if there is a `decision` map.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rmse_decided: Option<f64>,
+    /// [`max_abs`](Self::max_abs) over the same.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_abs_decided: Option<f64>,
 }
 
 /// The error of one map, relative to the range that B's values span.
@@ -53,11 +59,16 @@ pub fn compare(a: &Frame, b: &Frame) -> Result<Comparison> {
     same_size(a, b)?;
     let pixels = a.color.len();
     let values = |color: &[f32; 4]| color.map(f64::from);
-    let color = ColorError::of(a.color.par_iter().zip(&b.color).map(|(a, b)| (values(a), values(b))));
+    let colors = a.color.par_iter().zip(&b.color).map(|(a, b)| (values(a), values(b)));
+    let color = ColorError::of(colors.clone());
     let uncovered = a.color.iter().zip(&b.color).filter(|(a, b)| (a[3] > 0.0) != (b[3] > 0.0)).count();
 
     let decision = b.decision.as_ref().or(a.decision.as_ref());
     let excused: Option<Vec<bool>> = decision.map(|map| map.iter().map(|d| *d < DECISION_MARGIN).collect());
+    let decided = excused.as_ref().map(|excused| {
+        let kept = colors.zip(excused).filter(|(_, excused)| !**excused);
+        ColorError::of(kept.map(|(pair, _)| pair))
+    });
     let rgb = |frame: &Frame| frame.color.iter().map(|c| [c[0], c[1], c[2]]).collect::<Vec<_>>();
     let alpha = |frame: &Frame| frame.color.iter().map(|c| [c[3]]).collect::<Vec<_>>();
     let mut maps = vec![
@@ -83,6 +94,8 @@ pub fn compare(a: &Frame, b: &Frame) -> Result<Comparison> {
         percentile_99_9: color.percentile_99_9,
         maps,
         excused: excused.map(|excused| excused.iter().filter(|e| **e).count() as f64 / pixels as f64),
+        rmse_decided: decided.as_ref().map(|error| error.rmse),
+        max_abs_decided: decided.as_ref().map(|error| error.max_abs),
     })
 }
 
@@ -161,7 +174,18 @@ mod tests {
         assert_eq!(c.excused, Some(1.0 / 3.0));
         assert_eq!(c.maps[0].max_of_range_decided, Some(1.0));
         b.decision = Some(vec![1e-8, 1.0, 1.0]);
-        assert_eq!(compare(&a, &b).unwrap().maps[0].max_of_range_decided, Some(0.5));
+        let c = compare(&a, &b).unwrap();
+        assert_eq!(c.maps[0].max_of_range_decided, Some(0.5));
+        // One value of the eight in two pixels differs by one half; over all three the first pixel counts too.
+        assert_eq!((c.max_abs, c.max_abs_decided), (1.0, Some(0.5)));
+        assert!((c.rmse_decided.unwrap() - (0.25f64 / 8.0).sqrt()).abs() < 1e-12 && c.rmse > 0.3);
+        b.decision = Some(vec![1e-8; 3]);
+        let c = compare(&a, &b).unwrap();
+        assert_eq!((c.excused, c.rmse_decided, c.max_abs_decided), (Some(1.0), Some(0.0), Some(0.0)));
+        b.decision = None;
+        let c = compare(&a, &b).unwrap();
+        assert_eq!((c.rmse_decided, c.max_abs_decided), (None, None));
+        assert!(!serde_json::to_string(&c).unwrap().contains("decided"));
         assert!(compare(&a, &frame(&[0.0])).is_err());
     }
 }

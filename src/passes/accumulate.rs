@@ -259,6 +259,11 @@ impl AttributeBuffer {
         })
     }
 
+    /// Device memory that it takes, bytes.
+    pub fn bytes(&self) -> u64 {
+        self.sums.bytes() + self.overflows.bytes()
+    }
+
     /// How often a sum wrapped: the image is wrong unless this is 0.
     pub fn overflows(&self, gpu: &Gpu) -> Result<u64> {
         Ok(self.overflows.read(gpu, 1)?.first().copied().unwrap_or(0).into())

@@ -307,6 +307,14 @@ impl SplatBuffer {
         Ok(Self { surfels, pages })
     }
 
+    /// Device memory that the splats and their surfels take, bytes.
+    pub fn bytes(&self) -> u64 {
+        let of_page = |page: &SplatPage| {
+            page.splats.bytes() + page.queue.bytes() + page.filters.as_ref().map_or(0, Buffer::bytes)
+        };
+        self.surfels.bytes() + self.pages.iter().map(of_page).sum::<u64>()
+    }
+
     /// Splats that may touch a pixel of the image. Waits for the projection.
     pub fn drawn(&self, gpu: &Gpu) -> Result<u64> {
         let mut drawn = 0;

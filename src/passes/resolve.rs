@@ -95,6 +95,11 @@ impl ImageBuffer {
         let readback = Readback::new(gpu, pixels * record * 4, record * 4);
         Ok(Self { image, readback })
     }
+
+    /// Memory that it takes, bytes, with what the host reads it through.
+    pub fn bytes(&self) -> u64 {
+        self.image.bytes() + self.readback.bytes()
+    }
 }
 
 /// Records the pass over `rows` of the sums that `bound` binds.

@@ -53,6 +53,12 @@ impl SurfelBuffer {
         progress.end();
         Ok(Self { pages, srgb_to_linear })
     }
+
+    /// Device memory that it takes, bytes.
+    pub fn bytes(&self) -> u64 {
+        let of_page = |page: &SurfelPage| page.surfels.bytes() + page.colors.as_ref().map_or(0, wgpu::Buffer::size);
+        self.pages.iter().map(of_page).sum::<u64>() + self.srgb_to_linear.as_ref().map_or(0, Buffer::bytes)
+    }
 }
 
 fn upload<T: Pod>(gpu: &Gpu, values: &[T]) -> Result<wgpu::Buffer> {

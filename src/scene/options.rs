@@ -156,7 +156,8 @@ impl FromStr for Kernel {
 }
 
 /// What is done about splats that are near a pixel in size or below.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum LowPass {
     /// Nothing: a pixel's centre lies in the disk or not.
     #[default]
@@ -169,7 +170,8 @@ pub enum LowPass {
 }
 
 /// How a resolved pixel gets its colour.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Shading {
     /// The blended colour as it is.
     Unlit,

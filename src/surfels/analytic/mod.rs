@@ -20,8 +20,8 @@ pub const TORUS_MINOR: f64 = 0.4;
 /// Squares of the checkerboard along each edge.
 pub const CHECKER_SQUARES: u32 = 32;
 
-/// Disk radius of a sample in units of the mean spacing.
-const RADIUS_IN_SPACINGS: f64 = 1.5;
+/// Disk radius of a sample in units of the mean spacing, the square root of the area that each sample stands for.
+pub const RADIUS_IN_SPACINGS: f64 = 1.5;
 
 /// A surface with a formula.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -1,0 +1,289 @@
+//! What a study is: scenes, configurations, and what is asked of them.
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
+
+use crate::error::{Error, Result};
+use crate::passes::accumulate::{ACCUMULATORS, Accumulator, accumulator};
+use crate::scene::{BlendFormat, Epsilon, Kernel, LowPass, Maps, Raster, RasterDepth, RenderOptions, Shading};
+use crate::surfels::analytic::Shape;
+
+/// A study: every configuration on every scene.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Definition {
+    /// A short name.
+    pub name: String,
+    /// One sentence that says what the study shows.
+    pub about: String,
+    /// Width and height of the images, pixels.
+    #[serde(default = "default_size")]
+    pub size: [u32; 2],
+    /// Timed runs of each configuration, after one to warm up.
+    #[serde(default = "default_runs")]
+    pub runs: u32,
+    /// The configuration that the others' times are given relative to.
+    pub baseline: Option<String>,
+    /// What a quick run takes instead.
+    #[serde(default)]
+    pub quick: Quick,
+    /// What is rendered.
+    #[serde(rename = "scene", default)]
+    pub scenes: Vec<SceneEntry>,
+    /// How.
+    #[serde(rename = "config", default)]
+    pub configs: Vec<Config>,
+    /// Where the scenes' files are: the folder of the definition.
+    #[serde(skip)]
+    pub(super) folder: PathBuf,
+}
+
+/// What a quick run takes instead; see [`Definition::quick_form`].
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Quick {
+    /// Timed runs.
+    pub runs: Option<u32>,
+    /// Width and height of the images, pixels.
+    pub size: Option<[u32; 2]>,
+}
+
+/// One scene, or a sweep: each `count` with each `footprint_px`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneEntry {
+    /// Its name.
+    pub name: String,
+    /// A point cloud or mesh, relative to the definition's folder. Either this or a shape.
+    pub file: Option<PathBuf>,
+    /// A generated surface: sphere, torus, plane or checkerboard.
+    #[serde(default, deserialize_with = "parsed")]
+    pub shape: Option<Shape>,
+    /// Surfels of the shape.
+    pub count: Option<OneOrMany<u64>>,
+    /// Disk radius of a shape's surfels in units of their mean spacing; the generator's by default.
+    pub radius: Option<f64>,
+    /// The mean radius of the splats, pixels, as if seen face-on: disks are enlarged or shrunk to it.
+    pub footprint_px: Option<OneOrMany<f64>>,
+    /// Leaves out what of a sweep would cover more pixels than this, counting `surfels * pi * footprint_px^2`.
+    pub most_fragments: Option<f64>,
+    /// Camera position, world units; else the scene is framed.
+    pub eye: Option<[f64; 3]>,
+    /// What the camera looks at, world units; else the scene's centre.
+    pub target: Option<[f64; 3]>,
+    /// Which way is up in the image.
+    pub up: Option<[f64; 3]>,
+    /// Vertical field of view, degrees.
+    pub fov: Option<f64>,
+    /// Orthographic: world units from the image's top to its bottom.
+    pub ortho: Option<f64>,
+    /// How large the scene is seen, of what it would be: 0.5 takes the camera twice as far away.
+    pub fill: Option<f64>,
+    /// Cameras on a circle around the scene's centre, the first of which is the one above.
+    #[serde(default = "one")]
+    pub views: u32,
+    /// Compare with ground truth by rays: of the shape, or of the triangles of an OBJ file.
+    #[serde(default)]
+    pub truth: bool,
+    /// The shading of configurations that choose none.
+    pub shading: Option<Shading>,
+    /// Surfels in a quick run.
+    pub quick_count: Option<OneOrMany<u64>>,
+    /// Splats' mean radius in a quick run, pixels.
+    pub quick_footprint_px: Option<OneOrMany<f64>>,
+    /// Whether a quick run has it.
+    #[serde(default = "yes")]
+    pub quick: bool,
+}
+
+/// One way to render. What it does not say is as for `epsplat render`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// Its name.
+    pub name: String,
+    /// Who renders.
+    pub backend: BackendName,
+    /// How the compute kernels keep sums.
+    #[serde(default, deserialize_with = "accumulator_row")]
+    pub accumulator: Option<&'static Accumulator>,
+    /// Depth tolerance.
+    #[serde(default, deserialize_with = "parsed")]
+    pub epsilon: Option<Epsilon>,
+    /// Blending kernel.
+    #[serde(default, deserialize_with = "parsed")]
+    pub kernel: Option<Kernel>,
+    /// Low-pass filter.
+    pub lowpass: Option<LowPass>,
+    /// The rasteriser's targets.
+    #[serde(default, deserialize_with = "parsed")]
+    pub blend_format: Option<BlendFormat>,
+    /// How the rasteriser tells the visible surface.
+    #[serde(default, deserialize_with = "parsed")]
+    pub raster_depth: Option<RasterDepth>,
+    /// Shading; else the scene's, else Lambert.
+    pub shading: Option<Shading>,
+    /// Maps that are rendered too.
+    #[serde(default)]
+    pub maps: Vec<MapName>,
+    /// The largest RMSE against the f64 reference that is allowed.
+    pub error_limit: Option<f64>,
+    /// Scenes of more surfels are left out.
+    pub most_surfels: Option<u64>,
+    /// Scenes of fewer surfels are left out.
+    pub least_surfels: Option<u64>,
+    /// Whether a quick run has it.
+    #[serde(default = "yes")]
+    pub quick: bool,
+}
+
+/// Who renders.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum BackendName {
+    /// Compute kernels.
+    Gpu,
+    /// Fixed-function blending.
+    Raster,
+    /// f64 on the processor.
+    Reference,
+}
+
+/// A map beside the colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[allow(missing_docs)]
+pub enum MapName {
+    Depth,
+    Normal,
+    Weight,
+    Count,
+}
+
+/// A value, or the values of a sweep.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(untagged, expecting = "a number or a list of numbers is needed")]
+pub enum OneOrMany<T> {
+    /// One.
+    One(T),
+    /// A sweep.
+    Many(Vec<T>),
+}
+
+impl<T: Copy> OneOrMany<T> {
+    /// The values in order.
+    pub fn values(&self) -> Vec<T> {
+        match self {
+            Self::One(value) => vec![*value],
+            Self::Many(values) => values.clone(),
+        }
+    }
+}
+
+fn default_size() -> [u32; 2] {
+    [1024, 1024]
+}
+
+fn default_runs() -> u32 {
+    7
+}
+
+fn one() -> u32 {
+    1
+}
+
+fn yes() -> bool {
+    true
+}
+
+fn parsed<'de, D: Deserializer<'de>, T: FromStr<Err = Error>>(text: D) -> Result<Option<T>, D::Error> {
+    String::deserialize(text)?.parse().map(Some).map_err(D::Error::custom)
+}
+
+fn accumulator_row<'de, D: Deserializer<'de>>(text: D) -> Result<Option<&'static Accumulator>, D::Error> {
+    accumulator(&String::deserialize(text)?).map(Some).map_err(D::Error::custom)
+}
+
+impl Config {
+    /// The options of a render, on a scene whose own shading is `shading`.
+    pub fn options(&self, shading: Option<Shading>) -> RenderOptions {
+        let default = RenderOptions::default();
+        let wanted = |map| self.maps.contains(&map);
+        let raster = Raster::default();
+        RenderOptions {
+            epsilon: self.epsilon.unwrap_or(default.epsilon),
+            kernel: self.kernel.unwrap_or(default.kernel),
+            low_pass: self.lowpass.unwrap_or(default.low_pass),
+            accumulator: self.accumulator().map_or(default.accumulator, |row| row.name),
+            raster: (self.backend == BackendName::Raster).then(|| Raster {
+                format: self.blend_format.unwrap_or(raster.format),
+                depth: self.raster_depth.unwrap_or(raster.depth),
+            }),
+            shading: self.shading.or(shading).unwrap_or(default.shading),
+            maps: Maps {
+                depth: wanted(MapName::Depth),
+                normal: wanted(MapName::Normal),
+                weight: wanted(MapName::Weight),
+                count: wanted(MapName::Count),
+                decision: false,
+            },
+            ..default
+        }
+    }
+
+    /// How the compute kernels keep sums; none if others render.
+    pub fn accumulator(&self) -> Option<&'static Accumulator> {
+        (self.backend == BackendName::Gpu).then(|| self.accumulator.unwrap_or(&ACCUMULATORS[0]))
+    }
+
+    /// How sums are kept, by name; empty for the reference.
+    pub fn sums(&self) -> &'static str {
+        match self.backend {
+            BackendName::Gpu => self.accumulator().map_or("", |row| row.name),
+            BackendName::Raster => self.blend_format.unwrap_or(Raster::default().format).name(),
+            BackendName::Reference => "",
+        }
+    }
+
+    /// Whether two frames must have the same bits. The rasteriser blends in no fixed order.
+    pub fn deterministic(&self) -> bool {
+        match self.backend {
+            BackendName::Gpu => self.accumulator().is_some_and(|row| row.deterministic),
+            BackendName::Raster => false,
+            BackendName::Reference => true,
+        }
+    }
+
+    /// Whether it renders scenes of so many surfels.
+    pub fn takes(&self, surfels: u64) -> bool {
+        (self.least_surfels.unwrap_or(0)..=self.most_surfels.unwrap_or(u64::MAX)).contains(&surfels)
+    }
+}
+
+impl Definition {
+    /// The quick form: what `quick`, `quick_count` and `quick_footprint_px` say.
+    pub fn quick_form(mut self) -> Self {
+        self.runs = self.quick.runs.unwrap_or(self.runs);
+        self.size = self.quick.size.unwrap_or(self.size);
+        self.scenes.retain(|scene| scene.quick);
+        self.configs.retain(|config| config.quick);
+        for scene in &mut self.scenes {
+            scene.count = scene.quick_count.clone().or(scene.count.take());
+            scene.footprint_px = scene.quick_footprint_px.clone().or(scene.footprint_px.take());
+        }
+        self
+    }
+
+    /// Whether a configuration renders on an adapter.
+    pub fn needs_gpu(&self) -> bool {
+        self.configs.iter().any(|config| config.backend != BackendName::Reference)
+    }
+
+    /// Where a scene's file is.
+    pub(super) fn path_of(&self, file: &Path) -> PathBuf {
+        self.folder.join(file)
+    }
+}

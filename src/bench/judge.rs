@@ -1,0 +1,250 @@
+//! What the frames of a study are worth: their error against the f64 reference and against ground truth.
+
+use std::collections::BTreeMap;
+
+use super::runner::{Case, Timed};
+use crate::error::Result;
+use crate::frame::Frame;
+use crate::metrics::{Reconstruction, compare, reconstruction};
+use crate::progress::Progress;
+use crate::render::{Backend, Renderer, render};
+use crate::report::{ImageSet, Measurement, Numeric};
+use crate::scene::{Maps, RenderOptions};
+use crate::truth::{DEFAULT_GRID, Truth};
+
+/// The side that pictures for the page are kept at, pixels.
+const PICTURE_SIDE: usize = 512;
+
+/// A configuration against the reference.
+pub(super) struct Errors {
+    /// The worst of all cameras.
+    pub numeric: Numeric,
+    /// Fragments that are blended in a frame, mean over the cameras.
+    pub fragments: f64,
+    /// What the first camera sees.
+    pub picture: ImageSet,
+}
+
+/// The items with the same key together, in the order of their first: the indices of each group.
+fn grouped<K: PartialEq>(keys: impl Iterator<Item = K>) -> Vec<(K, Vec<usize>)> {
+    let mut groups: Vec<(K, Vec<usize>)> = Vec::new();
+    for (index, key) in keys.enumerate() {
+        match groups.iter_mut().find(|(known, _)| *known == key) {
+            Some((_, members)) => members.push(index),
+            None => groups.push((key, vec![index])),
+        }
+    }
+    groups
+}
+
+/// Compares all with the reference, which renders once what differs in nothing but how sums are kept.
+pub(super) fn against_reference(case: &Case<'_>, timed: &[Timed<'_>], progress: &dyn Progress) -> Result<Vec<Errors>> {
+    let default = RenderOptions::default();
+    let maps = Maps { count: true, decision: true, ..Maps::default() };
+    let key = |timed: &Timed<'_>| RenderOptions {
+        accumulator: default.accumulator,
+        raster: None,
+        maps,
+        ..timed.options.clone()
+    };
+    let picture = |timed: &Timed<'_>, reference: &Frame| {
+        let (image, reference) = small_pair(&timed.frames[0], reference);
+        ImageSet {
+            scene: case.entry.name.clone(),
+            config: timed.config.name.clone(),
+            image,
+            reference: Some(reference),
+        }
+    };
+    let mut errors: Vec<Option<Errors>> = timed.iter().map(|_| None).collect();
+    let share = 1.0 / case.staged.cameras.len() as f64;
+    for (options, members) in grouped(timed.iter().map(key)) {
+        for (view, camera) in case.staged.cameras.iter().enumerate() {
+            let (reference, _) = render(&case.staged.scene, camera, &options, &Backend::Reference, progress)?;
+            let fragments: f64 = reference.count.iter().flatten().map(|count| f64::from(*count)).sum();
+            for &member in &members {
+                let timed = &timed[member];
+                let comparison = compare(&timed.frames[view], &reference)?;
+                let error = errors[member].get_or_insert_with(|| Errors {
+                    numeric: Numeric::default(),
+                    fragments: 0.0,
+                    picture: picture(timed, &reference),
+                });
+                let numeric = &mut error.numeric;
+                numeric.rmse = numeric.rmse.max(comparison.rmse_decided.unwrap_or(comparison.rmse));
+                numeric.max_abs = numeric.max_abs.max(comparison.max_abs_decided.unwrap_or(comparison.max_abs));
+                numeric.psnr_db = (numeric.rmse > 0.0).then(|| -20.0 * numeric.rmse.log10());
+                error.fragments += share * fragments;
+            }
+        }
+    }
+    // Every configuration is in one group, and there is a camera.
+    Ok(errors.into_iter().flatten().collect())
+}
+
+/// The measures against ground truth of each, the worst of all cameras; empty ones if the scene has none. Depth and normal
+/// are rendered for it, apart from the timed frames, where a configuration does not ask for them.
+pub(super) fn against_truth(
+    case: &Case<'_>,
+    timed: &[Timed<'_>],
+    progress: &dyn Progress,
+) -> Result<Vec<BTreeMap<String, f64>>> {
+    let mut worst = vec![BTreeMap::new(); timed.len()];
+    let Some(surface) = &case.staged.surface else { return Ok(worst) };
+    for (_, members) in grouped(timed.iter().map(|timed| timed.options.shading)) {
+        let options = timed[members[0]].options;
+        let cast = |camera| Truth::cast(surface, camera, options, DEFAULT_GRID, progress);
+        let truths: Vec<Truth> = case.staged.cameras.iter().map(cast).collect::<Result<_>>()?;
+        for member in members {
+            let timed = &timed[member];
+            let maps = Maps { depth: true, normal: true, ..timed.options.maps };
+            let with_maps = RenderOptions { maps, ..timed.options.clone() };
+            let mut renderer = Renderer::new(&case.staged.scene, &with_maps, case.backend(timed.config))?;
+            for (camera, truth) in case.staged.cameras.iter().zip(&truths) {
+                let (frame, _) = renderer.frame(camera, &())?;
+                join_worst(&mut worst[member], &reconstruction(&frame, truth)?);
+            }
+        }
+    }
+    Ok(worst)
+}
+
+/// Measures of which less is worse.
+const LESS_IS_WORSE: [&str; 3] = ["psnr_db", "ssim", "silhouette_iou"];
+
+fn join_worst(worst: &mut BTreeMap<String, f64>, error: &Reconstruction) {
+    let measures = [
+        ("psnr_db", Some(error.psnr_db.unwrap_or(f64::INFINITY))),
+        ("max_abs", Some(error.max_abs)),
+        ("percentile_99_9", Some(error.percentile_99_9)),
+        ("ssim", error.ssim),
+        ("depth_relative_mean", error.depth_relative.map(|depth| depth.mean)),
+        ("depth_relative_rmse", error.depth_relative.map(|depth| depth.rmse)),
+        ("depth_relative_percentile_99", error.depth_relative.map(|depth| depth.percentile_99)),
+        ("normal_degrees_mean", error.normal_degrees.map(|normal| normal.mean)),
+        ("normal_degrees_percentile_99", error.normal_degrees.map(|normal| normal.percentile_99)),
+        ("hole_rate", error.hole_rate),
+        ("leak_rate", error.leak_rate),
+        ("silhouette_iou", error.silhouette_iou),
+    ];
+    for (name, value) in measures {
+        let Some(value) = value else { continue };
+        let worse = if LESS_IS_WORSE.contains(&name) { f64::min } else { f64::max };
+        worst.entry(name.to_owned()).and_modify(|known| *known = worse(*known, value)).or_insert(value);
+    }
+}
+
+/// Fills in [`Measurement::ratio_to_raster`] for the configurations of one case.
+pub(super) fn compare_with_raster(measurements: &mut [Measurement]) {
+    let rasters: Vec<(f64, f64)> = measurements
+        .iter()
+        .filter(|m| m.backend == "raster")
+        .filter_map(|m| Some((m.numeric_error()?, m.total_ms.median)))
+        .collect();
+    for m in measurements {
+        let Some(error) = m.numeric_error().filter(|_| m.total_ms.median > 0.0) else { continue };
+        let times = rasters.iter().filter(|(of_raster, _)| *of_raster <= error).map(|(_, ms)| *ms);
+        m.ratio_to_raster = times.min_by(f64::total_cmp).map(|ms| ms / m.total_ms.median);
+    }
+}
+
+/// The colours of both, shrunk by a whole factor to at most [`PICTURE_SIDE`]. Of each block of pixels both keep the one in
+/// which they differ most, so that no error is averaged away.
+fn small_pair(image: &Frame, reference: &Frame) -> (Frame, Frame) {
+    let (width, height) = (image.width as usize, image.height as usize);
+    let factor = width.max(height).div_ceil(PICTURE_SIDE).max(1);
+    let differs = |pixel: usize| {
+        let pairs = image.color[pixel].iter().zip(&reference.color[pixel]);
+        pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+    };
+    let mut kept = Vec::new();
+    for top in (0..height).step_by(factor) {
+        for left in (0..width).step_by(factor) {
+            let rows = top..(top + factor).min(height);
+            let block = rows.flat_map(|y| (left..(left + factor).min(width)).map(move |x| y * width + x));
+            let middle = top * width + left;
+            kept.push(block.fold(middle, |most, pixel| if differs(pixel) > differs(most) { pixel } else { most }));
+        }
+    }
+    let small = |frame: &Frame| Frame {
+        width: width.div_ceil(factor) as u32,
+        height: height.div_ceil(factor) as u32,
+        color: kept.iter().map(|pixel| frame.color[*pixel]).collect(),
+        depth: None,
+        normal: None,
+        weight: None,
+        count: None,
+        decision: None,
+    };
+    (small(image), small(reference))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::report::Summary;
+
+    fn measurement(backend: &str, median: f64, rmse: f64) -> Measurement {
+        Measurement {
+            backend: backend.into(),
+            total_ms: Summary { median, ..Summary::default() },
+            numeric: Some(Numeric { rmse, ..Numeric::default() }),
+            ..Measurement::default()
+        }
+    }
+
+    #[test]
+    fn a_ratio_is_to_the_fastest_raster_that_is_no_less_exact() {
+        let mut all = [
+            measurement("gpu", 10.0, 1e-6),
+            measurement("gpu", 5.0, 1e-3),
+            measurement("gpu", 5.0, 1e-9),
+            measurement("raster", 20.0, 1e-3),
+            measurement("raster", 40.0, 1e-6),
+        ];
+        compare_with_raster(&mut all);
+        let ratios: Vec<_> = all.iter().map(|m| m.ratio_to_raster).collect();
+        assert_eq!(ratios, [Some(4.0), Some(4.0), None, Some(1.0), Some(1.0)]);
+    }
+
+    #[test]
+    fn a_small_picture_keeps_the_largest_difference() {
+        let size = 2 * PICTURE_SIDE as u32 - 1;
+        let plain = Frame {
+            width: size,
+            height: 3,
+            color: vec![[0.5; 4]; 3 * size as usize],
+            depth: None,
+            normal: None,
+            weight: None,
+            count: None,
+            decision: None,
+        };
+        let mut other = plain.clone();
+        other.color[size as usize + 1] = [1.0; 4];
+        let (image, reference) = small_pair(&other, &plain);
+        assert_eq!((image.width, image.height, image.color.len()), (512, 2, 1024));
+        assert_eq!((image.color[0], image.color[1], reference.color[0]), ([1.0; 4], [0.5; 4], [0.5; 4]));
+    }
+
+    #[test]
+    fn the_worst_camera_counts() {
+        let of = |psnr_db, max_abs| Reconstruction {
+            psnr_db,
+            max_abs,
+            percentile_99_9: 0.0,
+            ssim: None,
+            depth_relative: None,
+            normal_degrees: None,
+            hole_rate: Some(0.0),
+            leak_rate: None,
+            silhouette_iou: Some(1.0),
+        };
+        let mut worst = BTreeMap::new();
+        for error in [of(None, 0.0), of(Some(30.0), 0.2), of(Some(40.0), 0.5)] {
+            join_worst(&mut worst, &error);
+        }
+        assert_eq!((worst["psnr_db"], worst["max_abs"], worst.len()), (30.0, 0.5, 5));
+    }
+}

@@ -1,0 +1,106 @@
+//! Where and when a study ran, without saying where on the machine its files are.
+
+use std::path::Path;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use crate::render::Backend;
+use crate::report::Machine;
+
+/// The machine, as far as the system tells.
+pub(super) fn machine(gpu: Option<&Backend>) -> Machine {
+    let adapter = match gpu {
+        Some(Backend::Gpu { gpu, .. }) => Some(&gpu.adapter),
+        _ => None,
+    };
+    let of_adapter =
+        |f: fn(&crate::gpu::device::AdapterDescription) -> &String| adapter.map(f).cloned().unwrap_or_default();
+    let cpu = line_after("/proc/cpuinfo", "model name", ':').unwrap_or_else(|| std::env::consts::ARCH.to_owned());
+    let os = line_after("/etc/os-release", "PRETTY_NAME", '=').unwrap_or_else(|| std::env::consts::OS.to_owned());
+    Machine {
+        adapter: of_adapter(|a| &a.name),
+        api: of_adapter(|a| &a.api),
+        driver: of_adapter(|a| &a.driver),
+        cpu,
+        cores: std::thread::available_parallelism().map_or(1, |n| u32::try_from(n.get()).unwrap_or(u32::MAX)),
+        os,
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+    }
+}
+
+/// The value of the first line `KEY separator VALUE` of a file of the system.
+fn line_after(path: &str, key: &str, separator: char) -> Option<String> {
+    let text = std::fs::read_to_string(path).ok()?;
+    let mut values = text.lines().filter_map(|line| line.split_once(separator)).filter(|(k, _)| k.trim() == key);
+    values.next().map(|(_, value)| value.trim().trim_matches('"').to_owned())
+}
+
+/// The command line of these arguments, the first of which is the program: absolute paths become names, for where a file
+/// is on this machine says nothing on another.
+///
+/// ```
+/// let typed = ["/usr/bin/epsplat", "bench", "benches/kernels.toml", "--out", "/home/me/out"];
+/// let command = epsplat::bench::machine::command(typed.map(str::to_owned));
+/// assert_eq!(command, "epsplat bench benches/kernels.toml --out out");
+/// ```
+pub fn command(arguments: impl IntoIterator<Item = String>) -> String {
+    let shown = |argument: &str| match argument.split_once('=') {
+        Some((option, value)) if option.starts_with('-') => format!("{option}={}", name_of(value)),
+        _ => name_of(argument),
+    };
+    let quoted = |word: String| if word.contains(' ') { format!("'{word}'") } else { word };
+    let rest = arguments.into_iter().skip(1).map(|argument| quoted(shown(&argument)));
+    std::iter::once("epsplat".to_owned()).chain(rest).collect::<Vec<_>>().join(" ")
+}
+
+/// An absolute path's last part; anything else as it is.
+fn name_of(word: &str) -> String {
+    let path = Path::new(word);
+    match path.file_name() {
+        Some(name) if path.is_absolute() => name.to_string_lossy().into_owned(),
+        _ => word.to_owned(),
+    }
+}
+
+/// The day and minute, UTC, of a time since 1970: `2025-01-31 23:59 UTC`.
+pub fn date(time: SystemTime) -> String {
+    let seconds = time.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
+    let (days, second) = (seconds / 86_400, seconds % 86_400);
+    let (year, month, day) = civil(days);
+    format!("{year:04}-{month:02}-{day:02} {:02}:{:02} UTC", second / 3600, second / 60 % 60)
+}
+
+/// Year, month and day of the Gregorian calendar, from the days since 1970-01-01: years begin in March, so that the day that
+/// some lack is their last (Hinnant, "chrono-compatible low-level date algorithms").
+fn civil(days: u64) -> (u64, u64, u64) {
+    let days = days + 719_468;
+    let (era, of_era) = (days / 146_097, days % 146_097);
+    let year = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
+    let of_year = of_era - (365 * year + year / 4 - year / 100);
+    let month = (5 * of_year + 2) / 153;
+    let day = of_year - (153 * month + 2) / 5 + 1;
+    let (month, later) = if month < 10 { (month + 3, 0) } else { (month - 9, 1) };
+    (400 * era + year + later, month, day)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    #[test]
+    fn dates_are_those_of_the_calendar() {
+        let at = |seconds| date(UNIX_EPOCH + Duration::from_secs(seconds));
+        assert_eq!(at(0), "1970-01-01 00:00 UTC");
+        assert_eq!(at(951_782_399), "2000-02-28 23:59 UTC");
+        assert_eq!(at(951_782_400), "2000-02-29 00:00 UTC");
+        assert_eq!(at(1_735_689_599), "2024-12-31 23:59 UTC");
+        assert_eq!(at(4_107_542_400), "2100-03-01 00:00 UTC");
+    }
+
+    #[test]
+    fn a_command_holds_no_place_of_this_machine() {
+        let of = |arguments: &[&str]| command(arguments.iter().map(|a| (*a).to_owned()));
+        assert_eq!(of(&["./target/epsplat", "bench", "a.toml", "--out=/x/y z"]), "epsplat bench a.toml '--out=y z'");
+        assert_eq!(of(&["e", "bench", "a b.toml"]), "epsplat bench 'a b.toml'");
+    }
+}

@@ -1,0 +1,15 @@
+//! Benchmark studies: what each speed costs in error, measured on scenes and configurations that a TOML file lists.
+//!
+//! [`Definition`] is such a file, [`run`] renders it, [`report::write`](crate::report::write) makes files of the outcome
+//! and [`table`] text.
+
+pub mod definition;
+mod judge;
+pub mod machine;
+mod reading;
+mod runner;
+mod staging;
+pub mod table;
+
+pub use definition::Definition;
+pub use runner::{Outcome, run};

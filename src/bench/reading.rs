@@ -1,0 +1,254 @@
+//! A study from a TOML file; a file that is none is refused in one sentence that names the file and the key.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use super::definition::{BackendName, Config, Definition, OneOrMany, SceneEntry};
+use crate::error::{Error, Result};
+use crate::scene::camera::check_size;
+
+impl Definition {
+    /// Reads a definition.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Read`] if there is none, [`Error::Malformed`] if it is no study; the message names the key.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
+        Self::parse(&text, path)
+    }
+
+    /// A definition from its text; `path` is where it came from.
+    ///
+    /// # Errors
+    ///
+    /// As [`read`](Self::read).
+    pub fn parse(text: &str, path: &Path) -> Result<Self> {
+        let mut definition: Self = toml::from_str(text).map_err(|e| Error::malformed(path, located(text, &e)))?;
+        definition.folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        definition.check().map_err(|what| Error::malformed(path, what))?;
+        Ok(definition)
+    }
+
+    /// What TOML's types do not say.
+    fn check(&self) -> Result<(), String> {
+        let [width, height] = self.size;
+        check_size(width, height).map_err(|e| format!("size: {e}"))?;
+        if let Some([width, height]) = self.quick.size {
+            check_size(width, height).map_err(|e| format!("quick.size: {e}"))?;
+        }
+        if self.runs == 0 || self.quick.runs == Some(0) {
+            return Err("runs: at least one run is needed".into());
+        }
+        unique("scene", self.scenes.iter().map(|scene| (&scene.name, scene.quick)))?;
+        let configs = unique("config", self.configs.iter().map(|config| (&config.name, config.quick)))?;
+        if let Some(baseline) = self.baseline.as_ref().filter(|name| !configs.contains(name)) {
+            return Err(format!("baseline: there is no config {baseline:?}"));
+        }
+        for scene in &self.scenes {
+            scene.check().map_err(|what| format!("scene {:?}: {what}", scene.name))?;
+        }
+        for config in &self.configs {
+            config.check().map_err(|what| format!("config {:?}: {what}", config.name))?;
+        }
+        Ok(())
+    }
+}
+
+/// The names, which must be some, some of them for a quick run, and all different.
+fn unique<'a>(table: &str, names: impl Iterator<Item = (&'a String, bool)>) -> Result<BTreeSet<&'a String>, String> {
+    let (mut seen, mut quick) = (BTreeSet::new(), false);
+    for (name, of_quick) in names {
+        if !seen.insert(name) {
+            return Err(format!("{table}: two are called {name:?}"));
+        }
+        quick |= of_quick;
+    }
+    if quick { Ok(seen) } else { Err(format!("{table}: a study needs at least one [[{table}]] without quick = false")) }
+}
+
+fn positive(key: &str, value: Option<f64>) -> Result<(), String> {
+    match value {
+        Some(value) if !(value.is_finite() && value > 0.0) => Err(format!("{key}: it must be positive, not {value}")),
+        _ => Ok(()),
+    }
+}
+
+fn not_beside(key: &str, given: bool, other: &str) -> Result<(), String> {
+    if given { Err(format!("{key}: it cannot be given beside {other}")) } else { Ok(()) }
+}
+
+impl SceneEntry {
+    fn check(&self) -> Result<(), String> {
+        match (&self.file, &self.shape) {
+            (Some(_), Some(_)) => return Err("shape: a scene has either a file or a shape".into()),
+            (None, None) => return Err("shape: a scene needs a file or a shape".into()),
+            (Some(file), None) => {
+                not_beside("count", self.count.is_some() || self.quick_count.is_some(), "file")?;
+                not_beside("radius", self.radius.is_some(), "file (footprint_px serves)")?;
+                if self.truth && !file.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) {
+                    return Err("truth: only OBJ files have triangles that rays can meet".into());
+                }
+            }
+            (None, Some(_)) if self.count.is_none() => return Err("count: a shape needs its number of surfels".into()),
+            (None, Some(_)) => {}
+        }
+        for (key, counts) in [("count", &self.count), ("quick_count", &self.quick_count)] {
+            let counts = counts.as_ref().map(OneOrMany::values);
+            if counts.is_some_and(|c| c.is_empty() || c.iter().any(|c| !(1..=u64::from(u32::MAX)).contains(c))) {
+                return Err(format!("{key}: a shape has 1 to 2^32 - 1 surfels"));
+            }
+        }
+        for (key, all) in [("footprint_px", &self.footprint_px), ("quick_footprint_px", &self.quick_footprint_px)] {
+            let all = all.as_ref().map(OneOrMany::values);
+            if all.as_ref().is_some_and(Vec::is_empty) {
+                return Err(format!("{key}: the list is empty"));
+            }
+            all.into_iter().flatten().try_for_each(|value| positive(key, Some(value)))?;
+        }
+        not_beside("radius", self.radius.is_some() && self.footprint_px.is_some(), "footprint_px")?;
+        not_beside("ortho", self.ortho.is_some() && self.fov.is_some(), "fov")?;
+        if self.eye.is_none() && (self.target.is_some() || self.up.is_some()) {
+            return Err("eye: target and up need it".into());
+        }
+        if self.views == 0 {
+            return Err("views: at least one is needed".into());
+        }
+        positive("radius", self.radius)?;
+        positive("fill", self.fill)?;
+        positive("fov", self.fov)?;
+        positive("ortho", self.ortho)?;
+        positive("most_fragments", self.most_fragments)
+    }
+}
+
+impl Config {
+    fn check(&self) -> Result<(), String> {
+        if self.backend != BackendName::Gpu && self.accumulator.is_some() {
+            return Err("accumulator: only the backend gpu has one".into());
+        }
+        if self.backend != BackendName::Raster && (self.blend_format.is_some() || self.raster_depth.is_some()) {
+            return Err("blend_format, raster_depth: only the backend raster has them".into());
+        }
+        match self.error_limit {
+            Some(limit) if limit.is_nan() || limit < 0.0 => Err(format!("error_limit: it must not be {limit}")),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// What is wrong, and in which line and key of `text`.
+fn located(text: &str, error: &toml::de::Error) -> String {
+    let message = error.message().trim().replace('\n', ", ");
+    let Some(span) = error.span() else { return message };
+    let before = text.get(..span.start).unwrap_or(text);
+    let number = before.lines().count().max(1) + usize::from(before.ends_with('\n'));
+    let line = text.lines().nth(number - 1).unwrap_or("").trim();
+    match line.split_once('=') {
+        Some((key, _)) => format!("line {number}, {}: {message}", key.trim()),
+        None if line.is_empty() => message,
+        None => format!("line {number}, {line}: {message}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::scene::{Epsilon, LowPass, Shading};
+
+    const HEAD: &str = "name = \"n\"\nabout = \"a\"\n";
+    const SCENE: &str = "[[scene]]\nname = \"s\"\nshape = \"sphere\"\ncount = 10\n";
+    const CONFIG: &str = "[[config]]\nname = \"c\"\nbackend = \"gpu\"\n";
+
+    fn parse(text: &str) -> Result<Definition> {
+        Definition::parse(text, Path::new("folder/study.toml"))
+    }
+
+    #[test]
+    fn what_a_definition_does_not_say_is_the_default() {
+        let study = parse(&[HEAD, SCENE, CONFIG].concat()).unwrap();
+        assert_eq!((study.size, study.runs), ([1024, 1024], 7));
+        assert!(study.needs_gpu() && study.baseline.is_none());
+        let options = study.configs[0].options(None);
+        assert_eq!(options, crate::scene::RenderOptions::default());
+        assert_eq!(study.configs[0].options(Some(Shading::Unlit)).shading, Shading::Unlit);
+        assert_eq!(study.path_of(Path::new("../a.obj")), Path::new("folder/../a.obj"));
+    }
+
+    #[test]
+    fn what_it_says_is_taken_and_a_quick_form_has_less() {
+        let text = "name = \"n\"\nabout = \"a\"\nsize = [64, 32]\nbaseline = \"c\"\n[quick]\nruns = 2\nsize = [8, 8]\n\
+                    [[scene]]\nname = \"s\"\nshape = \"torus\"\ncount = [10, 20]\nquick_count = 5\n\
+                    [[scene]]\nname = \"t\"\nfile = \"a.obj\"\ntruth = true\nquick = false\n\
+                    [[config]]\nname = \"c\"\nbackend = \"gpu\"\nepsilon = \"abs:2\"\nlowpass = \"ewa\"\n\
+                    accumulator = \"fixed64\"\nmaps = [\"depth\"]\nmost_surfels = 15\n\
+                    [[config]]\nname = \"r\"\nbackend = \"raster\"\nblend_format = \"rgba32float\"\nquick = false\n";
+        let study = parse(text).unwrap();
+        let options = study.configs[0].options(None);
+        assert_eq!((options.epsilon, options.low_pass), (Epsilon::Absolute(2.0), LowPass::Ewa));
+        assert!(options.accumulator == "fixed64" && options.maps.depth && !options.maps.normal);
+        assert!(study.configs[0].takes(15) && !study.configs[0].takes(16) && study.configs[1].takes(16));
+        assert!(study.configs[0].deterministic() && !study.configs[1].deterministic());
+        assert_eq!(study.configs[1].sums(), "rgba32float");
+        assert!(study.configs[1].options(None).raster.is_some() && options.raster.is_none());
+        assert_eq!(study.scenes[0].count.as_ref().unwrap().values(), [10, 20]);
+        let quick = study.quick_form();
+        assert_eq!((quick.runs, quick.size, quick.scenes.len(), quick.configs.len()), (2, [8, 8], 1, 1));
+        assert_eq!(quick.scenes[0].count, Some(OneOrMany::One(5)));
+    }
+
+    /// What is wrong is told with the file and the key.
+    #[test]
+    fn bad_definitions_are_refused_by_file_and_key() {
+        let cases: &[(&str, &[&str])] = &[
+            ("runs = \"x\"\n", &["line 3, runs:", "invalid type"]),
+            ("runz = 1\n", &["line 3", "runz"]),
+            ("runs = 0\n", &["runs:"]),
+            ("size = [0, 5]\n", &["size:"]),
+            ("baseline = \"d\"\n", &["baseline:", "\"d\""]),
+            ("[quick]\nruns = 0\n", &["runs:"]),
+            ("[[scene]]\nname = \"s\"\nshape = \"cube\"\ncount = 1\n", &["line 5, shape:", "cube", "torus"]),
+            ("[[scene]]\nname = \"t\"\nshape = \"torus\"\n", &["scene \"t\": count:"]),
+            ("[[scene]]\nname = \"t\"\n", &["scene \"t\": shape:"]),
+            ("[[scene]]\nname = \"t\"\nfile = \"a.ply\"\ncount = 1\n", &["count:", "file"]),
+            ("[[scene]]\nname = \"t\"\nfile = \"a.ply\"\ntruth = true\n", &["truth:", "OBJ"]),
+            ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = [1, \"x\"]\n", &["count:", "list of numbers"]),
+            ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 0\n", &["count:"]),
+            ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 1\nfill = -1\n", &["fill:", "-1"]),
+            ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 1\nfootprint_px = []\n", &["footprint_px:"]),
+            ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 1\nviews = 0\n", &["views:"]),
+            ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 1\nup = [0, 0, 1]\n", &["eye:"]),
+            ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 1\nfov = 9\northo = 1\n", &["ortho:", "fov"]),
+            ("[[scene]]\nname = \"s\"\nshape = \"torus\"\ncount = 1\n", &["scene: two are called \"s\""]),
+            ("[[config]]\nname = \"d\"\nbackend = \"cpu\"\n", &["line 5, backend:", "cpu", "raster"]),
+            ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nepsilon = \"1\"\n", &["line 6, epsilon:", "rel:E"]),
+            ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\naccumulator = \"f\"\n", &["accumulator:", "fixed32"]),
+            ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nlowpass = \"box\"\n", &["lowpass:", "ewa"]),
+            (
+                "[[config]]\nname = \"d\"\nbackend = \"gpu\"\nblend_format = \"rgba8unorm\"\n",
+                &["blend_format", "raster"],
+            ),
+            ("[[config]]\nname = \"d\"\nbackend = \"raster\"\naccumulator = \"fixed\"\n", &["accumulator:", "gpu"]),
+            ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nerror_limit = -1\n", &["error_limit:"]),
+            ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nmaps = [\"decision\"]\n", &["maps", "depth"]),
+            ("size = [\n", &["line"]),
+        ];
+        for (wrong, words) in cases {
+            let error = parse(&[HEAD, wrong, SCENE, CONFIG].concat()).unwrap_err().to_string();
+            assert!(error.starts_with("folder/study.toml: ") && !error.contains('\n'), "{error}");
+            for word in *words {
+                assert!(error.contains(word), "{wrong}: {error}");
+            }
+        }
+        for (text, word) in [
+            (HEAD.to_owned(), "[[scene]]"),
+            ([HEAD, SCENE].concat(), "[[config]]"),
+            ([HEAD, SCENE, CONFIG, "quick = false\n"].concat(), "[[config]] without quick"),
+            ("name = \"n\"\n".to_owned(), "about"),
+        ] {
+            let error = parse(&text).unwrap_err().to_string();
+            assert!(error.contains(word), "{error}");
+        }
+    }
+}

@@ -1,0 +1,318 @@
+//! Runs a study: on each scene all configurations take turns, so that a machine that slows down slows all of them.
+
+use std::collections::BTreeMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+use super::definition::{BackendName, Config, Definition, SceneEntry};
+use super::judge;
+use super::machine::machine;
+use super::staging::{Staged, points, stage};
+use crate::error::{Error, Result};
+use crate::frame::Frame;
+use crate::passes::raster;
+use crate::progress::Progress;
+use crate::render::{Backend, DeviceBytes, Renderer};
+use crate::report::{Measurement, Study, Summary};
+use crate::scene::{Camera, RenderOptions, SceneNeeds};
+
+/// What a study gave.
+#[derive(Debug)]
+pub struct Outcome {
+    /// The measurements. Command and date are the caller's to fill in.
+    pub study: Study,
+    /// What was left out or done otherwise, and why: a sentence each.
+    pub notes: Vec<String>,
+    /// Configurations that missed their error limit or gave different bits in two runs: a sentence each.
+    pub failures: Vec<String>,
+}
+
+/// One scene of a sweep.
+pub(super) struct Case<'a> {
+    pub definition: &'a Definition,
+    pub entry: &'a SceneEntry,
+    pub staged: &'a Staged,
+    gpu: Option<&'a Backend>,
+}
+
+/// One configuration on it.
+pub(super) struct Timed<'a> {
+    pub config: &'a Config,
+    pub options: &'a RenderOptions,
+    /// Mean milliseconds of a frame over the cameras, one value a run.
+    total_ms: Vec<f64>,
+    /// The same of each pass.
+    passes: BTreeMap<String, Vec<f64>>,
+    /// What the last run showed, a frame for each camera.
+    pub frames: Vec<Frame>,
+    /// Splats drawn, mean over the cameras.
+    drawn: f64,
+    bytes: DeviceBytes,
+    /// Whether the last run has the bits of the first.
+    stable: bool,
+}
+
+/// Renders every configuration on every scene. Times are those of whole frames, from the uploaded scene to the frame in host
+/// memory; errors are against the f64 reference with the same options, over the pixels that it does not excuse
+/// ([`Comparison::rmse_decided`](crate::metrics::Comparison::rmse_decided)), and the worst of all cameras.
+///
+/// Each configuration of a scene keeps its own buffers on the device while the scene is rendered. What the adapter cannot
+/// run is left out with a note.
+///
+/// # Errors
+///
+/// [`Error::NoAdapter`] if a configuration needs a `gpu` and there is none, and those of reading and rendering.
+pub fn run(definition: &Definition, gpu: Option<&Backend>, progress: &dyn Progress) -> Result<Outcome> {
+    if definition.needs_gpu() && gpu.is_none() {
+        return Err(Error::NoAdapter(format!("the study {} renders on an adapter", definition.name)));
+    }
+    let mut outcome = Outcome {
+        study: Study {
+            name: definition.name.clone(),
+            about: definition.about.clone(),
+            command: String::new(),
+            date: String::new(),
+            machine: machine(gpu),
+            runs: definition.runs,
+            measurements: Vec::new(),
+            images: Vec::new(),
+        },
+        notes: Vec::new(),
+        failures: Vec::new(),
+    };
+    for entry in &definition.scenes {
+        for point in points(entry) {
+            let staged = stage(definition, entry, point, progress)?;
+            Case { definition, entry, staged: &staged, gpu }.run(&mut outcome, progress)?;
+        }
+    }
+    Ok(outcome)
+}
+
+impl<'a> Case<'a> {
+    fn surfels(&self) -> u64 {
+        self.staged.scene.surfels.len() as u64
+    }
+
+    pub fn backend(&self, config: &Config) -> &'a Backend {
+        match (config.backend, self.gpu) {
+            (BackendName::Gpu | BackendName::Raster, Some(gpu)) => gpu,
+            _ => &Backend::Reference,
+        }
+    }
+
+    /// A configuration on this scene, in words.
+    fn named(&self, config: &Config) -> String {
+        let footprint = self.staged.footprint_px;
+        format!("{} on {} ({} surfels of {footprint:.2} px)", config.name, self.entry.name, self.surfels())
+    }
+
+    fn run(&self, outcome: &mut Outcome, progress: &dyn Progress) -> Result<()> {
+        let wanted = self.definition.configs.iter().filter(|config| config.takes(self.surfels()));
+        let plans: Vec<(&Config, RenderOptions)> =
+            wanted.map(|config| (config, config.options(self.entry.shading))).collect();
+        let timed = self.time(&plans, &mut outcome.notes, progress)?;
+        let errors = judge::against_reference(self, &timed, progress)?;
+        let truths = judge::against_truth(self, &timed, progress)?;
+        let mut measurements = Vec::new();
+        for ((timed, error), reconstruction) in timed.iter().zip(errors).zip(truths) {
+            let config = timed.config;
+            let measurement = self.measurement(timed, &error, reconstruction);
+            if !measurement.kept {
+                let limit = config.error_limit.unwrap_or(0.0);
+                let rmse = error.numeric.rmse;
+                outcome
+                    .failures
+                    .push(format!("{}: RMSE {rmse:.2e} misses its limit of {limit:.2e}", self.named(config)));
+            }
+            if config.deterministic() && !timed.stable {
+                outcome.failures.push(format!("{}: two runs gave different bits", self.named(config)));
+            }
+            measurements.push(measurement);
+            outcome.study.images.push(error.picture);
+        }
+        judge::compare_with_raster(&mut measurements);
+        outcome.study.measurements.append(&mut measurements);
+        Ok(())
+    }
+
+    /// One frame of each to warm up, then the runs, in each of which all take their turn.
+    fn time<'p>(
+        &self,
+        plans: &'p [(&'p Config, RenderOptions)],
+        notes: &mut Vec<String>,
+        progress: &dyn Progress,
+    ) -> Result<Vec<Timed<'p>>> {
+        progress
+            .begin(&format!("timing {}", self.entry.name), plans.len() as u64 * u64::from(1 + self.definition.runs));
+        let mut runners = Vec::new();
+        for (config, options) in plans {
+            let mut renderer = Renderer::new(&self.staged.scene, options, self.backend(config))?;
+            let warm_up = self.check(config, options).and_then(|()| self.turn(&mut renderer));
+            progress.advance(1);
+            let lap = match warm_up {
+                Ok(lap) => lap,
+                Err(Unfit::Adapter(why)) => {
+                    notes.push(format!("{} was left out: {why}", self.named(config)));
+                    continue;
+                }
+                Err(Unfit::Failed(error)) => return Err(self.failed(config, runners.len(), error)),
+            };
+            if lap.overflows > 0 {
+                let count = lap.overflows;
+                notes.push(format!("{}: {count} sums overflowed, and frames were rendered twice", self.named(config)));
+            }
+            let first: Vec<u64> = lap.frames.iter().map(fingerprint).collect();
+            let timed = Timed {
+                config,
+                options,
+                total_ms: Vec::new(),
+                passes: BTreeMap::new(),
+                frames: Vec::new(),
+                drawn: lap.drawn,
+                bytes: renderer.device_bytes(),
+                stable: true,
+            };
+            runners.push((renderer, first, timed));
+        }
+        let beside = runners.len().saturating_sub(1);
+        for _ in 0..self.definition.runs {
+            for (renderer, first, timed) in &mut runners {
+                // Frames of the run before make room.
+                timed.frames.clear();
+                let lap = self.turn(renderer).map_err(|unfit| self.failed(timed.config, beside, unfit.into()))?;
+                timed.total_ms.push(lap.total_ms);
+                for (pass, ms) in lap.passes {
+                    timed.passes.entry(pass).or_default().push(ms);
+                }
+                timed.stable = lap.frames.iter().map(fingerprint).eq(first.iter().copied());
+                timed.frames = lap.frames;
+                progress.advance(1);
+            }
+        }
+        progress.end();
+        Ok(runners.into_iter().map(|(_, _, timed)| timed).collect())
+    }
+
+    /// Whether the adapter has what a configuration needs.
+    fn check(&self, config: &Config, options: &RenderOptions) -> Result<(), Unfit> {
+        let Backend::Gpu { gpu, .. } = self.backend(config) else { return Ok(()) };
+        let outcome = match (options.raster, config.accumulator()) {
+            (Some(raster), _) => self.staged.cameras.iter().try_for_each(|camera| {
+                let needs = SceneNeeds::of(&self.staged.scene, &self.staged.scene.color_range(), camera, options);
+                raster::check(gpu, raster, &needs, camera)
+            }),
+            (None, Some(row)) => row.check(gpu),
+            (None, None) => Ok(()),
+        };
+        outcome.map_err(Unfit::Adapter)
+    }
+
+    /// A frame from each camera.
+    fn turn(&self, renderer: &mut Renderer<'_>) -> Result<Lap, Unfit> {
+        let cameras: &[Camera] = &self.staged.cameras;
+        let mut lap = Lap::default();
+        let share = 1.0 / cameras.len() as f64;
+        for camera in cameras {
+            let (frame, report) = renderer.frame(camera, &()).map_err(|error| match error {
+                Error::Limit { .. } => Unfit::Adapter(error),
+                other => Unfit::Failed(other),
+            })?;
+            lap.total_ms += share * report.total_ms;
+            lap.drawn += share * report.splats_drawn as f64;
+            lap.overflows += report.overflows;
+            for (pass, ms) in report.passes {
+                *lap.passes.entry(pass.trim_end_matches("_ms").to_owned()).or_default() += share * ms;
+            }
+            lap.frames.push(frame);
+        }
+        Ok(lap)
+    }
+
+    /// An error of the graphics stack says which configuration met it, and that it was not alone.
+    fn failed(&self, config: &Config, beside: usize, error: Error) -> Error {
+        match error {
+            Error::Gpu { adapter, what } => {
+                let others = format!("beside {beside} configurations that hold their buffers");
+                Error::Gpu { adapter, what: format!("{what} ({}, {others})", self.named(config)) }
+            }
+            other => other,
+        }
+    }
+
+    fn measurement(
+        &self,
+        timed: &Timed<'_>,
+        error: &judge::Errors,
+        reconstruction: BTreeMap<String, f64>,
+    ) -> Measurement {
+        let config = timed.config;
+        let [width, height] = self.definition.size;
+        // There is at least one run.
+        let total_ms = Summary::of(&timed.total_ms).unwrap_or_default();
+        let passes = timed.passes.iter().filter_map(|(pass, ms)| Some((pass.clone(), Summary::of(ms)?)));
+        let per_second = |count: f64| if total_ms.median > 0.0 { count / total_ms.median * 1e3 } else { 0.0 };
+        Measurement {
+            study: self.definition.name.clone(),
+            scene: self.entry.name.clone(),
+            config: config.name.clone(),
+            backend: match config.backend {
+                BackendName::Gpu => "gpu",
+                BackendName::Raster => "raster",
+                BackendName::Reference => "reference",
+            }
+            .to_owned(),
+            accumulator: config.sums().to_owned(),
+            surfels: self.surfels(),
+            footprint_px: self.staged.footprint_px,
+            width,
+            height,
+            total_ms,
+            passes: passes.collect(),
+            splats_per_second: per_second(timed.drawn),
+            fragments_per_second: Some(per_second(error.fragments)),
+            bytes_per_splat: timed.bytes.splats as f64 / self.surfels().max(1) as f64,
+            device_bytes: timed.bytes.splats + timed.bytes.pixels,
+            numeric: Some(error.numeric),
+            reconstruction,
+            ratio_to_raster: None,
+            error_limit: config.error_limit,
+            kept: config.error_limit.is_none_or(|limit| error.numeric.rmse <= limit),
+        }
+    }
+}
+
+/// What one turn of a configuration gave.
+#[derive(Default)]
+struct Lap {
+    total_ms: f64,
+    passes: BTreeMap<String, f64>,
+    frames: Vec<Frame>,
+    drawn: f64,
+    overflows: u64,
+}
+
+/// Why a configuration does not run.
+enum Unfit {
+    /// The adapter lacks a feature, or a limit is too small.
+    Adapter(Error),
+    /// Anything else.
+    Failed(Error),
+}
+
+impl From<Unfit> for Error {
+    fn from(unfit: Unfit) -> Self {
+        match unfit {
+            Unfit::Adapter(error) | Unfit::Failed(error) => error,
+        }
+    }
+}
+
+/// A hash of all bits of a frame.
+fn fingerprint(frame: &Frame) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    let mut add = |values: &[f32]| bytemuck::cast_slice::<f32, u8>(values).hash(&mut hasher);
+    add(bytemuck::cast_slice(&frame.color));
+    frame.normal.iter().for_each(|map| add(bytemuck::cast_slice(map)));
+    [&frame.depth, &frame.weight, &frame.count].into_iter().flatten().for_each(|map| add(map));
+    hasher.finish()
+}

@@ -1,0 +1,197 @@
+//! A scene of a study as it is rendered: surfels of the wanted size, cameras, and the surface that they stand for.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::{DMat3, DVec3};
+
+use super::definition::{Definition, OneOrMany, SceneEntry};
+use crate::error::Result;
+use crate::io::{self, Points};
+use crate::progress::Progress;
+use crate::scene::camera::DEFAULT_FOV;
+use crate::scene::{Camera, Colors, Lens, Projection, Scene, Surfel};
+use crate::surfels::analytic::{RADIUS_IN_SPACINGS, Shape, generate};
+use crate::surfels::build;
+use crate::truth::Surface;
+
+/// One point of a scene's sweep: how many surfels, and their mean radius in pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Point {
+    /// None for a file.
+    pub count: Option<u64>,
+    /// None for the radius that the surfels have.
+    pub footprint_px: Option<f64>,
+}
+
+/// A scene as it is rendered.
+pub(super) struct Staged {
+    /// The surfels.
+    pub scene: Scene,
+    /// At least one.
+    pub cameras: Vec<Camera>,
+    /// What the surfels stand for, if the study asks for ground truth.
+    pub surface: Option<Surface>,
+    /// Mean radius of the splats, pixels, as [`SceneEntry::footprint_px`] counts it.
+    pub footprint_px: f64,
+}
+
+/// The points of a scene's sweep, each count with each footprint.
+pub(super) fn points(entry: &SceneEntry) -> Vec<Point> {
+    fn each<T: Copy>(values: &Option<OneOrMany<T>>) -> Vec<Option<T>> {
+        values.as_ref().map_or_else(|| vec![None], |all| all.values().into_iter().map(Some).collect())
+    }
+    let of = |count: Option<u64>| {
+        each(&entry.footprint_px).into_iter().map(move |footprint_px| Point { count, footprint_px })
+    };
+    let small_enough = |point: &Point| match (point.count, point.footprint_px, entry.most_fragments) {
+        (Some(count), Some(radius), Some(most)) => count as f64 * PI * radius * radius <= most,
+        _ => true,
+    };
+    each(&entry.count).into_iter().flat_map(of).filter(small_enough).collect()
+}
+
+/// Makes the scene.
+pub(super) fn stage(
+    definition: &Definition,
+    entry: &SceneEntry,
+    point: Point,
+    progress: &dyn Progress,
+) -> Result<Staged> {
+    let file = entry.file.as_ref().map(|file| definition.path_of(file));
+    let points = match (&file, entry.shape) {
+        (Some(file), _) => io::read(file, progress)?,
+        (None, Some(shape)) => of_shape(shape, point.count.unwrap_or(1), entry.radius),
+        // Reading a definition makes sure that there is one of them; no points are told as an empty scene.
+        (None, None) => Points::default(),
+    };
+    let (mut scene, _) = build(vec![points], progress)?;
+    let surface = match (entry.truth, &file, entry.shape) {
+        (true, Some(file), _) => Some(Surface::read(file, progress)?),
+        (true, None, Some(shape)) => Some(Surface::Analytic(shape)),
+        _ => None,
+    };
+    let cameras = cameras(definition.size, entry, &scene)?;
+    let mut footprint_px = footprint(&scene, &cameras);
+    if let Some(wanted) = point.footprint_px.filter(|_| footprint_px > 0.0) {
+        let factor = (wanted / footprint_px) as f32;
+        let scaled = |axis: [f32; 3]| axis.map(|c| c * factor);
+        for surfel in &mut scene.surfels {
+            *surfel = Surfel { s: scaled(surfel.s), t: scaled(surfel.t), ..*surfel };
+        }
+        footprint_px = wanted;
+    }
+    Ok(Staged { scene, cameras, surface, footprint_px })
+}
+
+/// What `epsplat generate` writes, with disks of `radius` mean spacings.
+fn of_shape(shape: Shape, count: u64, radius: Option<f64>) -> Points {
+    let samples = generate(shape, count);
+    let factor = radius.map_or(1.0, |radius| radius / RADIUS_IN_SPACINGS) as f32;
+    let opaque = |[r, g, b]: [u8; 3]| [r, g, b, 255];
+    Points {
+        positions: samples.clone().map(|sample| sample.position).collect(),
+        normals: Some(samples.clone().map(|sample| sample.normal).collect()),
+        radii: Some(samples.clone().map(|sample| sample.radius * factor).collect()),
+        colors: Some(Colors::Srgb8(samples.map(|sample| opaque(sample.color)).collect())),
+        up: None,
+    }
+}
+
+/// The first camera as the scene's entry says, and the others around the scene's centre.
+fn cameras([width, height]: [u32; 2], entry: &SceneEntry, scene: &Scene) -> Result<Vec<Camera>> {
+    let lens = match entry.ortho {
+        Some(height) => Lens::OrthographicHeight(height),
+        None => Lens::Fov(entry.fov.unwrap_or(DEFAULT_FOV)),
+    };
+    let (size, near) = ((width, height), Camera::default_near(scene));
+    let center = scene.origin + scene.bounds().center();
+    let target = entry.target.map_or(center, DVec3::from);
+    let mut first = match entry.eye {
+        Some(eye) => Camera::look_at(size, lens, eye.into(), target, entry.up.map(DVec3::from), scene.up, near)?,
+        None => Camera::framing(size, lens, scene, near)?,
+    };
+    let fill = entry.fill.unwrap_or(1.0);
+    match first.projection {
+        // Along the line of sight, so that the target stays where it is in the image.
+        Projection::Pinhole => first.eye = target + (first.eye - target) / fill,
+        Projection::Orthographic => (first.fx, first.fy) = (first.fx * fill, first.fy * fill),
+    }
+    let turned = |view: u32| {
+        let turn = DMat3::from_axis_angle(scene.up.axis(), TAU * f64::from(view) / f64::from(entry.views));
+        let eye = center + turn * (first.eye - center);
+        Camera { eye, rotation: first.rotation * turn.transpose(), ..first.clone() }
+    };
+    Ok((0..entry.views).map(turned).collect())
+}
+
+/// The mean over surfels and cameras of the longer half-axis in pixels, at the depth of the centre and as if seen face-on;
+/// surfels behind the near depth have none. Added in order, so that it is always the same.
+fn footprint(scene: &Scene, cameras: &[Camera]) -> f64 {
+    let (mut sum, mut seen) = (0.0, 0u64);
+    for camera in cameras {
+        let focal = (camera.fx * camera.fy).sqrt();
+        for surfel in &scene.surfels {
+            let center = camera.to_camera(scene.origin + glam::Vec3::from_array(surfel.center).as_dvec3());
+            if center.z < camera.near {
+                continue;
+            }
+            let depth = if camera.projection == Projection::Pinhole { center.z } else { 1.0 };
+            sum += f64::from(surfel.radius()) * focal / depth;
+            seen += 1;
+        }
+    }
+    sum / seen.max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use std::path::Path;
+
+    fn staged(entry: &str) -> (Definition, Vec<Staged>) {
+        let text = format!(
+            "name = \"n\"\nabout = \"a\"\nsize = [100, 100]\n[[scene]]\nname = \"s\"\n{entry}\n\
+             [[config]]\nname = \"c\"\nbackend = \"reference\""
+        );
+        let definition = Definition::parse(&text, Path::new("x.toml")).unwrap();
+        let entry = &definition.scenes[0];
+        let all = points(entry).into_iter().map(|point| stage(&definition, entry, point, &()).unwrap()).collect();
+        (definition, all)
+    }
+
+    #[test]
+    fn a_sweep_is_each_count_with_each_footprint_that_is_not_too_large() {
+        let entry = "shape = \"sphere\"\ncount = [100, 200]\nfootprint_px = [1, 4]\nmost_fragments = 6000";
+        let (_, all) = staged(entry);
+        let sizes: Vec<_> = all.iter().map(|s| (s.scene.surfels.len(), s.footprint_px)).collect();
+        assert_eq!(sizes, [(100, 1.0), (100, 4.0), (200, 1.0)]);
+        for staged in &all {
+            assert!((footprint(&staged.scene, &staged.cameras) / staged.footprint_px - 1.0).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_radius_is_in_spacings_and_fill_is_a_share_of_the_image() {
+        let (_, plain) = staged("shape = \"sphere\"\ncount = 1000");
+        let (_, thick) = staged("shape = \"sphere\"\ncount = 1000\nradius = 3.0");
+        let (_, far) = staged("shape = \"sphere\"\ncount = 1000\nfill = 0.1");
+        let ratio = |of: &[Staged]| of[0].footprint_px / plain[0].footprint_px;
+        assert!((ratio(&thick) - 2.0).abs() < 1e-6);
+        // The nearer half is enlarged the more, the nearer the camera is.
+        assert!((ratio(&far) - 0.1).abs() < 0.02, "{}", ratio(&far));
+        let (_, flat) = staged("shape = \"plane\"\ncount = 100\northo = 4\nfill = 0.5");
+        assert!((flat[0].footprint_px - 0.3 * 100.0 / 4.0 * 0.5).abs() < 1e-6);
+    }
+
+    #[test]
+    fn views_go_around_the_centre_and_see_it_in_the_same_place() {
+        let (_, all) = staged("shape = \"torus\"\ncount = 500\nviews = 3");
+        let [first, second, third] = &all[0].cameras[..] else { unreachable!() };
+        for other in [second, third] {
+            let center = all[0].scene.bounds().center();
+            assert!((first.to_camera(center) - other.to_camera(center)).length() < 1e-9);
+            assert!((first.eye - other.eye).length() > 1.0);
+        }
+    }
+}

@@ -1,0 +1,176 @@
+//! A study's outcome as text: for a terminal, and as Markdown for a README.
+
+use super::definition::{Config, Definition};
+use crate::passes::accumulate::Features;
+use crate::report::{Measurement, Study};
+use crate::scene::BlendFormat;
+
+/// A column: its head, and its cell for a measurement.
+type Column<'a> = (String, Box<dyn Fn(&Measurement) -> String + 'a>);
+
+/// What stands where nothing was measured.
+const NONE: &str = "-";
+
+/// Every measurement in a line: scene, configuration, milliseconds a frame (median ± median absolute deviation), the time as
+/// a multiple of the baseline's, largest error and RMSE against the f64 reference, PSNR, holes and leaks against ground
+/// truth, and how many times as fast as the fastest rasteriser of the same error. Columns that would be empty are left out.
+pub fn text(definition: &Definition, study: &Study) -> String {
+    let all = &study.measurements;
+    let optional = |value: Option<f64>, digits: usize| value.map_or(NONE.to_owned(), |v| format!("{v:.digits$}"));
+    let truth = |m: &Measurement, measure: &str| m.reconstruction.get(measure).copied();
+    let percent = move |m: &Measurement, measure: &str| optional(truth(m, measure).map(|share| 100.0 * share), 3);
+    let mut columns: Vec<Column<'_>> = vec![
+        ("scene".into(), Box::new(|m| m.scene.clone())),
+        ("config".into(), Box::new(|m| m.config.clone())),
+        ("surfels".into(), Box::new(|m| m.surfels.to_string())),
+        ("px".into(), Box::new(|m| format!("{:.2}", m.footprint_px))),
+        ("ms".into(), Box::new(|m| format!("{:.2} ± {:.2}", m.total_ms.median, m.total_ms.mad))),
+    ];
+    if let Some(baseline) = &definition.baseline {
+        columns.push((format!("time / {baseline}"), Box::new(|m| optional(relative(definition, study, m), 2))));
+    }
+    columns.push(("max error".into(), Box::new(|m| error(m.numeric.map(|n| n.max_abs)))));
+    columns.push(("RMSE".into(), Box::new(|m| error(m.numeric_error()))));
+    if all.iter().any(|m| !m.reconstruction.is_empty()) {
+        columns.push(("PSNR, dB".into(), Box::new(move |m| optional(truth(m, "psnr_db"), 2))));
+        columns.push(("SSIM".into(), Box::new(move |m| optional(truth(m, "ssim"), 4))));
+        columns.push(("holes, %".into(), Box::new(move |m| percent(m, "hole_rate"))));
+        columns.push(("leaks, %".into(), Box::new(move |m| percent(m, "leak_rate"))));
+    }
+    if all.iter().any(|m| m.ratio_to_raster.is_some()) {
+        columns.push(("x raster".into(), Box::new(|m| optional(m.ratio_to_raster, 2))));
+    }
+    if all.iter().any(|m| m.error_limit.is_some()) {
+        let kept = |m: &Measurement| match m.error_limit {
+            None => NONE.to_owned(),
+            Some(_) => if m.kept { "kept" } else { "MISSED" }.to_owned(),
+        };
+        columns.push(("limit".into(), Box::new(kept)));
+    }
+    let heads = columns.iter().map(|(head, _)| head.clone()).collect();
+    let rows = all.iter().map(|m| columns.iter().map(|(_, cell)| cell(m)).collect());
+    aligned(&std::iter::once(heads).chain(rows).collect::<Vec<Vec<String>>>())
+}
+
+/// A table in Markdown for each scene: configuration, time as a multiple of the baseline's, largest error and RMSE against
+/// the f64 reference, whether the bits are the same in any order, and which adapters run it.
+pub fn markdown(definition: &Definition, study: &Study) -> String {
+    let baseline = definition.baseline.as_deref().unwrap_or("baseline");
+    let mut text = String::new();
+    for case in study.measurements.chunk_by(same_case) {
+        let first = &case[0];
+        text += &format!("**{}**, {} surfels, {}x{}\n\n", first.scene, first.surfels, first.width, first.height);
+        text += &format!("| | time / {baseline} | largest error | RMSE | same bits in any order | runs on |\n");
+        text += "|---|---|---|---|---|---|\n";
+        for m in case {
+            let time = relative(definition, study, m).map_or(NONE.to_owned(), |ratio| format!("{ratio:.2}"));
+            let (largest, rmse) = (error(m.numeric.map(|n| n.max_abs)), error(m.numeric_error()));
+            let config = definition.configs.iter().find(|config| config.name == m.config);
+            let bits = config.map_or(NONE, |config| if config.deterministic() { "yes" } else { "no" });
+            let on = config.map_or(NONE, runs_on);
+            text += &format!("| `{}` | {time} | {largest} | {rmse} | {bits} | {on} |\n", m.config);
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// Which adapters run a configuration.
+fn runs_on(config: &Config) -> &'static str {
+    let raster = config.options(None).raster;
+    match (raster.map(|raster| raster.format), config.accumulator().map(|row| row.features)) {
+        (Some(BlendFormat::Rgba32Float), _) => "adapters that blend 32-bit floats",
+        (Some(_), _) | (None, Some(Features::None)) => "any adapter",
+        (None, Some(Features::AtomicsU64)) => "adapters with 64-bit atomics",
+        (None, Some(Features::AtomicsF32)) => "adapters with f32 atomics",
+        (None, None) => "the processor",
+    }
+}
+
+/// Whether two measurements differ in the configuration alone.
+fn same_case(a: &Measurement, b: &Measurement) -> bool {
+    a.scene == b.scene && a.surfels == b.surfels && a.footprint_px == b.footprint_px
+}
+
+/// The median time as a multiple of the baseline's on the same scene; none without a baseline there.
+fn relative(definition: &Definition, study: &Study, of: &Measurement) -> Option<f64> {
+    let baseline = definition.baseline.as_ref()?;
+    let base = study.measurements.iter().find(|m| m.config == *baseline && same_case(m, of))?;
+    Some(of.total_ms.median / base.total_ms.median).filter(|ratio| ratio.is_finite())
+}
+
+fn error(value: Option<f64>) -> String {
+    value.map_or(NONE.to_owned(), |value| format!("{value:.1e}"))
+}
+
+/// Columns as wide as their widest cell; names to the left, numbers to the right.
+fn aligned(rows: &[Vec<String>]) -> String {
+    let columns = rows.first().map_or(0, Vec::len);
+    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..columns).map(width).collect();
+    let mut text = String::new();
+    for row in rows {
+        let cells = row.iter().zip(&widths).enumerate().map(|(column, (cell, &width))| match column {
+            0 | 1 => format!("{cell:width$}"),
+            _ => format!("{cell:>width$}"),
+        });
+        text += cells.collect::<Vec<_>>().join("  ").trim_end();
+        text.push('\n');
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::report::{Machine, Numeric, Summary};
+    use std::path::Path;
+
+    fn study() -> (Definition, Study) {
+        let text = "name = \"n\"\nabout = \"a\"\nbaseline = \"base\"\n[[scene]]\nname = \"s\"\nshape = \"torus\"\ncount = 9\n\
+                    [[config]]\nname = \"base\"\nbackend = \"gpu\"\naccumulator = \"fixed32\"\n\
+                    [[config]]\nname = \"float\"\nbackend = \"gpu\"\naccumulator = \"float\"\nerror_limit = 1e-9\n";
+        let definition = Definition::parse(text, Path::new("x.toml")).unwrap();
+        let of = |config: &str, median| Measurement {
+            scene: "s".into(),
+            config: config.into(),
+            surfels: 9,
+            total_ms: Summary { median, ..Summary::default() },
+            numeric: Some(Numeric { rmse: 1e-7, max_abs: 2e-6, psnr_db: Some(140.0) }),
+            ..Measurement::default()
+        };
+        let float = Measurement { error_limit: Some(1e-9), ..of("float", 3.0) };
+        let study = Study {
+            name: "n".into(),
+            about: "a".into(),
+            command: String::new(),
+            date: String::new(),
+            machine: Machine::default(),
+            runs: 1,
+            measurements: vec![of("base", 2.0), float],
+            images: Vec::new(),
+        };
+        (definition, study)
+    }
+
+    #[test]
+    fn times_are_relative_to_the_baseline_and_empty_columns_are_not_there() {
+        let (definition, study) = study();
+        let text = text(&definition, &study);
+        let lines: Vec<&str> = text.lines().collect();
+        assert!(lines[0].contains("time / base") && !text.contains("PSNR") && !text.contains("x raster"), "{text}");
+        assert!(lines[1].starts_with("s      base ") && lines[1].contains("2.00 ± 0.00"), "{text}");
+        assert!(lines[2].contains(" 1.50 ") && lines[2].ends_with("MISSED"), "{text}");
+        assert!(lines[1].contains("2.0e-6") && lines[1].contains("1.0e-7"), "{text}");
+    }
+
+    #[test]
+    fn the_readmes_table_says_what_runs_where() {
+        let (definition, study) = study();
+        let text = markdown(&definition, &study);
+        assert!(text.contains("| `base` | 1.00 | 2.0e-6 | 1.0e-7 | yes | any adapter |"), "{text}");
+        assert!(text.contains("| `float` | 1.50 | 2.0e-6 | 1.0e-7 | no | adapters with f32 atomics |"), "{text}");
+        assert!(text.starts_with("**s**, 9 surfels"), "{text}");
+    }
+}

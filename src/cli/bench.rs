@@ -1,0 +1,78 @@
+//! `epsplat bench`: a study of speed and error from a definition.
+
+use std::path::PathBuf;
+use std::time::SystemTime;
+
+use clap::Args;
+use epsplat::bench::{self, Definition, machine, table};
+use epsplat::gpu::Gpu;
+use epsplat::render::Backend;
+use epsplat::{Error, Result, report};
+
+use super::progress::Bars;
+use super::{note, print};
+
+/// Run a benchmark study: every configuration on every scene of a definition, each speed with its error.
+///
+/// Configurations take turns, so that a machine that slows down slows all of them. Errors are against the f64 reference with
+/// the same options, over the pixels that it does not excuse, and against ground truth by rays where a scene asks for it.
+#[derive(Args)]
+#[command(after_help = "Example:\n  epsplat bench benches/accumulators.toml --quick --out report\n\n\
+    Exits with 1, after everything is written, if a configuration misses its error limit or, where its bits must not\n\
+    change, gives different bits in two runs.")]
+pub struct Arguments {
+    /// The study's definition: .toml
+    definition: PathBuf,
+    /// A folder for the report: index.html, results.csv, results.json
+    #[arg(short, long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Timed runs of each configuration, instead of the definition's
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    runs: Option<u32>,
+    /// The definition's quick form, of some seconds
+    #[arg(long)]
+    quick: bool,
+    /// Print Markdown instead: time as a multiple of the baseline's, errors, same bits, which adapters
+    #[arg(long)]
+    table: bool,
+    /// Part of the adapter's name, as `epsplat adapters` lists them
+    #[arg(long, value_name = "SUBSTRING")]
+    adapter: Option<String>,
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let mut definition = Definition::read(&arguments.definition)?;
+    if arguments.quick {
+        definition = definition.quick_form();
+    }
+    definition.runs = arguments.runs.unwrap_or(definition.runs);
+    if arguments.table && definition.baseline.is_none() {
+        return Err(Error::Usage(format!(
+            "--table gives times relative to a baseline, and {} names none",
+            arguments.definition.display()
+        )));
+    }
+    let gpu = match definition.needs_gpu() {
+        true => Some(Gpu::open(arguments.adapter.as_deref())?),
+        false => None,
+    };
+    if let Some(gpu) = &gpu {
+        note(&format!("rendering on {} ({}, {})", gpu.adapter.name, gpu.adapter.api, gpu.adapter.kind));
+    }
+    let backend = gpu.map(Backend::gpu);
+    let outcome = bench::run(&definition, backend.as_ref(), &Bars::new())?;
+    outcome.notes.iter().for_each(|line| note(line));
+    let mut study = outcome.study;
+    study.command = machine::command(std::env::args_os().map(|argument| argument.to_string_lossy().into_owned()));
+    study.date = machine::date(SystemTime::now());
+    let render = if arguments.table { table::markdown } else { table::text };
+    print(&render(&definition, &study))?;
+    if let Some(folder) = &arguments.out {
+        report::write(folder, &study)?;
+        note(&format!("{}: the report", folder.join("index.html").display()));
+    }
+    if outcome.failures.is_empty() {
+        return Ok(());
+    }
+    Err(Error::Study { name: study.name, what: outcome.failures.join("; ") })
+}

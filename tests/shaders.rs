@@ -10,7 +10,7 @@ use epsplat::gpu::Sources;
 use epsplat::gpu::device::STORAGE_BUFFERS;
 use epsplat::gpu::kernel::{FILES, reflect};
 use epsplat::passes::accumulate::{ACCUMULATORS, Features, accumulator};
-use epsplat::passes::variant::{COLOR_CHANNEL, PixelLayout, STAGES, color_channels, files, overrides};
+use epsplat::passes::variant::{COLOR_CHANNEL, PixelLayout, color_channels, files, overrides, stages};
 use epsplat::scene::{Kernel, KernelShape, RenderOptions, SceneNeeds};
 use naga::AddressSpace;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
@@ -41,7 +41,11 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
     let mut without = BTreeSet::new();
     for (text, needs) in &texts {
         let module = naga::front::wgsl::parse_str(text).unwrap_or_else(|e| panic!("{}", e.emit_to_string(text)));
-        let needed = capabilities(accumulator(needs.accumulator).unwrap().features);
+        let features = match needs.raster {
+            None => accumulator(needs.accumulator).unwrap().features,
+            Some(_) => Features::None,
+        };
+        let needed = capabilities(features);
         let all = needed.iter().copied().collect::<Capabilities>();
         is_valid(&module, all).unwrap_or_else(|e| panic!("{}: {e}", needs.accumulator));
         for capability in needed {
@@ -49,11 +53,13 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
             without.insert(needs.accumulator);
         }
         let entries: BTreeSet<&str> = module.entry_points.iter().map(|entry| entry.name.as_str()).collect();
-        assert_eq!(entries, BTreeSet::from(STAGES));
-        for (_, variable) in module.global_variables.iter() {
-            if variable.binding.is_some() {
-                assert!(matches!(variable.space, AddressSpace::Uniform | AddressSpace::Storage { .. }));
-            }
+        let drawn: &[&str] =
+            if needs.raster.is_some() { &["quad", "raster_visibility", "raster_attributes"] } else { &[] };
+        assert_eq!(entries, stages(needs).iter().chain(drawn).copied().collect());
+        for (_, variable) in module.global_variables.iter().filter(|(_, v)| v.binding.is_some()) {
+            let buffer = matches!(variable.space, AddressSpace::Uniform | AddressSpace::Storage { .. });
+            // Only what the rasteriser wrote is a texture.
+            assert!(buffer || (needs.raster.is_some() && variable.space == AddressSpace::Handle));
         }
         assert!(!text.lines().any(|line| line.starts_with("enable") || line.starts_with("requires")));
     }

@@ -9,17 +9,36 @@ fn front_at(pixel: u32) -> f32 {
     return bitcast<f32>(visible[pixel]);
 }
 
-fn add_fragment(splat: Splat, filter_: Filter, attributes: Attributes, x: u32, y: u32) {
-    let fragment = footprint(splat, filter_, x, y);
-    if (!fragment.hit) {
-        return;
+// The fragments of one invocation: the splat's pixels from `offset` on in steps of `step`. Each round of the outer loop
+// finds the invocation's next accepted fragment and then adds it, so that the invocations of a subgroup, whose accepted
+// fragments lie at different places, do the costly part together.
+fn accumulate_splat(index: u32, offset: vec2<u32>, step: u32) {
+    let splat = projected[index];
+    let pixels = reach(splat);
+    let first = pixels.first + offset;
+    let filter_ = filter_of(index);
+    let attributes = attributes_of(index, splat);
+    var at = select(first, vec2<u32>(0u, pixels.last.y + 1u), first.x > pixels.last.x);
+    loop {
+        var fragment: Fragment;
+        var pixel: u32;
+        var front: f32;
+        var accepted = false;
+        while (at.y <= pixels.last.y && !accepted) {
+            pixel = pixel_index(at.x, at.y);
+            front = front_at(pixel);
+            let farthest = farthest_accepted(front, attributes.radius);
+            fragment = footprint(splat, filter_, at.x, at.y);
+            accepted = fragment.hit && fragment.depth <= farthest;
+            at.x += step;
+            let wrapped = at.x > pixels.last.x;
+            at = select(at, vec2<u32>(first.x, at.y + step), wrapped);
+        }
+        if (!accepted) {
+            break;
+        }
+        blend(pixel, fragment, front, attributes);
     }
-    let pixel = pixel_index(x, y);
-    let front = front_at(pixel);
-    if (fragment.depth > farthest_accepted(front, attributes.radius)) {
-        return;
-    }
-    blend(pixel, fragment, front, attributes);
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -28,21 +47,9 @@ fn accumulate(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
-    let index = linear_index(workgroup, workgroups, local);
-    if (index >= arrayLength(&projected)) {
-        return;
-    }
-    let splat = projected[index];
-    let pixels = reach(splat);
-    if (any(pixels.first > pixels.last) || is_large(splat)) {
-        return;
-    }
-    let filter_ = filter_of(index);
-    let attributes = attributes_of(index, splat);
-    for (var y = pixels.first.y; y <= pixels.last.y; y++) {
-        for (var x = pixels.first.x; x <= pixels.last.x; x++) {
-            add_fragment(splat, filter_, attributes, x, y);
-        }
+    let index = scattered_index(workgroup, workgroups, local, arrayLength(&projected));
+    if (index < arrayLength(&projected) && !is_large(projected[index])) {
+        accumulate_splat(index, vec2<u32>(0u), 1u);
     }
 }
 
@@ -53,16 +60,7 @@ fn accumulate_large(
     @builtin(local_invocation_id) local: vec3<u32>,
 ) {
     let index = large_splat(workgroup, workgroups);
-    if (index >= arrayLength(&projected)) {
-        return;
-    }
-    let splat = projected[index];
-    let pixels = reach(splat);
-    let filter_ = filter_of(index);
-    let attributes = attributes_of(index, splat);
-    for (var y = pixels.first.y + local.y; y <= pixels.last.y; y += TILE) {
-        for (var x = pixels.first.x + local.x; x <= pixels.last.x; x += TILE) {
-            add_fragment(splat, filter_, attributes, x, y);
-        }
+    if (index < arrayLength(&projected)) {
+        accumulate_splat(index, local.xy, TILE);
     }
 }

@@ -1,7 +1,7 @@
 // Depths are written and compared in the fragment shader, bit for bit as the compute path does: the rasteriser keeps the
 // nearest depth, the attribute pass reads it.
 
-@group(0) @binding(6) var nearest_depth: texture_depth_2d;
+@group(0) @binding(19) var nearest_depth: texture_depth_2d;
 
 fn corner_depth(splat: Splat, image: vec2<f32>, index: u32) -> f32 {
     return 0.0;

@@ -14,8 +14,10 @@ fn corner_depth(splat: Splat, image: vec2<f32>, index: u32) -> f32 {
     if (!MOVED) {
         return depth_order(z);
     }
-    let straight = farthest_accepted(z, radius_of(index)) - z;
-    return depth_order(z + select(straight, straight * along_axis(image), ALONG_RAY));
+    // A fraction of the depth is the same fraction of the distance; a length along the ray is less of a depth.
+    let fraction = z * view.epsilon_relative;
+    let length = farthest_accepted(z, radius_of(index)) - z - fraction;
+    return depth_order(z + fraction + select(length, length * along_axis(image), ALONG_RAY));
 }
 
 @fragment

@@ -1,6 +1,6 @@
 // The blended sums of up to four channels.
 
-@group(0) @binding(8) var sums_0: texture_2d<f32>;
+@group(0) @binding(20) var sums_0: texture_2d<f32>;
 
 struct Targets {
     @location(0) sums_0: vec4<f32>,

@@ -1,6 +1,6 @@
 // The blended sums of up to twelve channels.
 
-@group(0) @binding(8) var sums_0: texture_2d<f32>;
+@group(0) @binding(20) var sums_0: texture_2d<f32>;
 @group(0) @binding(17) var sums_1: texture_2d<f32>;
 @group(0) @binding(18) var sums_2: texture_2d<f32>;
 

@@ -30,7 +30,7 @@ fn visibility(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
-    let index = linear_index(workgroup, workgroups, local);
+    let index = scattered_index(workgroup, workgroups, local, arrayLength(&projected));
     if (index >= arrayLength(&projected)) {
         return;
     }

@@ -10,7 +10,10 @@ use epsplat::passes::accumulate::accumulator;
 use epsplat::render::{Backend, Report, render};
 use epsplat::scene::camera::DEFAULT_FOV;
 use epsplat::scene::light::MAX_LIGHTS;
-use epsplat::scene::{Camera, Epsilon, Kernel, Lens, Light, LowPass, Maps, RenderOptions, Scene, Shading, Up};
+use epsplat::scene::{
+    BlendFormat, Camera, Epsilon, Kernel, Lens, Light, LowPass, Maps, Raster, RasterDepth, RenderOptions, Scene,
+    Shading, Up,
+};
 use epsplat::{Error, Result, io, surfels};
 use glam::DVec3;
 
@@ -80,6 +83,13 @@ pub struct Arguments {
     /// How sums are kept on the device: fixed, fixed32, fixed64, packed64, float or cas (see the README)
     #[arg(long, value_name = "NAME", value_parser = parse_accumulator)]
     accumulator: Option<&'static str>,
+    /// What --backend raster blends into: rgba8unorm, rgba16float or rgba32float [default: rgba16float]
+    #[arg(long, value_name = "FORMAT")]
+    blend_format: Option<BlendFormat>,
+    /// How --backend raster tests depth: exact (in the shader, as compute does), offset (by the rasteriser, along the
+    /// camera's axis) or ray (along the view ray) [default: exact]
+    #[arg(long, value_name = "HOW")]
+    raster_depth: Option<RasterDepth>,
     /// Shading of the blended colour
     #[arg(long, value_enum, default_value_t = ShadingName::Lambert)]
     shading: ShadingName,
@@ -103,6 +113,8 @@ enum BackendName {
     Auto,
     /// Compute kernels on an adapter
     Gpu,
+    /// The adapter's rasteriser and blender, for comparison
+    Raster,
     /// The kernels' f64 twins on the processor
     Reference,
 }
@@ -216,7 +228,7 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
             LowPassName::Ewa => LowPass::Ewa,
         },
         accumulator: arguments.accumulator.unwrap_or(default.accumulator),
-        raster: None,
+        raster: raster(arguments)?,
         shading: match arguments.shading {
             ShadingName::Unlit => Shading::Unlit,
             ShadingName::Lambert => Shading::Lambert,
@@ -225,6 +237,25 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
         background: arguments.background.unwrap_or(default.background),
         maps,
     })
+}
+
+/// The rasteriser's options, if it renders.
+fn raster(arguments: &Arguments) -> Result<Option<Raster>> {
+    let chosen = arguments.blend_format.is_some() || arguments.raster_depth.is_some();
+    if arguments.backend != BackendName::Raster {
+        return match chosen {
+            true => Err(Error::Usage("--blend-format and --raster-depth need --backend raster".into())),
+            false => Ok(None),
+        };
+    }
+    if arguments.accumulator.is_some() {
+        return Err(Error::Usage("--backend raster adds in --blend-format: leave --accumulator out".into()));
+    }
+    let default = Raster::default();
+    Ok(Some(Raster {
+        format: arguments.blend_format.unwrap_or(default.format),
+        depth: arguments.raster_depth.unwrap_or(default.depth),
+    }))
 }
 
 fn backend(arguments: &Arguments) -> Result<Backend> {

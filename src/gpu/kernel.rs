@@ -121,11 +121,11 @@ pub fn reflect(text: &str) -> std::result::Result<(naga::Module, Bindings, Vec<S
 #[derive(Default)]
 pub(crate) struct Programs(Mutex<HashMap<ProgramKey, Arc<Program>>>);
 
-/// A module's text, and its constants by name as bits.
-type ProgramKey = (String, Vec<(&'static str, u64)>);
+/// A module's text, its constants by name as bits, and its draws in words.
+type ProgramKey = (String, Vec<(&'static str, u64)>, String);
 
 impl Programs {
-    /// The entry points `stages` of the module `text`, and `draws`, which follow from the text.
+    /// The entry points `stages` of the module `text`, which follow from it, and `draws`.
     pub(crate) fn get(
         &self,
         gpu: &Gpu,
@@ -134,7 +134,8 @@ impl Programs {
         draws: &[Draw],
         constants: &[(&'static str, f64)],
     ) -> Result<Arc<Program>> {
-        let key = (text, constants.iter().map(|&(name, value)| (name, value.to_bits())).collect());
+        let bits = constants.iter().map(|&(name, value)| (name, value.to_bits())).collect();
+        let key = (text, bits, format!("{draws:?}"));
         // A poisoned lock means that another thread panicked while it compiled; the map itself is whole.
         let mut programs = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(program) = programs.get(&key) {
@@ -147,6 +148,7 @@ impl Programs {
 }
 
 /// A render pipeline to compile: the rasteriser's part of a program.
+#[derive(Debug)]
 pub(crate) struct Draw {
     pub(crate) name: &'static str,
     pub(crate) vertex: &'static str,

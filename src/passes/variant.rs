@@ -206,6 +206,8 @@ pub fn overrides(needs: &SceneNeeds, options: &RenderOptions, fraction_bits: u32
     }
     if let Some(raster) = needs.raster {
         constants.push(("BLEND_SCALE", raster::blend_scale(raster.format)));
+        // The visibility pass's pipeline says otherwise.
+        constants.push(("MOVED", 0.0));
         constants.push(("ALONG_RAY", u32::from(raster.depth == RasterDepth::Ray).into()));
     }
     if needs.low_pass == LowPass::Ewa {

@@ -9,7 +9,9 @@ use epsplat::frame::Frame;
 use epsplat::gpu::Gpu;
 use epsplat::gpu::layout::{ONE, View};
 use epsplat::passes::accumulate::{ACCUMULATORS, Accumulator};
-use epsplat::scene::{ColorNeed, KernelShape, LowPass, Projection, RenderOptions, SceneNeeds};
+use epsplat::scene::{
+    BlendFormat, ColorNeed, KernelShape, LowPass, Projection, Raster, RasterDepth, RenderOptions, SceneNeeds,
+};
 
 /// What one unit in a sum of the accumulator `fixed` is of a full weight.
 pub const UNIT: f64 = 1.0 / ONE as f64;
@@ -57,6 +59,13 @@ pub fn all_needs() -> Vec<SceneNeeds> {
             }
         }
     }
+    // The rasteriser's, with as many targets as the sums take.
+    for (step, (depth, _)) in (0..240).zip(RasterDepth::ALL.iter().cycle()) {
+        let (kernel, base) = (shapes[step % 4], base[(step * 101) % base.len()]);
+        let low_pass = [LowPass::None, LowPass::Max, LowPass::Ewa][step / 3 % 3];
+        let raster = Some(Raster { format: BlendFormat::ALL[step / 7 % 3].0, depth: *depth });
+        all.push(SceneNeeds { raster, kernel, low_pass, epsilon_radius: step % 5 == 0, ..base });
+    }
     all
 }
 
@@ -78,6 +87,7 @@ fn base_needs() -> Vec<SceneNeeds> {
                 projection,
                 accumulator: ACCUMULATORS[0].name,
                 wide_sums: false,
+                raster: None,
                 kernel: KernelShape::Ellipse,
                 epsilon_radius: false,
                 color,

@@ -1,0 +1,147 @@
+//! The rasteriser's path: the same picture as compute's, up to what its blending and its depth test lose.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use epsplat::frame::Frame;
+use epsplat::gpu::Sources;
+use epsplat::hardcases::{HardCase, Row, Truth, cases, judge};
+use epsplat::passes::accumulate::{Accumulator, Features};
+use epsplat::render::{Backend, Report, render};
+use epsplat::scene::{BlendFormat, Maps, Raster, RasterDepth, RenderOptions, Shading};
+
+const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
+
+/// Cases with every kind of footprint and attribute, and depths of many magnitudes.
+const CASES: [&str; 6] = [
+    "intersecting sheets",
+    "intersecting sheets, orthographic",
+    "only the kernel's tail, hat",
+    "across the near depth",
+    "anisotropy 1000:1",
+    "UTM, a kilometre off",
+];
+
+fn all_cases() -> Vec<(HardCase, Truth)> {
+    let all = cases().unwrap().into_iter().filter(|case| CASES.contains(&case.name.as_str()));
+    let all: Vec<_> = all.map(|case| (case.truth().unwrap(), case)).map(|(truth, case)| (case, truth)).collect();
+    assert_eq!(all.len(), CASES.len());
+    all
+}
+
+fn options(case: &HardCase, format: BlendFormat, depth: RasterDepth) -> RenderOptions {
+    let maps = Maps { count: format != BlendFormat::Rgba8Unorm, ..MAPS };
+    RenderOptions { raster: Some(Raster { format, depth }), maps, ..case.options.clone() }
+}
+
+fn frame(case: &HardCase, options: &RenderOptions, backend: &Backend) -> (Frame, Report) {
+    render(&case.scene, &case.camera, options, backend, &()).unwrap()
+}
+
+/// The bound of src/passes/raster.rs for a floating format of unit roundoff `2^-bits`.
+fn floating(error_bound: fn(f64, f64, u32) -> f64) -> Accumulator {
+    Accumulator { name: "raster", file: "", words: 0, deterministic: false, features: Features::None, error_bound }
+}
+
+fn judged(case: &HardCase, truth: &Truth, format: BlendFormat, backend: &Backend) -> Row {
+    let (frame, report) = frame(case, &options(case, format, RasterDepth::Exact), backend);
+    assert_eq!((report.backend, report.accumulator), ("raster", format.name()));
+    let bound = match format {
+        BlendFormat::Rgba32Float => floating(|n, _, _| (2.0 * n * 2f64.powi(-24)) + 4.0 * 2f64.powi(-24)),
+        _ => floating(|n, _, _| (2.0 * n * 2f64.powi(-11)) + 4.0 * 2f64.powi(-24)),
+    };
+    judge(case, truth, &bound, &frame, &report)
+}
+
+fn kept(row: &Row) -> bool {
+    row.lost + row.invented + row.nan == 0 && row.maps.iter().all(|map| map.used_of_own <= 1.0)
+}
+
+#[test]
+fn exact_depths_lose_no_more_than_the_formats_bound() {
+    let Some(gpu) = common::gpu() else { return };
+    let blends_f32 = gpu.adapter.blends_f32;
+    let backend = Backend::gpu(gpu);
+    for (case, truth) in all_cases() {
+        for (format, runs) in [(BlendFormat::Rgba32Float, blends_f32), (BlendFormat::Rgba16Float, true)] {
+            if runs {
+                let row = judged(&case, &truth, format, &backend);
+                assert!(kept(&row), "{} in {}: {row:#?}", case.name, format.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_broken_raster_kernel_is_noticed() {
+    let cases = all_cases();
+    for (file, from, to) in [
+        ("raster_exact.wgsl", "fragment.depth > farthest", "fragment.depth * 1.001 > farthest"),
+        ("raster_exact.wgsl", "fragment.depth * depth_scale()", "0.999 * fragment.depth * depth_scale()"),
+        ("raster.wgsl", "extent.last + 1u", "extent.last"),
+        ("accumulator_raster.wgsl", "clamp(value, 0.0, 1.0)", "clamp(1.01 * value, 0.0, 1.0)"),
+        ("raster_targets_3.wgsl", "textureLoad(sums_1", "textureLoad(sums_2"),
+    ] {
+        let Some(gpu) = common::gpu() else { return };
+        let backend = Backend::Gpu { gpu: Box::new(gpu), sources: Sources::default().replace(file, from, to).unwrap() };
+        let noticed =
+            |(case, truth): &(HardCase, Truth)| !kept(&judged(case, truth, BlendFormat::Rgba16Float, &backend));
+        assert!(cases.iter().any(noticed), "{file} with {to}");
+    }
+}
+
+/// Interpolated depths decide otherwise in few pixels, and blend as the exact ones do elsewhere.
+#[test]
+fn the_classic_depth_test_accepts_nearly_the_same_fragments() {
+    let Some(gpu) = common::gpu() else { return };
+    let backend = Backend::gpu(gpu);
+    for name in ["intersecting sheets", "intersecting sheets, orthographic", "UTM, a kilometre off"] {
+        let case = cases().unwrap().into_iter().find(|case| case.name == name).unwrap();
+        let count = |depth| frame(&case, &options(&case, BlendFormat::Rgba16Float, depth), &backend).0.count.unwrap();
+        let exact = count(RasterDepth::Exact);
+        let covered = exact.iter().filter(|count| **count > 0.0).count();
+        for depth in [RasterDepth::Offset, RasterDepth::Ray] {
+            let classic = count(depth);
+            let differ = exact.iter().zip(&classic).filter(|(a, b)| a != b).count();
+            let changed = exact.iter().zip(&classic).filter(|(a, b)| (**a > 0.0) != (**b > 0.0)).count();
+            assert_eq!(changed, 0, "{name}, {}: covered pixels", depth.name());
+            assert!(differ * 50 < covered, "{name}, {}: {differ} of {covered} pixels", depth.name());
+        }
+    }
+}
+
+#[test]
+fn eight_bits_lose_what_they_must_and_refuse_to_count() {
+    let Some(gpu) = common::gpu() else { return };
+    let backend = Backend::gpu(gpu);
+    let (case, truth) = all_cases().into_iter().find(|(case, _)| case.name == "intersecting sheets").unwrap();
+    let (eight, _) = frame(&case, &options(&case, BlendFormat::Rgba8Unorm, RasterDepth::Exact), &backend);
+    let worst = |frame: &Frame| {
+        let both = frame.color.iter().zip(&truth.frame.color).filter(|(a, b)| a[3] > 0.0 && b[3] > 0.0);
+        both.flat_map(|(a, b)| a.iter().zip(b)).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+    };
+    let (half, _) = frame(&case, &options(&case, BlendFormat::Rgba16Float, RasterDepth::Exact), &backend);
+    assert!(worst(&eight) > 10.0 * worst(&half), "{} and {}", worst(&eight), worst(&half));
+    let counted = RenderOptions { maps: MAPS, ..options(&case, BlendFormat::Rgba8Unorm, RasterDepth::Exact) };
+    let error = render(&case.scene, &case.camera, &counted, &backend, &()).unwrap_err().to_string();
+    assert!(error.contains("8-bit"), "{error}");
+}
+
+/// Lit pictures take another way through resolve; they must be compute's up to 11 bits.
+#[test]
+fn lit_pictures_are_computes() {
+    let Some(gpu) = common::gpu() else { return };
+    let backend = Backend::gpu(gpu);
+    for (case, _) in all_cases().iter().filter(|(case, _)| case.name.starts_with("intersecting")) {
+        let plain = RenderOptions::default();
+        assert_eq!(plain.shading, Shading::Lambert);
+        let lit = RenderOptions { shading: plain.shading, lights: plain.lights, ..case.options.clone() };
+        let (compute, _) = frame(case, &lit, &backend);
+        let raster = RenderOptions { raster: Some(Raster::default()), ..lit.clone() };
+        let (raster, _) = frame(case, &raster, &backend);
+        let errors = compute.color.iter().zip(&raster.color).flat_map(|(a, b)| a.iter().zip(b));
+        let worst = errors.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(worst > 0.0 && worst < 0.05, "{}: {worst}", case.name);
+    }
+}

@@ -80,6 +80,8 @@ pub struct SceneEntry {
     pub fov: Option<f64>,
     /// Orthographic: world units from the image's top to its bottom.
     pub ortho: Option<f64>,
+    /// Width and height of this scene's images, pixels, in quick runs too; else the study's.
+    pub size: Option<[u32; 2]>,
     /// How large the scene is seen, of what it would be: 0.5 takes the camera twice as far away.
     pub fill: Option<f64>,
     /// Cameras on a circle around the scene's centre, the first of which is the one above.

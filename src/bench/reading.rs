@@ -32,11 +32,8 @@ impl Definition {
 
     /// What TOML's types do not say.
     fn check(&self) -> Result<(), String> {
-        let [width, height] = self.size;
-        check_size(width, height).map_err(|e| format!("size: {e}"))?;
-        if let Some([width, height]) = self.quick.size {
-            check_size(width, height).map_err(|e| format!("quick.size: {e}"))?;
-        }
+        sized("size", Some(self.size))?;
+        sized("quick.size", self.quick.size)?;
         if self.runs == 0 || self.quick.runs == Some(0) {
             return Err("runs: at least one run is needed".into());
         }
@@ -65,6 +62,10 @@ fn unique<'a>(table: &str, names: impl Iterator<Item = (&'a String, bool)>) -> R
         quick |= of_quick;
     }
     if quick { Ok(seen) } else { Err(format!("{table}: a study needs at least one [[{table}]] without quick = false")) }
+}
+
+fn sized(key: &str, size: Option<[u32; 2]>) -> Result<(), String> {
+    size.map_or(Ok(()), |[width, height]| check_size(width, height).map_err(|e| format!("{key}: {e}")))
 }
 
 fn positive(key: &str, value: Option<f64>) -> Result<(), String> {
@@ -114,6 +115,7 @@ impl SceneEntry {
         if self.views == 0 {
             return Err("views: at least one is needed".into());
         }
+        sized("size", self.size)?;
         positive("radius", self.radius)?;
         positive("fill", self.fill)?;
         positive("fov", self.fov)?;
@@ -210,6 +212,7 @@ mod tests {
             ("[quick]\nruns = 0\n", &["runs:"]),
             ("[[scene]]\nname = \"s\"\nshape = \"cube\"\ncount = 1\n", &["line 5, shape:", "cube", "torus"]),
             ("[[scene]]\nname = \"t\"\nshape = \"torus\"\n", &["scene \"t\": count:"]),
+            ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 1\nsize = [9, 0]\n", &["scene \"t\": size:", "9x0"]),
             ("[[scene]]\nname = \"t\"\n", &["scene \"t\": shape:"]),
             ("[[scene]]\nname = \"t\"\nfile = \"a.ply\"\ncount = 1\n", &["count:", "file"]),
             ("[[scene]]\nname = \"t\"\nfile = \"a.ply\"\ntruth = true\n", &["truth:", "OBJ"]),

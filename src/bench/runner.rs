@@ -246,7 +246,8 @@ impl<'a> Case<'a> {
         reconstruction: BTreeMap<String, f64>,
     ) -> Measurement {
         let config = timed.config;
-        let [width, height] = self.definition.size;
+        // There is at least one camera, and all have one size.
+        let (width, height) = self.staged.cameras.first().map_or((0, 0), |camera| (camera.width, camera.height));
         // There is at least one run.
         let total_ms = Summary::of(&timed.total_ms).unwrap_or_default();
         let passes = timed.passes.iter().filter_map(|(pass, ms)| Some((pass.clone(), Summary::of(ms)?)));

@@ -70,7 +70,7 @@ pub(super) fn stage(
         (true, None, Some(shape)) => Some(Surface::Analytic(shape)),
         _ => None,
     };
-    let cameras = cameras(definition.size, entry, &scene)?;
+    let cameras = cameras(entry.size.unwrap_or(definition.size), entry, &scene)?;
     let mut footprint_px = footprint(&scene, &cameras);
     if let Some(wanted) = point.footprint_px.filter(|_| footprint_px > 0.0) {
         let factor = (wanted / footprint_px) as f32;

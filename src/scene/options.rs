@@ -170,7 +170,7 @@ pub enum LowPass {
     /// The larger of the object-space kernel and a round one of 0.71 pixels (Botsch et al. 2005): no splat falls between
     /// the pixels' centres.
     Max,
-    /// The kernel convolved with a Gaussian of half a pixel (EWA, Zwicker et al. 2001): no aliasing either.
+    /// The kernel convolved with the pixel (EWA, Zwicker et al. 2001): no aliasing either.
     Ewa,
 }
 

@@ -183,7 +183,7 @@ fn a_broken_accumulator_kernel_or_epsilon_is_noticed() {
     for (kernel, file, from, to) in [
         ("gaussian", "kernel_gaussian.wgsl", "-KERNEL_FALL", "-1.0005 * KERNEL_FALL"),
         ("ellipse:6,3,smooth", "kernel_ellipse.wgsl", "power) - KERNEL_STEP", "power)"),
-        ("ellipse:6,3,smooth", "accumulate.wgsl", ", LEAST_WEIGHT, 1.0)", ", 0.0, 1.0)"),
+        ("ellipse:6,3,smooth", "blend.wgsl", ", LEAST_WEIGHT, 1.0)", ", 0.0, 1.0)"),
         ("hat", "kernel_hat.wgsl", "sqrt(rho2)", "1.0005 * sqrt(rho2)"),
         ("constant", "kernel_constant.wgsl", "return 1.0", "return 0.9995"),
     ] {

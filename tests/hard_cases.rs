@@ -116,13 +116,13 @@ fn a_broken_kernel_fails_a_hard_case() {
         ("visibility.wgsl", "atomicMin(", "atomicMax(", "intersecting sheets"),
         (
             "accumulate.wgsl",
-            "fragment.depth > farthest",
-            "fragment.depth * 1.000004 > farthest",
+            "fragment.depth <= farthest",
+            "fragment.depth * 1.000004 <= farthest",
             "sheets 3e-6 about epsilon",
         ),
         (
-            "accumulate.wgsl",
-            "clamp(fragment.gain * kernel_weight(fragment.rho2), LEAST_WEIGHT, 1.0)",
+            "blend.wgsl",
+            "clamp(kernel_weight(fragment.rho2), LEAST_WEIGHT, 1.0)",
             "kernel_weight(fragment.rho2)",
             "only the kernel's tail, smooth",
         ),

@@ -16,7 +16,7 @@ use epsplat::gpu::layout::{
 use epsplat::passes::accumulate::accumulator;
 use epsplat::passes::variant::{COLOR_CHANNEL, PixelLayout, color_channels, files};
 use epsplat::scene::camera::MAX_SIDE;
-use epsplat::scene::options::LEAST_WEIGHT;
+use epsplat::scene::options::{LEAST_FILTERED_WEIGHT, LEAST_WEIGHT};
 use epsplat::scene::{SceneNeeds, Surfel};
 use naga::{AddressSpace, ArraySize, Expression, Literal, Module, ScalarKind, TypeInner};
 
@@ -369,6 +369,7 @@ fn constants_agree() {
             assert_eq!(constant(name), Some(f64::from(value)), "{name}");
         }
         assert_eq!(constant("LEAST_WEIGHT"), Some(LEAST_WEIGHT));
+        assert_eq!(constant("LEAST_FILTERED_WEIGHT"), Some(LEAST_FILTERED_WEIGHT));
         let colors = color_channels(&needs) > 0;
         assert_eq!(constant("COLOR_CHANNEL"), colors.then_some(f64::from(COLOR_CHANNEL)));
         let one = match needs.accumulator {

@@ -3,6 +3,8 @@
 
 // 2^-10: see LEAST_WEIGHT in src/scene/options.rs.
 const LEAST_WEIGHT: f32 = 0.0009765625;
+// 2^-24: see LEAST_FILTERED_WEIGHT there.
+const LEAST_FILTERED_WEIGHT: f32 = 5.9604644775390625e-8;
 
 struct Attributes {
     color: vec4<f32>,
@@ -16,7 +18,8 @@ fn attributes_of(index: u32, splat: Splat) -> Attributes {
 }
 
 fn blend(pixel: u32, fragment: Fragment, front: f32, attributes: Attributes) {
-    let weight = quantise(clamp(fragment.gain * kernel_weight(fragment.rho2), LEAST_WEIGHT, 1.0));
+    let unfiltered = clamp(kernel_weight(fragment.rho2), LEAST_WEIGHT, 1.0);
+    let weight = quantise(max(fragment.gain * unfiltered, LEAST_FILTERED_WEIGHT));
     accumulate_color(pixel, weight, attributes.color);
     accumulate_normal(pixel, weight, attributes.normal);
     accumulate_depth(pixel, weight, fragment.depth, front);

@@ -37,7 +37,7 @@ use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::layout::ONE;
-use crate::scene::options::LEAST_WEIGHT;
+use crate::scene::options::LEAST_FILTERED_WEIGHT;
 use crate::scene::{Camera, RenderOptions, Scene};
 
 /// An accumulator: one row of the table below, one file `wgsl/accumulator_*.wgsl`.
@@ -214,7 +214,7 @@ pub fn reference<'a>(
                 if !(at.hit(camera) && at.depth <= back) {
                     continue;
                 }
-                let weight = (gain * options.kernel.weight(at.rho2)).max(LEAST_WEIGHT);
+                let weight = (gain * options.kernel.weight(at.rho2)).max(LEAST_FILTERED_WEIGHT);
                 sum.weight += weight;
                 for (total, value) in sum.color.iter_mut().zip(color) {
                     *total += weight * value;

@@ -82,6 +82,11 @@ pub enum Kernel {
 /// large enough that a pixel reached by a kernel's tail alone keeps 14 bits of its attributes in 24-bit sums.
 pub const LEAST_WEIGHT: f64 = 1.0 / 1024.0;
 
+/// The least weight of a fragment that a low-pass has spread over its pixel: the weight of a splat of a millionth of a
+/// pixel is as small a share of that of a large one. It is a whole unit of every accumulator, and a floor as high as
+/// [`LEAST_WEIGHT`] would flatten the filter itself.
+pub const LEAST_FILTERED_WEIGHT: f64 = 1.0 / 16_777_216.0;
+
 /// A kernel without its numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[allow(missing_docs)]

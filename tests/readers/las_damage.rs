@@ -107,3 +107,11 @@ fn lengths_in_damaged_files_are_not_allocated() {
         assert!(kib < 1 << 20, "{peak}");
     }
 }
+
+/// Eighteen bytes of GPS times in which the decoder calls itself some hundred thousand times (found by fuzzing): it once
+/// ran out of stack, which no error handling survives.
+#[test]
+fn a_deep_recursion_of_the_decoder_is_survived() {
+    let message = Folder::new().refusal("deep.laz", include_bytes!("deep_gps_time.laz"));
+    assert!(message.contains("decoding fails after 0"), "{message}");
+}

@@ -41,9 +41,20 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
         return Ok(Points { up: Some(Up::Z), ..Points::default() });
     }
     progress.begin(&format!("reading {}", fault::name(path)), promised);
-    let points = surviving(|| decode(file, decoding, promised.min(length), progress));
+    let points = deep(|| surviving(|| decode(file, decoding, promised.min(length), progress)));
     progress.end();
     points.map_err(|fault| fault.of(path))
+}
+
+/// Stack of the threads that decode, bytes; memory is taken only as far as it is used. The decoder calls itself for each
+/// change between GPS time sequences (laz 0.13.0), of which a damaged file of a few bytes can hold a million in a row. A
+/// call takes 64 bytes of stack, so this is room for four million; in the usual 2 MiB the program would be aborted.
+const DECODER_STACK: usize = 1 << 28;
+
+/// Runs `decode` on threads whose stacks are deep enough for damaged files.
+fn deep<T: Send>(decode: impl FnOnce() -> Result<T, Fault> + Send) -> Result<T, Fault> {
+    let pool = rayon::ThreadPoolBuilder::new().stack_size(DECODER_STACK).build();
+    pool.map_err(|error| Fault::Io(io::Error::other(error)))?.install(decode)
 }
 
 /// Runs what calls the decoder: corrupt data can make it panic.

@@ -1,4 +1,4 @@
-//! The command line: `epsplat render`, `compare`, `generate`, `info` and `adapters`.
+//! The command line; see `epsplat --help`.
 
 mod cli;
 

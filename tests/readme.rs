@@ -22,7 +22,9 @@ fn commands() -> Vec<String> {
 fn every_command_of_the_readme_runs() {
     let folder = tempfile::tempdir().unwrap();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    std::os::unix::fs::symlink(root.join("data"), folder.path().join("data")).unwrap();
+    for name in ["data", "benches"] {
+        std::os::unix::fs::symlink(root.join(name), folder.path().join(name)).unwrap();
+    }
     let commands = commands();
     assert!(commands.len() >= 8, "the README lost its commands: {commands:?}");
     let mut ran = 0;

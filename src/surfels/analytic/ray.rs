@@ -70,29 +70,37 @@ fn torus_crossings(start: DVec3, direction: DVec3) -> Vec<f64> {
 }
 
 /// The roots at which the polynomial (coefficients in ascending powers) changes sign between `low` and `high`,
-/// ascending, each to the last bit that evaluation can tell.
+/// ascending, each to about the last bit of a number as large as the interval.
 fn roots(polynomial: &[f64], low: f64, high: f64, found: &mut Vec<f64>) {
-    let value = |t: f64| polynomial.iter().rev().fold(0.0, |sum, c| sum * t + c);
+    let value = |of: &[f64], t: f64| of.iter().rev().fold(0.0, |sum, c| sum * t + c);
+    let derivative: Vec<f64> = polynomial.iter().zip(0u32..).skip(1).map(|(c, power)| c * f64::from(power)).collect();
     let mut turns = Vec::new();
     if polynomial.len() > 2 {
-        let derivative: Vec<f64> =
-            polynomial.iter().zip(0u32..).skip(1).map(|(c, power)| c * f64::from(power)).collect();
         roots(&derivative, low, high, &mut turns);
     }
     turns.push(high);
+    let least = (high - low) * (-54f64).exp2();
     let mut from = low;
     for to in turns {
         let (mut a, mut b) = (from, to);
-        let rising = value(b) > 0.0;
-        if (value(a) > 0.0) != rising {
-            loop {
-                let middle = 0.5 * (a + b);
-                if middle <= a || middle >= b {
-                    break;
+        let rising = value(polynomial, b) > 0.0;
+        if (value(polynomial, a) > 0.0) != rising {
+            // Newton's method inside a bracket, which is halved where Newton would leave it or a step is not half the last.
+            let (mut t, mut step) = (0.5 * (a + b), b - a);
+            while step > least {
+                let at = value(polynomial, t);
+                if (at > 0.0) == rising {
+                    b = t
+                } else {
+                    a = t
                 }
-                if (value(middle) > 0.0) == rising { b = middle } else { a = middle }
+                let newton = t - at / value(&derivative, t);
+                let next =
+                    if newton > a && newton < b && (newton - t).abs() < 0.5 * step { newton } else { 0.5 * (a + b) };
+                step = (next - t).abs();
+                t = next;
             }
-            found.push(b);
+            found.push(t);
         }
         from = to;
     }

@@ -115,3 +115,11 @@ fn a_deep_recursion_of_the_decoder_is_survived() {
     let message = Folder::new().refusal("deep.laz", include_bytes!("deep_gps_time.laz"));
     assert!(message.contains("decoding fails after 0"), "{message}");
 }
+
+/// Items in layers, in a file that says it has no chunks of layers (found by fuzzing): the decoder took a layer of 3 GB
+/// for true.
+#[test]
+fn layers_outside_chunks_of_layers_are_refused() {
+    let message = Folder::new().refusal("layers.laz", include_bytes!("layers_outside_chunks.laz"));
+    assert_eq!(message, "its LASzip record does not describe its points");
+}

@@ -108,7 +108,7 @@ impl Scheme {
     fn parse(data: &[u8]) -> Option<Self> {
         let u16_at = |at: usize| data.get(at..)?.first_chunk().copied().map(u16::from_le_bytes);
         let chunk = u32::from_le_bytes(data.get(12..)?.first_chunk().copied()?);
-        let items = u16_at(32)?;
+        let (compressor, items) = (u16_at(0)?, u16_at(32)?);
         let (mut record, mut layers) = (0, 0);
         for item in 0..usize::from(items) {
             let (kind, size) = (u16_at(34 + 6 * item)?, u64::from(u16_at(36 + 6 * item)?));
@@ -126,14 +126,15 @@ impl Scheme {
                 14 => (size, size), // extra bytes: one layer each
                 _ => return None,
             };
-            if size != own_size {
+            // Nor are layers looked for outside chunks of layers, but the decoder would take their lengths for true.
+            if size != own_size || (kind >= 10) != (compressor == 3) {
                 return None;
             }
             record += size;
             layers += own_layers;
         }
         let chunk = Some(chunk).filter(|&chunk| chunk != 0 && chunk != u32::MAX);
-        Some(Self { compressor: u16_at(0)?, chunk, record, layers })
+        Some(Self { compressor, chunk, record, layers })
     }
 }
 
@@ -235,7 +236,7 @@ mod tests {
     /// The data of a LASzip record with these items: kinds and sizes.
     fn record(items: &[(u16, u16)]) -> Vec<u8> {
         let mut data = vec![0; 32];
-        data[0] = 3;
+        data[0] = if items.iter().any(|(kind, _)| *kind >= 10) { 3 } else { 2 };
         data[12..16].copy_from_slice(&50_000u32.to_le_bytes());
         data.extend((items.len() as u16).to_le_bytes());
         data.extend(items.iter().flat_map(|&(kind, size)| [kind, size, 3]).flat_map(u16::to_le_bytes));
@@ -247,6 +248,10 @@ mod tests {
         let scheme = Scheme::parse(&record(&[(10, 30), (12, 8), (14, 5)]));
         assert!(scheme.is_some_and(|scheme| (scheme.record, scheme.layers) == (43, 16)));
         assert!(Scheme::parse(&record(&[(6, 20), (7, 8), (8, 6), (0, 5)])).is_some());
+        // Layers and chunks of layers go together.
+        let mut without = record(&[(10, 30)]);
+        without[0] = 1;
+        assert!(Scheme::parse(&without).is_none());
         for item in [(11, 30), (10, 29), (6, 30), (12, 6), (5, 8), (15, 1)] {
             assert!(Scheme::parse(&record(&[item])).is_none(), "{item:?}");
         }

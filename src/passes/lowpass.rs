@@ -134,17 +134,18 @@ mod tests {
 
     #[test]
     fn the_blur_is_the_ratio_of_variances() {
-        assert!((blur(Kernel::Gaussian { sigma: 0.5 }) - 1.0).abs() < 1e-12);
-        // A disk of constant weight has variance 1/4 along each axis.
-        assert!((blur(Kernel::Constant) - 1.0).abs() < 1e-6);
-        // A cone: 3/20.
-        assert!((blur(Kernel::Hat) - 0.25 / 0.15).abs() < 5e-3);
+        assert!((blur(Kernel::Gaussian { sigma: 0.25 }) - 4.0 / 3.0).abs() < 1e-12);
+        // A cone has variance 3/20 along each axis.
+        assert!((blur(Kernel::Hat) - 1.0 / (12.0 * 0.15)).abs() < 5e-3);
+        // A disk of constant weight has 1/4, for which the filter would not reach the next pixel's centre.
+        assert_eq!(blur(Kernel::Constant), RADIUS * RADIUS);
     }
 
     #[test]
     fn ewa_adds_the_pixels_variance_and_keeps_the_volume() {
         let options = RenderOptions {
-            kernel: Kernel::Gaussian { sigma: 0.5 },
+            // For which the blur is 1.
+            kernel: Kernel::Gaussian { sigma: PIXEL_VARIANCE.sqrt() },
             low_pass: LowPass::Ewa,
             ..RenderOptions::default()
         };

@@ -6,6 +6,7 @@ mod compare;
 mod generate;
 mod hardcases;
 mod info;
+mod parse;
 mod progress;
 mod render;
 

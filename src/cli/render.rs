@@ -6,7 +6,6 @@ use clap::{Args, ValueEnum};
 use epsplat::frame::Frame;
 use epsplat::gpu::Gpu;
 use epsplat::io::camera::{self, Pose};
-use epsplat::passes::accumulate::accumulator;
 use epsplat::render::{Backend, Report, render};
 use epsplat::scene::camera::DEFAULT_FOV;
 use epsplat::scene::light::MAX_LIGHTS;
@@ -17,6 +16,7 @@ use epsplat::scene::{
 use epsplat::{Error, Result, io, surfels};
 use glam::DVec3;
 
+use super::parse::{parse_accumulator, parse_color, parse_intrinsics, parse_size, parse_vector};
 use super::progress::Bars;
 use super::{note, write_json};
 
@@ -408,48 +408,4 @@ fn check_json(json: &Path, arguments: &Arguments) -> Result<()> {
         return Err(Error::Usage(format!("--json {} would overwrite an input or the image", json.display())));
     }
     check_folder(json)
-}
-
-fn parse_accumulator(text: &str) -> Result<&'static str, String> {
-    accumulator(text).map(|row| row.name).map_err(|e| e.to_string())
-}
-
-fn parse_size(text: &str) -> Result<(u32, u32), String> {
-    let side = |part: &str| part.parse::<u32>().map_err(|_| format!("{part:?} is not a number of pixels"));
-    let (width, height) = text.split_once('x').ok_or("a size is WIDTHxHEIGHT")?;
-    let (width, height) = (side(width)?, side(height)?);
-    epsplat::scene::camera::check_size(width, height).map_err(|e| e.to_string())?;
-    Ok((width, height))
-}
-
-fn parse_numbers(text: &str) -> Result<Vec<f64>, String> {
-    let number = |part: &str| match part.trim().parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value),
-        _ => Err(format!("{part:?} is not a finite number")),
-    };
-    text.split(',').map(number).collect()
-}
-
-fn parse_vector(text: &str) -> Result<DVec3, String> {
-    match parse_numbers(text)?[..] {
-        [x, y, z] => Ok(DVec3::new(x, y, z)),
-        _ => Err("three numbers are needed: X,Y,Z".into()),
-    }
-}
-
-fn parse_intrinsics(text: &str) -> Result<[f64; 4], String> {
-    parse_numbers(text)?.try_into().map_err(|_| "four numbers are needed: FX,FY,CX,CY".into())
-}
-
-fn parse_color(text: &str) -> Result<[f32; 4], String> {
-    let values: Vec<f32> = parse_numbers(text)?.into_iter().map(|v| v as f32).collect();
-    let color = match values[..] {
-        [r, g, b] => [r, g, b, 1.0],
-        [r, g, b, a] => [r, g, b, a],
-        _ => return Err("three or four numbers are needed: R,G,B[,A]".into()),
-    };
-    if color.iter().any(|c| !c.is_finite()) {
-        return Err("a colour must be finite".into());
-    }
-    if color[3] < 0.0 || color[3] > 1.0 { Err("alpha lies between 0 and 1".into()) } else { Ok(color) }
 }

@@ -9,7 +9,7 @@ use epsplat::gpu::Sources;
 use epsplat::hardcases::{HardCase, Row, Truth, cases, judge};
 use epsplat::passes::accumulate::{Accumulator, Features};
 use epsplat::render::{Backend, Report, render};
-use epsplat::scene::{BlendFormat, Maps, Raster, RasterDepth, RenderOptions, Shading};
+use epsplat::scene::{BlendFormat, Camera, Maps, Raster, RasterDepth, RenderOptions, Shading};
 
 const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
 
@@ -144,4 +144,39 @@ fn lit_pictures_are_computes() {
         let worst = errors.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         assert!(worst > 0.0 && worst < 0.05, "{}: {worst}", case.name);
     }
+}
+
+/// Triangles and parallelograms about the disks leave out no fragment that the boxes about them have; shapes that are too
+/// small are noticed.
+#[test]
+fn tight_shapes_leave_out_nothing() {
+    let tight = Sources::default();
+    let boxes = tight.clone().replace("raster.wgsl", "if (FILTERED || thin", "if (true || thin").unwrap();
+    let small = tight.clone().replace("raster.wgsl", "SHAPE_MARGIN: f32 = 0.05", "SHAPE_MARGIN: f32 = -0.5").unwrap();
+    let draw = |sources: &Sources, case: &HardCase, size, depth| {
+        let Some(gpu) = common::gpu() else { return vec![] };
+        let backend = Backend::Gpu { gpu: Box::new(gpu), sources: sources.clone() };
+        let camera = Camera { width: size, height: size, ..case.camera.clone() };
+        let options = RenderOptions { ..options(case, BlendFormat::Rgba16Float, depth) };
+        common::bits(&render(&case.scene, &camera, &options, &backend, &()).unwrap().0)
+    };
+    let mut noticed = [0; 2];
+    for (case, _) in all_cases() {
+        // As many pixels as make the splats quads, and so few that they are triangles.
+        let most = 10 * case.scene.surfels.len() as u32;
+        let few = (f64::from(most).sqrt() as u32 - 1).min(case.camera.width);
+        for (shape, size) in [(0, few), (1, (f64::from(most).sqrt() as u32 + 1).max(case.camera.width))] {
+            for depth in [RasterDepth::Exact, RasterDepth::Offset] {
+                let expected = draw(&boxes, &case, size, depth);
+                // Interpolated depths follow the corners, so of these only what is covered is compared.
+                let same = |bits: Vec<u32>| match depth {
+                    RasterDepth::Exact => bits == expected,
+                    _ => bits.iter().zip(&expected).all(|(a, b)| (*a == 0) == (*b == 0)),
+                };
+                assert!(same(draw(&tight, &case, size, depth)), "{} at {size}, {}", case.name, depth.name());
+                noticed[shape] += u32::from(!same(draw(&small, &case, size, depth)));
+            }
+        }
+    }
+    assert!(common::gpu().is_none() || noticed.iter().all(|n| *n > 2), "{noticed:?}");
 }

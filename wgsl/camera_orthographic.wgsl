@@ -97,6 +97,10 @@ fn ray(x: u32, y: u32) -> vec3<f32> {
     return view.rotation[2].xyz;
 }
 
+fn homogeneous_row(splat: Splat) -> vec3<f32> {
+    return vec3<f32>(0.0, 0.0, 1.0);
+}
+
 // For the rasteriser's depth test; see camera_pinhole.wgsl.
 fn depth_of(c: f32) -> f32 {
     return clamp(c, view.near, view.farthest);

@@ -227,6 +227,11 @@ fn ray(x: u32, y: u32) -> vec3<f32> {
     return normalize(image.x * view.rotation[0].xyz + image.y * view.rotation[1].xyz + view.rotation[2].xyz);
 }
 
+// The third row of the matrix that takes an image point to (u, v, 1), up to a factor.
+fn homogeneous_row(splat: Splat) -> vec3<f32> {
+    return vec3<f32>(splat.c[0], splat.c[1], splat.c[2]);
+}
+
 // For the rasteriser's depth test (raster_offset.wgsl): the depth from the value of row c; a measure of depth that is
 // linear over the image of a plane, in [0, 1] and largest in front; and the cosine between the ray through an image
 // point and the camera's axis.

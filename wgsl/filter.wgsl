@@ -1,6 +1,8 @@
 // What a low-pass needs of a splat beside its record. The filter is centred on the splat and elliptical: rho^2 = |R x|^2
 // for x pixels from the centre, R upper triangular. Layout mirrored in src/gpu/layout.rs.
 
+const FILTERED: bool = true;
+
 struct Filter {
     // The splat's centre relative to the anchor's centre, pixels.
     center_x: f32,

@@ -1,5 +1,7 @@
 // No low-pass: a pixel's centre is in the disk or not. Same interface as filter.wgsl with lowpass_*.wgsl.
 
+const FILTERED: bool = false;
+
 struct Filter {
     nothing: u32,
 }

@@ -29,10 +29,9 @@ fn raster_attributes(corner: Corner) -> Targets {
     let pixel = vec2<u32>(corner.position.xy);
     let place = pixel_index(pixel.x, pixel.y);
     let front = front_at(place);
-    let radius = radius_of(corner.index);
-    if (!fragment.hit || fragment.depth > farthest_accepted(front, radius)) {
+    if (!fragment.hit || fragment.depth > farthest_accepted(front, corner.radius)) {
         discard;
     }
-    blend(place, fragment, front, attributes_of(corner.index, projected[corner.index]));
+    blend(place, fragment, front, carried(corner));
     return targets();
 }

@@ -33,8 +33,7 @@ fn raster_attributes(corner: Corner) -> Targets {
     // Outside the disk the sums gain nothing: no fragment is discarded, so that the depth test may come first.
     if (fragment.hit) {
         let pixel = vec2<u32>(corner.position.xy);
-        let attributes = attributes_of(corner.index, projected[corner.index]);
-        blend(pixel_index(pixel.x, pixel.y), fragment, 0.0, attributes);
+        blend(pixel_index(pixel.x, pixel.y), fragment, 0.0, carried(corner));
     }
     return targets();
 }

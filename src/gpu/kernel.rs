@@ -210,7 +210,7 @@ impl Program {
                     buffers: &[],
                 },
                 primitive: wgpu::PrimitiveState {
-                    topology: wgpu::PrimitiveTopology::TriangleStrip,
+                    topology: wgpu::PrimitiveTopology::TriangleList,
                     ..Default::default()
                 },
                 depth_stencil: draw.depth.clone(),
@@ -279,14 +279,14 @@ impl Program {
 }
 
 impl Program {
-    /// Draws `instances` quads by the pipeline `name`.
+    /// Draws the triangles of `vertices` vertices by the pipeline `name`.
     pub(crate) fn draw(
         &self,
         gpu: &Gpu,
         pass: &mut wgpu::RenderPass<'_>,
         name: &str,
         bound: &[(&str, wgpu::BindingResource<'_>)],
-        instances: u32,
+        vertices: u32,
     ) -> Result<()> {
         let Some(pipeline) = self.draws.get(name) else {
             return Err(gpu.error(format!("there is no pipeline {name}")));
@@ -294,7 +294,7 @@ impl Program {
         let group = self.group(gpu, name, &pipeline.get_bind_group_layout(0), bound)?;
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, &group, &[]);
-        pass.draw(0..4, 0..instances);
+        pass.draw(0..vertices, 0..1);
         Ok(())
     }
 }

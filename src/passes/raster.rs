@@ -24,6 +24,11 @@ use crate::gpu::Gpu;
 use crate::gpu::kernel::{Bound, Draw};
 use crate::scene::{BlendFormat, Camera, Raster, RasterDepth, SceneNeeds};
 
+/// Vertices of a splat; see raster.wgsl.
+pub fn vertices(needs: &SceneNeeds) -> u32 {
+    if needs.triangles { 3 } else { 6 }
+}
+
 /// Channels of a target.
 const CHANNELS: u32 = 4;
 
@@ -88,17 +93,23 @@ pub(crate) fn draws(raster: Raster, pixel: PixelLayout) -> Vec<Draw> {
         blend: Some(wgpu::BlendState { color: add, alpha: add }),
         write_mask: wgpu::ColorWrites::ALL,
     };
-    let draw = |name, fragment, targets, depth, moved: bool| Draw {
+    let draw = |name, (vertex, fragment), targets, depth, moved: bool| Draw {
         name,
-        vertex: "quad",
+        vertex,
         fragment,
         targets,
         depth,
         constant: Some(("MOVED", u32::from(moved).into())),
     };
     vec![
-        draw("visibility", "raster_visibility", vec![], depth(near_first, true), true),
-        draw("accumulate", "raster_attributes", vec![target; targets(pixel) as usize], test, false),
+        draw("visibility", ("shape", "raster_visibility"), vec![], depth(near_first, true), true),
+        draw(
+            "accumulate",
+            ("shape_with_attributes", "raster_attributes"),
+            vec![target; targets(pixel) as usize],
+            test,
+            false,
+        ),
     ]
 }
 
@@ -199,8 +210,10 @@ pub fn record(
     let nearest = ("nearest_depth", wgpu::BindingResource::TextureView(&targets.depth));
     let draw = |pass: &mut wgpu::RenderPass<'_>, name, own: &[(&str, wgpu::BindingResource<'_>)]| {
         for (index, page) in splats.pages.iter().enumerate() {
-            // A page has fewer than 2^32 splats.
-            program.draw(gpu, pass, name, &splats.bindings(index, own), page.splats.len as u32)?;
+            // Of more splats a binding would have 45 GB.
+            let vertices = u32::try_from(page.splats.len * u64::from(vertices(&recorder.variant.needs)))
+                .map_err(|_| gpu.error("a page has too many splats for the rasteriser's vertices"))?;
+            program.draw(gpu, pass, name, &splats.bindings(index, own), vertices)?;
         }
         Ok(())
     };

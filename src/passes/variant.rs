@@ -205,6 +205,7 @@ pub fn overrides(needs: &SceneNeeds, options: &RenderOptions, fraction_bits: u32
         Kernel::Hat | Kernel::Constant => {}
     }
     if let Some(raster) = needs.raster {
+        constants.push(("VERTICES", raster::vertices(needs).into()));
         constants.push(("BLEND_SCALE", raster::blend_scale(raster.format)));
         // The visibility pass's pipeline says otherwise.
         constants.push(("MOVED", 0.0));

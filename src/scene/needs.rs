@@ -27,6 +27,10 @@ pub struct SceneNeeds {
     pub wide_sums: bool,
     /// Sums are the rasteriser's.
     pub raster: Option<Raster>,
+    /// It draws a triangle a splat instead of a quad, as there are more surfels than tenths of the image's pixels. On a
+    /// software adapter at 1024x1024, frames of 1,000,000 splats take 0.6 times as long by triangles as by quads, of
+    /// 100,000 as long, of 10,000 1.2 times.
+    pub triangles: bool,
     /// The kernel's formula.
     pub kernel: KernelShape,
     /// The filter for small splats.
@@ -81,6 +85,7 @@ impl SceneNeeds {
                 && options.accumulator == "fixed"
                 && (low[3] != high[3] || may_be_small(options)),
             raster: options.raster,
+            triangles: options.raster.is_some() && 10 * scene.surfels.len() > camera.pixels(),
             kernel: options.kernel.shape(),
             low_pass: options.low_pass,
             epsilon_radius: matches!(options.epsilon, Epsilon::Radius(_)),

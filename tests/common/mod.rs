@@ -64,7 +64,8 @@ pub fn all_needs() -> Vec<SceneNeeds> {
         let (kernel, base) = (shapes[step % 4], base[(step * 101) % base.len()]);
         let low_pass = [LowPass::None, LowPass::Max, LowPass::Ewa][step / 3 % 3];
         let raster = Some(Raster { format: BlendFormat::ALL[step / 7 % 3].0, depth: *depth });
-        all.push(SceneNeeds { raster, kernel, low_pass, epsilon_radius: step % 5 == 0, ..base });
+        let triangles = step / 2 % 2 == 0;
+        all.push(SceneNeeds { raster, triangles, kernel, low_pass, epsilon_radius: step % 5 == 0, ..base });
     }
     all
 }
@@ -88,6 +89,7 @@ fn base_needs() -> Vec<SceneNeeds> {
                 accumulator: ACCUMULATORS[0].name,
                 wide_sums: false,
                 raster: None,
+                triangles: false,
                 kernel: KernelShape::Ellipse,
                 epsilon_radius: false,
                 color,

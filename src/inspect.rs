@@ -1,7 +1,7 @@
 //! What a researcher reads back between the stages: the device's own splats, depths and sums, and a way to run one
 //! function of a kernel over an array. Both are for study and for tests; a render keeps all of it on the device.
 
-use bytemuck::Pod;
+use bytemuck::{Pod, Zeroable};
 
 use crate::error::{Error, Result};
 use crate::gpu::buffers::Buffer;
@@ -10,6 +10,7 @@ use crate::gpu::layout::{ONE, ONE_WIDE, Splat, View};
 use crate::gpu::timing::Timing;
 use crate::gpu::{Gpu, Sources};
 use crate::passes::accumulate::AttributeBuffer;
+use crate::passes::order::order;
 use crate::passes::project::SplatBuffer;
 use crate::passes::upload::SurfelBuffer;
 use crate::passes::variant::{PixelLayout, Variant};
@@ -91,9 +92,12 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
     let sums = AttributeBuffer::new(gpu, &variant, rows.pixels)?;
     visibility::record(&mut recorder, &projected, rows, &nearest)?;
     accumulate::record(&mut recorder, &projected, rows, &nearest, &sums)?;
-    let mut splats = Vec::with_capacity(scene.surfels.len());
+    let mut splats = vec![Splat::zeroed(); scene.surfels.len()];
+    let mut order = order(&scene.surfels, &scene.bounds()).into_iter();
     for page in &projected.pages {
-        splats.extend(page.splats.read(gpu, page.splats.len)?);
+        for (splat, index) in page.splats.read(gpu, page.splats.len)?.into_iter().zip(&mut order) {
+            splats[index as usize] = splat;
+        }
     }
     Ok(Stages {
         splats,
@@ -119,7 +123,7 @@ pub fn evaluate<I: Pod, O: Pod>(gpu: &Gpu, text: &str, view: &View, inputs: &[I]
         bindings.get(ENTRY).ok_or_else(|| Error::Usage(format!("the kernel has no entry point {ENTRY}")))?;
     let view = Buffer::uniform(gpu, "view", view)?;
     let source = Buffer::storage(gpu, "inputs", inputs.len() as u64)?;
-    source.write(gpu, inputs, &())?;
+    source.write(gpu, inputs.len(), |range| inputs[range].into(), &())?;
     let target = Buffer::<O>::storage(gpu, "outputs", output_len)?;
     let buffers = [("view", &view.raw), ("inputs", &source.raw), ("outputs", &target.raw)];
     let guard = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);

@@ -11,7 +11,7 @@ use std::mem::{offset_of, size_of};
 use epsplat::gpu::Sources;
 use epsplat::gpu::kernel::{FILES, reflect};
 use epsplat::gpu::layout::{
-    AWAY, Band, Filter, MOST_GROUPS, ONE, ONE_WIDE, QUEUE_GRID, QUEUE_START, STRETCHES, Splat, TILE, View, WORKGROUP,
+    AWAY, Band, Filter, MOST_GROUPS, ONE, ONE_WIDE, QUEUE_GRID, QUEUE_START, Splat, TILE, View, WORKGROUP,
 };
 use epsplat::passes::accumulate::accumulator;
 use epsplat::passes::variant::{COLOR_CHANNEL, PixelLayout, color_channels, files};
@@ -360,7 +360,6 @@ fn constants_agree() {
             ("TILE", TILE),
             ("QUEUE_START", QUEUE_START),
             ("QUEUE_GRID", QUEUE_GRID),
-            ("STRETCHES", STRETCHES),
             ("MOST_GROUPS", MOST_GROUPS),
             ("AWAY", AWAY),
             ("NOTHING", f32::INFINITY.to_bits()),

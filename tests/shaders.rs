@@ -53,8 +53,11 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
             without.insert(needs.accumulator);
         }
         let entries: BTreeSet<&str> = module.entry_points.iter().map(|entry| entry.name.as_str()).collect();
-        let drawn: &[&str] =
-            if needs.raster.is_some() { &["quad", "raster_visibility", "raster_attributes"] } else { &[] };
+        let drawn: &[&str] = if needs.raster.is_some() {
+            &["shape", "shape_with_attributes", "raster_visibility", "raster_attributes"]
+        } else {
+            &[]
+        };
         assert_eq!(entries, stages(needs).iter().chain(drawn).copied().collect());
         for (_, variable) in module.global_variables.iter().filter(|(_, v)| v.binding.is_some()) {
             let buffer = matches!(variable.space, AddressSpace::Uniform | AddressSpace::Storage { .. });

@@ -47,7 +47,7 @@ fn accumulate(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
-    let index = scattered_index(workgroup, workgroups, local, arrayLength(&projected));
+    let index = linear_index(workgroup, workgroups, local);
     if (index < arrayLength(&projected) && !is_large(projected[index])) {
         accumulate_splat(index, vec2<u32>(0u), 1u);
     }

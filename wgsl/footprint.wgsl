@@ -61,20 +61,6 @@ fn depth_scale() -> f32 {
     return 0.5 * bitcast<f32>(0x7f000000u - (bitcast<u32>(view.farthest) & 0x7f800000u));
 }
 
-// Neighbours in a file are often neighbours in the image, and what a workgroup costs depends on where it draws. Software
-// adapters give each of their threads one contiguous part of a dispatch, and many cores that draw in one place wait for
-// each other: so the workgroups take turns over 64 stretches of the splats. Sums and minima depend on no order.
-const STRETCHES: u32 = 8u;
-
-// The splat of this invocation in a dispatch of at least `count` invocations, rounded up to whole turns; `count` or more
-// where there is none.
-fn scattered_index(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32, count: u32) -> u32 {
-    let turns = ((count + WORKGROUP - 1u) / WORKGROUP + STRETCHES - 1u) / STRETCHES;
-    let group = workgroup.y * workgroups.x + workgroup.x;
-    let turned = (group % STRETCHES) * turns + group / STRETCHES;
-    return select(count, turned * WORKGROUP + local, group < turns * STRETCHES);
-}
-
 // Pixels of the band; its buffers may have room for more.
 fn band_pixels() -> u32 {
     return band.rows * view.width;

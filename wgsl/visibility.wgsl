@@ -30,7 +30,7 @@ fn visibility(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
-    let index = scattered_index(workgroup, workgroups, local, arrayLength(&projected));
+    let index = linear_index(workgroup, workgroups, local);
     if (index >= arrayLength(&projected)) {
         return;
     }

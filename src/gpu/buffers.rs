@@ -1,6 +1,8 @@
 //! Device buffers: created against the limits, paged, uploaded and read back in bounded pieces.
 
+use std::borrow::Cow;
 use std::marker::PhantomData;
+use std::ops::Range;
 
 use bytemuck::Pod;
 
@@ -90,12 +92,18 @@ impl<T: Pod> Buffer<T> {
         Ok(Self { raw, len, element: PhantomData })
     }
 
-    /// Overwrites the elements from `first` on.
-    pub fn write(&self, gpu: &Gpu, values: &[T], progress: &dyn Progress) -> Result<()> {
+    /// Overwrites the first `len` elements; `values` gives those of a range.
+    pub fn write<'a>(
+        &self,
+        gpu: &Gpu,
+        len: usize,
+        values: impl Fn(Range<usize>) -> Cow<'a, [T]>,
+        progress: &dyn Progress,
+    ) -> Result<()> {
         let per_piece = (PIECE / size_of::<T>() as u64).max(1) as usize;
-        for (piece, values) in values.chunks(per_piece).enumerate() {
-            let offset = (piece * per_piece * size_of::<T>()) as u64;
-            gpu.queue.write_buffer(&self.raw, offset, bytemuck::cast_slice(values));
+        for first in (0..len).step_by(per_piece) {
+            let values = values(first..len.min(first + per_piece));
+            gpu.queue.write_buffer(&self.raw, (first * size_of::<T>()) as u64, bytemuck::cast_slice(&values));
             // Submitting and waiting frees the staging memory of this piece.
             gpu.queue.submit([]);
             gpu.wait()?;

@@ -13,9 +13,6 @@ pub const WORKGROUP: u32 = 64;
 /// Splats whose bounds hold more pixels than this get a workgroup each instead of an invocation.
 pub const LARGE: u32 = 1024;
 
-/// Stretches of the splats over which a dispatch's workgroups take turns.
-pub const STRETCHES: u32 = 8;
-
 /// Words at the start of a page's queue of large splats: how many there are, how many splats are in view at all, and
 /// the grid of workgroups that draws the large ones.
 pub const QUEUE_START: u32 = 5;

@@ -3,6 +3,7 @@
 //!
 //! | stage | takes | makes |
 //! |---|---|---|
+//! | [`order`] | [`Scene`](crate::scene::Scene) | the order of its surfels in memory |
 //! | [`upload`] | [`Scene`](crate::scene::Scene) | [`upload::SurfelBuffer`] |
 //! | [`project`] | surfels | [`project::SplatBuffer`] |
 //! | [`visibility`] | splats | [`visibility::VisibilityBuffer`] |
@@ -14,6 +15,7 @@
 pub mod accumulate;
 pub mod footprint;
 pub mod lowpass;
+pub mod order;
 pub mod project;
 pub mod raster;
 pub mod resolve;

@@ -284,11 +284,6 @@ pub fn record(recorder: &mut Recorder<'_>, buffer: &SplatBuffer) -> Result<()> {
     )
 }
 
-/// Invocations of a dispatch whose workgroups take turns over the stretches of `len` splats (`scattered_index`).
-fn turns(len: u64) -> u64 {
-    len.next_multiple_of(u64::from(layout::STRETCHES * layout::WORKGROUP))
-}
-
 impl SplatBuffer {
     /// Room for the splats of `surfels`.
     pub fn new(gpu: &Gpu, surfels: SurfelBuffer, low_pass: LowPass) -> Result<Self> {
@@ -354,7 +349,7 @@ impl SplatBuffer {
         recorder.timing.pass(gpu, stage, before, |pass| {
             for (index, page) in self.pages.iter().enumerate() {
                 let bound = self.bindings(index, &own);
-                program.dispatch(gpu, pass, stage, &bound, Grid::Of(grid(gpu, turns(page.splats.len))?))?;
+                program.dispatch(gpu, pass, stage, &bound, Grid::Of(grid(gpu, page.splats.len)?))?;
                 let at = u64::from(layout::QUEUE_GRID) * 4;
                 program.dispatch(gpu, pass, large, &bound, Grid::In(&page.queue.raw, at))?;
             }

@@ -1,7 +1,11 @@
-//! Stage 0: the scene in device memory, in pages that fit a binding.
+//! Stage 0: the scene in device memory, in an [`order`] that draws well, in pages that fit a binding.
+
+use std::borrow::Cow;
 
 use bytemuck::Pod;
+use rayon::prelude::*;
 
+use super::order::order;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::{Buffer, page_len};
@@ -32,16 +36,16 @@ impl SurfelBuffer {
         let len = page_len(gpu, size_of::<Splat>()) as usize;
         progress.begin("uploading surfels", scene.surfels.len() as u64);
         let mut pages = Vec::new();
-        for (page, surfels) in scene.surfels.chunks(len).enumerate() {
-            let range = page * len..page * len + surfels.len();
-            let buffer = Buffer::storage(gpu, "surfels", surfels.len() as u64)?;
-            buffer.write(gpu, surfels, progress)?;
+        let order = order(&scene.surfels, &scene.bounds());
+        for indices in order.chunks(len) {
+            let surfels = Buffer::storage(gpu, "surfels", indices.len() as u64)?;
+            surfels.write(gpu, indices.len(), |range| taken(&scene.surfels, &indices[range]), progress)?;
             let colors = match (needs.color, &scene.colors) {
-                (ColorNeed::Srgb8, Colors::Srgb8(codes)) => Some(upload(gpu, &codes[range])?),
-                (ColorNeed::Linear, Colors::Linear(colors)) => Some(upload(gpu, &colors[range])?),
+                (ColorNeed::Srgb8, Colors::Srgb8(codes)) => Some(upload(gpu, codes, indices)?),
+                (ColorNeed::Linear, Colors::Linear(colors)) => Some(upload(gpu, colors, indices)?),
                 _ => None,
             };
-            pages.push(SurfelPage { surfels: buffer, colors });
+            pages.push(SurfelPage { surfels, colors });
         }
         let srgb_to_linear = match needs.color {
             ColorNeed::Srgb8 => {
@@ -61,8 +65,13 @@ impl SurfelBuffer {
     }
 }
 
-fn upload<T: Pod>(gpu: &Gpu, values: &[T]) -> Result<wgpu::Buffer> {
-    let buffer = Buffer::storage(gpu, "colours", values.len() as u64)?;
-    buffer.write(gpu, values, &())?;
+fn upload<T: Pod + Send + Sync>(gpu: &Gpu, values: &[T], indices: &[u32]) -> Result<wgpu::Buffer> {
+    let buffer = Buffer::storage(gpu, "colours", indices.len() as u64)?;
+    buffer.write(gpu, indices.len(), |range| taken(values, &indices[range]), &())?;
     Ok(buffer.raw)
+}
+
+/// The values at `indices`.
+fn taken<'a, T: Pod + Send + Sync>(values: &[T], indices: &[u32]) -> Cow<'a, [T]> {
+    indices.par_iter().map(|&index| values[index as usize]).collect::<Vec<_>>().into()
 }

@@ -53,7 +53,7 @@ pub struct Report {
     pub adapter: String,
     /// How sums were kept: an accumulator, the rasteriser's format, or the reference's `f64`.
     pub accumulator: &'static str,
-    /// How often a sum of the accumulator that was asked for wrapped. If ever, the frame was rendered again with `fixed`,
+    /// Fragments that made a sum of the accumulator that was asked for wrap. If any, the frame was rendered again with `fixed`,
     /// and `total_ms` holds both.
     pub overflows: u64,
     /// Surfels in the scene.
@@ -183,7 +183,8 @@ impl<'a> Renderer<'a> {
         camera: &Camera,
         progress: &dyn Progress,
     ) -> Result<(Frame, Report)> {
-        let needs = SceneNeeds::of(self.scene, &self.color_range, camera, self.options);
+        let needs = SceneNeeds::of(self.scene, &self.color_range, camera, self.options)
+            .with_atomics_u64(gpu.adapter.atomics_u64);
         let variant = Variant::of(&needs, self.options, self.scene.surfels.len() as u64)?;
         match needs.raster {
             Some(raster) => raster::check(gpu, raster, &needs, camera)?,

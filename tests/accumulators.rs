@@ -170,7 +170,7 @@ fn broken(file: &str, from: &str, to: &str, gpu: Gpu) -> Backend {
 fn a_broken_accumulator_kernel_or_epsilon_is_noticed() {
     let Some(gpu) = common::gpu() else { return };
     let noticed = |case: &Case, row: &Accumulator, file: &str, from: &str, to: &str| {
-        let Some(gpu) = common::gpu() else { return };
+        let Some(gpu) = common::gpu_for(file) else { return };
         let findings = run(case, row, &broken(file, from, to, gpu));
         assert!(findings.wrong.len() >= 20, "{file} with {to}: only {} differences", findings.wrong.len());
     };

@@ -11,6 +11,7 @@ use epsplat::frame::Frame;
 use epsplat::gpu::Sources;
 use epsplat::gpu::buffers::page_len;
 use epsplat::gpu::layout::Splat;
+use epsplat::hardcases::cases;
 use epsplat::inspect::stages;
 use epsplat::passes::accumulate::{ACCUMULATORS, Accumulator};
 use epsplat::render::{Backend, render};
@@ -64,12 +65,16 @@ fn order_and_repetition_do_not_change_a_bit() {
             assert!(bits(&frame(&moved, &camera, &options, &backend)) != first, "{name}");
         }
         // And a sum in which the last fragment wins.
-        let Some(gpu) = common::gpu() else { return };
+        let Some(gpu) = common::gpu_for(row.file) else { return };
         let sources = Sources::default();
-        let sources = ["atomicAdd(&sums[word], value)", ADD_TO_CHANNEL, "atomicAdd(&sums[pair], (u64"]
-            .into_iter()
-            .find_map(|add| sources.clone().replace(row.file, add, &add.replace("atomicAdd", "atomicExchange")).ok())
-            .unwrap_or_else(|| panic!("{} adds in another way than this test knows", row.file));
+        let sources = [
+            "atomicAdd(&sums[2u * (pixel * CHANNELS + channel)], value)",
+            ADD_TO_CHANNEL,
+            "atomicAdd(&sums[pair], (u64",
+        ]
+        .into_iter()
+        .find_map(|add| sources.clone().replace(row.file, add, &add.replace("atomicAdd", "atomicExchange")).ok())
+        .unwrap_or_else(|| panic!("{} adds in another way than this test knows", row.file));
         let careless = Backend::Gpu { gpu: Box::new(gpu), sources };
         let (scene, camera) = crowded().remove(0);
         let [one, other] = [&scene, &shuffled(&scene, 5)].map(|scene| {
@@ -79,6 +84,43 @@ fn order_and_repetition_do_not_change_a_bit() {
         });
         assert!(one != other, "{name}: a sum that depends on the order was not noticed");
     }
+}
+
+/// `fixed` keeps the same sums in another way where the adapter adds 64 bits at once.
+#[test]
+fn an_adapters_64_bit_atomics_do_not_change_a_bit() {
+    let Some(with) = common::gpu() else { return };
+    if !with.adapter.atomics_u64 {
+        eprintln!("skipped: no 64-bit atomics");
+        return;
+    }
+    let with = Backend::gpu(with);
+    let Some(mut without) = common::gpu() else { return };
+    without.adapter.atomics_u64 = false;
+    let without = Backend::gpu(without);
+    let own = options(ACCUMULATORS[0].name);
+    let crowded = crowded().into_iter().map(|(scene, camera)| ("crowded".to_owned(), scene, camera, own.clone()));
+    let hard = cases().unwrap().into_iter().map(|case| (case.name, case.scene, case.camera, case.options));
+    let mut seen = [false; 2];
+    let broken = [("high - from_low", "high"), ("from_low + from_high", "from_low")].map(|(from, to)| {
+        let sources = Sources::default().replace("accumulator_fixed_pairs.wgsl", from, to).unwrap();
+        common::gpu().map(|gpu| Backend::Gpu { gpu: Box::new(gpu), sources }).unwrap()
+    });
+    let mut noticed = [false; 2];
+    for (name, scene, camera, options) in crowded.chain(hard) {
+        let options = RenderOptions { maps: MAPS, accumulator: own.accumulator, ..options };
+        let [(one, report), (other, plain)] =
+            [&with, &without].map(|backend| render(&scene, &camera, &options, backend, &()).unwrap());
+        assert!(report.needs.contains(&"atomics-u64") && !plain.needs.contains(&"atomics-u64"));
+        seen[usize::from(report.needs.contains(&"wide-sums"))] = true;
+        assert!(bits(&one) == bits(&other), "{name}: other bits without 64-bit atomics");
+        for (backend, noticed) in broken.iter().zip(&mut noticed) {
+            let (frame, _) = render(&scene, &camera, &options, backend, &()).unwrap();
+            *noticed |= bits(&frame) != bits(&other);
+        }
+    }
+    assert_eq!(seen, [true; 2], "both widths of terms");
+    assert_eq!(noticed, [true; 2], "wrong carries do not show");
 }
 
 const ADD_TO_CHANNEL: &str = "atomicAdd(&sums[pixel * CHANNELS + channel], value)";

@@ -42,6 +42,7 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
     for (text, needs) in &texts {
         let module = naga::front::wgsl::parse_str(text).unwrap_or_else(|e| panic!("{}", e.emit_to_string(text)));
         let features = match needs.raster {
+            None if needs.atomics_u64 => Features::AtomicsU64,
             None => accumulator(needs.accumulator).unwrap().features,
             Some(_) => Features::None,
         };
@@ -66,7 +67,7 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
         }
         assert!(!text.lines().any(|line| line.starts_with("enable") || line.starts_with("requires")));
     }
-    assert_eq!(without, BTreeSet::from(["fixed64", "float", "packed64"]));
+    assert_eq!(without, BTreeSet::from(["fixed", "fixed64", "float", "packed64"]));
     // The default runs anywhere.
     assert_eq!(ACCUMULATORS[0].features, Features::None);
 }
@@ -228,7 +229,7 @@ fn absent_parts_have_their_partners_signatures() {
             }
         }
     };
-    alike("accumulator_", &["quantise", "term", "add", "add_pair", "sum_at", "weight_at"]);
+    alike("accumulator_", &["quantise", "term", "add", "add_pair", "settle", "sum_at", "weight_at"]);
     alike("kernel_", &["kernel_weight"]);
     alike("epsilon", &["radius_of", "deepest_accepted", "farthest_accepted"]);
     let shared = ["homography", "intersect", "ray"];

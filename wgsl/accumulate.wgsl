@@ -26,10 +26,11 @@ fn accumulate_splat(index: u32, offset: vec2<u32>, step: u32) {
         var accepted = false;
         while (at.y <= pixels.last.y && !accepted) {
             pixel = pixel_index(at.x, at.y);
-            front = front_at(pixel);
-            let farthest = farthest_accepted(front, attributes.radius);
             fragment = footprint(splat, filter_, at.x, at.y);
-            accepted = fragment.hit && fragment.depth <= farthest;
+            if (fragment.hit) {
+                front = front_at(pixel);
+                accepted = fragment.depth <= farthest_accepted(front, attributes.radius);
+            }
             at.x += step;
             let wrapped = at.x > pixels.last.x;
             at = select(at, vec2<u32>(first.x, at.y + step), wrapped);

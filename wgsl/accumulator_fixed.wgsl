@@ -8,8 +8,8 @@ override CHANNELS: u32;
 alias Term = u32;
 const COUNT_ONE: Term = 1u;
 
-// The units of a weight of 1: 2^32 - 2^10.
-const ONE: f32 = 4294966272.0;
+// The units of a weight of 1.
+const ONE: f32 = FIXED_ONE;
 
 fn quantise(weight: f32) -> Term {
     return u32(round(weight * ONE));
@@ -21,11 +21,20 @@ fn term(weight: Term, value: f32) -> Term {
     return u32(round(f32(weight) * clamp(value, 0.0, 1.0)));
 }
 
+// The channels whose low words wrapped under the fragment in work.
+var<private> carries: u32;
+
 fn add(pixel: u32, channel: u32, value: Term) {
-    let word = 2u * (pixel * CHANNELS + channel);
-    let before = atomicAdd(&sums[word], value);
-    if (before + value < before) {
-        atomicAdd(&sums[word + 1u], 1u);
+    let before = atomicAdd(&sums[2u * (pixel * CHANNELS + channel)], value);
+    carries |= select(0u, 1u << channel, before + value < before);
+}
+
+// After a fragment's terms: carries are rare, so one loop over all channels is less work than a branch for each.
+fn settle(pixel: u32) {
+    while (carries != 0u) {
+        let channel = firstTrailingBit(carries);
+        atomicAdd(&sums[2u * (pixel * CHANNELS + channel) + 1u], 1u);
+        carries &= carries - 1u;
     }
 }
 

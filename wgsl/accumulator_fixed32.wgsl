@@ -6,8 +6,11 @@ override CHANNELS: u32;
 override FRACTION_BITS: u32;
 
 @group(0) @binding(8) var<storage, read_write> sums: array<atomic<u32>>;
-// How often a sum wrapped.
+// Fragments that made a sum wrap.
 @group(0) @binding(14) var<storage, read_write> overflows: atomic<u32>;
+
+// The fragment in work did.
+var<private> wrapped: bool;
 
 alias Term = u32;
 const COUNT_ONE: Term = 1u;
@@ -27,8 +30,14 @@ fn term(weight: Term, value: f32) -> Term {
 
 fn add(pixel: u32, channel: u32, value: Term) {
     let before = atomicAdd(&sums[pixel * CHANNELS + channel], value);
-    if (before + value < before) {
+    wrapped |= before + value < before;
+}
+
+// After a fragment's terms.
+fn settle(pixel: u32) {
+    if (wrapped) {
         atomicAdd(&overflows, 1u);
+        wrapped = false;
     }
 }
 

@@ -29,8 +29,12 @@ fn add_pair(pixel: u32, channel: u32, first: Term, second: Term) {
     add(pixel, channel + 1u, second);
 }
 
+fn settle(pixel: u32) {}
+
+// Rounded as accumulator_fixed_wide.wgsl does, which has the same sums in two words.
 fn sum_at(pixel: u32, channel: u32) -> f32 {
-    return f32(atomicLoad(&sums[pixel * CHANNELS + channel]));
+    let sum = atomicLoad(&sums[pixel * CHANNELS + channel]);
+    return f32(u32(sum >> 32u)) * 4294967296.0 + f32(u32(sum & 0xfffffffflu));
 }
 
 fn weight_at(pixel: u32) -> f32 {

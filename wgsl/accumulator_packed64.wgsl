@@ -7,6 +7,9 @@ override FRACTION_BITS: u32;
 @group(0) @binding(8) var<storage, read_write> sums: array<atomic<u64>>;
 @group(0) @binding(14) var<storage, read_write> overflows: atomic<u32>;
 
+// A sum wrapped under the fragment in work.
+var<private> wrapped: bool;
+
 alias Term = u32;
 const COUNT_ONE: Term = 1u;
 
@@ -27,8 +30,14 @@ fn add_halves(pair: u32, low: Term, high: Term) {
     let before_low = u32(before & 0xfffffffflu);
     let before_high = u32(before >> 32u);
     // A low half that wraps carries into the high one, which is as wrong as a high half that wraps.
-    if (before_low + low < before_low || before_high + high < before_high) {
+    wrapped |= before_low + low < before_low || before_high + high < before_high;
+}
+
+// After a fragment's terms.
+fn settle(pixel: u32) {
+    if (wrapped) {
         atomicAdd(&overflows, 1u);
+        wrapped = false;
     }
 }
 

@@ -26,6 +26,8 @@ fn add_pair(pixel: u32, channel: u32, first: Term, second: Term) {
     add(pixel, channel + 1u, second);
 }
 
+fn settle(pixel: u32) {}
+
 fn four_terms(first: u32) -> vec4<f32> {
     return BLEND_SCALE * vec4<f32>(terms[first], terms[first + 1u], terms[first + 2u], terms[first + 3u]);
 }

@@ -24,4 +24,5 @@ fn blend(pixel: u32, fragment: Fragment, front: f32, attributes: Attributes) {
     accumulate_normal(pixel, weight, attributes.normal);
     accumulate_depth(pixel, weight, fragment.depth, front);
     accumulate_count(pixel);
+    settle(pixel);
 }

@@ -79,6 +79,9 @@ const NOTHING: u32 = 0x7f800000u;
 // The channel of a pixel's sums that holds the weight.
 const WEIGHT_CHANNEL: u32 = 0u;
 
+// The units of a weight of 1 in the sums of `fixed`: 2^32 - 2^10.
+const FIXED_ONE: f32 = 4294966272.0;
+
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<uniform> band: Band;
 

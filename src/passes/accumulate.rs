@@ -18,7 +18,7 @@
 //!   full weight is still rarer than fragments, whose weights are mostly small, and was not measurable in frame times;
 //!   and the rim of the paper's kernel, exp(-6), keeps 23 bits. Where weights may be smaller still, or alphas differ
 //!   ([`SceneNeeds::wide_sums`](crate::scene::SceneNeeds::wide_sums)), terms are those of `fixed64` in two words, which
-//!   takes two additions for most.
+//!   takes two additions for most. An adapter with 64-bit atomics makes the same sums in half the additions.
 //! - **fixed32**: the same in one word. B fraction bits, `32 - bits(min(surfels, 255))`, are at least 24 and let 255 full
 //!   weights (or all surfels there are) meet in a pixel; a sum that wraps is noticed and the frame rendered again with
 //!   `fixed`. `n 2^-B / w + 5 u`.
@@ -38,7 +38,7 @@ use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::layout::ONE;
 use crate::scene::options::LEAST_FILTERED_WEIGHT;
-use crate::scene::{Camera, RenderOptions, Scene};
+use crate::scene::{Camera, RenderOptions, Scene, SceneNeeds};
 
 /// An accumulator: one row of the table below, one file `wgsl/accumulator_*.wgsl`.
 #[derive(Debug)]
@@ -71,8 +71,25 @@ pub enum Features {
 /// The rounding of one f32 operation.
 const U: f64 = 1.0 / 16_777_216.0;
 
-/// The file of `fixed` where terms may be small.
-pub const WIDE_FILE: &str = "accumulator_fixed_wide.wgsl";
+/// The files of `fixed`, by whether terms may be small ([`SceneNeeds::wide_sums`]) and whether the adapter adds 64 bits at
+/// once ([`SceneNeeds::atomics_u64`]): the sums are the same with it, in half the additions.
+fn fixed_file(needs: &SceneNeeds) -> &'static str {
+    match (needs.wide_sums, needs.atomics_u64) {
+        (false, false) => "accumulator_fixed.wgsl",
+        (false, true) => "accumulator_fixed_pairs.wgsl",
+        (true, false) => "accumulator_fixed_wide.wgsl",
+        (true, true) => "accumulator_fixed64.wgsl",
+    }
+}
+
+/// The file that keeps the sums of a render with `needs`.
+pub fn file(needs: &SceneNeeds) -> &'static str {
+    match accumulator(needs.accumulator) {
+        Ok(row) if row.name == ACCUMULATORS[0].name => fixed_file(needs),
+        Ok(row) => row.file,
+        Err(_) => "",
+    }
+}
 
 /// Every accumulator; the first is the default.
 pub const ACCUMULATORS: &[Accumulator] = &[

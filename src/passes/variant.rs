@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::accumulate::{Accumulator, WIDE_FILE, accumulator};
+use super::accumulate::{self, Accumulator, accumulator};
 use super::{lowpass, raster};
 use crate::error::Result;
 use crate::gpu::kernel::Program;
@@ -86,8 +86,7 @@ pub fn files(needs: &SceneNeeds) -> Vec<&'static str> {
     ];
     let depth = match needs.raster {
         None => {
-            let row = accumulator(needs.accumulator).map_or("", |row| row.file);
-            files.extend(["visibility.wgsl", "accumulate.wgsl", pick(needs.wide_sums, WIDE_FILE, row)]);
+            files.extend(["visibility.wgsl", "accumulate.wgsl", accumulate::file(needs)]);
             "depth.wgsl"
         }
         Some(raster) => {

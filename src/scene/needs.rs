@@ -25,6 +25,8 @@ pub struct SceneNeeds {
     /// The accumulator is `fixed` and terms may be small: alphas differ, so that means are divided by a small mean alpha;
     /// or a fragment's weight may be less than [`SMALL_WEIGHT`]. Then terms keep 40 bits.
     pub wide_sums: bool,
+    /// The accumulator is `fixed` and the adapter has 64-bit atomics, which make the same sums in half the additions.
+    pub atomics_u64: bool,
     /// Sums are the rasteriser's.
     pub raster: Option<Raster>,
     /// It draws a triangle a splat instead of a quad, as there are more surfels than tenths of the image's pixels. On a
@@ -84,6 +86,7 @@ impl SceneNeeds {
             wide_sums: options.raster.is_none()
                 && options.accumulator == "fixed"
                 && (low[3] != high[3] || may_be_small(options)),
+            atomics_u64: false,
             raster: options.raster,
             triangles: options.raster.is_some() && 10 * scene.surfels.len() > camera.pixels(),
             kernel: options.kernel.shape(),
@@ -100,6 +103,11 @@ impl SceneNeeds {
             weight_map: options.maps.weight,
             decision: options.maps.decision,
         }
+    }
+
+    /// The same on an adapter that has 64-bit atomics or not.
+    pub fn with_atomics_u64(self, atomics_u64: bool) -> Self {
+        Self { atomics_u64: atomics_u64 && self.accumulator == "fixed" && self.raster.is_none(), ..self }
     }
 
     /// The needs by name, for people and JSON.
@@ -128,6 +136,7 @@ impl SceneNeeds {
             (self.low_pass == LowPass::Max, "lowpass-max"),
             (self.low_pass == LowPass::Ewa, "lowpass-ewa"),
             (self.wide_sums, "wide-sums"),
+            (self.atomics_u64, "atomics-u64"),
             (self.epsilon_radius, "epsilon-radius"),
             (self.alpha, "alpha"),
             (self.normal, "normal"),

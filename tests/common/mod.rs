@@ -30,6 +30,13 @@ pub fn gpu() -> Option<Gpu> {
     }
 }
 
+/// The adapter with which `fixed` is kept by the kernel in `file`: without 64-bit atomics if they would replace it.
+pub fn gpu_for(file: &str) -> Option<Gpu> {
+    let mut gpu = gpu()?;
+    gpu.adapter.atomics_u64 &= !["accumulator_fixed.wgsl", "accumulator_fixed_wide.wgsl"].contains(&file);
+    Some(gpu)
+}
+
 /// The accumulators that the adapter can run; of each other one a line on stderr.
 pub fn accumulators(gpu: &Gpu) -> Vec<&'static Accumulator> {
     let able = |row: &&Accumulator| row.check(gpu).inspect_err(|why| eprintln!("skipped: {why}")).is_ok();
@@ -53,7 +60,10 @@ pub fn all_needs() -> Vec<SceneNeeds> {
                     let accumulator = row.name;
                     all.push(SceneNeeds { accumulator, kernel, epsilon_radius, low_pass, ..base[next] });
                     if accumulator == ACCUMULATORS[0].name {
-                        all.push(SceneNeeds { wide_sums: true, kernel, epsilon_radius, low_pass, ..base[next] });
+                        for (wide_sums, atomics_u64) in [(true, false), (false, true), (true, true)] {
+                            let next = base[next];
+                            all.push(SceneNeeds { wide_sums, atomics_u64, kernel, epsilon_radius, low_pass, ..next });
+                        }
                     }
                 }
             }
@@ -88,6 +98,7 @@ fn base_needs() -> Vec<SceneNeeds> {
                 projection,
                 accumulator: ACCUMULATORS[0].name,
                 wide_sums: false,
+                atomics_u64: false,
                 raster: None,
                 triangles: false,
                 kernel: KernelShape::Ellipse,

@@ -1,0 +1,72 @@
+// The sums of accumulator_fixed.wgsl, bit for bit, for adapters with 64-bit atomics: two neighbouring sums in the halves
+// of one u64, so that a fragment makes half as many additions. What wraps in the low half runs into the high one; both
+// halves' carries are counted in a u64 of their own, so that it can be taken out again.
+// Error bound: src/passes/accumulate.rs.
+
+override CHANNELS: u32;
+
+// Of a pixel: a u64 of sums for each pair of channels, then one of carries for each.
+@group(0) @binding(8) var<storage, read_write> sums: array<atomic<u64>>;
+
+alias Term = u32;
+const COUNT_ONE: Term = 1u;
+
+// The units of a weight of 1.
+const ONE: f32 = FIXED_ONE;
+
+fn quantise(weight: f32) -> Term {
+    return u32(round(weight * ONE));
+}
+
+fn term(weight: Term, value: f32) -> Term {
+    return u32(round(f32(weight) * clamp(value, 0.0, 1.0)));
+}
+
+// What wrapped under the fragment in work, three bits a pair: whether its low half did, and how often its high half, which
+// carries reach twice where the halves are added one by one.
+var<private> carries: u32;
+
+fn add_halves(pixel: u32, pair: u32, low: Term, high: Term) {
+    let before = atomicAdd(&sums[pixel * CHANNELS + pair], (u64(high) << 32u) | u64(low));
+    let before_low = u32(before & 0xfffffffflu);
+    let before_high = u32(before >> 32u);
+    let from_low = select(0u, 1u, before_low + low < before_low);
+    // A term is less than 2^32 - 1.
+    let from_high = select(0u, 2u, before_high + (high + from_low) < before_high);
+    carries += (from_low + from_high) << (3u * pair);
+}
+
+fn add(pixel: u32, channel: u32, value: Term) {
+    let odd = (channel & 1u) == 1u;
+    add_halves(pixel, channel >> 1u, select(value, 0u, odd), select(0u, value, odd));
+}
+
+fn add_pair(pixel: u32, channel: u32, first: Term, second: Term) {
+    add_halves(pixel, channel >> 1u, first, second);
+}
+
+// After a fragment's terms: carries are rare, so one loop over all pairs is less work than a branch for each.
+fn settle(pixel: u32) {
+    while (carries != 0u) {
+        let pair = firstTrailingBit(carries) / 3u;
+        let wraps = (carries >> (3u * pair)) & 7u;
+        atomicAdd(&sums[pixel * CHANNELS + CHANNELS / 2u + pair], (u64(wraps >> 1u) << 32u) | u64(wraps & 1u));
+        carries &= ~(7u << (3u * pair));
+    }
+}
+
+// A sum read back, in the units of the terms; ratios of two sums have no unit.
+fn sum_at(pixel: u32, channel: u32) -> f32 {
+    let at = pixel * CHANNELS + (channel >> 1u);
+    let halves = atomicLoad(&sums[at]);
+    let wraps = atomicLoad(&sums[at + CHANNELS / 2u]);
+    let from_low = wraps & 0xfffffffflu;
+    let low = (from_low << 32u) | (halves & 0xfffffffflu);
+    let high = (wraps & 0xffffffff00000000lu) | (halves >> 32u);
+    let sum = select(low, high - from_low, (channel & 1u) == 1u);
+    return f32(u32(sum >> 32u)) * 4294967296.0 + f32(u32(sum & 0xfffffffflu));
+}
+
+fn weight_at(pixel: u32) -> f32 {
+    return sum_at(pixel, WEIGHT_CHANNEL) / ONE;
+}

@@ -143,6 +143,8 @@ fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         ("projected_filters", Element::Struct("Filter")),
         ("queue", Element::Plain(WORD)),
         ("queued", Element::Plain(WORD)),
+        ("rare", Element::Plain(WORD)),
+        ("listed", Element::Plain(WORD)),
         ("nearest", Element::Plain(WORD)),
         ("visible", Element::Plain(WORD)),
         ("sums", Element::Plain(sums_of(accumulator).0)),
@@ -385,7 +387,7 @@ fn constants_agree() {
         assert_eq!(constant("ONE"), one, "{}", needs.accumulator);
         for entry in module.entry_points.iter().filter(|entry| entry.stage == naga::ShaderStage::Compute) {
             let size = match entry.name.as_str() {
-                "arrange" => [1, 1, 1],
+                "arrange" | "arrange_rare" => [1, 1, 1],
                 name if name.ends_with("_large") => [TILE, TILE, 1],
                 _ => [WORKGROUP, 1, 1],
             };

@@ -30,6 +30,7 @@ fn homography(
     t: vec3<f32>,
     s_world: vec3<f32>,
     t_world: vec3<f32>,
+    every: bool,
 ) -> Homography {
     var h: Homography;
     let p_z = center[2].high;
@@ -58,6 +59,10 @@ fn homography(
     h.b = vec3<f32>(b, -dot(b, offset));
     h.c = vec3<f32>(c, p_z - dot(c, offset));
     if (is_thin(a, b)) {
+        if (!every) {
+            h.rare = true;
+            return h;
+        }
         let offset_x = two_sum(image.x - pixel.x - 0.5, x.low);
         let offset_y = two_sum(image.y - pixel.y - 0.5, y.low);
         let rows = precise_rows(s_world, t_world, offset_x, offset_y);

@@ -87,6 +87,7 @@ fn homography(
     t: vec3<f32>,
     s_world: vec3<f32>,
     t_world: vec3<f32>,
+    every: bool,
 ) -> Homography {
     // In units of its own distance no product of a splat's lengths under- or overflows, however small a part of the scene
     // it is. The unit is a power of two, so this is exact.
@@ -96,7 +97,7 @@ fn homography(
     for (var i = 0u; i < 3u; i++) {
         scaled[i] = Double(center[i].high * scale, center[i].low * scale);
     }
-    var h = scaled_homography(scaled, s * scale, t * scale, s_world * scale, t_world * scale, view.near * scale);
+    var h = scaled_homography(scaled, s * scale, t * scale, s_world * scale, t_world * scale, view.near * scale, every);
     // The rows are inverse lengths.
     h.a *= scale;
     h.a_low *= scale;
@@ -114,6 +115,7 @@ fn scaled_homography(
     s_world: vec3<f32>,
     t_world: vec3<f32>,
     near: f32,
+    every: bool,
 ) -> Homography {
     let p = vec3<f32>(center[0].high, center[1].high, center[2].high);
     let slope = sqrt(s.z * s.z + t.z * t.z);
@@ -148,6 +150,10 @@ fn scaled_homography(
             h.b = vec3<f32>(b.xy, -dot(b.xy, offset));
             h.c = vec3<f32>(c.xy, 1.0 / p.z - dot(c.xy, offset));
             if (is_thin(a.xy, b.xy)) {
+                if (!every) {
+                    h.rare = true;
+                    return h;
+                }
                 let offset_x = two_sum(image.x - pixel.x - 0.5, x.low);
                 let offset_y = two_sum(image.y - pixel.y - 0.5, y.low);
                 let rows = precise_rows(center, s_world, t_world, offset_x, offset_y);
@@ -170,6 +176,10 @@ fn scaled_homography(
             h.high = image + vec2<f32>(across.y, down.y);
             return h;
         }
+    }
+    if (!every) {
+        h.rare = true;
+        return h;
     }
     // The disk reaches the near depth, or its centre lies far outside the image: no useful centre pixel, so the
     // homography is anchored in the image and the bounds are those of the part in front.

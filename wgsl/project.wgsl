@@ -1,10 +1,16 @@
-// Stage 1: every surfel becomes a splat, once. One invocation a surfel. Twin: src/passes/project.rs.
+// Stage 1: every surfel becomes a splat, once. One invocation a surfel; the rare ones that take much longer (thin splats,
+// disks that reach the near depth) are listed and done together, so that the others of a subgroup need not wait for each.
+// Twin: src/passes/project.rs.
 
 @group(0) @binding(2) var<storage, read> surfels: array<Surfel>;
 @group(0) @binding(3) var<storage, read_write> splats: array<Splat>;
 // Word 0 counts the large splats, word 1 all that are in view; three words from QUEUE_GRID on are the grid of workgroups
 // that draws the large ones, and from QUEUE_START on come their indices.
 @group(0) @binding(4) var<storage, read_write> queue: array<atomic<u32>>;
+
+// The rare ones, in the same form; the grid is project_rare's.
+@group(0) @binding(21) var<storage, read_write> rare: array<atomic<u32>>;
+@group(0) @binding(22) var<storage, read> listed: array<u32>;
 
 const QUEUE_GRID: u32 = 2u;
 const MOST_GROUPS: u32 = 65535u;
@@ -33,7 +39,13 @@ fn rotate_plain(world: vec3<f32>) -> vec3<f32> {
     );
 }
 
-fn project_surfel(index: u32) -> bool {
+// What became of a surfel.
+const OUT_OF_VIEW: u32 = 0u;
+const IN_VIEW: u32 = 1u;
+const RARE: u32 = 2u;
+
+// Of a rare surfel the splat is written only if `every` kind is asked for.
+fn project_surfel(index: u32, every: bool) -> u32 {
     let surfel = surfels[index];
     var relative: array<Double, 3>;
     for (var i = 0u; i < 3u; i++) {
@@ -46,7 +58,10 @@ fn project_surfel(index: u32) -> bool {
     let center = rotate(relative);
     let s = rotate_plain(s_world);
     let t = rotate_plain(t_world);
-    var h = homography(center, s, t, s_world, t_world);
+    var h = homography(center, s, t, s_world, t_world, every);
+    if (h.rare) {
+        return RARE;
+    }
     low_pass(index, &h);
 
     // Bounds are conservative: the margin covers the rounding of the extent, and `intersect` decides.
@@ -74,7 +89,17 @@ fn project_surfel(index: u32) -> bool {
         // Places depend on the schedule, but nothing later depends on places.
         atomicStore(&queue[QUEUE_START + atomicAdd(&queue[0], 1u)], index);
     }
-    return visible;
+    return select(OUT_OF_VIEW, IN_VIEW, visible);
+}
+
+fn count_drawn(local: u32, drawn: bool) {
+    if (drawn) {
+        atomicAdd(&group_drawn, 1u);
+    }
+    workgroupBarrier();
+    if (local == 0u) {
+        atomicAdd(&queue[1], atomicLoad(&group_drawn));
+    }
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -84,23 +109,49 @@ fn project(
     @builtin(local_invocation_index) local: u32,
 ) {
     let index = linear_index(workgroup, workgroups, local);
+    var fate = OUT_OF_VIEW;
     if (index < arrayLength(&surfels)) {
-        if (project_surfel(index)) {
-            atomicAdd(&group_drawn, 1u);
-        }
+        fate = project_surfel(index, false);
     }
-    workgroupBarrier();
-    if (local == 0u) {
-        atomicAdd(&queue[1], atomicLoad(&group_drawn));
+    if (fate == RARE) {
+        atomicStore(&rare[QUEUE_START + atomicAdd(&rare[0], 1u)], index);
+    }
+    count_drawn(local, fate == IN_VIEW);
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn project_rare(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let place = linear_index(workgroup, workgroups, local);
+    var fate = OUT_OF_VIEW;
+    if (place < listed[0]) {
+        fate = project_surfel(listed[QUEUE_START + place], true);
+    }
+    count_drawn(local, fate == IN_VIEW);
+}
+
+// Between the two: a workgroup for WORKGROUP of the rare ones, in rows that no adapter finds too long.
+@compute @workgroup_size(1)
+fn arrange_rare() {
+    let grid = rows_of((atomicLoad(&rare[0]) + WORKGROUP - 1u) / WORKGROUP);
+    for (var k = 0u; k < 3u; k++) {
+        atomicStore(&rare[QUEUE_GRID + k], grid[k]);
     }
 }
 
-// After all surfels: a workgroup for each large splat, in rows that no adapter finds too long.
+fn rows_of(groups: u32) -> vec3<u32> {
+    let rows = (groups + MOST_GROUPS - 1u) / MOST_GROUPS;
+    return vec3<u32>((groups + max(rows, 1u) - 1u) / max(rows, 1u), rows, 1u);
+}
+
+// After all surfels: a workgroup for each large splat.
 @compute @workgroup_size(1)
 fn arrange() {
-    let large = atomicLoad(&queue[0]);
-    let rows = (large + MOST_GROUPS - 1u) / MOST_GROUPS;
-    atomicStore(&queue[QUEUE_GRID], (large + max(rows, 1u) - 1u) / max(rows, 1u));
-    atomicStore(&queue[QUEUE_GRID + 1u], rows);
-    atomicStore(&queue[QUEUE_GRID + 2u], 1u);
+    let grid = rows_of(atomicLoad(&queue[0]));
+    for (var k = 0u; k < 3u; k++) {
+        atomicStore(&queue[QUEUE_GRID + k], grid[k]);
+    }
 }

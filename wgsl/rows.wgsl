@@ -15,6 +15,8 @@ struct Homography {
     // First and last point that the disk can reach, image coordinates; empty if low > high.
     low: vec2<f32>,
     high: vec2<f32>,
+    // Left to project_rare.
+    rare: bool,
     // > 0 if s x t points away from the viewer; 0 for a disk seen exactly edge-on, which itself covers nothing.
     away: f32,
     // For the low-pass, where the splat's centre is an anchor: its place relative to the anchor's centre, the images of

@@ -251,6 +251,8 @@ pub struct SplatPage {
     pub splats: Buffer<layout::Splat>,
     /// Counts and a grid, then the indices of the large splats, which get a workgroup each.
     queue: Buffer<u32>,
+    /// In the same form the splats that take long to project, which get a dispatch of their own.
+    rare: Buffer<u32>,
     /// Their low-pass filters, if there are any.
     filters: Option<Buffer<layout::Filter>>,
 }
@@ -264,7 +266,9 @@ pub fn record(recorder: &mut Recorder<'_>, buffer: &SplatBuffer) -> Result<()> {
         "project",
         |encoder| {
             for page in &buffer.pages {
-                encoder.clear_buffer(&page.queue.raw, 0, Some(u64::from(layout::QUEUE_START) * 4));
+                for list in [&page.queue, &page.rare] {
+                    encoder.clear_buffer(&list.raw, 0, Some(u64::from(layout::QUEUE_START) * 4));
+                }
             }
         },
         |pass| {
@@ -274,9 +278,14 @@ pub fn record(recorder: &mut Recorder<'_>, buffer: &SplatBuffer) -> Result<()> {
                     ("surfels", surfels.surfels.bound()),
                     ("splats", page.splats.bound()),
                     ("queue", page.queue.bound()),
+                    ("rare", page.rare.bound()),
+                    ("listed", page.rare.bound()),
                 ];
                 buffers.extend(page.filters.as_ref().map(|filters| ("filters", filters.bound())));
                 program.dispatch(gpu, pass, "project", &buffers, Grid::Of(grid(gpu, surfels.surfels.len)?))?;
+                program.dispatch(gpu, pass, "arrange_rare", &buffers, Grid::Of((1, 1)))?;
+                let at = u64::from(layout::QUEUE_GRID) * 4;
+                program.dispatch(gpu, pass, "project_rare", &buffers, Grid::In(&page.rare.raw, at))?;
                 program.dispatch(gpu, pass, "arrange", &buffers, Grid::Of((1, 1)))?;
             }
             Ok(())
@@ -290,9 +299,11 @@ impl SplatBuffer {
         let mut pages = Vec::with_capacity(surfels.pages.len());
         for page in &surfels.pages {
             let len = page.surfels.len;
+            let list = |what| Buffer::indirect(gpu, what, len + u64::from(layout::QUEUE_START));
             pages.push(SplatPage {
                 splats: Buffer::storage(gpu, "splats", len)?,
-                queue: Buffer::indirect(gpu, "queue of large splats", len + u64::from(layout::QUEUE_START))?,
+                queue: list("queue of large splats")?,
+                rare: list("list of rare splats")?,
                 filters: match low_pass {
                     LowPass::None => None,
                     _ => Some(Buffer::storage(gpu, "low-pass filters", len)?),
@@ -305,7 +316,8 @@ impl SplatBuffer {
     /// Device memory that the splats and their surfels take, bytes.
     pub fn bytes(&self) -> u64 {
         let of_page = |page: &SplatPage| {
-            page.splats.bytes() + page.queue.bytes() + page.filters.as_ref().map_or(0, Buffer::bytes)
+            let lists = page.queue.bytes() + page.rare.bytes();
+            page.splats.bytes() + lists + page.filters.as_ref().map_or(0, Buffer::bytes)
         };
         self.surfels.bytes() + self.pages.iter().map(of_page).sum::<u64>()
     }

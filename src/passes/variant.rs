@@ -15,13 +15,23 @@ use crate::scene::{ColorNeed, Kernel, KernelShape, LowPass, Projection, RasterDe
 pub fn stages(needs: &SceneNeeds) -> &'static [&'static str] {
     match needs.raster {
         None => &STAGES,
-        Some(_) => &["project", "arrange", "resolve"],
+        Some(_) => &["project", "arrange_rare", "project_rare", "arrange", "resolve"],
     }
 }
 
 /// The entry points of the stages on compute kernels alone.
-pub const STAGES: [&str; 8] =
-    ["project", "arrange", "clear", "visibility", "visibility_large", "accumulate", "accumulate_large", "resolve"];
+pub const STAGES: [&str; 10] = [
+    "project",
+    "arrange_rare",
+    "project_rare",
+    "arrange",
+    "clear",
+    "visibility",
+    "visibility_large",
+    "accumulate",
+    "accumulate_large",
+    "resolve",
+];
 
 /// A render's kernels, before they are compiled.
 #[derive(Clone, Debug)]

@@ -84,11 +84,11 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
     };
     let view = View::new(scene, &scene.bounds(), &color_range, camera, options);
     let uniform = Buffer::uniform(gpu, "view", &view)?;
-    let timing = Timing::new(gpu, 4)?;
+    let timing = Timing::new(gpu, 5)?;
     let mut recorder = Recorder { gpu, program: &program, view: &uniform, variant: &variant, timing };
     let projected = SplatBuffer::new(gpu, SurfelBuffer::upload(gpu, scene, &needs, &())?, needs.low_pass)?;
     project::record(&mut recorder, &projected)?;
-    let nearest = VisibilityBuffer::new(gpu, rows.pixels)?;
+    let nearest = VisibilityBuffer::new(gpu, &bands)?;
     let sums = AttributeBuffer::new(gpu, &variant, rows.pixels)?;
     visibility::record(&mut recorder, &projected, rows, &nearest)?;
     accumulate::record(&mut recorder, &projected, rows, &nearest, &sums)?;

@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::buffers::Buffer;
-use crate::gpu::layout::{Band, MOST_ROUNDS, TILE, View};
+use crate::gpu::layout::{Band, MOST_ROUNDS, OCCLUSION_TILE, TILE, View};
 use crate::gpu::timing::Timing;
 use crate::gpu::{Gpu, Sources};
 use crate::passes::accumulate::{ACCUMULATORS, AttributeBuffer};
@@ -210,7 +210,7 @@ impl<'a> Renderer<'a> {
         progress.begin("rendering rows", camera.height.into());
         let start = Instant::now();
         pixels.view.set(gpu, &self.view(camera));
-        let timing = Timing::new(gpu, 1 + 4 * pixels.bands.len() as u32)?;
+        let timing = Timing::new(gpu, 1 + 5 * pixels.bands.len() as u32)?;
         let mut recorder = Recorder { gpu, program: &program, view: &pixels.view, variant: &variant, timing };
         let mut frame = Frame::new(camera, &self.options.maps);
         project::record(&mut recorder, &splats)?;
@@ -275,7 +275,7 @@ impl PixelBuffers {
         let bands = bands(gpu, camera, variant)?;
         let most = bands.iter().map(|rows| rows.pixels).max().unwrap_or(0);
         let sums = match variant.needs.raster {
-            None => Sums::Storage(VisibilityBuffer::new(gpu, most)?, AttributeBuffer::new(gpu, variant, most)?),
+            None => Sums::Storage(VisibilityBuffer::new(gpu, &bands)?, AttributeBuffer::new(gpu, variant, most)?),
             Some(raster) => Sums::Targets(raster, raster::Targets::new(gpu, raster, variant.pixel, camera)?),
         };
         Ok(Self {
@@ -320,7 +320,9 @@ pub(crate) fn bands(gpu: &Gpu, camera: &Camera, variant: &Variant) -> Result<Vec
         let count = rows_per_band.min(camera.height - first);
         let band = Band { first_row: first, rows: count, padding_0: 0, padding_1: 0 };
         let uniform = Buffer::uniform(gpu, "band", &band)?;
-        bands.push(Rows { first, count, pixels: u64::from(count) * u64::from(camera.width), uniform });
+        let [tiles_x, tiles_y] = [camera.width, count].map(|side| u64::from(side.div_ceil(OCCLUSION_TILE)));
+        let pixels = u64::from(count) * u64::from(camera.width);
+        bands.push(Rows { first, count, pixels, tiles: tiles_x * tiles_y, uniform });
         first += count;
     }
     Ok(bands)

@@ -11,7 +11,8 @@ use std::mem::{offset_of, size_of};
 use epsplat::gpu::Sources;
 use epsplat::gpu::kernel::{FILES, reflect};
 use epsplat::gpu::layout::{
-    AWAY, Band, Filter, MOST_GROUPS, ONE, ONE_WIDE, QUEUE_GRID, QUEUE_START, Splat, TILE, View, WORKGROUP,
+    AWAY, Band, Filter, MOST_GROUPS, OCCLUSION_TILE, ONE, ONE_WIDE, QUEUE_GRID, QUEUE_START, Splat, TILE, View,
+    WORKGROUP,
 };
 use epsplat::passes::accumulate::accumulator;
 use epsplat::passes::variant::{COLOR_CHANNEL, PixelLayout, color_channels, files};
@@ -374,6 +375,8 @@ fn constants_agree() {
         ] {
             assert_eq!(constant(name), Some(f64::from(value)), "{name}");
         }
+        let tile = needs.raster.is_none().then_some(f64::from(OCCLUSION_TILE));
+        assert_eq!(constant("OCCLUSION_TILE"), tile);
         assert_eq!(constant("LEAST_WEIGHT"), Some(LEAST_WEIGHT));
         assert_eq!(constant("LEAST_FILTERED_WEIGHT"), Some(LEAST_FILTERED_WEIGHT));
         let colors = color_channels(&needs) > 0;

@@ -12,11 +12,8 @@ fn front_at(pixel: u32) -> f32 {
 // The fragments of one invocation: the splat's pixels from `offset` on in steps of `step`. Each round of the outer loop
 // finds the invocation's next accepted fragment and then adds it, so that the invocations of a subgroup, whose accepted
 // fragments lie at different places, do the costly part together.
-fn accumulate_splat(index: u32, offset: vec2<u32>, step: u32) {
-    let splat = projected[index];
-    let pixels = reach(splat);
+fn accumulate_splat(index: u32, splat: Splat, filter_: Filter, pixels: Rectangle, offset: vec2<u32>, step: u32) {
     let first = pixels.first + offset;
-    let filter_ = filter_of(index);
     let attributes = attributes_of(index, splat);
     var at = select(first, vec2<u32>(0u, pixels.last.y + 1u), first.x > pixels.last.x);
     loop {
@@ -49,8 +46,13 @@ fn accumulate(
     @builtin(local_invocation_index) local: u32,
 ) {
     let index = linear_index(workgroup, workgroups, local);
-    if (index < arrayLength(&projected) && !is_large(projected[index])) {
-        accumulate_splat(index, vec2<u32>(0u), 1u);
+    if (index < arrayLength(&projected)) {
+        let splat = projected[index];
+        let filter_ = filter_of(index);
+        let pixels = reach(splat);
+        if (!is_large(splat) && !hidden(splat, filter_, pixels, radius_of(index))) {
+            accumulate_splat(index, splat, filter_, pixels, vec2<u32>(0u), 1u);
+        }
     }
 }
 
@@ -62,6 +64,7 @@ fn accumulate_large(
 ) {
     let index = large_splat(workgroup, workgroups);
     if (index < arrayLength(&projected)) {
-        accumulate_splat(index, local.xy, TILE);
+        let splat = projected[index];
+        accumulate_splat(index, splat, filter_of(index), reach(splat), local.xy, TILE);
     }
 }

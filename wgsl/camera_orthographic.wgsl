@@ -94,6 +94,10 @@ fn intersect(abc: vec3<f32>) -> Fragment {
     return Fragment(rho2 <= 1.0 && abc.z >= view.near, abc.z, rho2, 1.0);
 }
 
+fn nearest_between(low: f32, high: f32) -> f32 {
+    return low;
+}
+
 fn plane_depth(abc: vec3<f32>, low: f32, high: f32) -> f32 {
     return clamp(abc.z, low, high);
 }

@@ -226,6 +226,11 @@ fn intersect(abc: vec3<f32>) -> Fragment {
     return Fragment(reached && depth >= view.near, depth, select(rho2, min(rho2, 1.0), reached), 1.0);
 }
 
+// The least depth of a fragment where row c has values between `low` and `high`.
+fn nearest_between(low: f32, high: f32) -> f32 {
+    return select(3e38, 1.0 / high, high > 0.0);
+}
+
 // The depth of the splat's plane, held within [low, high].
 fn plane_depth(abc: vec3<f32>, low: f32, high: f32) -> f32 {
     return 1.0 / clamp(abc.z, 1.0 / high, 1.0 / low);

@@ -24,6 +24,11 @@ fn filter_of(index: u32) -> Filter {
     return projected_filters[index];
 }
 
+// The least depth of the fragments that the filter adds, device units.
+fn least_filtered(filter_: Filter) -> f32 {
+    return select(3e38, filter_.depth_low, filter_.gain > 0.0);
+}
+
 // Squared radius on the filter's ellipse.
 fn filter_rho2(filter_: Filter, d: vec2<f32>) -> f32 {
     let x = d - vec2<f32>(filter_.center_x, filter_.center_y);

@@ -12,6 +12,10 @@ fn filter_of(index: u32) -> Filter {
 
 fn low_pass(index: u32, h: ptr<function, Homography>) {}
 
+fn least_filtered(filter_: Filter) -> f32 {
+    return 3e38;
+}
+
 fn filtered(fragment: Fragment, abc: vec3<f32>, filter_: Filter, d: vec2<f32>) -> Fragment {
     return fragment;
 }

@@ -55,6 +55,7 @@ pub const FILES: &[(&str, &str)] = wgsl![
     "normal_absent.wgsl",
     "normal_map.wgsl",
     "normal_map_absent.wgsl",
+    "occlusion.wgsl",
     "project.wgsl",
     "raster.wgsl",
     "raster_exact.wgsl",

@@ -29,6 +29,9 @@ pub const MOST_ROUNDS: u32 = 32_768;
 /// Invocations of a workgroup that draws a large splat: a square of 16.
 pub const TILE: u32 = 16;
 
+/// Side of the tiles by which hidden splats are told, pixels.
+pub const OCCLUSION_TILE: u32 = 8;
+
 /// Units of a weight of 1 in the sums of the accumulator `fixed`: as many as a word holds, of which f32 and the least
 /// weight keep every digit.
 pub const ONE: u32 = u32::MAX - 1023;

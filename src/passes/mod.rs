@@ -52,5 +52,7 @@ pub struct Rows {
     pub count: u32,
     /// Pixels in them.
     pub pixels: u64,
+    /// Tiles of [`OCCLUSION_TILE`](crate::gpu::layout::OCCLUSION_TILE) pixels squared that cover them.
+    pub tiles: u64,
     pub(crate) uniform: Buffer<Band>,
 }

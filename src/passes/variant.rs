@@ -20,7 +20,7 @@ pub fn stages(needs: &SceneNeeds) -> &'static [&'static str] {
 }
 
 /// The entry points of the stages on compute kernels alone.
-pub const STAGES: [&str; 10] = [
+pub const STAGES: [&str; 11] = [
     "project",
     "arrange_rare",
     "project_rare",
@@ -28,6 +28,7 @@ pub const STAGES: [&str; 10] = [
     "clear",
     "visibility",
     "visibility_large",
+    "occlude",
     "accumulate",
     "accumulate_large",
     "resolve",
@@ -96,7 +97,7 @@ pub fn files(needs: &SceneNeeds) -> Vec<&'static str> {
     ];
     let depth = match needs.raster {
         None => {
-            files.extend(["visibility.wgsl", "accumulate.wgsl", accumulate::file(needs)]);
+            files.extend(["visibility.wgsl", "occlusion.wgsl", "accumulate.wgsl", accumulate::file(needs)]);
             "depth.wgsl"
         }
         Some(raster) => {

@@ -1,7 +1,8 @@
 //! Stage 2: the nearest depth at every pixel, `min z` over the splats that cover it (paper 000, section 5.3, first
 //! pass; there the tolerance is added to the depths, here to the comparison, which is exact).
 //!
-//! On the device depths are positive f32, whose bits order as u32: an atomic min.
+//! On the device depths are positive f32, whose bits order as u32: an atomic min. What is then farthest in each tile of
+//! pixels lets the next pass leave out splats that are hidden altogether.
 
 use super::footprint::footprint;
 use super::project::{Splat, SplatBuffer};
@@ -37,14 +38,15 @@ pub fn reference<'a>(
 
 /// The nearest depth of each pixel of some rows, as bits, in device units.
 pub struct VisibilityBuffer {
-    /// One word a pixel.
+    /// One word a pixel, then one a tile (occlusion.wgsl).
     pub nearest: Buffer<u32>,
 }
 
 impl VisibilityBuffer {
-    /// Room for `pixels`.
-    pub fn new(gpu: &Gpu, pixels: u64) -> Result<Self> {
-        Ok(Self { nearest: Buffer::storage(gpu, "nearest depths", pixels)? })
+    /// Room for each of `bands`.
+    pub fn new(gpu: &Gpu, bands: &[Rows]) -> Result<Self> {
+        let words = bands.iter().map(|rows| rows.pixels + rows.tiles).max().unwrap_or(0);
+        Ok(Self { nearest: Buffer::storage(gpu, "nearest depths", words)? })
     }
 }
 
@@ -52,14 +54,16 @@ impl VisibilityBuffer {
 pub fn record(recorder: &mut Recorder<'_>, splats: &SplatBuffer, rows: &Rows, buffer: &VisibilityBuffer) -> Result<()> {
     let (gpu, program) = (recorder.gpu, recorder.program);
     let buffers = [("nearest", buffer.nearest.bound())];
-    recorder.timing.pass(
-        gpu,
-        "visibility",
-        |_| {},
-        |pass| {
-            let bound = [("view", recorder.view.bound()), ("band", rows.uniform.bound()), buffers[0].clone()];
-            program.dispatch(gpu, pass, "clear", &bound, Grid::Of(grid(gpu, rows.pixels)?))
-        },
-    )?;
-    splats.dispatch(recorder, ("visibility", "visibility_large"), rows, &buffers, |_| {})
+    let bound = [("view", recorder.view.bound()), ("band", rows.uniform.bound()), buffers[0].clone()];
+    let mut alone = |recorder: &mut Recorder<'_>, stage, invocations| {
+        recorder.timing.pass(
+            gpu,
+            "visibility",
+            |_| {},
+            |pass| program.dispatch(gpu, pass, stage, &bound, Grid::Of(grid(gpu, invocations)?)),
+        )
+    };
+    alone(recorder, "clear", rows.pixels)?;
+    splats.dispatch(recorder, ("visibility", "visibility_large"), rows, &buffers, |_| {})?;
+    alone(recorder, "occlude", rows.tiles)
 }

@@ -1,0 +1,62 @@
+// Stage 2, its end: the farthest of the nearest depths in each tile of pixels, by which stage 3 tells splats that are
+// hidden altogether without a look at their pixels. No image depends on it.
+// Host side: src/passes/visibility.rs.
+
+const OCCLUSION_TILE: u32 = 8u;
+
+fn occlusion_tiles() -> vec2<u32> {
+    return (vec2<u32>(view.width, band.rows) + OCCLUSION_TILE - 1u) / OCCLUSION_TILE;
+}
+
+// One invocation a tile. Their words follow those of the band's pixels; 0 where nothing is.
+@compute @workgroup_size(WORKGROUP)
+fn occlude(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let tile = linear_index(workgroup, workgroups, local);
+    let tiles = occlusion_tiles();
+    if (tile >= tiles.x * tiles.y) {
+        return;
+    }
+    let first = vec2<u32>(tile % tiles.x, tile / tiles.x) * OCCLUSION_TILE;
+    let end = min(first + OCCLUSION_TILE, vec2<u32>(view.width, band.rows));
+    var farthest = 0u;
+    for (var y = first.y; y < end.y; y++) {
+        for (var x = first.x; x < end.x; x++) {
+            let front = atomicLoad(&nearest[y * view.width + x]);
+            farthest = max(farthest, select(front, 0u, front == NOTHING));
+        }
+    }
+    atomicStore(&nearest[band_pixels() + tile], farthest);
+}
+
+// Whether no fragment of the splat can be accepted at `pixels`: accepted depths grow with the nearest one.
+fn hidden(splat: Splat, filter_: Filter, pixels: Rectangle, radius: f32) -> bool {
+    let reached = nearest_reached(splat, filter_, pixels);
+    let tiles = occlusion_tiles();
+    let first = (pixels.first - vec2<u32>(0u, band.first_row)) / OCCLUSION_TILE;
+    let last = (pixels.last - vec2<u32>(0u, band.first_row)) / OCCLUSION_TILE;
+    var behind = true;
+    for (var y = first.y; y <= last.y; y++) {
+        for (var x = first.x; x <= last.x; x++) {
+            let front = bitcast<f32>(visible[band_pixels() + y * tiles.x + x]);
+            behind = behind && (front == 0.0 || reached > farthest_accepted(front, radius));
+        }
+    }
+    return behind;
+}
+
+// A depth in front of every fragment of the splat at `pixels`, device units.
+fn nearest_reached(splat: Splat, filter_: Filter, pixels: Rectangle) -> f32 {
+    let first = vec2<f32>(vec2<i32>(pixels.first) - vec2<i32>(splat.anchor_x, splat.anchor_y));
+    let last = vec2<f32>(vec2<i32>(pixels.last) - vec2<i32>(splat.anchor_x, splat.anchor_y));
+    let c = vec2<f32>(splat.c[0], splat.c[1]);
+    let low = min(c * first, c * last);
+    let high = max(c * first, c * last);
+    // Eight times what the three products and two sums of `footprint` can round.
+    let slack = 4e-6 * (dot(max(abs(low), abs(high)), vec2<f32>(1.0)) + abs(splat.c[2]));
+    let depth = nearest_between(low.x + low.y + splat.c[2] - slack, high.x + high.y + splat.c[2] + slack);
+    return min(depth, least_filtered(filter_)) * (1.0 - 1e-6);
+}

@@ -38,14 +38,15 @@ fn hidden(splat: Splat, filter_: Filter, pixels: Rectangle, radius: f32) -> bool
     let tiles = occlusion_tiles();
     let first = (pixels.first - vec2<u32>(0u, band.first_row)) / OCCLUSION_TILE;
     let last = (pixels.last - vec2<u32>(0u, band.first_row)) / OCCLUSION_TILE;
-    var behind = true;
+    // Positive f32 order as their bits.
+    var front = 0u;
+    let start = band_pixels();
     for (var y = first.y; y <= last.y; y++) {
         for (var x = first.x; x <= last.x; x++) {
-            let front = bitcast<f32>(visible[band_pixels() + y * tiles.x + x]);
-            behind = behind && (front == 0.0 || reached > farthest_accepted(front, radius));
+            front = max(front, visible[start + y * tiles.x + x]);
         }
     }
-    return behind;
+    return front == 0u || reached > farthest_accepted(bitcast<f32>(front), radius);
 }
 
 // A depth in front of every fragment of the splat at `pixels`, device units.

@@ -40,10 +40,11 @@ fn visibility(
     }
     let pixels = reach(splat);
     let filter_ = filter_of(index);
-    for (var y = pixels.first.y; y <= pixels.last.y; y++) {
-        for (var x = pixels.first.x; x <= pixels.last.x; x++) {
-            cover(splat, filter_, x, y);
-        }
+    var at = pixels.first;
+    while (at.y <= pixels.last.y) {
+        cover(splat, filter_, at.x, at.y);
+        at.x++;
+        at = select(at, vec2<u32>(pixels.first.x, at.y + 1u), at.x > pixels.last.x);
     }
 }
 

@@ -187,7 +187,7 @@ fn summary(report: &Report, output: &Path) -> String {
         .iter()
         .filter_map(|name| report.passes.get(*name).map(|ms| format!("{} {ms:.1}", name.trim_end_matches("_ms"))));
     let clock = match (report.backend, report.clock) {
-        ("gpu", "wall") => ", wall time: the adapter has no timestamps",
+        ("gpu", "wall") => ", wall time",
         _ => "",
     };
     format!(

@@ -123,6 +123,30 @@ fn an_adapters_64_bit_atomics_do_not_change_a_bit() {
     assert_eq!(noticed, [true; 2], "wrong carries do not show");
 }
 
+/// Splats that are left out as hidden would have added nothing; those that are left out wrongly show.
+#[test]
+fn hidden_splats_do_not_change_a_bit() {
+    let Some(own) = common::gpu().map(Backend::gpu) else { return };
+    let with = |to: &str| {
+        let sources = Sources::default().replace("occlusion.wgsl", "reached > farthest_accepted(", to).unwrap();
+        common::gpu().map(|gpu| Backend::Gpu { gpu: Box::new(gpu), sources }).unwrap()
+    };
+    let none = with("1e-9 * reached > farthest_accepted(");
+    let too_many = with("1.05 * reached > farthest_accepted(");
+    let crowded = crowded()
+        .into_iter()
+        .map(|(scene, camera)| ("crowded".to_owned(), scene, camera, options(ACCUMULATORS[0].name)));
+    let hard = cases().unwrap().into_iter().map(|case| (case.name, case.scene, case.camera, case.options));
+    let mut noticed = 0;
+    for (name, scene, camera, options) in crowded.chain(hard) {
+        let [own, all, fewer] =
+            [&own, &none, &too_many].map(|backend| bits(&render(&scene, &camera, &options, backend, &()).unwrap().0));
+        assert!(own == all, "{name}: leaving out hidden splats shows");
+        noticed += u32::from(fewer != all);
+    }
+    assert!(noticed > 3, "{noticed}");
+}
+
 const ADD_TO_CHANNEL: &str = "atomicAdd(&sums[pixel * CHANNELS + channel], value)";
 
 #[test]

@@ -5,7 +5,7 @@
 
 override CHANNELS: u32;
 
-// Of a pixel: a u64 of sums for each pair of channels, then one of carries for each.
+// For each pair of each pixel's channels a u64 of sums; after those of the whole band, as many of carries.
 @group(0) @binding(8) var<storage, read_write> sums: array<atomic<u64>>;
 
 alias Term = u32;
@@ -27,7 +27,7 @@ fn term(weight: Term, value: f32) -> Term {
 var<private> carries: u32;
 
 fn add_halves(pixel: u32, pair: u32, low: Term, high: Term) {
-    let before = atomicAdd(&sums[pixel * CHANNELS + pair], (u64(high) << 32u) | u64(low));
+    let before = atomicAdd(&sums[pixel * (CHANNELS / 2u) + pair], (u64(high) << 32u) | u64(low));
     let before_low = u32(before & 0xfffffffflu);
     let before_high = u32(before >> 32u);
     let from_low = select(0u, 1u, before_low + low < before_low);
@@ -50,16 +50,16 @@ fn settle(pixel: u32) {
     while (carries != 0u) {
         let pair = firstTrailingBit(carries) / 3u;
         let wraps = (carries >> (3u * pair)) & 7u;
-        atomicAdd(&sums[pixel * CHANNELS + CHANNELS / 2u + pair], (u64(wraps >> 1u) << 32u) | u64(wraps & 1u));
+        atomicAdd(&sums[(band_pixels() + pixel) * (CHANNELS / 2u) + pair], (u64(wraps >> 1u) << 32u) | u64(wraps & 1u));
         carries &= ~(7u << (3u * pair));
     }
 }
 
 // A sum read back, in the units of the terms; ratios of two sums have no unit.
 fn sum_at(pixel: u32, channel: u32) -> f32 {
-    let at = pixel * CHANNELS + (channel >> 1u);
+    let at = pixel * (CHANNELS / 2u) + (channel >> 1u);
     let halves = atomicLoad(&sums[at]);
-    let wraps = atomicLoad(&sums[at + CHANNELS / 2u]);
+    let wraps = atomicLoad(&sums[at + band_pixels() * (CHANNELS / 2u)]);
     let from_low = wraps & 0xfffffffflu;
     let low = (from_low << 32u) | (halves & 0xfffffffflu);
     let high = (wraps & 0xffffffff00000000lu) | (halves >> 32u);

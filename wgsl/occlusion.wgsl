@@ -34,6 +34,9 @@ fn occlude(
 
 // Whether no fragment of the splat can be accepted at `pixels`: accepted depths grow with the nearest one.
 fn hidden(splat: Splat, filter_: Filter, pixels: Rectangle, radius: f32) -> bool {
+    if (any(pixels.first > pixels.last)) {
+        return true;
+    }
     let reached = nearest_reached(splat, filter_, pixels);
     let tiles = occlusion_tiles();
     let first = (pixels.first - vec2<u32>(0u, band.first_row)) / OCCLUSION_TILE;

@@ -1,10 +1,10 @@
-// Stage 1: every surfel becomes a splat, once. One invocation a surfel; the rare ones that take much longer (thin splats,
-// disks that reach the near depth) are listed and done together, so that the others of a subgroup need not wait for each.
+// Stage 1: every surfel becomes a splat, once. One invocation a surfel; the rare ones that take longer (thin splats, disks
+// that reach the near depth, large splats) are listed and done together, so that the others of a subgroup need not wait.
 // Twin: src/passes/project.rs.
 
 @group(0) @binding(2) var<storage, read> surfels: array<Surfel>;
 @group(0) @binding(3) var<storage, read_write> splats: array<Splat>;
-// Word 0 counts the large splats, word 1 all that are in view; three words from QUEUE_GRID on are the grid of workgroups
+// Word 0 counts the large splats, word 1 all that are out of view; three words from QUEUE_GRID on are the grid of workgroups
 // that draws the large ones, and from QUEUE_START on come their indices.
 @group(0) @binding(4) var<storage, read_write> queue: array<atomic<u32>>;
 
@@ -15,7 +15,7 @@
 const QUEUE_GRID: u32 = 2u;
 const MOST_GROUPS: u32 = 65535u;
 
-var<workgroup> group_drawn: atomic<u32>;
+var<workgroup> group_unseen: atomic<u32>;
 
 // World to camera.
 fn rotate(world: array<Double, 3>) -> array<Double, 3> {
@@ -84,21 +84,25 @@ fn project_surfel(index: u32, every: bool) -> u32 {
         splat.c = array<f32, 3>(h.c.x, h.c.y, h.c.z);
         splat.a_low = array<f32, 3>(h.a_low.x, h.a_low.y, h.a_low.z);
     }
-    splats[index] = splat;
     if (visible && is_large(splat)) {
+        if (!every) {
+            return RARE;
+        }
         // Places depend on the schedule, but nothing later depends on places.
         atomicStore(&queue[QUEUE_START + atomicAdd(&queue[0], 1u)], index);
     }
+    splats[index] = splat;
     return select(OUT_OF_VIEW, IN_VIEW, visible);
 }
 
-fn count_drawn(local: u32, drawn: bool) {
-    if (drawn) {
-        atomicAdd(&group_drawn, 1u);
+// Most splats are in view, so those that are not are counted.
+fn count_unseen(local: u32, unseen: bool) {
+    if (unseen) {
+        atomicAdd(&group_unseen, 1u);
     }
     workgroupBarrier();
     if (local == 0u) {
-        atomicAdd(&queue[1], atomicLoad(&group_drawn));
+        atomicAdd(&queue[1], atomicLoad(&group_unseen));
     }
 }
 
@@ -109,14 +113,14 @@ fn project(
     @builtin(local_invocation_index) local: u32,
 ) {
     let index = linear_index(workgroup, workgroups, local);
-    var fate = OUT_OF_VIEW;
+    var fate = IN_VIEW;
     if (index < arrayLength(&surfels)) {
         fate = project_surfel(index, false);
     }
     if (fate == RARE) {
         atomicStore(&rare[QUEUE_START + atomicAdd(&rare[0], 1u)], index);
     }
-    count_drawn(local, fate == IN_VIEW);
+    count_unseen(local, fate == OUT_OF_VIEW);
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -126,11 +130,11 @@ fn project_rare(
     @builtin(local_invocation_index) local: u32,
 ) {
     let place = linear_index(workgroup, workgroups, local);
-    var fate = OUT_OF_VIEW;
+    var fate = IN_VIEW;
     if (place < listed[0]) {
         fate = project_surfel(listed[QUEUE_START + place], true);
     }
-    count_drawn(local, fate == IN_VIEW);
+    count_unseen(local, fate == OUT_OF_VIEW);
 }
 
 // Between the two: a workgroup for WORKGROUP of the rare ones, in rows that no adapter finds too long.

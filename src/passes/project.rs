@@ -326,7 +326,8 @@ impl SplatBuffer {
     pub fn drawn(&self, gpu: &Gpu) -> Result<u64> {
         let mut drawn = 0;
         for page in &self.pages {
-            drawn += page.queue.read(gpu, 2)?.get(1).copied().map_or(0, u64::from);
+            let unseen = page.queue.read(gpu, 2)?.get(1).copied().map_or(0, u64::from);
+            drawn += page.splats.len.saturating_sub(unseen);
         }
         Ok(drawn)
     }

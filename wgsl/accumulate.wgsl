@@ -45,6 +45,7 @@ fn accumulate(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
+    hold();
     let index = linear_index(workgroup, workgroups, local);
     if (index < arrayLength(&projected)) {
         let splat = projected[index];
@@ -62,6 +63,7 @@ fn accumulate_large(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_id) local: vec3<u32>,
 ) {
+    hold();
     let index = large_splat(workgroup, workgroups);
     if (index < arrayLength(&projected)) {
         let splat = projected[index];

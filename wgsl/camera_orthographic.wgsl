@@ -91,7 +91,7 @@ struct Fragment {
 
 fn intersect(abc: vec3<f32>) -> Fragment {
     let rho2 = dot(abc.xy, abc.xy);
-    return Fragment(rho2 <= 1.0 && abc.z >= view.near, abc.z, rho2, 1.0);
+    return Fragment(rho2 <= 1.0 && abc.z >= held.near, abc.z, rho2, 1.0);
 }
 
 fn nearest_between(low: f32, high: f32) -> f32 {

@@ -223,7 +223,7 @@ fn intersect(abc: vec3<f32>) -> Fragment {
     let uv = abc.xy * depth;
     // Behind the camera rho is infinite.
     let rho2 = select(3e38, dot(uv, uv), abc.z > 0.0);
-    return Fragment(reached && depth >= view.near, depth, select(rho2, min(rho2, 1.0), reached), 1.0);
+    return Fragment(reached && depth >= held.near, depth, select(rho2, min(rho2, 1.0), reached), 1.0);
 }
 
 // The least depth of a fragment where row c has values between `low` and `high`.

@@ -6,7 +6,7 @@ fn radius_of(index: u32) -> f32 {
 }
 
 fn deepest_accepted(front: f32) -> f32 {
-    return min(front + (front * view.epsilon_relative + view.epsilon_absolute), view.farthest);
+    return min(front + (front * held.epsilon_relative + held.epsilon_absolute), held.farthest);
 }
 
 fn farthest_accepted(front: f32, radius: f32) -> f32 {

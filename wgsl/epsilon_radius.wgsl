@@ -10,9 +10,9 @@ fn radius_of(index: u32) -> f32 {
 
 // Of the largest surfel: what depths are measured by.
 fn deepest_accepted(front: f32) -> f32 {
-    return min(front + (front * view.epsilon_relative + view.epsilon_deepest), view.farthest);
+    return min(front + (front * held.epsilon_relative + held.epsilon_deepest), held.farthest);
 }
 
 fn farthest_accepted(front: f32, radius: f32) -> f32 {
-    return min(front + (front * view.epsilon_relative + view.epsilon_radius * radius), view.farthest);
+    return min(front + (front * held.epsilon_relative + held.epsilon_radius * radius), held.farthest);
 }

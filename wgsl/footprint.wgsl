@@ -1,6 +1,36 @@
 // The splat's record evaluated at a pixel: the one place where coverage, depth and rho are decided, in every pass.
 // Twin: src/passes/footprint.rs.
 
+// What is needed of the uniforms at each fragment, read once an invocation: some drivers read uniforms again wherever they
+// are used, which took a tenth of the frame. Every entry point that evaluates fragments starts with hold().
+struct Held {
+    near: f32,
+    farthest: f32,
+    epsilon_relative: f32,
+    epsilon_absolute: f32,
+    epsilon_radius: f32,
+    epsilon_deepest: f32,
+    width: u32,
+    first_row: u32,
+    pixels: u32,
+}
+
+var<private> held: Held;
+
+fn hold() {
+    held = Held(
+        view.near,
+        view.farthest,
+        view.epsilon_relative,
+        view.epsilon_absolute,
+        view.epsilon_radius,
+        view.epsilon_deepest,
+        view.width,
+        band.first_row,
+        band.rows * view.width,
+    );
+}
+
 struct Rectangle {
     first: vec2<u32>,
     last: vec2<u32>,
@@ -63,10 +93,10 @@ fn depth_scale() -> f32 {
 
 // Pixels of the band; its buffers may have room for more.
 fn band_pixels() -> u32 {
-    return band.rows * view.width;
+    return held.pixels;
 }
 
 // The pixel's place in the band's buffers.
 fn pixel_index(x: u32, y: u32) -> u32 {
-    return (y - band.first_row) * view.width + x;
+    return (y - held.first_row) * held.width + x;
 }

@@ -15,6 +15,7 @@ fn occlude(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
+    hold();
     let tile = linear_index(workgroup, workgroups, local);
     let tiles = occlusion_tiles();
     if (tile >= tiles.x * tiles.y) {

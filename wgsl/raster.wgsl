@@ -70,6 +70,7 @@ fn corner_image(splat: Splat, number: u32) -> vec2<f32> {
 
 // A corner in clip space; a splat out of view has none.
 fn corner_of(vertex: u32) -> Corner {
+    hold();
     let index = vertex / VERTICES;
     let place = vertex % VERTICES;
     let splat = projected[index];
@@ -108,6 +109,7 @@ fn shape_with_attributes(@builtin(vertex_index) vertex: u32) -> Corner {
 }
 
 fn fragment_of(corner: Corner) -> Fragment {
+    hold();
     var splat: Splat;
     splat.anchor_x = corner.anchor.x;
     splat.anchor_y = corner.anchor.y;

@@ -25,6 +25,7 @@ fn resolve(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
+    hold();
     let pixel = linear_index(workgroup, workgroups, local);
     if (pixel >= band_pixels()) {
         return;

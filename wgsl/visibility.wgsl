@@ -11,6 +11,7 @@ fn clear(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
+    hold();
     let pixel = linear_index(workgroup, workgroups, local);
     if (pixel < band_pixels()) {
         atomicStore(&nearest[pixel], NOTHING);
@@ -30,6 +31,7 @@ fn visibility(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
+    hold();
     let index = linear_index(workgroup, workgroups, local);
     if (index >= arrayLength(&projected)) {
         return;
@@ -54,6 +56,7 @@ fn visibility_large(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_id) local: vec3<u32>,
 ) {
+    hold();
     let index = large_splat(workgroup, workgroups);
     if (index >= arrayLength(&projected)) {
         return;

@@ -55,7 +55,7 @@ pub fn record(recorder: &mut Recorder<'_>, splats: &SplatBuffer, rows: &Rows, bu
     let (gpu, program) = (recorder.gpu, recorder.program);
     let buffers = [("nearest", buffer.nearest.bound())];
     let bound = [("view", recorder.view.bound()), ("band", rows.uniform.bound()), buffers[0].clone()];
-    let mut alone = |recorder: &mut Recorder<'_>, stage, invocations| {
+    let alone = |recorder: &mut Recorder<'_>, stage, invocations| {
         recorder.timing.pass(
             gpu,
             "visibility",

@@ -8,8 +8,8 @@ use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::io::png;
 
-/// Larger pictures are shrunk by a whole factor, or a study of many would make a page that no phone opens.
-const LARGEST_SIDE: u32 = 1024;
+/// Larger pictures are shrunk by a whole factor: the page shows them no larger, and a sweep has hundreds.
+const LARGEST_SIDE: u32 = 512;
 
 /// A grid of values, row by row from the top.
 pub(super) struct Grid<T> {
@@ -77,15 +77,15 @@ mod tests {
     #[test]
     fn small_pictures_are_kept_and_large_ones_shrunk_in_blocks() {
         assert_eq!(
-            [shrink_factor(1, 1), shrink_factor(1024, 10), shrink_factor(1025, 10), shrink_factor(5000, 9)],
-            [1, 1, 2, 5]
+            [shrink_factor(1, 1), shrink_factor(512, 10), shrink_factor(513, 10), shrink_factor(5000, 9)],
+            [1, 1, 2, 10]
         );
-        let values: Vec<u32> = (0..1025 * 3).collect();
+        let values: Vec<u32> = (0..513 * 3).collect();
         let largest = |block: &[u32]| block.iter().copied().max().unwrap_or(0);
-        let small = shrink(1025, 3, &values, largest);
-        assert_eq!((small.width, small.height, small.values.len()), (513, 2, 513 * 2));
-        assert_eq!((small.values[0], small.values[512]), (1026, 1025 + 1024));
-        assert_eq!(small.values.last(), Some(&(1025 * 3 - 1)));
+        let small = shrink(513, 3, &values, largest);
+        assert_eq!((small.width, small.height, small.values.len()), (257, 2, 257 * 2));
+        assert_eq!((small.values[0], small.values[256]), (514, 513 + 512));
+        assert_eq!(small.values.last(), Some(&(513 * 3 - 1)));
         assert_eq!(shrink(2, 1, &[4, 5], largest).values, [4, 5]);
     }
 

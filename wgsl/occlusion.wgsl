@@ -60,7 +60,7 @@ fn nearest_reached(splat: Splat, filter_: Filter, pixels: Rectangle) -> f32 {
     let c = vec2<f32>(splat.c[0], splat.c[1]);
     let low = min(c * first, c * last);
     let high = max(c * first, c * last);
-    // Eight times what the three products and two sums of `footprint` can round.
+    // The two products and two sums of `footprint` round by less than 4 * 2^-24 of these magnitudes: a sixteenth of this.
     let slack = 4e-6 * (dot(max(abs(low), abs(high)), vec2<f32>(1.0)) + abs(splat.c[2]));
     let depth = nearest_between(low.x + low.y + splat.c[2] - slack, high.x + high.y + splat.c[2] + slack);
     return min(depth, least_filtered(filter_)) * (1.0 - 1e-6);

@@ -13,7 +13,7 @@ pub const WORKGROUP: u32 = 64;
 /// Splats whose bounds hold more pixels than this get a workgroup each instead of an invocation.
 pub const LARGE: u32 = 1024;
 
-/// Words at the start of a page's queue of large splats: how many there are, how many splats are in view at all, and
+/// Words at the start of a page's queue of large splats: how many there are, how many splats are out of view, and
 /// the grid of workgroups that draws the large ones.
 pub const QUEUE_START: u32 = 5;
 

@@ -10,6 +10,7 @@ use crate::gpu::layout::{ONE, ONE_WIDE, Splat, View};
 use crate::gpu::timing::Timing;
 use crate::gpu::{Gpu, Sources};
 use crate::passes::accumulate::AttributeBuffer;
+use crate::passes::cull::Part;
 use crate::passes::order::order;
 use crate::passes::project::SplatBuffer;
 use crate::passes::upload::SurfelBuffer;
@@ -87,11 +88,11 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
     let timing = Timing::new(gpu, 5)?;
     let mut recorder = Recorder { gpu, program: &program, view: &uniform, variant: &variant, timing };
     let projected = SplatBuffer::new(gpu, SurfelBuffer::upload(gpu, scene, &needs, &())?, needs.low_pass)?;
-    project::record(&mut recorder, &projected)?;
     let nearest = VisibilityBuffer::new(gpu, &bands)?;
     let sums = AttributeBuffer::new(gpu, &variant, rows.pixels)?;
-    visibility::record(&mut recorder, &projected, rows, &nearest)?;
-    accumulate::record(&mut recorder, &projected, rows, &nearest, &sums)?;
+    project::record(&mut recorder, &projected, Part::All, (rows, Some(&nearest)))?;
+    visibility::record(&mut recorder, (&projected, Part::All), rows, &nearest)?;
+    accumulate::record(&mut recorder, (&projected, &[Part::All]), rows, &nearest, &sums)?;
     let mut splats = vec![Splat::zeroed(); scene.surfels.len()];
     let mut order = order(&scene.surfels, &scene.bounds()).into_iter();
     for page in &projected.pages {

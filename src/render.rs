@@ -14,6 +14,7 @@ use crate::gpu::layout::{Band, MOST_ROUNDS, OCCLUSION_TILE, TILE, View};
 use crate::gpu::timing::Timing;
 use crate::gpu::{Gpu, Sources};
 use crate::passes::accumulate::{ACCUMULATORS, AttributeBuffer};
+use crate::passes::cull::Part;
 use crate::passes::project::SplatBuffer;
 use crate::passes::resolve::ImageBuffer;
 use crate::passes::upload::SurfelBuffer;
@@ -58,7 +59,7 @@ pub struct Report {
     pub overflows: u64,
     /// Surfels in the scene.
     pub surfels: u64,
-    /// Splats that may touch a pixel.
+    /// Splats that may touch a pixel. Those that were left out because they are hidden are not counted.
     pub splats_drawn: u64,
     /// Image width.
     pub width: u32,
@@ -185,7 +186,10 @@ impl<'a> Renderer<'a> {
     ) -> Result<(Frame, Report)> {
         let needs = SceneNeeds::of(self.scene, &self.color_range, camera, self.options)
             .with_atomics_u64(gpu.adapter.atomics_u64);
-        let variant = Variant::of(&needs, self.options, self.scene.surfels.len() as u64)?;
+        let surfels = self.scene.surfels.len() as u64;
+        let rows = rows_per_band(gpu, camera, &Variant::of(&needs, self.options, surfels)?)?;
+        let needs = needs.with_bands(camera.height.div_ceil(rows));
+        let variant = Variant::of(&needs, self.options, surfels)?;
         match needs.raster {
             Some(raster) => raster::check(gpu, raster, &needs, camera)?,
             None => variant.accumulator.check(gpu)?,
@@ -210,18 +214,25 @@ impl<'a> Renderer<'a> {
         progress.begin("rendering rows", camera.height.into());
         let start = Instant::now();
         pixels.view.set(gpu, &self.view(camera));
-        let timing = Timing::new(gpu, 1 + 5 * pixels.bands.len() as u32)?;
+        let timing = Timing::new(gpu, 3 + 6 * pixels.bands.len() as u32)?;
         let mut recorder = Recorder { gpu, program: &program, view: &pixels.view, variant: &variant, timing };
         let mut frame = Frame::new(camera, &self.options.maps);
-        project::record(&mut recorder, &splats)?;
-        if let (Sums::Targets(options, targets), Some(first)) = (&pixels.sums, pixels.bands.first()) {
+        let parts: &[Part] = if needs.cull { &[Part::Near, Part::Far] } else { &[Part::All] };
+        if let ([first, ..], Sums::Targets(options, targets)) = (&pixels.bands[..], &pixels.sums) {
+            project::record(&mut recorder, &splats, Part::All, (first, None))?;
             raster::record(&mut recorder, *options, &splats, first, targets)?;
         }
         for rows in &pixels.bands {
             let sums = match &pixels.sums {
                 Sums::Storage(nearest, sums) => {
-                    visibility::record(&mut recorder, &splats, rows, nearest)?;
-                    accumulate::record(&mut recorder, &splats, rows, nearest, sums)?;
+                    for &part in parts {
+                        // Bands share their splats.
+                        if rows.first == 0 {
+                            project::record(&mut recorder, &splats, part, (rows, Some(nearest)))?;
+                        }
+                        visibility::record(&mut recorder, (&splats, part), rows, nearest)?;
+                    }
+                    accumulate::record(&mut recorder, (&splats, parts), rows, nearest, sums)?;
                     vec![("visible", nearest.nearest.bound()), ("sums", sums.sums.bound())]
                 }
                 Sums::Targets(_, targets) => targets.bindings(),
@@ -298,11 +309,11 @@ impl PixelBuffers {
     }
 }
 
-/// The image in bands of whole rows whose sums fit a binding.
-pub(crate) fn bands(gpu: &Gpu, camera: &Camera, variant: &Variant) -> Result<Vec<Rows>> {
+/// Rows of the image whose sums fit a binding.
+fn rows_per_band(gpu: &Gpu, camera: &Camera, variant: &Variant) -> Result<u32> {
     let row_bytes = u64::from(camera.width) * u64::from(variant.sum_words().max(variant.pixel.image_words)) * 4;
-    let rows_per_band = gpu.buffer_limit() / row_bytes;
-    if rows_per_band == 0 {
+    let rows = gpu.buffer_limit() / row_bytes;
+    if rows == 0 {
         return Err(Error::Limit {
             adapter: gpu.adapter.name.clone(),
             limit: "max_storage_buffer_binding_size",
@@ -313,7 +324,12 @@ pub(crate) fn bands(gpu: &Gpu, camera: &Camera, variant: &Variant) -> Result<Vec
     }
     // A workgroup that draws a splat over the whole band must not tire its invocations.
     let most_pixels = u64::from(MOST_ROUNDS * TILE * TILE);
-    let rows_per_band = rows_per_band.min(most_pixels / u64::from(camera.width)).min(u64::from(camera.height)) as u32;
+    Ok(rows.min(most_pixels / u64::from(camera.width)).min(u64::from(camera.height)) as u32)
+}
+
+/// The image in bands of whole rows.
+pub(crate) fn bands(gpu: &Gpu, camera: &Camera, variant: &Variant) -> Result<Vec<Rows>> {
+    let rows_per_band = rows_per_band(gpu, camera, variant)?;
     let mut bands = Vec::new();
     let mut first = 0;
     while first < camera.height {

@@ -5,7 +5,7 @@
 
 mod common;
 
-use common::scenes::{crowded, front, shuffled};
+use common::scenes::{crowded, front, shuffled, sphere};
 use common::{Random, bits};
 use epsplat::frame::Frame;
 use epsplat::gpu::Sources;
@@ -15,7 +15,7 @@ use epsplat::hardcases::cases;
 use epsplat::inspect::stages;
 use epsplat::passes::accumulate::{ACCUMULATORS, Accumulator};
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Maps, RenderOptions, Scene, Shading, Surfel, Up};
+use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Lens, LowPass, Maps, RenderOptions, Scene, Shading, Surfel, Up};
 use glam::{DVec3, Vec3};
 
 const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
@@ -43,11 +43,20 @@ fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Back
     frame
 }
 
+/// Kernels that draw each batch from its last surfel to its first: the order in which surfels are stored hardly depends on
+/// that of the scene.
+fn reversed(sources: Sources) -> Sources {
+    let (own, reversed) = ("workgroup.x * WORKGROUP + local", "(BATCH - 1u - (workgroup.x * WORKGROUP + local))");
+    sources.replace("cull.wgsl", own, reversed).unwrap()
+}
+
 #[test]
 fn order_and_repetition_do_not_change_a_bit() {
     let Some(gpu) = common::gpu() else { return };
     let all = common::accumulators(&gpu);
     let backend = Backend::gpu(gpu);
+    let Some(gpu) = common::gpu() else { return };
+    let backwards = Backend::Gpu { gpu: Box::new(gpu), sources: reversed(Sources::default()) };
     for row in all.into_iter().filter(|row| row.deterministic) {
         let (name, options) = (row.name, options(row.name));
         for (scene, camera) in scenes(row) {
@@ -57,6 +66,7 @@ fn order_and_repetition_do_not_change_a_bit() {
                 let other = frame(&shuffled(&scene, seed), &camera, &options, &backend);
                 assert!(bits(&other) == first, "{name}: order {seed} differs");
             }
+            assert!(bits(&frame(&scene, &camera, &options, &backwards)) == first, "{name}: backwards differs");
             // The comparison sees every surfel moved by a unit in the last place.
             let mut moved = scene.clone();
             for surfel in &mut moved.surfels {
@@ -75,10 +85,12 @@ fn order_and_repetition_do_not_change_a_bit() {
         .into_iter()
         .find_map(|add| sources.clone().replace(row.file, add, &add.replace("atomicAdd", "atomicExchange")).ok())
         .unwrap_or_else(|| panic!("{} adds in another way than this test knows", row.file));
-        let careless = Backend::Gpu { gpu: Box::new(gpu), sources };
+        let careless = Backend::Gpu { gpu: Box::new(gpu), sources: sources.clone() };
+        let Some(gpu) = common::gpu_for(row.file) else { return };
+        let careless_backwards = Backend::Gpu { gpu: Box::new(gpu), sources: reversed(sources) };
         let (scene, camera) = crowded().remove(0);
-        let [one, other] = [&scene, &shuffled(&scene, 5)].map(|scene| {
-            let (frame, report) = render(scene, &camera, &options, &careless, &()).unwrap();
+        let [one, other] = [careless, careless_backwards].map(|careless| {
+            let (frame, report) = render(&scene, &camera, &options, &careless, &()).unwrap();
             assert_eq!(report.accumulator, name);
             bits(&frame)
         });
@@ -145,6 +157,56 @@ fn hidden_splats_do_not_change_a_bit() {
         noticed += u32::from(fewer != all);
     }
     assert!(noticed > 3, "{noticed}");
+}
+
+/// Batches that are left out, as they are hidden or out of view, would have added nothing; those that are left out wrongly
+/// show.
+#[test]
+fn batches_left_out_do_not_change_a_bit() {
+    let Some(gpu) = common::gpu() else { return };
+    // Several pages, one band: the sums of 128 x 128 pixels take 1.5 MB.
+    let Some(small) = common::gpu() else { return };
+    let gpus = [gpu, small.with_buffer_limit(1_600_000)];
+    let replaced = |from, to| Sources::default().replace("cull.wgsl", from, to).unwrap();
+    let shown = |sources: &Sources| sources.clone().replace("cull.wgsl", "return true;", "return false;").unwrap();
+    let every = replaced("!near && any(pixels.first > pixels.last)", "false");
+    let wrong = replaced("!(reached > deepest_accepted(", "!(1.5 * reached > deepest_accepted(");
+    let scene = sphere(200_000, 1.5);
+    let look = |eye: DVec3, lens| Camera::look_at((128, 128), lens, eye, DVec3::ZERO, None, Up::Y, 1e-3).unwrap();
+    let outside = DVec3::new(1.0, 0.7, 3.0);
+    let views = [
+        ("outside", look(outside, Lens::Fov(45.0)), 0.85),
+        ("parallel", look(outside, Lens::OrthographicHeight(2.2)), 0.95),
+        ("close", look(outside * 0.4, Lens::Fov(30.0)), 0.6),
+        ("inside", look(DVec3::new(0.1, 0.2, 0.6), Lens::Fov(60.0)), 0.6),
+    ];
+    for gpu in gpus {
+        let mut backend = Backend::gpu(gpu);
+        let mut frame = |sources: Sources, camera: &Camera, options: &RenderOptions| {
+            if let Backend::Gpu { sources: kept, .. } = &mut backend {
+                *kept = sources;
+            }
+            render(&scene, camera, options, &backend, &()).unwrap()
+        };
+        for low_pass in [LowPass::None, LowPass::Max, LowPass::Ewa] {
+            for (name, camera, most) in &views {
+                let options = RenderOptions { low_pass, ..options(ACCUMULATORS[0].name) };
+                let (own, report) = frame(Sources::default(), camera, &options);
+                let (all, of_all) = frame(shown(&every), camera, &options);
+                assert!(bits(&own) == bits(&all), "{name}: leaving out batches shows");
+                assert!(report.needs.contains(&"cull"));
+                let drawn = [report, of_all].map(|report| report.splats_drawn);
+                let share = drawn[0] as f64 / scene.surfels.len() as f64;
+                assert!(share <= *most, "{name}: {share} of the surfels are drawn");
+                assert!(drawn[0] <= drawn[1], "{name}: {drawn:?}");
+            }
+            let (_, camera, _) = &views[0];
+            let options = RenderOptions { low_pass, epsilon: Epsilon::Absolute(1.9), ..options(ACCUMULATORS[0].name) };
+            let (own, _) = frame(Sources::default(), camera, &options);
+            let (less, _) = frame(wrong.clone(), camera, &options);
+            assert!(bits(&own) != bits(&less), "what is left out wrongly does not show");
+        }
+    }
 }
 
 const ADD_TO_CHANNEL: &str = "atomicAdd(&sums[pixel * CHANNELS + channel], value)";

@@ -46,7 +46,7 @@ fn accumulate(
     @builtin(local_invocation_index) local: u32,
 ) {
     hold();
-    let index = linear_index(workgroup, workgroups, local);
+    let index = surfel_of(workgroup, workgroups, local);
     if (index < arrayLength(&projected)) {
         let splat = projected[index];
         let filter_ = filter_of(index);

@@ -7,6 +7,13 @@ fn image_of(position: Double, axis: u32) -> Double {
     return sum(product(focal, position), principal);
 }
 
+// The part of the image (low x, y; high x, y) that a ball covers.
+fn ball_extent(center: vec3<f32>, radius: f32, nearest: f32) -> vec4<f32> {
+    let image = center.xy * view.intrinsics.xy + view.intrinsics.zw;
+    let extent = radius * view.intrinsics.xy;
+    return vec4<f32>(image - extent, image + extent);
+}
+
 // Changes per pixel of the rows of the inverse of [s t], in doubled precision.
 fn precise_rows(s_world: vec3<f32>, t_world: vec3<f32>, offset_x: Double, offset_y: Double) -> Rows {
     let s = rotate(widen(s_world));

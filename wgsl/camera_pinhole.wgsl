@@ -55,6 +55,17 @@ fn clipped_extent(
     return extent;
 }
 
+// The part of the image (low x, y; high x, y) that a ball before the camera covers; `nearest` is its least depth. An image of
+// one of its points lies within `turned` of the centre's; and so does that of a disk within it as its low-pass sees it, but
+// for the second order.
+fn ball_extent(center: vec3<f32>, radius: f32, nearest: f32) -> vec4<f32> {
+    let ratio = center.xy / center.z;
+    let image = ratio * view.intrinsics.xy + view.intrinsics.zw;
+    let turned = radius * sqrt(1.0 + ratio * ratio) / nearest;
+    let extent = (turned + turned * turned) * view.intrinsics.xy;
+    return vec4<f32>(image - extent, image + extent);
+}
+
 // Changes per pixel of the rows t x p and p x s over p . (s x t), in doubled precision.
 fn precise_rows(
     p: array<Double, 3>,

@@ -38,6 +38,11 @@ struct View {
     epsilon_deepest: f32,
     // No surfel lies deeper, device units: an unbounded epsilon accepts up to here.
     farthest: f32,
+    // Depth of the middle of the scene's bounds, device units.
+    middle: f32,
+    padding_0: u32,
+    padding_1: u32,
+    padding_2: u32,
 }
 
 // The rows of the image that the visibility and attribute buffers hold.

@@ -8,15 +8,8 @@ fn occlusion_tiles() -> vec2<u32> {
     return (vec2<u32>(view.width, band.rows) + OCCLUSION_TILE - 1u) / OCCLUSION_TILE;
 }
 
-// One invocation a tile. Their words follow those of the band's pixels; 0 where nothing is.
-@compute @workgroup_size(WORKGROUP)
-fn occlude(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    hold();
-    let tile = linear_index(workgroup, workgroups, local);
+// The farthest of the tile's nearest depths; a pixel where nothing is counts as `nothing`.
+fn farthest_in(tile: u32, nothing: u32) {
     let tiles = occlusion_tiles();
     if (tile >= tiles.x * tiles.y) {
         return;
@@ -27,10 +20,22 @@ fn occlude(
     for (var y = first.y; y < end.y; y++) {
         for (var x = first.x; x < end.x; x++) {
             let front = atomicLoad(&nearest[y * view.width + x]);
-            farthest = max(farthest, select(front, 0u, front == NOTHING));
+            farthest = max(farthest, select(front, nothing, front == NOTHING));
         }
     }
+    // The tiles' words follow those of the band's pixels.
     atomicStore(&nearest[band_pixels() + tile], farthest);
+}
+
+// When all is drawn: what has nothing stays so. One invocation a tile.
+@compute @workgroup_size(WORKGROUP)
+fn occlude(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    hold();
+    farthest_in(linear_index(workgroup, workgroups, local), 0u);
 }
 
 // Whether no fragment of the splat can be accepted at `pixels`: accepted depths grow with the nearest one.

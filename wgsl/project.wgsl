@@ -112,7 +112,7 @@ fn project(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
-    let index = linear_index(workgroup, workgroups, local);
+    let index = surfel_of(workgroup, workgroups, local);
     var fate = IN_VIEW;
     if (index < arrayLength(&surfels)) {
         fate = project_surfel(index, false);

@@ -32,7 +32,7 @@ fn visibility(
     @builtin(local_invocation_index) local: u32,
 ) {
     hold();
-    let index = linear_index(workgroup, workgroups, local);
+    let index = surfel_of(workgroup, workgroups, local);
     if (index >= arrayLength(&projected)) {
         return;
     }

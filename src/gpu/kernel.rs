@@ -35,6 +35,8 @@ pub const FILES: &[(&str, &str)] = wgsl![
     "color_sums.wgsl",
     "count.wgsl",
     "count_absent.wgsl",
+    "cull.wgsl",
+    "cull_absent.wgsl",
     "depth.wgsl",
     "depth_absent.wgsl",
     "depth_whole.wgsl",

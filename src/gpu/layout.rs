@@ -29,6 +29,12 @@ pub const MOST_ROUNDS: u32 = 32_768;
 /// Invocations of a workgroup that draws a large splat: a square of 16.
 pub const TILE: u32 = 16;
 
+/// Surfels of a batch: consecutive in memory, and left out together (`wgsl/cull.wgsl`).
+pub const BATCH: u32 = 512;
+
+/// Words at the start of a list of batches: the grid of workgroups that draws them, and a count of others.
+pub const LIST_START: u32 = 4;
+
 /// Side of the tiles by which hidden splats are told, pixels.
 pub const OCCLUSION_TILE: u32 = 8;
 
@@ -70,6 +76,10 @@ pub struct View {
     pub epsilon_radius: f32,
     pub epsilon_deepest: f32,
     pub farthest: f32,
+    pub middle: f32,
+    pub padding_0: u32,
+    pub padding_1: u32,
+    pub padding_2: u32,
 }
 
 /// The rows of the image that the per-pixel buffers hold at a time.
@@ -204,6 +214,10 @@ impl View {
             epsilon_radius: of_radius as f32,
             epsilon_deepest: (of_radius * f64::from(scene.largest_radius()) * unit) as f32,
             farthest: (farthest * unit) as f32,
+            middle: (camera.rotation.row(2).dot(bounds.center() - eye_relative) * unit) as f32,
+            padding_0: 0,
+            padding_1: 0,
+            padding_2: 0,
         }
     }
 }

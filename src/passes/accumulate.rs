@@ -28,6 +28,7 @@
 //! - **float**, **cas**: f32 sums, by atomic add or by compare and exchange. A sum of n terms in any order errs by at most
 //!   `(n - 1) u` of itself, and so does the weight's: `2 n u + 4 u`. The order shows.
 
+use super::cull::Part;
 use super::footprint::footprint;
 use super::project::{Splat, SplatBuffer};
 use super::variant::Variant;
@@ -287,10 +288,10 @@ impl AttributeBuffer {
     }
 }
 
-/// Records the pass over `rows`.
+/// Records the pass of `parts` of the splats over `rows`.
 pub fn record(
     recorder: &mut Recorder<'_>,
-    splats: &SplatBuffer,
+    (splats, parts): (&SplatBuffer, &[Part]),
     rows: &Rows,
     visible: &VisibilityBuffer,
     buffer: &AttributeBuffer,
@@ -298,7 +299,7 @@ pub fn record(
     let words = recorder.variant.sum_words();
     let buffers =
         [("visible", visible.nearest.bound()), ("sums", buffer.sums.bound()), ("overflows", buffer.overflows.bound())];
-    splats.dispatch(recorder, ("accumulate", "accumulate_large"), rows, &buffers, |encoder| {
+    splats.dispatch(recorder, ("accumulate", parts), Some("accumulate_large"), rows, &buffers, |encoder| {
         let bytes = rows.pixels * u64::from(words) * 4;
         encoder.clear_buffer(&buffer.sums.raw, 0, Some(bytes));
         if rows.first == 0 {

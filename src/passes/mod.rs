@@ -5,6 +5,7 @@
 //! |---|---|---|
 //! | [`order`] | [`Scene`](crate::scene::Scene) | the order of its surfels in memory |
 //! | [`upload`] | [`Scene`](crate::scene::Scene) | [`upload::SurfelBuffer`] |
+//! | [`cull`] | surfels, nearest depths so far | the batches that are projected |
 //! | [`project`] | surfels | [`project::SplatBuffer`] |
 //! | [`visibility`] | splats | [`visibility::VisibilityBuffer`] |
 //! | [`accumulate`] | splats, nearest depths | [`accumulate::AttributeBuffer`] |
@@ -13,6 +14,7 @@
 //! [`footprint`] is evaluated inside visibility and accumulate, with the [`lowpass`] that [`project`] prepared; [`variant`] says which kernels a render is made of.
 
 pub mod accumulate;
+pub mod cull;
 pub mod footprint;
 pub mod lowpass;
 pub mod order;

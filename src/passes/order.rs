@@ -8,10 +8,11 @@
 
 use rayon::prelude::*;
 
+use crate::gpu::layout::BATCH;
 use crate::scene::{Bounds, Surfel};
 
-/// Surfels of a run. Of 64, 512 and 4096 the middle gave the shortest frames on a software adapter.
-pub const RUN: usize = 512;
+/// Surfels of a run, which is a batch. Of 64, 512 and 4096 the middle gave the shortest frames on a software adapter.
+const RUN: usize = BATCH as usize;
 
 /// Bits of each coordinate on the curve.
 const BITS: u32 = 10;
@@ -38,13 +39,11 @@ pub fn order(surfels: &[Surfel], bounds: &Bounds) -> Vec<u32> {
     };
     let mut along: Vec<u64> = surfels.par_iter().enumerate().map(place).collect();
     along.par_sort_unstable();
-    let runs = along.len().div_ceil(RUN);
-    let stride = dealing(runs);
-    let dealt = (0..runs).flat_map(|turn| {
-        let first = turn * stride % runs * RUN;
-        &along[first..along.len().min(first + RUN)]
-    });
-    dealt.map(|place| *place as u32).collect()
+    // What is left of the last run stays last, so that each run is stored as one batch.
+    let (runs, rest) = along.as_chunks::<RUN>();
+    let stride = dealing(runs.len());
+    let dealt = (0..runs.len()).flat_map(|turn| &runs[turn * stride % runs.len()]);
+    dealt.chain(rest).map(|place| *place as u32).collect()
 }
 
 /// A step near the golden ratio of `runs` that comes to each of them once.

@@ -13,8 +13,10 @@
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::cull::{self, Batches, Part};
 use super::lowpass::{self, Design, Filter};
 use super::upload::SurfelBuffer;
+use super::visibility::VisibilityBuffer;
 use super::{Recorder, Rows};
 use crate::error::Result;
 use crate::gpu::buffers::Buffer;
@@ -249,30 +251,39 @@ pub struct SplatBuffer {
 pub struct SplatPage {
     /// The records.
     pub splats: Buffer<layout::Splat>,
+    /// Which batches are projected.
+    pub(super) batches: Batches,
     /// Counts and a grid, then the indices of the large splats, which get a workgroup each.
-    queue: Buffer<u32>,
+    pub(super) queue: Buffer<u32>,
     /// In the same form the splats that take long to project, which get a dispatch of their own.
     rare: Buffer<u32>,
     /// Their low-pass filters, if there are any.
     filters: Option<Buffer<layout::Filter>>,
 }
 
-/// Records the projection of every page.
-pub fn record(recorder: &mut Recorder<'_>, buffer: &SplatBuffer) -> Result<()> {
+/// Records the projection of `part` of every page; of [`Part::Far`], after `visible` holds the near ones.
+pub fn record(
+    recorder: &mut Recorder<'_>,
+    buffer: &SplatBuffer,
+    part: Part,
+    (rows, visible): (&Rows, Option<&VisibilityBuffer>),
+) -> Result<()> {
     let (gpu, program) = (recorder.gpu, recorder.program);
     let view = recorder.view.bound();
     recorder.timing.pass(
         gpu,
         "project",
         |encoder| {
+            cull::clear(encoder, buffer, part);
             for page in &buffer.pages {
-                for list in [&page.queue, &page.rare] {
+                // The far ones follow the near ones in the queue.
+                for list in [Some(&page.rare), (part != Part::Far).then_some(&page.queue)].into_iter().flatten() {
                     encoder.clear_buffer(&list.raw, 0, Some(u64::from(layout::QUEUE_START) * 4));
                 }
             }
         },
         |pass| {
-            for (surfels, page) in buffer.surfels.pages.iter().zip(&buffer.pages) {
+            for (index, (surfels, page)) in buffer.surfels.pages.iter().zip(&buffer.pages).enumerate() {
                 let mut buffers = vec![
                     ("view", view.clone()),
                     ("surfels", surfels.surfels.bound()),
@@ -282,7 +293,9 @@ pub fn record(recorder: &mut Recorder<'_>, buffer: &SplatBuffer) -> Result<()> {
                     ("listed", page.rare.bound()),
                 ];
                 buffers.extend(page.filters.as_ref().map(|filters| ("filters", filters.bound())));
-                program.dispatch(gpu, pass, "project", &buffers, Grid::Of(grid(gpu, surfels.surfels.len)?))?;
+                cull::record(gpu, program, pass, &buffers, (buffer, index, part), (rows, visible))?;
+                buffers.extend(page.batches.of(part).map(|list| ("drawn", list.bound())));
+                program.dispatch(gpu, pass, "project", &buffers, page.grid(gpu, part)?)?;
                 program.dispatch(gpu, pass, "arrange_rare", &buffers, Grid::Of((1, 1)))?;
                 let at = u64::from(layout::QUEUE_GRID) * 4;
                 program.dispatch(gpu, pass, "project_rare", &buffers, Grid::In(&page.rare.raw, at))?;
@@ -291,6 +304,16 @@ pub fn record(recorder: &mut Recorder<'_>, buffer: &SplatBuffer) -> Result<()> {
             Ok(())
         },
     )
+}
+
+impl SplatPage {
+    /// A workgroup for every [`layout::WORKGROUP`] surfels of `part`.
+    fn grid(&self, gpu: &Gpu, part: Part) -> Result<Grid<'_>> {
+        Ok(match self.batches.of(part) {
+            Some(list) => Grid::In(&list.raw, 0),
+            None => Grid::Of(grid(gpu, self.splats.len)?),
+        })
+    }
 }
 
 impl SplatBuffer {
@@ -302,6 +325,7 @@ impl SplatBuffer {
             let list = |what| Buffer::indirect(gpu, what, len + u64::from(layout::QUEUE_START));
             pages.push(SplatPage {
                 splats: Buffer::storage(gpu, "splats", len)?,
+                batches: Batches::new(gpu, len)?,
                 queue: list("queue of large splats")?,
                 rare: list("list of rare splats")?,
                 filters: match low_pass {
@@ -316,13 +340,13 @@ impl SplatBuffer {
     /// Device memory that the splats and their surfels take, bytes.
     pub fn bytes(&self) -> u64 {
         let of_page = |page: &SplatPage| {
-            let lists = page.queue.bytes() + page.rare.bytes();
+            let lists = page.batches.bytes() + page.queue.bytes() + page.rare.bytes();
             page.splats.bytes() + lists + page.filters.as_ref().map_or(0, Buffer::bytes)
         };
         self.surfels.bytes() + self.pages.iter().map(of_page).sum::<u64>()
     }
 
-    /// Splats that may touch a pixel of the image. Waits for the projection.
+    /// Splats that may touch a pixel of the image, and are not known to be hidden. Waits for the projection.
     pub fn drawn(&self, gpu: &Gpu) -> Result<u64> {
         let mut drawn = 0;
         for page in &self.pages {
@@ -347,11 +371,13 @@ impl SplatBuffer {
         bound
     }
 
-    /// Records `stage` over the splats of every page: an invocation each, and of `large` a workgroup each.
+    /// Records `stage` over the splats of `parts` of every page, an invocation each; and `large` over all large ones, a
+    /// workgroup each.
     pub(crate) fn dispatch(
         &self,
         recorder: &mut Recorder<'_>,
-        (stage, large): (&'static str, &'static str),
+        (stage, parts): (&'static str, &[Part]),
+        large: Option<&'static str>,
         rows: &Rows,
         buffers: &[(&str, wgpu::BindingResource<'_>)],
         before: impl FnOnce(&mut wgpu::CommandEncoder),
@@ -362,9 +388,15 @@ impl SplatBuffer {
         recorder.timing.pass(gpu, stage, before, |pass| {
             for (index, page) in self.pages.iter().enumerate() {
                 let bound = self.bindings(index, &own);
-                program.dispatch(gpu, pass, stage, &bound, Grid::Of(grid(gpu, page.splats.len)?))?;
-                let at = u64::from(layout::QUEUE_GRID) * 4;
-                program.dispatch(gpu, pass, large, &bound, Grid::In(&page.queue.raw, at))?;
+                for &part in parts {
+                    let mut bound = bound.clone();
+                    bound.extend(page.batches.of(part).map(|list| ("drawn", list.bound())));
+                    program.dispatch(gpu, pass, stage, &bound, page.grid(gpu, part)?)?;
+                }
+                if let Some(large) = large {
+                    let at = u64::from(layout::QUEUE_GRID) * 4;
+                    program.dispatch(gpu, pass, large, &bound, Grid::In(&page.queue.raw, at))?;
+                }
             }
             Ok(())
         })

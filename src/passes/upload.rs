@@ -5,11 +5,12 @@ use std::borrow::Cow;
 use bytemuck::Pod;
 use rayon::prelude::*;
 
+use super::cull::ball;
 use super::order::order;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::{Buffer, page_len};
-use crate::gpu::layout::Splat;
+use crate::gpu::layout::{BATCH, MOST_GROUPS, Splat};
 use crate::progress::Progress;
 use crate::scene::color::SRGB8_TO_LINEAR;
 use crate::scene::{ColorNeed, Colors, Scene, SceneNeeds, Surfel};
@@ -26,6 +27,8 @@ pub struct SurfelBuffer {
 pub struct SurfelPage {
     /// The disks.
     pub surfels: Buffer<Surfel>,
+    /// The bounding balls of their batches.
+    pub(crate) balls: Buffer<[f32; 4]>,
     pub(crate) colors: Option<wgpu::Buffer>,
 }
 
@@ -33,7 +36,10 @@ impl SurfelBuffer {
     /// Uploads `scene` as far as `needs` asks for it.
     pub fn upload(gpu: &Gpu, scene: &Scene, needs: &SceneNeeds, progress: &dyn Progress) -> Result<Self> {
         // The splat's record is the largest of what is paged alike.
-        let len = page_len(gpu, size_of::<Splat>()) as usize;
+        // Whole batches, unless one is too large; each is a row of a dispatch, of which every adapter grants so many.
+        let most = page_len(gpu, size_of::<Splat>());
+        let whole = most / u64::from(BATCH) * u64::from(BATCH);
+        let len = if whole > 0 { whole.min(u64::from(MOST_GROUPS * BATCH)) } else { most } as usize;
         progress.begin("uploading surfels", scene.surfels.len() as u64);
         let mut pages = Vec::new();
         let order = order(&scene.surfels, &scene.bounds());
@@ -45,7 +51,13 @@ impl SurfelBuffer {
                 (ColorNeed::Linear, Colors::Linear(colors)) => Some(upload(gpu, colors, indices)?),
                 _ => None,
             };
-            pages.push(SurfelPage { surfels, colors });
+            let batches: Vec<_> = indices
+                .par_chunks(BATCH as usize)
+                .map(|batch| ball(batch.iter().map(|&i| &scene.surfels[i as usize])))
+                .collect();
+            let balls = Buffer::storage(gpu, "batches", batches.len() as u64)?;
+            balls.write(gpu, batches.len(), |range| batches[range].into(), &())?;
+            pages.push(SurfelPage { surfels, balls, colors });
         }
         let srgb_to_linear = match needs.color {
             ColorNeed::Srgb8 => {
@@ -60,7 +72,9 @@ impl SurfelBuffer {
 
     /// Device memory that it takes, bytes.
     pub fn bytes(&self) -> u64 {
-        let of_page = |page: &SurfelPage| page.surfels.bytes() + page.colors.as_ref().map_or(0, wgpu::Buffer::size);
+        let of_page = |page: &SurfelPage| {
+            page.surfels.bytes() + page.balls.bytes() + page.colors.as_ref().map_or(0, wgpu::Buffer::size)
+        };
         self.pages.iter().map(of_page).sum::<u64>() + self.srgb_to_linear.as_ref().map_or(0, Buffer::bytes)
     }
 }

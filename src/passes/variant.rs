@@ -4,35 +4,25 @@
 use std::sync::Arc;
 
 use super::accumulate::{self, Accumulator, accumulator};
-use super::{lowpass, raster};
+use super::lowpass::Design;
+use super::{cull, lowpass, raster};
 use crate::error::Result;
 use crate::gpu::kernel::Program;
 use crate::gpu::layout::LARGE;
 use crate::gpu::{Gpu, Sources};
 use crate::scene::{ColorNeed, Kernel, KernelShape, LowPass, Projection, RasterDepth, RenderOptions, SceneNeeds};
 
-/// The entry points that a render with `needs` dispatches, in order.
-pub fn stages(needs: &SceneNeeds) -> &'static [&'static str] {
-    match needs.raster {
-        None => &STAGES,
-        Some(_) => &["project", "arrange_rare", "project_rare", "arrange", "resolve"],
+/// The entry points that a render with `needs` dispatches.
+pub fn stages(needs: &SceneNeeds) -> Vec<&'static str> {
+    let mut stages = vec!["project", "arrange_rare", "project_rare", "arrange", "resolve"];
+    if needs.raster.is_none() {
+        stages.extend(["clear", "visibility", "visibility_large", "occlude", "accumulate", "accumulate_large"]);
     }
+    if needs.cull {
+        stages.extend(["cull_near", "cull_far", "occlude_open"]);
+    }
+    stages
 }
-
-/// The entry points of the stages on compute kernels alone.
-pub const STAGES: [&str; 11] = [
-    "project",
-    "arrange_rare",
-    "project_rare",
-    "arrange",
-    "clear",
-    "visibility",
-    "visibility_large",
-    "occlude",
-    "accumulate",
-    "accumulate_large",
-    "resolve",
-];
 
 /// A render's kernels, before they are compiled.
 #[derive(Clone, Debug)]
@@ -58,7 +48,7 @@ impl Variant {
     /// The compiled kernels; `gpu` keeps them.
     pub fn compile(&self, gpu: &Gpu, sources: &Sources) -> Result<Arc<Program>> {
         let draws = self.needs.raster.map_or_else(Vec::new, |raster| raster::draws(raster, self.pixel));
-        gpu.programs.get(gpu, sources.join(&files(&self.needs)), stages(&self.needs), &draws, &self.constants)
+        gpu.programs.get(gpu, sources.join(&files(&self.needs)), &stages(&self.needs), &draws, &self.constants)
     }
 
     /// u32 words of a pixel's sums in storage; the rasteriser's are in textures.
@@ -79,6 +69,7 @@ pub fn files(needs: &SceneNeeds) -> Vec<&'static str> {
             Projection::Orthographic => "camera_orthographic.wgsl",
         },
         "project.wgsl",
+        pick(needs.cull, "cull.wgsl", "cull_absent.wgsl"),
         "footprint.wgsl",
         "blend.wgsl",
         pick(needs.epsilon_radius, "epsilon_radius.wgsl", "epsilon.wgsl"),
@@ -220,6 +211,9 @@ pub fn overrides(needs: &SceneNeeds, options: &RenderOptions, fraction_bits: u32
         // The visibility pass's pipeline says otherwise.
         constants.push(("MOVED", 0.0));
         constants.push(("ALONG_RAY", u32::from(raster.depth == RasterDepth::Ray).into()));
+    }
+    if needs.cull {
+        constants.push(("FILTER_REACH", cull::filter_reach(&Design::of(options))));
     }
     if needs.low_pass == LowPass::Ewa {
         constants.push(("FILTER_BLUR", lowpass::blur(options.kernel)));

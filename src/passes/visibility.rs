@@ -4,6 +4,7 @@
 //! On the device depths are positive f32, whose bits order as u32: an atomic min. What is then farthest in each tile of
 //! pixels lets the next pass leave out splats that are hidden altogether.
 
+use super::cull::Part;
 use super::footprint::footprint;
 use super::project::{Splat, SplatBuffer};
 use super::{Recorder, Rows};
@@ -50,8 +51,13 @@ impl VisibilityBuffer {
     }
 }
 
-/// Records the pass over `rows`.
-pub fn record(recorder: &mut Recorder<'_>, splats: &SplatBuffer, rows: &Rows, buffer: &VisibilityBuffer) -> Result<()> {
+/// Records the pass of `part` of the splats over `rows`. The large ones are drawn last.
+pub fn record(
+    recorder: &mut Recorder<'_>,
+    (splats, part): (&SplatBuffer, Part),
+    rows: &Rows,
+    buffer: &VisibilityBuffer,
+) -> Result<()> {
     let (gpu, program) = (recorder.gpu, recorder.program);
     let buffers = [("nearest", buffer.nearest.bound())];
     let bound = [("view", recorder.view.bound()), ("band", rows.uniform.bound()), buffers[0].clone()];
@@ -63,7 +69,11 @@ pub fn record(recorder: &mut Recorder<'_>, splats: &SplatBuffer, rows: &Rows, bu
             |pass| program.dispatch(gpu, pass, stage, &bound, Grid::Of(grid(gpu, invocations)?)),
         )
     };
-    alone(recorder, "clear", rows.pixels)?;
-    splats.dispatch(recorder, ("visibility", "visibility_large"), rows, &buffers, |_| {})?;
-    alone(recorder, "occlude", rows.tiles)
+    if part != Part::Far {
+        alone(recorder, "clear", rows.pixels)?;
+    }
+    let more_follows = part == Part::Near;
+    let large = (!more_follows).then_some("visibility_large");
+    splats.dispatch(recorder, ("visibility", &[part]), large, rows, &buffers, |_| {})?;
+    alone(recorder, if more_follows { "occlude_open" } else { "occlude" }, rows.tiles)
 }

@@ -27,6 +27,8 @@ pub struct SceneNeeds {
     pub wide_sums: bool,
     /// The accumulator is `fixed` and the adapter has 64-bit atomics, which make the same sums in half the additions.
     pub atomics_u64: bool,
+    /// Batches of surfels that are out of view or hidden are left out.
+    pub cull: bool,
     /// Sums are the rasteriser's.
     pub raster: Option<Raster>,
     /// It draws a triangle a splat instead of a quad, as there are more surfels than tenths of the image's pixels. On a
@@ -87,6 +89,7 @@ impl SceneNeeds {
                 && options.accumulator == "fixed"
                 && (low[3] != high[3] || may_be_small(options)),
             atomics_u64: false,
+            cull: false,
             raster: options.raster,
             triangles: options.raster.is_some() && 10 * scene.surfels.len() > camera.pixels(),
             kernel: options.kernel.shape(),
@@ -108,6 +111,12 @@ impl SceneNeeds {
     /// The same on an adapter that has 64-bit atomics or not.
     pub fn with_atomics_u64(self, atomics_u64: bool) -> Self {
         Self { atomics_u64: atomics_u64 && self.accumulator == "fixed" && self.raster.is_none(), ..self }
+    }
+
+    /// The same for an image of one band or of several. In one, what is drawn first hides what is drawn later, and that is
+    /// not projected. The rasteriser draws every splat.
+    pub fn with_bands(self, bands: u32) -> Self {
+        Self { cull: bands == 1 && self.raster.is_none(), ..self }
     }
 
     /// The needs by name, for people and JSON.
@@ -137,6 +146,7 @@ impl SceneNeeds {
             (self.low_pass == LowPass::Ewa, "lowpass-ewa"),
             (self.wide_sums, "wide-sums"),
             (self.atomics_u64, "atomics-u64"),
+            (self.cull, "cull"),
             (self.epsilon_radius, "epsilon-radius"),
             (self.alpha, "alpha"),
             (self.normal, "normal"),

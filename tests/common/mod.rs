@@ -75,7 +75,15 @@ pub fn all_needs() -> Vec<SceneNeeds> {
         let low_pass = [LowPass::None, LowPass::Max, LowPass::Ewa][step / 3 % 3];
         let raster = Some(Raster { format: BlendFormat::ALL[step / 7 % 3].0, depth: *depth });
         let triangles = step / 2 % 2 == 0;
-        all.push(SceneNeeds { raster, triangles, kernel, low_pass, epsilon_radius: step % 5 == 0, ..base });
+        all.push(SceneNeeds {
+            raster,
+            triangles,
+            kernel,
+            low_pass,
+            epsilon_radius: step % 5 == 0,
+            cull: false,
+            ..base
+        });
     }
     all
 }
@@ -99,6 +107,8 @@ fn base_needs() -> Vec<SceneNeeds> {
                 accumulator: ACCUMULATORS[0].name,
                 wide_sums: false,
                 atomics_u64: false,
+                // Both, of each of the others.
+                cull: bits.count_ones() % 2 == 0,
                 raster: None,
                 triangles: false,
                 kernel: KernelShape::Ellipse,

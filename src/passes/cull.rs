@@ -1,0 +1,226 @@
+//! Stage 1, its start: batches of surfels that cannot show are left out before they are projected.
+//!
+//! The order of the surfels makes each [`BATCH`] of them a neighbourhood, with a bounding ball. Of the batches in view those
+//! nearer than the middle of the scene are projected and drawn first ([`Part::Near`]). What is then farthest in each tile of
+//! pixels hides those of the others ([`Part::Far`]) that lie behind it, and epsilon behind that, at all of their pixels. Of a
+//! closed surface that is most of its back.
+//!
+//! **No image depends on it.** A fragment of a batch that is left out has a depth z of more than the deepest that is
+//! accepted at its pixel for the nearest depth so far, and the true nearest is no farther, so the fragment is neither
+//! nearest nor accepted. Both sides have room for rounding: a depth that a kernel finds differs from that of the disk by
+//! some units of 2^-24 over the cosine between ray and normal, and the room is a thousandth.
+//!
+//! There are no normal cones: a surfel is seen from both sides, so that a surface with a border has no holes.
+
+use glam::{DVec2, DVec3, Vec3};
+
+use super::Rows;
+use super::lowpass::{Design, RADIUS};
+use super::project::SplatBuffer;
+use super::visibility::VisibilityBuffer;
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::gpu::buffers::Buffer;
+use crate::gpu::kernel::{Grid, Program, grid};
+use crate::gpu::layout::{BATCH, LIST_START, WORKGROUP};
+use crate::scene::{Camera, LowPass, Projection, Surfel};
+
+/// Which batches a stage draws.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// Every one: nothing is left out.
+    All,
+    /// In view and nearer than the middle of the scene.
+    Near,
+    /// In view, farther, and not hidden by the near ones.
+    Far,
+}
+
+/// A ball around disks: centre x, y, z and radius, world units relative to the scene's origin.
+pub(crate) fn ball<'a>(surfels: impl Iterator<Item = &'a Surfel> + Clone) -> [f32; 4] {
+    let center = |surfel: &Surfel| Vec3::from_array(surfel.center).as_dvec3();
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for surfel in surfels.clone() {
+        (low, high) = (low.min(center(surfel)), high.max(center(surfel)));
+    }
+    let middle = (low + (high - low) * 0.5).as_vec3();
+    let radius = surfels.map(|surfel| center(surfel).distance(middle.as_dvec3()) + reach(surfel)).fold(0.0, f64::max);
+    // Up to the next f32 and past the rounding of these lengths.
+    middle.extend((radius * (1.0 + 1e-6)) as f32).to_array()
+}
+
+/// The longer half-axis of the ellipse whose half-axes s and t need not be perpendicular: the larger singular value of [s t].
+fn reach(surfel: &Surfel) -> f64 {
+    let [s, t] = [surfel.s, surfel.t].map(|axis| Vec3::from_array(axis).as_dvec3());
+    let (sum, difference) = (s.length_squared() + t.length_squared(), s.length_squared() - t.length_squared());
+    (0.5 * (sum + difference.hypot(2.0 * s.dot(t)))).sqrt()
+}
+
+/// How far a low-pass may reach past its disk, pixels.
+pub fn filter_reach(design: &Design) -> f64 {
+    match design.low_pass {
+        LowPass::None => 0.0,
+        LowPass::Max => RADIUS,
+        LowPass::Ewa => design.blur.sqrt(),
+    }
+}
+
+/// The twin of `ball_extent` and `pixels_of`: the first and last points of the image that disks in the ball at `center`
+/// (camera space) can touch, world units and pixels; `None` for a ball that reaches the near depth.
+pub fn reference(center: DVec3, radius: f64, camera: &Camera, filter_reach: f64) -> Option<[DVec2; 2]> {
+    let focal = DVec2::new(camera.fx, camera.fy);
+    let principal = DVec2::new(camera.cx, camera.cy);
+    let nearest = center.z - radius;
+    if nearest <= camera.near {
+        return None;
+    }
+    let (image, extent) = match camera.projection {
+        Projection::Pinhole => {
+            let ratio = center.truncate() / center.z;
+            let turned = (DVec2::ONE + ratio * ratio).map(f64::sqrt) * radius / nearest;
+            (ratio * focal + principal, (turned + turned * turned) * focal)
+        }
+        Projection::Orthographic => (center.truncate() * focal + principal, radius * focal),
+    };
+    let extent = extent + filter_reach + 2.0;
+    Some([image - extent, image + extent])
+}
+
+/// The batches of a page that are drawn.
+pub(crate) struct Batches {
+    near: Buffer<u32>,
+    far: Buffer<u32>,
+}
+
+impl Batches {
+    /// Room for the batches of `surfels` surfels.
+    pub(crate) fn new(gpu: &Gpu, surfels: u64) -> Result<Self> {
+        let list = |what| -> Result<Buffer<u32>> {
+            let batches = surfels.div_ceil(BATCH.into());
+            let list = Buffer::indirect(gpu, what, batches + u64::from(LIST_START))?;
+            // A row of the grid is a batch.
+            gpu.queue.write_buffer(&list.raw, 0, bytemuck::cast_slice(&[BATCH / WORKGROUP, 0, 1, 0]));
+            Ok(list)
+        };
+        Ok(Self { near: list("near batches")?, far: list("far batches")? })
+    }
+
+    /// Those of `part`, if they are listed.
+    pub(crate) fn of(&self, part: Part) -> Option<&Buffer<u32>> {
+        match part {
+            Part::All => None,
+            Part::Near => Some(&self.near),
+            Part::Far => Some(&self.far),
+        }
+    }
+
+    pub(crate) fn bytes(&self) -> u64 {
+        self.near.bytes() + self.far.bytes()
+    }
+}
+
+/// Empties the lists of `part`.
+pub(crate) fn clear(encoder: &mut wgpu::CommandEncoder, splats: &SplatBuffer, part: Part) {
+    for list in splats.pages.iter().filter_map(|page| page.batches.of(part)) {
+        encoder.clear_buffer(&list.raw, 4, Some(4));
+        encoder.clear_buffer(&list.raw, 12, Some(4));
+    }
+}
+
+/// Records which batches of a page are in its `part`, beside `buffers` of their projection.
+pub(crate) fn record<'a>(
+    gpu: &Gpu,
+    program: &Program,
+    pass: &mut wgpu::ComputePass<'_>,
+    buffers: &[(&'a str, wgpu::BindingResource<'a>)],
+    (splats, index, part): (&'a SplatBuffer, usize, Part),
+    (rows, visible): (&'a Rows, Option<&'a VisibilityBuffer>),
+) -> Result<()> {
+    let (surfels, batches) = (&splats.surfels.pages[index], &splats.pages[index].batches);
+    let (stage, list) = match part {
+        Part::All => return Ok(()),
+        Part::Near => ("cull_near", &batches.near),
+        Part::Far => ("cull_far", &batches.far),
+    };
+    let own = [
+        ("band", rows.uniform.bound()),
+        ("balls", surfels.balls.bound()),
+        ("surviving", list.bound()),
+        ("drawn", batches.near.bound()),
+    ];
+    let mut bound = buffers.to_vec();
+    bound.extend(own);
+    bound.extend(visible.map(|visible| ("visible", visible.nearest.bound())));
+    program.dispatch(gpu, pass, stage, &bound, Grid::Of(grid(gpu, surfels.balls.len)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::passes::project;
+    use crate::scene::{Lens, RenderOptions};
+    use glam::DMat3;
+    use proptest::prelude::*;
+
+    fn camera(orthographic: bool) -> Camera {
+        let lens = if orthographic { Lens::OrthographicHeight(4.0) } else { Lens::Fov(70.0) };
+        Camera::posed((640, 480), lens, DVec3::ZERO, DMat3::IDENTITY, 0.05).unwrap()
+    }
+
+    /// Whether the image of a ball holds what `surfel` may touch.
+    fn holds([low, high]: [DVec2; 2], surfel: &Surfel, camera: &Camera, design: &Design) -> bool {
+        project::reference(0, surfel, DVec3::ZERO, camera, design).is_none_or(|splat| {
+            (0..2).all(|k| low[k] <= f64::from(splat.first[k]) && f64::from(splat.last[k]) <= high[k])
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn disks_within_a_ball_touch_its_pixels_only(
+            at in prop::array::uniform3(-1.0..1.0f64),
+            depth in 0.2..5.0f64,
+            disks in prop::collection::vec((prop::array::uniform9(-1.0..1.0f32), 0.001..0.3f32), 1..6),
+            low_pass in prop::sample::select(vec![LowPass::None, LowPass::Max, LowPass::Ewa]),
+            orthographic: bool,
+        ) {
+            let camera = camera(orthographic);
+            let center = DVec3::new(at[0], at[1], at[2] * 0.1 + 1.0) * depth;
+            let surfels: Vec<_> = disks
+                .iter()
+                .map(|(v, size)| Surfel {
+                    center: (center.as_vec3() + Vec3::from_slice(&v[..3]) * *size).to_array(),
+                    s: (Vec3::from_slice(&v[3..6]) * *size).to_array(),
+                    t: (Vec3::from_slice(&v[6..]) * *size).to_array(),
+                })
+                .collect();
+            let [x, y, z, radius] = ball(surfels.iter()).map(f64::from);
+            let design = Design::of(&RenderOptions { low_pass, ..RenderOptions::default() });
+            if let Some(pixels) = reference(DVec3::new(x, y, z), radius, &camera, filter_reach(&design)) {
+                for surfel in &surfels {
+                    prop_assert!(holds(pixels, surfel, &camera, &design), "{pixels:?} does not hold {surfel:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_ball_too_small_does_not_hold_its_disk() {
+        let (camera, center) = (camera(false), DVec3::new(0.5, 0.2, 2.0));
+        let design = Design::of(&RenderOptions::default());
+        let disk = Surfel::disk(center.as_vec3(), Vec3::Z, 0.2);
+        let of_radius = |radius| reference(center, radius, &camera, 0.0).unwrap();
+        assert!(holds(of_radius(0.2), &disk, &camera, &design));
+        assert!(!holds(of_radius(0.15), &disk, &camera, &design));
+    }
+
+    #[test]
+    fn skewed_half_axes_reach_as_far_as_their_ellipse() {
+        let skewed = Surfel { center: [0.0; 3], s: [1.0, 0.0, 0.0], t: [0.9, 0.1, 0.0] };
+        let farthest = (0..10_000)
+            .map(|i| f64::from(i) * 1e-4 * std::f64::consts::TAU)
+            .map(|angle| DVec2::new(angle.cos() + 0.9 * angle.sin(), 0.1 * angle.sin()).length())
+            .fold(0.0, f64::max);
+        assert!((reach(&skewed) - farthest).abs() < 1e-6, "{} is not {farthest}", reach(&skewed));
+        assert!(f64::from(skewed.radius()) < 0.9 * farthest, "the longer half-axis would do");
+    }
+}

@@ -1,0 +1,155 @@
+// Stage 1, its start: which batches of surfels are projected at all. First those in view that lie nearer than the middle of
+// the scene; once these are drawn, those of the others that are not hidden behind them. A batch is left out only if none of
+// its fragments could be nearest or within epsilon of the nearest, so no image depends on it.
+// Host side and twin: src/passes/cull.rs.
+
+// A batch's bounding ball: centre and radius, world units relative to the scene's origin.
+@group(0) @binding(23) var<storage, read> balls: array<vec4<f32>>;
+// The grid of workgroups that draws the listed batches, of which word 1 counts them; then how many more may be drawn after
+// them; from LIST_START on the numbers of the listed, and from the end back those of the others.
+@group(0) @binding(24) var<storage, read_write> surviving: array<atomic<u32>>;
+@group(0) @binding(25) var<storage, read> drawn: array<u32>;
+
+const BATCH: u32 = 512u;
+const LIST_START: u32 = 4u;
+const LIST_REST: u32 = 3u;
+
+// Past so many tiles a batch counts as seen: one invocation should not look at a whole image.
+const MOST_TILES: u32 = 4096u;
+
+// What the rounding of rows c may add to or take from a depth, relative (src/passes/cull.rs).
+const DEPTH_SLACK: f32 = 1e-3;
+
+// The surfel of this invocation: a row of the grid is a batch.
+fn surfel_of(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32) -> u32 {
+    return drawn[LIST_START + workgroup.y] * BATCH + workgroup.x * WORKGROUP + local;
+}
+
+struct Ball {
+    // Camera space, device units.
+    center: vec3<f32>,
+    radius: f32,
+    // Depths of its fragments.
+    nearest: f32,
+    farthest: f32,
+}
+
+fn ball_of(batch: u32) -> Ball {
+    let ball = balls[batch];
+    let relative = ball.xyz * view.unit - view.eye.xyz;
+    var b: Ball;
+    b.center = rotate_plain(relative);
+    // Ten roundings of f32 in these lengths.
+    b.radius = ball.w * view.unit + 1e-6 * (length(relative) + length(view.eye.xyz));
+    b.nearest = b.center.z - b.radius;
+    b.farthest = b.center.z + b.radius;
+    return b;
+}
+
+// How far a low-pass may reach past its disk, pixels.
+override FILTER_REACH: f32;
+
+// The batch's pixels, as far as they lie in the image; empty if a first lies past a last.
+fn pixels_of(ball: Ball) -> Rectangle {
+    let extent = ball_extent(ball.center, ball.radius, ball.nearest);
+    // A pixel more on each side, as splats' own bounds have a margin, and one for rounding.
+    let margin = FILTER_REACH + 2.0 + 1e-5 * (abs(extent.xy) + abs(extent.zw));
+    let first = max(extent.xy - margin, vec2<f32>(0.0));
+    let last = min(extent.zw + margin, vec2<f32>(f32(view.width), f32(view.height)) - 1.0);
+    if (!all(first <= last)) {
+        return Rectangle(vec2<u32>(1u), vec2<u32>(0u));
+    }
+    return Rectangle(vec2<u32>(first), vec2<u32>(last));
+}
+
+fn list(batch: u32) {
+    atomicStore(&surviving[LIST_START + atomicAdd(&surviving[1], 1u)], batch);
+}
+
+fn leave_out(batch: u32) {
+    atomicAdd(&queue[1], min(BATCH, arrayLength(&surfels) - batch * BATCH));
+}
+
+// Whether the batch reaches the near depth, so that its place in the image says nothing.
+fn reaches_near(ball: Ball) -> bool {
+    return !(ball.nearest > view.near);
+}
+
+// One invocation a batch.
+@compute @workgroup_size(WORKGROUP)
+fn cull_near(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let batch = linear_index(workgroup, workgroups, local);
+    if (batch >= arrayLength(&balls)) {
+        return;
+    }
+    let ball = ball_of(batch);
+    let near = reaches_near(ball);
+    let pixels = pixels_of(ball);
+    if (ball.farthest < view.near || (!near && any(pixels.first > pixels.last))) {
+        leave_out(batch);
+    } else if (near || ball.center.z <= view.middle) {
+        list(batch);
+    } else {
+        let place = atomicAdd(&surviving[LIST_REST], 1u);
+        atomicStore(&surviving[arrayLength(&surviving) - 1u - place], batch);
+    }
+}
+
+// After the near ones are drawn: a pixel without any hides nothing. One invocation a tile.
+@compute @workgroup_size(WORKGROUP)
+fn occlude_open(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    hold();
+    farthest_in(linear_index(workgroup, workgroups, local), NOTHING);
+}
+
+// Then, one invocation for each of the others (and more, which have none).
+@compute @workgroup_size(WORKGROUP)
+fn cull_far(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    hold();
+    let place = linear_index(workgroup, workgroups, local);
+    if (place >= drawn[LIST_REST]) {
+        return;
+    }
+    let batch = drawn[arrayLength(&drawn) - 1u - place];
+    let ball = ball_of(batch);
+    if (behind(ball, pixels_of(ball))) {
+        leave_out(batch);
+    } else {
+        list(batch);
+    }
+}
+
+// Whether everything drawn so far at `pixels`, and epsilon behind it, lies in front of the ball.
+fn behind(ball: Ball, pixels: Rectangle) -> bool {
+    let first = pixels.first / OCCLUSION_TILE;
+    let last = pixels.last / OCCLUSION_TILE;
+    let size = last - first + 1u;
+    if (size.x * size.y > MOST_TILES) {
+        return false;
+    }
+    let reached = ball.nearest * (1.0 - DEPTH_SLACK);
+    let tiles = occlusion_tiles();
+    let start = band_pixels();
+    for (var y = first.y; y <= last.y; y++) {
+        for (var x = first.x; x <= last.x; x++) {
+            // Nothing, which is +inf, hides nothing.
+            let front = bitcast<f32>(visible[start + y * tiles.x + x]);
+            if (!(reached > deepest_accepted(front) * (1.0 + DEPTH_SLACK))) {
+                return false;
+            }
+        }
+    }
+    return true;
+}

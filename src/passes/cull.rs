@@ -155,6 +155,7 @@ pub(crate) fn record<'a>(
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
     use crate::passes::project;

@@ -92,7 +92,10 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
     let sums = AttributeBuffer::new(gpu, &variant, rows.pixels)?;
     project::record(&mut recorder, &projected, Part::All, (rows, Some(&nearest)))?;
     visibility::record(&mut recorder, (&projected, Part::All), rows, &nearest)?;
+    visibility::record_large(&mut recorder, &projected, rows, &nearest)?;
+    visibility::occlude(&mut recorder, Part::All, rows, &nearest)?;
     accumulate::record(&mut recorder, (&projected, &[Part::All]), rows, &nearest, &sums)?;
+    accumulate::record_large(&mut recorder, &projected, rows, &nearest, &sums)?;
     let mut splats = vec![Splat::zeroed(); scene.surfels.len()];
     let mut order = order(&scene.surfels, &scene.bounds()).into_iter();
     for page in &projected.pages {

@@ -17,10 +17,11 @@ use crate::passes::accumulate::{ACCUMULATORS, AttributeBuffer};
 use crate::passes::cull::Part;
 use crate::passes::project::SplatBuffer;
 use crate::passes::resolve::ImageBuffer;
+use crate::passes::tiles::Tiles;
 use crate::passes::upload::SurfelBuffer;
 use crate::passes::variant::{PixelLayout, Variant};
 use crate::passes::visibility::VisibilityBuffer;
-use crate::passes::{Recorder, Rows, accumulate, project, raster, resolve, visibility};
+use crate::passes::{Recorder, Rows, accumulate, project, raster, resolve, tiles, visibility};
 use crate::progress::Progress;
 use crate::scene::light::MAX_LIGHTS;
 use crate::scene::{Bounds, Camera, Raster, RenderOptions, Scene, SceneNeeds};
@@ -108,6 +109,7 @@ pub struct Renderer<'a> {
     color_range: ([f32; 4], [f32; 4]),
     splats: Option<SplatBuffer>,
     pixels: Option<PixelBuffers>,
+    tiles: Option<Tiles>,
     held: DeviceBytes,
 }
 
@@ -157,6 +159,7 @@ impl<'a> Renderer<'a> {
             color_range,
             splats: None,
             pixels: None,
+            tiles: None,
             held: DeviceBytes::default(),
         })
     }
@@ -188,7 +191,8 @@ impl<'a> Renderer<'a> {
             .with_atomics_u64(gpu.adapter.atomics_u64);
         let surfels = self.scene.surfels.len() as u64;
         let rows = rows_per_band(gpu, camera, &Variant::of(&needs, self.options, surfels)?)?;
-        let needs = needs.with_bands(camera.height.div_ceil(rows));
+        let shared = gpu.adapter.subgroups && gpu.adapter.kind == "software";
+        let needs = needs.with_bands(camera.height.div_ceil(rows)).with_tiles(shared);
         let variant = Variant::of(&needs, self.options, surfels)?;
         match needs.raster {
             Some(raster) => raster::check(gpu, raster, &needs, camera)?,
@@ -206,15 +210,19 @@ impl<'a> Renderer<'a> {
             Some(pixels) if pixels.size == (camera.width, camera.height) && pixels.pixel == variant.pixel => pixels,
             other => {
                 // The old ones make room first.
-                drop(other);
+                drop((other, self.tiles.take()));
                 PixelBuffers::new(gpu, self, camera, &variant)?
             }
         };
-        self.held = DeviceBytes { splats: splats.bytes(), pixels: pixels.bytes() };
+        let mut tiles = match self.tiles.take() {
+            Some(tiles) => Some(tiles.of_variant(variant.compile_tiles(gpu, sources)?)),
+            None => None,
+        };
         progress.begin("rendering rows", camera.height.into());
         let start = Instant::now();
         pixels.view.set(gpu, &self.view(camera));
-        let timing = Timing::new(gpu, 3 + 6 * pixels.bands.len() as u32)?;
+        let passes_of_pages = if needs.tiles { 5 * splats.pages.len() as u32 } else { 0 };
+        let timing = Timing::new(gpu, 3 + (6 + passes_of_pages) * pixels.bands.len() as u32)?;
         let mut recorder = Recorder { gpu, program: &program, view: &pixels.view, variant: &variant, timing };
         let mut frame = Frame::new(camera, &self.options.maps);
         let parts: &[Part] = if needs.cull { &[Part::Near, Part::Far] } else { &[Part::All] };
@@ -231,8 +239,24 @@ impl<'a> Renderer<'a> {
                             project::record(&mut recorder, &splats, part, (rows, Some(nearest)))?;
                         }
                         visibility::record(&mut recorder, (&splats, part), rows, nearest)?;
+                        if part == Part::Near {
+                            visibility::occlude(&mut recorder, part, rows, nearest)?;
+                        }
                     }
+                    if needs.tiles && tiles.is_none() && rows.first == 0 {
+                        let kernels = || variant.compile_tiles(gpu, sources);
+                        tiles = Tiles::measured(&mut recorder, &splats, &pixels.bands, camera.width, kernels)?;
+                    }
+                    match &tiles {
+                        Some(tiles) => tiles::visibility(&mut recorder, &splats, rows, tiles, nearest)?,
+                        None => visibility::record_large(&mut recorder, &splats, rows, nearest)?,
+                    }
+                    visibility::occlude(&mut recorder, Part::All, rows, nearest)?;
                     accumulate::record(&mut recorder, (&splats, parts), rows, nearest, sums)?;
+                    match &tiles {
+                        Some(tiles) => tiles::accumulate(&mut recorder, &splats, rows, tiles, (nearest, sums))?,
+                        None => accumulate::record_large(&mut recorder, &splats, rows, nearest, sums)?,
+                    }
                     vec![("visible", nearest.nearest.bound()), ("sums", sums.sums.bound())]
                 }
                 Sums::Targets(_, targets) => targets.bindings(),
@@ -247,6 +271,14 @@ impl<'a> Renderer<'a> {
             Sums::Storage(_, sums) => sums.overflows(gpu)?,
             Sums::Targets(..) => 0,
         };
+        if let Some(tiles) = &tiles
+            && !tiles.held(gpu, &splats)?
+        {
+            // The next try measures the room that it needs.
+            (self.splats, self.pixels) = (Some(splats), Some(pixels));
+            let (frame, report) = self.on_gpu(gpu, sources, camera, progress)?;
+            return Ok((frame, Report { total_ms: report.total_ms + total_ms, ..report }));
+        }
         if overflows > 0 {
             // The device's memory is free again before the second try.
             drop((pixels, splats));
@@ -272,7 +304,9 @@ impl<'a> Renderer<'a> {
             total_ms,
             needs: needs.names(),
         };
-        (self.splats, self.pixels) = (Some(splats), Some(pixels));
+        let of_tiles = tiles.as_ref().map_or(0, Tiles::bytes);
+        self.held = DeviceBytes { splats: splats.bytes(), pixels: pixels.bytes() + of_tiles };
+        (self.splats, self.pixels, self.tiles) = (Some(splats), Some(pixels), tiles);
         Ok((frame, report))
     }
 

@@ -11,11 +11,11 @@ use std::mem::{offset_of, size_of};
 use epsplat::gpu::Sources;
 use epsplat::gpu::kernel::{FILES, reflect};
 use epsplat::gpu::layout::{
-    AWAY, Band, Filter, MOST_GROUPS, OCCLUSION_TILE, ONE, ONE_WIDE, QUEUE_GRID, QUEUE_START, Splat, TILE, View,
-    WORKGROUP,
+    AWAY, BATCH, Band, Filter, LIST_START, LargeAttributes, MOST_GROUPS, OCCLUSION_TILE, ONE, ONE_WIDE, QUEUE_GRID,
+    QUEUE_START, QUEUE_TILE_GRID, Splat, TILE, TILE_SIZE, View, WORKGROUP,
 };
 use epsplat::passes::accumulate::accumulator;
-use epsplat::passes::variant::{COLOR_CHANNEL, PixelLayout, color_channels, files};
+use epsplat::passes::variant::{COLOR_CHANNEL, PixelLayout, color_channels, modules};
 use epsplat::scene::camera::MAX_SIDE;
 use epsplat::scene::options::{LEAST_FILTERED_WEIGHT, LEAST_WEIGHT};
 use epsplat::scene::{SceneNeeds, Surfel};
@@ -113,6 +113,7 @@ fn mirrors() -> BTreeMap<&'static str, Struct> {
         }),
         mirror!(Band { first_row, rows, padding_0, padding_1 }),
         mirror!(Splat { anchor_x, anchor_y, bounds_first, bounds_last, a, b, c, a_low }),
+        mirror!(LargeAttributes { color, normal, radius }),
         mirror!(Surfel { center, s, t }),
         mirror!(Filter { center_x, center_y, depth_low, depth_high, r_xx, r_xy, r_yy, gain }),
     ])
@@ -153,6 +154,16 @@ fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         ("balls", Element::Plain(&[<[f32; 4]>::SHAPE])),
         ("surviving", Element::Plain(WORD)),
         ("drawn", Element::Plain(WORD)),
+        ("ends", Element::Plain(WORD)),
+        ("listed_ends", Element::Plain(WORD)),
+        ("lists", Element::Plain(WORD)),
+        ("tile_lists", Element::Plain(WORD)),
+        ("larges", Element::Struct("Splat")),
+        ("attributes_of_larges", Element::Struct("LargeAttributes")),
+        ("large_splats", Element::Struct("Splat")),
+        ("large_attributes", Element::Struct("LargeAttributes")),
+        ("large_splat_words", Element::Plain(WORD)),
+        ("large_attribute_words", Element::Plain(WORD)),
         ("nearest", Element::Plain(WORD)),
         ("visible", Element::Plain(WORD)),
         ("sums", Element::Plain(sums_of(accumulator).0)),
@@ -271,14 +282,26 @@ fn compare(
 struct Made {
     module: Module,
     needs: SceneNeeds,
+    tiles: bool,
 }
 
 /// The different modules of all needs.
-fn modules(sources: &Sources) -> Vec<Made> {
-    let texts: BTreeMap<String, SceneNeeds> =
-        common::all_needs().into_iter().map(|needs| (sources.join(&files(&needs)), needs)).collect();
-    let made = |(text, needs): (String, _)| Made { module: reflect(&text).unwrap_or_else(|e| panic!("{e}")).0, needs };
+fn all_modules(sources: &Sources) -> Vec<Made> {
+    let joined = |needs: SceneNeeds| {
+        modules(&needs).into_iter().map(move |(files, _)| (sources.join(&files), (needs, files.contains(&"tile.wgsl"))))
+    };
+    let texts: BTreeMap<String, (SceneNeeds, bool)> = common::all_needs().into_iter().flat_map(joined).collect();
+    let made = |(text, (needs, tiles)): (String, _)| Made {
+        module: reflect(&text).unwrap_or_else(|e| panic!("{e}")).0,
+        needs,
+        tiles,
+    };
     texts.into_iter().map(made).collect()
+}
+
+/// The first module of `needs`.
+fn first_of(sources: &Sources, needs: &SceneNeeds) -> Module {
+    reflect(&sources.join(&modules(needs)[0].0)).unwrap().0
 }
 
 #[test]
@@ -296,8 +319,13 @@ fn mirrors_have_no_gaps() {
 #[test]
 fn every_binding_has_the_hosts_layout() {
     let mut seen = BTreeSet::new();
-    for Made { module, needs } in modules(&Sources::default()) {
-        assert_eq!(differences(&module, kept_as(&needs)), Vec::<String>::new(), "{}", needs.accumulator);
+    for Made { module, needs, tiles } in all_modules(&Sources::default()) {
+        assert_eq!(
+            differences(&module, if tiles { "fixed" } else { kept_as(&needs) }),
+            Vec::<String>::new(),
+            "{}",
+            needs.accumulator
+        );
         let buffers = module.global_variables.iter().filter(|(_, v)| v.space != AddressSpace::Handle);
         seen.extend(buffers.filter_map(|(_, v)| v.binding.and(v.name.clone())));
     }
@@ -312,7 +340,7 @@ fn a_changed_layout_is_noticed() {
     assert!(!needs.lambert);
     let broken = |from: &str, to: &str| {
         let sources = Sources::default().replace("layout.wgsl", from, to).unwrap();
-        differences(&reflect(&sources.join(&files(&needs))).unwrap().0, needs.accumulator).join("; ")
+        differences(&first_of(&sources, &needs), needs.accumulator).join("; ")
     };
     let swapped =
         broken("    a: array<f32, 3>,\n    b: array<f32, 3>,\n", "    b: array<f32, 3>,\n    a: array<f32, 3>,\n");
@@ -331,7 +359,7 @@ fn a_changed_layout_is_noticed() {
     assert!(retyped.contains("light_count") && retyped.contains("Float"), "{retyped}");
     // Sums of another kind than the accumulator's.
     let wide = SceneNeeds { accumulator: "fixed64", ..needs };
-    let other = &reflect(&Sources::default().join(&files(&wide))).unwrap().0;
+    let other = &first_of(&Sources::default(), &wide);
     assert_eq!(differences(other, "packed64"), Vec::<String>::new());
     for name in ["fixed", "float"] {
         let sums = differences(other, name).join("; ");
@@ -343,7 +371,7 @@ fn a_changed_layout_is_noticed() {
 fn binding_numbers_are_unique_over_all_files() {
     let mut numbers: BTreeMap<u32, BTreeSet<String>> = BTreeMap::new();
     let mut names: BTreeMap<String, BTreeSet<u32>> = BTreeMap::new();
-    for Made { module, .. } in modules(&Sources::default()) {
+    for Made { module, .. } in all_modules(&Sources::default()) {
         for (_, variable) in module.global_variables.iter() {
             if let (Some(binding), Some(name)) = (&variable.binding, &variable.name) {
                 assert_eq!(binding.group, 0, "{name}");
@@ -368,13 +396,14 @@ fn constant(module: &Module, name: &str) -> Option<f64> {
 
 #[test]
 fn constants_agree() {
-    for Made { module, needs } in modules(&Sources::default()) {
+    for Made { module, needs, tiles } in all_modules(&Sources::default()) {
         let constant = |name| constant(&module, name);
         for (name, value) in [
             ("WORKGROUP", WORKGROUP),
             ("TILE", TILE),
             ("QUEUE_START", QUEUE_START),
             ("QUEUE_GRID", QUEUE_GRID),
+            ("QUEUE_TILE_GRID", QUEUE_TILE_GRID),
             ("MOST_GROUPS", MOST_GROUPS),
             ("AWAY", AWAY),
             ("NOTHING", f32::INFINITY.to_bits()),
@@ -384,6 +413,13 @@ fn constants_agree() {
         }
         let tile = needs.raster.is_none().then_some(f64::from(OCCLUSION_TILE));
         assert_eq!(constant("OCCLUSION_TILE"), tile);
+        let of_tiles = [("TILE_WIDTH", TILE_SIZE[0]), ("TILE_HEIGHT", TILE_SIZE[1])];
+        let of_batches = [("BATCH", BATCH), ("LIST_START", LIST_START)];
+        for (exists, constants) in [(tiles, of_tiles), (needs.cull, of_batches)] {
+            for (name, value) in constants {
+                assert_eq!(constant(name), exists.then_some(f64::from(value)), "{name}");
+            }
+        }
         assert_eq!(constant("LEAST_WEIGHT"), Some(LEAST_WEIGHT));
         assert_eq!(constant("LEAST_FILTERED_WEIGHT"), Some(LEAST_FILTERED_WEIGHT));
         let colors = color_channels(&needs) > 0;
@@ -399,6 +435,7 @@ fn constants_agree() {
             let size = match entry.name.as_str() {
                 "arrange" | "arrange_rare" => [1, 1, 1],
                 name if name.ends_with("_large") => [TILE, TILE, 1],
+                "tile_scan" => [256, 1, 1],
                 _ => [WORKGROUP, 1, 1],
             };
             assert_eq!(entry.workgroup_size, size, "{}", entry.name);

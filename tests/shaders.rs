@@ -10,7 +10,7 @@ use epsplat::gpu::Sources;
 use epsplat::gpu::device::STORAGE_BUFFERS;
 use epsplat::gpu::kernel::{FILES, reflect};
 use epsplat::passes::accumulate::{ACCUMULATORS, Features, accumulator};
-use epsplat::passes::variant::{COLOR_CHANNEL, PixelLayout, color_channels, files, overrides, stages};
+use epsplat::passes::variant::{COLOR_CHANNEL, PixelLayout, color_channels, modules, overrides};
 use epsplat::scene::{Kernel, KernelShape, RenderOptions, SceneNeeds};
 use naga::AddressSpace;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
@@ -32,26 +32,36 @@ fn is_valid(module: &naga::Module, capabilities: Capabilities) -> Result<(), Str
     outcome.map(|_| ()).map_err(|e| e.into_inner().to_string())
 }
 
+/// The modules of all needs, with their files and entry points.
+fn all_modules() -> Vec<(SceneNeeds, Vec<&'static str>, Vec<&'static str>)> {
+    let of = |needs: SceneNeeds| modules(&needs).into_iter().map(move |(files, stages)| (needs, files, stages));
+    common::all_needs().into_iter().flat_map(of).collect()
+}
+
 #[test]
 fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
     let sources = Sources::default();
-    let texts: BTreeMap<String, SceneNeeds> =
-        common::all_needs().into_iter().map(|needs| (sources.join(&files(&needs)), needs)).collect();
+    let texts: BTreeMap<String, (SceneNeeds, Vec<&str>, Vec<&str>)> = all_modules()
+        .into_iter()
+        .map(|(needs, files, stages)| (sources.join(&files), (needs, files, stages)))
+        .collect();
     assert!(texts.len() > 500, "{}", texts.len());
     let mut without = BTreeSet::new();
-    for (text, needs) in &texts {
+    for (text, (needs, files, stages)) in &texts {
         let module = naga::front::wgsl::parse_str(text).unwrap_or_else(|e| panic!("{}", e.emit_to_string(text)));
         let features = match needs.raster {
             None if needs.atomics_u64 => Features::AtomicsU64,
             None => accumulator(needs.accumulator).unwrap().features,
             Some(_) => Features::None,
         };
-        let needed = capabilities(features);
+        let features = if files.contains(&"tile.wgsl") { Features::None } else { features };
+        let mut needed = capabilities(features);
+        needed.extend(files.contains(&"splat_shared.wgsl").then_some(Capabilities::SUBGROUP));
         let all = needed.iter().copied().collect::<Capabilities>();
         is_valid(&module, all).unwrap_or_else(|e| panic!("{}: {e}", needs.accumulator));
         for capability in needed {
             assert!(is_valid(&module, all - capability).is_err(), "{} needs no {capability:?}", needs.accumulator);
-            without.insert(needs.accumulator);
+            without.insert(if capability == Capabilities::SUBGROUP { "tiles" } else { needs.accumulator });
         }
         let entries: BTreeSet<&str> = module.entry_points.iter().map(|entry| entry.name.as_str()).collect();
         let drawn: &[&str] = if needs.raster.is_some() {
@@ -59,7 +69,10 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
         } else {
             &[]
         };
-        assert_eq!(entries, stages(needs).iter().chain(drawn).copied().collect());
+        let own: BTreeSet<&str> = stages.iter().chain(drawn).copied().collect();
+        // The module of the tiles has what it shares with the first, and so entry points that nobody compiles.
+        let shared = entries.difference(&own).count();
+        assert!(own.is_subset(&entries) && (shared == 0) != files.contains(&"tile.wgsl"), "{entries:?}");
         for (_, variable) in module.global_variables.iter().filter(|(_, v)| v.binding.is_some()) {
             let buffer = matches!(variable.space, AddressSpace::Uniform | AddressSpace::Storage { .. });
             // Only what the rasteriser wrote is a texture.
@@ -67,7 +80,7 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
         }
         assert!(!text.lines().any(|line| line.starts_with("enable") || line.starts_with("requires")));
     }
-    assert_eq!(without, BTreeSet::from(["fixed", "fixed64", "float", "packed64"]));
+    assert_eq!(without, BTreeSet::from(["fixed", "fixed64", "float", "packed64", "tiles"]));
     // The default runs anywhere.
     assert_eq!(ACCUMULATORS[0].features, Features::None);
 }
@@ -76,10 +89,10 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
 fn an_invalid_kernel_or_one_with_a_feature_is_noticed() {
     let needs = common::all_needs()[0];
     let broken = Sources::default().replace("kernel_ellipse.wgsl", "exp(-KERNEL_A", "exp(-view").unwrap();
-    assert!(reflect(&broken.join(&files(&needs))).is_err());
+    assert!(reflect(&broken.join(&modules(&needs)[0].0)).is_err());
     let wide =
         Sources::default().replace("kernel_ellipse.wgsl", "var power: f32;", "var power: f32; let w = 1lu;").unwrap();
-    let text = wide.join(&files(&needs));
+    let text = wide.join(&modules(&needs)[0].0);
     let module = naga::front::wgsl::parse_str(&text).unwrap();
     assert!(Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module).is_err());
 }
@@ -95,7 +108,8 @@ fn every_file_is_known_and_reached() {
     let known: BTreeSet<String> = FILES.iter().map(|(name, _)| (*name).to_owned()).collect();
     assert_eq!(on_disk, known);
     assert_eq!(known.len(), FILES.len());
-    let reached: BTreeSet<String> = common::all_needs().iter().flat_map(files).map(str::to_owned).collect();
+    let reached: BTreeSet<String> =
+        all_modules().into_iter().flat_map(|(_, files, _)| files).map(str::to_owned).collect();
     assert_eq!(reached, known);
 }
 
@@ -104,8 +118,8 @@ fn host_and_kernels_agree_about_overrides() {
     let sources = Sources::default();
     let mut declared_anywhere = BTreeSet::new();
     let mut set_anywhere = BTreeSet::new();
-    for needs in common::all_needs() {
-        let module = reflect(&sources.join(&files(&needs))).unwrap().0;
+    for (needs, files, _) in all_modules() {
+        let module = reflect(&sources.join(&files)).unwrap().0;
         let kernel = match needs.kernel {
             KernelShape::Gaussian => Kernel::Gaussian { sigma: 0.4 },
             KernelShape::Ellipse => Kernel::Ellipse { a: 6.0, n: 3.0, smooth: true },
@@ -132,15 +146,16 @@ fn host_and_kernels_agree_about_overrides() {
 fn storage_buffers_stay_within_core_limits() {
     let sources = Sources::default();
     let mut most = 0;
-    for needs in common::all_needs() {
-        let (module, bindings, _) = reflect(&sources.join(&files(&needs))).unwrap();
+    for (needs, files, stages) in all_modules() {
+        let (module, bindings, _) = reflect(&sources.join(&files)).unwrap();
         let stored: BTreeSet<&str> = module
             .global_variables
             .iter()
             .filter(|(_, v)| matches!(v.space, AddressSpace::Storage { .. }))
             .filter_map(|(_, v)| v.name.as_deref())
             .collect();
-        for (stage, variables) in &bindings {
+        let dispatched = |stage: &str| needs.raster.is_some() || stages.contains(&stage);
+        for (stage, variables) in bindings.iter().filter(|(stage, _)| dispatched(stage)) {
             let count = variables.iter().filter(|(name, _)| stored.contains(name.as_str())).count();
             assert!(count <= CORE_STORAGE_BUFFERS, "{stage} of {:?} uses {count}", needs.names());
             most = most.max(count);
@@ -230,6 +245,9 @@ fn absent_parts_have_their_partners_signatures() {
         }
     };
     alike("accumulator_", &["quantise", "term", "add", "add_pair", "settle", "sum_at", "weight_at"]);
+    alike("tile_terms", &["quantise", "term", "add"]);
+    alike("tile_deposit", &["deposit_sums"]);
+    alike("splat_", &["shared_splat", "shared_attributes", "shared_any"]);
     alike("kernel_", &["kernel_weight"]);
     alike("epsilon", &["radius_of", "deepest_accepted", "farthest_accepted"]);
     let shared = ["homography", "intersect", "ray"];

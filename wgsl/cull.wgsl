@@ -10,7 +10,7 @@
 @group(0) @binding(24) var<storage, read_write> surviving: array<atomic<u32>>;
 @group(0) @binding(25) var<storage, read> drawn: array<u32>;
 
-const BATCH: u32 = 512u;
+const BATCH: u32 = 64u;
 const LIST_START: u32 = 4u;
 const LIST_REST: u32 = 3u;
 

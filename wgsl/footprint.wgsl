@@ -65,7 +65,7 @@ fn is_large(splat: Splat) -> bool {
 
 // The queue of large splats, as project.wgsl wrote it.
 @group(0) @binding(13) var<storage, read> queued: array<u32>;
-const QUEUE_START: u32 = 5u;
+const QUEUE_START: u32 = 8u;
 const TILE: u32 = 16u;
 
 // The splat of this workgroup, or none (a number that is no index).

@@ -11,14 +11,20 @@ use crate::scene::{Bounds, Camera, Light, RenderOptions, Scene};
 pub const WORKGROUP: u32 = 64;
 
 /// Splats whose bounds hold more pixels than this get a workgroup each instead of an invocation.
-pub const LARGE: u32 = 1024;
+pub const LARGE: u32 = 256;
 
 /// Words at the start of a page's queue of large splats: how many there are, how many splats are out of view, and
-/// the grid of workgroups that draws the large ones.
-pub const QUEUE_START: u32 = 5;
+/// the grids that have a workgroup or an invocation for each of the large ones.
+pub const QUEUE_START: u32 = 8;
 
 /// Word of the queue at which that grid starts.
 pub const QUEUE_GRID: u32 = 2;
+
+/// Word of the queue at which the grid of invocations starts.
+pub const QUEUE_TILE_GRID: u32 = 5;
+
+/// Pixels of a tile, across and down (`wgsl/tile.wgsl`).
+pub const TILE_SIZE: [u32; 2] = [32, 16];
 
 /// The most workgroups per dimension that every adapter grants.
 pub const MOST_GROUPS: u32 = 65_535;
@@ -30,7 +36,7 @@ pub const MOST_ROUNDS: u32 = 32_768;
 pub const TILE: u32 = 16;
 
 /// Surfels of a batch: consecutive in memory, and left out together (`wgsl/cull.wgsl`).
-pub const BATCH: u32 = 512;
+pub const BATCH: u32 = 64;
 
 /// Words at the start of a list of batches: the grid of workgroups that draws them, and a count of others.
 pub const LIST_START: u32 = 4;
@@ -109,6 +115,16 @@ pub struct Splat {
     pub b: [f32; 3],
     pub c: [f32; 3],
     pub a_low: [f32; 3],
+}
+
+/// The attributes of a large splat; see the WGSL.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct LargeAttributes {
+    pub color: [f32; 4],
+    pub normal: [f32; 3],
+    pub radius: f32,
 }
 
 /// What a low-pass needs of a splat; see `wgsl/filter.wgsl`.

@@ -37,6 +37,7 @@ use super::{Recorder, Rows};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
+use crate::gpu::kernel::Bound;
 use crate::gpu::layout::ONE;
 use crate::scene::options::LEAST_FILTERED_WEIGHT;
 use crate::scene::{Camera, RenderOptions, Scene, SceneNeeds};
@@ -90,6 +91,16 @@ pub fn file(needs: &SceneNeeds) -> &'static str {
         Ok(row) => row.file,
         Err(_) => "",
     }
+}
+
+/// The files that keep the sums of a tile's pixels, where [`file`] keeps them in storage.
+pub fn tile_files(needs: &SceneNeeds) -> [&'static str; 3] {
+    let pairs = fixed_file(needs) == "accumulator_fixed_pairs.wgsl";
+    [
+        if needs.wide_sums { "tile_terms_wide.wgsl" } else { "tile_terms.wgsl" },
+        "tile_sums.wgsl",
+        if pairs { "tile_deposit_pairs.wgsl" } else { "tile_deposit.wgsl" },
+    ]
 }
 
 /// Every accumulator; the first is the default.
@@ -288,7 +299,14 @@ impl AttributeBuffer {
     }
 }
 
-/// Records the pass of `parts` of the splats over `rows`.
+impl AttributeBuffer {
+    /// What the pass binds of its own, and of the one before it.
+    pub(crate) fn bindings<'a>(&'a self, visible: &'a VisibilityBuffer) -> Bound<'a> {
+        vec![("visible", visible.nearest.bound()), ("sums", self.sums.bound()), ("overflows", self.overflows.bound())]
+    }
+}
+
+/// Records the pass of `parts` of the small splats over `rows`.
 pub fn record(
     recorder: &mut Recorder<'_>,
     (splats, parts): (&SplatBuffer, &[Part]),
@@ -296,16 +314,24 @@ pub fn record(
     visible: &VisibilityBuffer,
     buffer: &AttributeBuffer,
 ) -> Result<()> {
-    let words = recorder.variant.sum_words();
-    let buffers =
-        [("visible", visible.nearest.bound()), ("sums", buffer.sums.bound()), ("overflows", buffer.overflows.bound())];
-    splats.dispatch(recorder, ("accumulate", parts), Some("accumulate_large"), rows, &buffers, |encoder| {
-        let bytes = rows.pixels * u64::from(words) * 4;
+    let bytes = rows.pixels * u64::from(recorder.variant.sum_words()) * 4;
+    splats.dispatch(recorder, ("accumulate", parts), rows, &buffer.bindings(visible), |encoder| {
         encoder.clear_buffer(&buffer.sums.raw, 0, Some(bytes));
         if rows.first == 0 {
             encoder.clear_buffer(&buffer.overflows.raw, 0, None);
         }
     })
+}
+
+/// Records the pass of the large splats over `rows`, a workgroup each.
+pub fn record_large(
+    recorder: &mut Recorder<'_>,
+    splats: &SplatBuffer,
+    rows: &Rows,
+    visible: &VisibilityBuffer,
+    buffer: &AttributeBuffer,
+) -> Result<()> {
+    splats.dispatch_large(recorder, ("accumulate", "accumulate_large"), rows, &buffer.bindings(visible))
 }
 
 #[cfg(test)]

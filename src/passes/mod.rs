@@ -9,6 +9,7 @@
 //! | [`project`] | surfels | [`project::SplatBuffer`] |
 //! | [`visibility`] | splats | [`visibility::VisibilityBuffer`] |
 //! | [`accumulate`] | splats, nearest depths | [`accumulate::AttributeBuffer`] |
+//! | [`tiles`] | large splats | the same two |
 //! | [`resolve`] | sums | [`Frame`](crate::frame::Frame) |
 //!
 //! [`footprint`] is evaluated inside visibility and accumulate, with the [`lowpass`] that [`project`] prepared; [`variant`] says which kernels a render is made of.
@@ -21,6 +22,7 @@ pub mod order;
 pub mod project;
 pub mod raster;
 pub mod resolve;
+pub mod tiles;
 pub mod upload;
 pub mod variant;
 pub mod visibility;

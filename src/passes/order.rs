@@ -11,8 +11,9 @@ use rayon::prelude::*;
 use crate::gpu::layout::BATCH;
 use crate::scene::{Bounds, Surfel};
 
-/// Surfels of a run, which is a batch. Of 64, 512 and 4096 the middle gave the shortest frames on a software adapter.
-const RUN: usize = BATCH as usize;
+/// Surfels of a run: whole batches. Of 64, 512 and 4096 the middle gave the shortest frames on a software adapter.
+const RUN: usize = 512;
+const _: () = assert!(RUN.is_multiple_of(BATCH as usize));
 
 /// Bits of each coordinate on the curve.
 const BITS: u32 = 10;

@@ -356,6 +356,15 @@ impl SplatBuffer {
         Ok(drawn)
     }
 
+    /// The most large splats that a page has. Waits for the projection.
+    pub(crate) fn most_large(&self, gpu: &Gpu) -> Result<u64> {
+        let mut most = 0;
+        for page in &self.pages {
+            most = most.max(page.queue.read(gpu, 1)?.first().copied().map_or(0, u64::from));
+        }
+        Ok(most)
+    }
+
     /// What a stage over the splats of page `index` may bind, beside its own `buffers`.
     pub(crate) fn bindings<'a>(&'a self, index: usize, buffers: &[(&'a str, wgpu::BindingResource<'a>)]) -> Bound<'a> {
         let (surfels, page) = (&self.surfels.pages[index], &self.pages[index]);
@@ -371,34 +380,61 @@ impl SplatBuffer {
         bound
     }
 
-    /// Records `stage` over the splats of `parts` of every page, an invocation each; and `large` over all large ones, a
-    /// workgroup each.
+    /// Records `stage` over the splats of `parts` of every page, an invocation each.
     pub(crate) fn dispatch(
         &self,
         recorder: &mut Recorder<'_>,
         (stage, parts): (&'static str, &[Part]),
-        large: Option<&'static str>,
         rows: &Rows,
         buffers: &[(&str, wgpu::BindingResource<'_>)],
         before: impl FnOnce(&mut wgpu::CommandEncoder),
     ) -> Result<()> {
         let (gpu, program) = (recorder.gpu, recorder.program);
-        let mut own = vec![("view", recorder.view.bound()), ("band", rows.uniform.bound())];
-        own.extend_from_slice(buffers);
+        let own = with_view(recorder, rows, buffers);
         recorder.timing.pass(gpu, stage, before, |pass| {
             for (index, page) in self.pages.iter().enumerate() {
-                let bound = self.bindings(index, &own);
                 for &part in parts {
-                    let mut bound = bound.clone();
+                    let mut bound = self.bindings(index, &own);
                     bound.extend(page.batches.of(part).map(|list| ("drawn", list.bound())));
                     program.dispatch(gpu, pass, stage, &bound, page.grid(gpu, part)?)?;
-                }
-                if let Some(large) = large {
-                    let at = u64::from(layout::QUEUE_GRID) * 4;
-                    program.dispatch(gpu, pass, large, &bound, Grid::In(&page.queue.raw, at))?;
                 }
             }
             Ok(())
         })
     }
+
+    /// Records `kernel` over the large splats of every page, a workgroup each, as a part of `stage`.
+    pub(crate) fn dispatch_large(
+        &self,
+        recorder: &mut Recorder<'_>,
+        (stage, kernel): (&'static str, &'static str),
+        rows: &Rows,
+        buffers: &[(&str, wgpu::BindingResource<'_>)],
+    ) -> Result<()> {
+        let (gpu, program) = (recorder.gpu, recorder.program);
+        let own = with_view(recorder, rows, buffers);
+        recorder.timing.pass(
+            gpu,
+            stage,
+            |_| {},
+            |pass| {
+                for (index, page) in self.pages.iter().enumerate() {
+                    let grid = Grid::In(&page.queue.raw, u64::from(layout::QUEUE_GRID) * 4);
+                    program.dispatch(gpu, pass, kernel, &self.bindings(index, &own), grid)?;
+                }
+                Ok(())
+            },
+        )
+    }
+}
+
+/// The uniforms of every stage over splats, and `buffers`.
+fn with_view<'a>(
+    recorder: &Recorder<'a>,
+    rows: &'a Rows,
+    buffers: &[(&'a str, wgpu::BindingResource<'a>)],
+) -> Bound<'a> {
+    let mut own = vec![("view", recorder.view.bound()), ("band", rows.uniform.bound())];
+    own.extend_from_slice(buffers);
+    own
 }

@@ -13,7 +13,7 @@ use crate::gpu::{Gpu, Sources};
 use crate::scene::{ColorNeed, Kernel, KernelShape, LowPass, Projection, RasterDepth, RenderOptions, SceneNeeds};
 
 /// The entry points that a render with `needs` dispatches.
-pub fn stages(needs: &SceneNeeds) -> Vec<&'static str> {
+fn stages(needs: &SceneNeeds) -> Vec<&'static str> {
     let mut stages = vec!["project", "arrange_rare", "project_rare", "arrange", "resolve"];
     if needs.raster.is_none() {
         stages.extend(["clear", "visibility", "visibility_large", "occlude", "accumulate", "accumulate_large"]);
@@ -23,6 +23,9 @@ pub fn stages(needs: &SceneNeeds) -> Vec<&'static str> {
     }
     stages
 }
+
+/// The entry points of the tiles.
+const TILE_STAGES: [&str; 5] = ["tile_count", "tile_scan", "tile_place", "tile_visibility", "tile_accumulate"];
 
 /// A render's kernels, before they are compiled.
 #[derive(Clone, Debug)]
@@ -51,14 +54,28 @@ impl Variant {
         gpu.programs.get(gpu, sources.join(&files(&self.needs)), &stages(&self.needs), &draws, &self.constants)
     }
 
+    /// The compiled kernels of the tiles; `gpu` keeps them.
+    pub fn compile_tiles(&self, gpu: &Gpu, sources: &Sources) -> Result<Arc<Program>> {
+        gpu.programs.get(gpu, sources.join(&tile_files(&self.needs)), &TILE_STAGES, &[], &self.constants)
+    }
+
     /// u32 words of a pixel's sums in storage; the rasteriser's are in textures.
     pub fn sum_words(&self) -> u32 {
         if self.needs.raster.is_some() { 0 } else { self.pixel.channels * self.accumulator.words }
     }
 }
 
-/// The files that a render with `needs` is made of.
-pub fn files(needs: &SceneNeeds) -> Vec<&'static str> {
+/// The modules that a render with `needs` is made of: their files, and the entry points that it dispatches.
+pub fn modules(needs: &SceneNeeds) -> Vec<(Vec<&'static str>, Vec<&'static str>)> {
+    let mut modules = vec![(files(needs), stages(needs))];
+    if needs.tiles {
+        modules.push((tile_files(needs), TILE_STAGES.to_vec()));
+    }
+    modules
+}
+
+/// The files of a render's first module.
+fn files(needs: &SceneNeeds) -> Vec<&'static str> {
     let pick = |needed, file, absent| if needed { file } else { absent };
     let mut files = vec![
         "layout.wgsl",
@@ -116,6 +133,15 @@ pub fn files(needs: &SceneNeeds) -> Vec<&'static str> {
         ColorNeed::Srgb8 => files.extend(["color_srgb8.wgsl", "color_sums.wgsl"]),
         ColorNeed::Linear => files.extend(["color_linear.wgsl", "color_sums.wgsl"]),
     }
+    files
+}
+
+/// The files of the tiles' module.
+fn tile_files(needs: &SceneNeeds) -> Vec<&'static str> {
+    let stored = accumulate::file(needs);
+    let mut files: Vec<_> = files(needs).into_iter().filter(|file| *file != stored).collect();
+    files.extend(accumulate::tile_files(needs));
+    files.extend(["tile.wgsl", if needs.subgroups { "splat_shared.wgsl" } else { "splat_plain.wgsl" }]);
     files
 }
 

@@ -51,29 +51,49 @@ impl VisibilityBuffer {
     }
 }
 
-/// Records the pass of `part` of the splats over `rows`. The large ones are drawn last.
+/// Records the pass of `part` of the small splats over `rows`.
 pub fn record(
     recorder: &mut Recorder<'_>,
     (splats, part): (&SplatBuffer, Part),
     rows: &Rows,
     buffer: &VisibilityBuffer,
 ) -> Result<()> {
-    let (gpu, program) = (recorder.gpu, recorder.program);
-    let buffers = [("nearest", buffer.nearest.bound())];
-    let bound = [("view", recorder.view.bound()), ("band", rows.uniform.bound()), buffers[0].clone()];
-    let alone = |recorder: &mut Recorder<'_>, stage, invocations| {
-        recorder.timing.pass(
-            gpu,
-            "visibility",
-            |_| {},
-            |pass| program.dispatch(gpu, pass, stage, &bound, Grid::Of(grid(gpu, invocations)?)),
-        )
-    };
     if part != Part::Far {
-        alone(recorder, "clear", rows.pixels)?;
+        over(recorder, "clear", (rows, rows.pixels), buffer)?;
     }
-    let more_follows = part == Part::Near;
-    let large = (!more_follows).then_some("visibility_large");
-    splats.dispatch(recorder, ("visibility", &[part]), large, rows, &buffers, |_| {})?;
-    alone(recorder, if more_follows { "occlude_open" } else { "occlude" }, rows.tiles)
+    splats.dispatch(recorder, ("visibility", &[part]), rows, &[("nearest", buffer.nearest.bound())], |_| {})
+}
+
+/// Records the pass of the large splats over `rows`, a workgroup each.
+pub fn record_large(
+    recorder: &mut Recorder<'_>,
+    splats: &SplatBuffer,
+    rows: &Rows,
+    buffer: &VisibilityBuffer,
+) -> Result<()> {
+    let buffers = [("nearest", buffer.nearest.bound())];
+    splats.dispatch_large(recorder, ("visibility", "visibility_large"), rows, &buffers)
+}
+
+/// Records the farthest of the nearest depths in each tile; after [`Part::Near`], what is empty hides nothing.
+pub fn occlude(recorder: &mut Recorder<'_>, part: Part, rows: &Rows, buffer: &VisibilityBuffer) -> Result<()> {
+    let stage = if part == Part::Near { "occlude_open" } else { "occlude" };
+    over(recorder, stage, (rows, rows.tiles), buffer)
+}
+
+/// Records a kernel over the depths alone.
+fn over(
+    recorder: &mut Recorder<'_>,
+    stage: &str,
+    (rows, invocations): (&Rows, u64),
+    buffer: &VisibilityBuffer,
+) -> Result<()> {
+    let (gpu, program) = (recorder.gpu, recorder.program);
+    let bound = [("view", recorder.view.bound()), ("band", rows.uniform.bound()), ("nearest", buffer.nearest.bound())];
+    recorder.timing.pass(
+        gpu,
+        "visibility",
+        |_| {},
+        |pass| program.dispatch(gpu, pass, stage, &bound, Grid::Of(grid(gpu, invocations)?)),
+    )
 }

@@ -29,6 +29,11 @@ pub struct SceneNeeds {
     pub atomics_u64: bool,
     /// Batches of surfels that are out of view or hidden are left out.
     pub cull: bool,
+    /// Large splats are drawn by tiles.
+    pub tiles: bool,
+    /// A splat's record is read by a subgroup together, as the adapter's processor would else read it for each of its
+    /// invocations.
+    pub subgroups: bool,
     /// Sums are the rasteriser's.
     pub raster: Option<Raster>,
     /// It draws a triangle a splat instead of a quad, as there are more surfels than tenths of the image's pixels. On a
@@ -90,6 +95,8 @@ impl SceneNeeds {
                 && (low[3] != high[3] || may_be_small(options)),
             atomics_u64: false,
             cull: false,
+            tiles: false,
+            subgroups: false,
             raster: options.raster,
             triangles: options.raster.is_some() && 10 * scene.surfels.len() > camera.pixels(),
             kernel: options.kernel.shape(),
@@ -117,6 +124,13 @@ impl SceneNeeds {
     /// not projected. The rasteriser draws every splat.
     pub fn with_bands(self, bands: u32) -> Self {
         Self { cull: bands == 1 && self.raster.is_none(), ..self }
+    }
+
+    /// The same with tiles for large splats, where the accumulator can: on an adapter whose `subgroups` should share what they
+    /// read, or not.
+    pub fn with_tiles(self, subgroups: bool) -> Self {
+        let tiles = self.accumulator == "fixed" && self.raster.is_none();
+        Self { tiles, subgroups: tiles && subgroups, ..self }
     }
 
     /// The needs by name, for people and JSON.
@@ -147,6 +161,7 @@ impl SceneNeeds {
             (self.wide_sums, "wide-sums"),
             (self.atomics_u64, "atomics-u64"),
             (self.cull, "cull"),
+            (self.tiles, "tiles"),
             (self.epsilon_radius, "epsilon-radius"),
             (self.alpha, "alpha"),
             (self.normal, "normal"),

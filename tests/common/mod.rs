@@ -58,7 +58,8 @@ pub fn all_needs() -> Vec<SceneNeeds> {
                     next = (next + 101) % base.len();
                     let low_pass = [LowPass::None, LowPass::Max, LowPass::Ewa][next % 3];
                     let accumulator = row.name;
-                    all.push(SceneNeeds { accumulator, kernel, epsilon_radius, low_pass, ..base[next] });
+                    let tiles = accumulator == ACCUMULATORS[0].name;
+                    all.push(SceneNeeds { accumulator, tiles, kernel, epsilon_radius, low_pass, ..base[next] });
                     if accumulator == ACCUMULATORS[0].name {
                         for (wide_sums, atomics_u64) in [(true, false), (false, true), (true, true)] {
                             let next = base[next];
@@ -82,6 +83,7 @@ pub fn all_needs() -> Vec<SceneNeeds> {
             low_pass,
             epsilon_radius: step % 5 == 0,
             cull: false,
+            tiles: false,
             ..base
         });
     }
@@ -107,7 +109,9 @@ fn base_needs() -> Vec<SceneNeeds> {
                 accumulator: ACCUMULATORS[0].name,
                 wide_sums: false,
                 atomics_u64: false,
+                tiles: bits * 37 / 8 % 4 == 0,
                 // Both, of each of the others.
+                subgroups: bits.count_ones() % 3 == 0,
                 cull: bits.count_ones() % 2 == 0,
                 raster: None,
                 triangles: false,

@@ -1,0 +1,169 @@
+//! Large splats drawn by tiles, by workgroups, or one by one: no threshold between them shows in any bit.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use common::bits;
+use common::scenes::{cases, crowded, front, sphere, stack};
+use epsplat::frame::Frame;
+use epsplat::gpu::{Gpu, Sources};
+use epsplat::render::{Backend, Renderer, Report, render};
+use epsplat::scene::{Camera, Colors, Epsilon, Kernel, LowPass, Maps, Projection, RenderOptions, Scene, Shading};
+
+const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
+
+/// Kernels that take splats of more than `pixels` pixels for large.
+fn large_from(pixels: u32) -> Sources {
+    Sources::default().replace("footprint.wgsl", "size.y > LARGE", &format!("size.y > {pixels}u")).unwrap()
+}
+
+fn on(gpu: Gpu, sources: Sources) -> Backend {
+    Backend::Gpu { gpu: Box::new(gpu), sources }
+}
+
+fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Backend) -> (Frame, Report) {
+    let (frame, report) = render(scene, camera, options, backend, &()).unwrap();
+    assert!(report.needs.contains(&"tiles"));
+    (frame, report)
+}
+
+/// Scenes whose splats are of all sizes, and options that need each form of the kernels.
+fn drawn() -> Vec<(&'static str, Scene, Camera, RenderOptions)> {
+    let plain = RenderOptions { maps: MAPS, epsilon: Epsilon::Relative(0.02), ..Default::default() };
+    let mut all = Vec::new();
+    let (scene, camera) = crowded().swap_remove(1);
+    all.push(("crowded", scene, camera, plain.clone()));
+    let camera = common::scenes::sphere_camera(101, Projection::Pinhole);
+    let globe = sphere(900, 2.5);
+    let mut unlit = plain.clone();
+    (unlit.shading, unlit.maps) = (Shading::Unlit, Maps::default());
+    all.push(("unlit", globe.clone(), camera.clone(), unlit.clone()));
+    let constant = Scene { colors: Colors::Constant([0.2, 0.4, 0.6, 1.0]), ..globe.clone() };
+    all.push(("constant", constant, camera.clone(), unlit));
+    all.push(("max", globe.clone(), camera.clone(), RenderOptions { low_pass: LowPass::Max, ..plain.clone() }));
+    all.push(("ewa", globe.clone(), camera.clone(), RenderOptions { low_pass: LowPass::Ewa, ..plain.clone() }));
+    let of_radius = RenderOptions { epsilon: Epsilon::Radius(0.5), ..plain.clone() };
+    all.push(("radius", globe.clone(), camera.clone(), of_radius));
+    // Weights that fall to nothing take wide sums.
+    let wide = RenderOptions { kernel: Kernel::Gaussian { sigma: 0.2 }, ..plain.clone() };
+    all.push(("wide", globe, camera, wide));
+    for case in cases().into_iter().filter(|case| case.name.contains("near depth")) {
+        all.push((case.name, case.scene, case.camera, plain.clone()));
+    }
+    all
+}
+
+/// Asserts that the drawn scenes called `names` are the same with each of `thresholds`.
+fn compare(names: &[&str], thresholds: &[u32], adapt: impl Fn(&mut Gpu)) {
+    let backend = |pixels| {
+        let mut gpu = common::gpu()?;
+        adapt(&mut gpu);
+        Some(on(gpu, large_from(pixels)))
+    };
+    // Scatter alone, to compare with.
+    let Some(scatter) = backend(u32::MAX) else { return };
+    let others: Vec<_> = thresholds.iter().filter_map(|&pixels| Some((pixels, backend(pixels)?))).collect();
+    for (name, scene, camera, options) in drawn().into_iter().filter(|(name, ..)| names.contains(name)) {
+        let (expected, _) = frame(&scene, &camera, &options, &scatter);
+        for (pixels, backend) in &others {
+            let (tiled, _) = frame(&scene, &camera, &options, backend);
+            assert!(bits(&tiled) == bits(&expected), "{name}: tiles from {pixels} pixels on show");
+        }
+    }
+}
+
+#[test]
+fn no_threshold_between_scatter_and_tiles_shows() {
+    compare(&["crowded"], &[0, 40, 1000], |_| {});
+}
+
+#[test]
+fn every_form_of_the_kernels_draws_the_same_by_tiles() {
+    let names: Vec<_> = drawn().iter().map(|(name, ..)| *name).collect();
+    assert!(names.len() >= 9);
+    compare(&names, &[0], |_| {});
+}
+
+#[test]
+fn adapters_without_64_bit_atomics_and_subgroups_draw_the_same_by_tiles() {
+    compare(&["unlit", "wide", "max"], &[0], |gpu| {
+        (gpu.adapter.atomics_u64, gpu.adapter.subgroups) = (false, false);
+    });
+}
+
+#[test]
+fn bands_and_pages_of_tiles_do_not_show() {
+    let Some(whole) = common::gpu() else { return };
+    let Some(small) = common::gpu() else { return };
+    let (whole, small) = (on(whole, large_from(30)), on(small.with_buffer_limit(70_000), large_from(30)));
+    let (name, scene, camera, options) = drawn().swap_remove(0);
+    let [one, many] = [whole, small].map(|backend| frame(&scene, &camera, &options, &backend));
+    assert!(bits(&one.0) == bits(&many.0), "{name}");
+    assert!(one.1.needs.contains(&"cull") && !many.1.needs.contains(&"cull"), "there is one band only");
+}
+
+/// A kernel that draws a tile wrongly is noticed, whatever it does wrong.
+#[test]
+fn a_wrong_tile_is_noticed() {
+    let (name, scene, camera, options) = drawn().swap_remove(1);
+    let wrong = [
+        ("tile.wgsl", "select(0u, across << 4u, high.y == 1u)", "0u"),
+        ("tile.wgsl", "b.w = nearer(b.w, next.splat, next.filter_, row.x + 7u, row.y);", ""),
+        ("tile.wgsl", "if (row.pixels > 5u) { deposit(5u, row.pixel + 5u); }", ""),
+        ("tile.wgsl", "deepest_accepted(farthest)", "farthest"),
+        ("tile_sums.wgsl", "high + select(0u, 1u, sum < low)", "high"),
+        // A unit of 2^-32 would not show, 2^-4 does.
+        ("tile_deposit_pairs.wgsl", "vec2<u32>(carried, 0u)", "vec2<u32>(carried << 28u, 0u)"),
+    ];
+    let Some(gpu) = common::gpu_for("accumulator_fixed_pairs.wgsl") else { return };
+    let (expected, _) = frame(&scene, &camera, &options, &on(gpu, large_from(0)));
+    for (file, from, to) in wrong {
+        let Some(gpu) = common::gpu_for("accumulator_fixed_pairs.wgsl") else { return };
+        let sources = large_from(0).replace(file, from, to).unwrap();
+        let (frame, _) = frame(&scene, &camera, &options, &on(gpu, sources));
+        assert!(bits(&frame) != bits(&expected), "{name}: {from} in {file} may be {to:?}");
+    }
+}
+
+/// The first frame's lists are too small for the second, which is rendered again with more room.
+#[test]
+fn a_view_that_needs_more_room_gets_it() {
+    let Some(gpu) = common::gpu() else { return };
+    let backend = on(gpu, large_from(30));
+    let scene = sphere(900, 2.5);
+    let options = RenderOptions::default();
+    let view = |size| common::scenes::sphere_camera(size, Projection::Pinhole);
+    // Another lens keeps the image's size, and with it the buffers.
+    let far = common::scenes::sphere_camera_with(160, epsplat::scene::Lens::Fov(170.0));
+    let mut renderer = Renderer::new(&scene, &options, &backend).unwrap();
+    renderer.frame(&far, &()).unwrap();
+    let small = renderer.device_bytes().pixels;
+    let (kept, _) = renderer.frame(&view(160), &()).unwrap();
+    assert!(renderer.device_bytes().pixels > small, "there was room enough: the test tests nothing");
+    let (fresh, _) = render(&scene, &view(160), &options, &backend, &()).unwrap();
+    assert!(bits(&kept) == bits(&fresh));
+    // And back: what is kept does not show either.
+    let (kept, _) = renderer.frame(&far, &()).unwrap();
+    let (fresh, _) = render(&scene, &far, &options, &backend, &()).unwrap();
+    assert!(bits(&kept) == bits(&fresh));
+}
+
+/// A list longer than what one loop of any driver runs through is left to the workgroups.
+#[test]
+fn long_lists_are_drawn_to_their_end() {
+    let Some(gpu) = common::gpu() else { return };
+    let backend = on(gpu, large_from(0));
+    let (scene, _) = stack(30_000, 1.0);
+    let camera = front(4);
+    let options = RenderOptions {
+        kernel: Kernel::Constant,
+        shading: Shading::Unlit,
+        maps: MAPS,
+        epsilon: Epsilon::Absolute(1.0),
+        ..Default::default()
+    };
+    let (frame, _) = frame(&scene, &camera, &options, &backend);
+    let counts = frame.count.unwrap();
+    assert!(counts.iter().all(|&count| count == 30_000.0), "{counts:?}");
+}

@@ -68,7 +68,7 @@ impl Stages {
 /// [`Error::Usage`] if the image's sums need more than one buffer; and whatever a render can fail with.
 pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu, sources: &Sources) -> Result<Stages> {
     let color_range = scene.color_range();
-    let needs = SceneNeeds::of(scene, &color_range, camera, options);
+    let needs = SceneNeeds { tiles: false, ..SceneNeeds::of(scene, &color_range, camera, options) };
     let variant = Variant::of(&needs, options, scene.surfels.len() as u64)?;
     variant.accumulator.check(gpu)?;
     let program = variant.compile(gpu, sources)?;

@@ -192,7 +192,7 @@ impl<'a> Renderer<'a> {
         let surfels = self.scene.surfels.len() as u64;
         let rows = rows_per_band(gpu, camera, &Variant::of(&needs, self.options, surfels)?)?;
         let shared = gpu.adapter.subgroups && gpu.adapter.kind == "software";
-        let needs = needs.with_bands(camera.height.div_ceil(rows)).with_tiles(shared);
+        let needs = needs.with_bands(camera.height.div_ceil(rows)).with_subgroups(shared);
         let variant = Variant::of(&needs, self.options, surfels)?;
         match needs.raster {
             Some(raster) => raster::check(gpu, raster, &needs, camera)?,

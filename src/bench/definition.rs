@@ -8,7 +8,9 @@ use serde::{Deserialize, Deserializer};
 
 use crate::error::{Error, Result};
 use crate::passes::accumulate::{ACCUMULATORS, Accumulator, accumulator};
-use crate::scene::{BlendFormat, Epsilon, Kernel, LowPass, Maps, Raster, RasterDepth, RenderOptions, Shading};
+use crate::scene::{
+    BlendFormat, Epsilon, Kernel, LowPass, Maps, Organisation, Raster, RasterDepth, RenderOptions, Shading,
+};
 use crate::surfels::analytic::Shape;
 
 /// A study: every configuration on every scene.
@@ -87,6 +89,8 @@ pub struct SceneEntry {
     /// Cameras on a circle around the scene's centre, the first of which is the one above.
     #[serde(default = "one")]
     pub views: u32,
+    /// The configurations that render it, by name; else all.
+    pub configs: Option<Vec<String>>,
     /// Compare with ground truth by rays: of the shape, or of the triangles of an OBJ file.
     #[serde(default)]
     pub truth: bool,
@@ -112,6 +116,9 @@ pub struct Config {
     /// How the compute kernels keep sums.
     #[serde(default, deserialize_with = "accumulator_row")]
     pub accumulator: Option<&'static Accumulator>,
+    /// How the compute kernels draw splats.
+    #[serde(default, deserialize_with = "parsed")]
+    pub organisation: Option<Organisation>,
     /// Depth tolerance.
     #[serde(default, deserialize_with = "parsed")]
     pub epsilon: Option<Epsilon>,
@@ -133,10 +140,6 @@ pub struct Config {
     pub maps: Vec<MapName>,
     /// The largest RMSE against the f64 reference that is allowed.
     pub error_limit: Option<f64>,
-    /// Scenes of more surfels are left out.
-    pub most_surfels: Option<u64>,
-    /// Scenes of fewer surfels are left out.
-    pub least_surfels: Option<u64>,
     /// Whether a quick run has it.
     #[serde(default = "yes")]
     pub quick: bool,
@@ -220,6 +223,7 @@ impl Config {
             kernel: self.kernel.unwrap_or(default.kernel),
             low_pass: self.lowpass.unwrap_or(default.low_pass),
             accumulator: self.accumulator().map_or(default.accumulator, |row| row.name),
+            organisation: self.organisation.unwrap_or_default(),
             raster: (self.backend == BackendName::Raster).then(|| Raster {
                 format: self.blend_format.unwrap_or(raster.format),
                 depth: self.raster_depth.unwrap_or(raster.depth),
@@ -257,11 +261,6 @@ impl Config {
             BackendName::Raster => false,
             BackendName::Reference => true,
         }
-    }
-
-    /// Whether it renders scenes of so many surfels.
-    pub fn takes(&self, surfels: u64) -> bool {
-        (self.least_surfels.unwrap_or(0)..=self.most_surfels.unwrap_or(u64::MAX)).contains(&surfels)
     }
 }
 

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::definition::{BackendName, Config, Definition, OneOrMany, SceneEntry};
 use crate::error::{Error, Result};
+use crate::passes::accumulate::ACCUMULATORS;
 use crate::scene::camera::check_size;
 
 impl Definition {
@@ -44,6 +45,9 @@ impl Definition {
         }
         for scene in &self.scenes {
             scene.check().map_err(|what| format!("scene {:?}: {what}", scene.name))?;
+            if let Some(name) = scene.configs.iter().flatten().find(|name| !configs.contains(name)) {
+                return Err(format!("scene {:?}: configs: there is no config {name:?}", scene.name));
+            }
         }
         for config in &self.configs {
             config.check().map_err(|what| format!("config {:?}: {what}", config.name))?;
@@ -129,6 +133,9 @@ impl Config {
         if self.backend != BackendName::Gpu && self.accumulator.is_some() {
             return Err("accumulator: only the backend gpu has one".into());
         }
+        if self.organisation.is_some() && self.accumulator().is_none_or(|row| row.name != ACCUMULATORS[0].name) {
+            return Err("organisation: only the accumulator fixed of the backend gpu has more than one".into());
+        }
         if self.backend != BackendName::Raster && (self.blend_format.is_some() || self.raster_depth.is_some()) {
             return Err("blend_format, raster_depth: only the backend raster has them".into());
         }
@@ -182,15 +189,16 @@ mod tests {
     fn what_it_says_is_taken_and_a_quick_form_has_less() {
         let text = "name = \"n\"\nabout = \"a\"\nsize = [64, 32]\nbaseline = \"c\"\n[quick]\nruns = 2\nsize = [8, 8]\n\
                     [[scene]]\nname = \"s\"\nshape = \"torus\"\ncount = [10, 20]\nquick_count = 5\n\
-                    [[scene]]\nname = \"t\"\nfile = \"a.obj\"\ntruth = true\nquick = false\n\
+                    [[scene]]\nname = \"t\"\nfile = \"a.obj\"\ntruth = true\nquick = false\nconfigs = [\"r\"]\n\
                     [[config]]\nname = \"c\"\nbackend = \"gpu\"\nepsilon = \"abs:2\"\nlowpass = \"ewa\"\n\
-                    accumulator = \"fixed64\"\nmaps = [\"depth\"]\nmost_surfels = 15\n\
+                    accumulator = \"fixed64\"\nmaps = [\"depth\"]\n\
                     [[config]]\nname = \"r\"\nbackend = \"raster\"\nblend_format = \"rgba32float\"\nquick = false\n";
         let study = parse(text).unwrap();
         let options = study.configs[0].options(None);
         assert_eq!((options.epsilon, options.low_pass), (Epsilon::Absolute(2.0), LowPass::Ewa));
         assert!(options.accumulator == "fixed64" && options.maps.depth && !options.maps.normal);
-        assert!(study.configs[0].takes(15) && !study.configs[0].takes(16) && study.configs[1].takes(16));
+        assert_eq!(study.scenes[0].configs, None);
+        assert_eq!(study.scenes[1].configs, Some(vec!["r".to_owned()]));
         assert!(study.configs[0].deterministic() && !study.configs[1].deterministic());
         assert_eq!(study.configs[1].sums(), "rgba32float");
         assert!(study.configs[1].options(None).raster.is_some() && options.raster.is_none());
@@ -214,6 +222,7 @@ mod tests {
             ("[[scene]]\nname = \"t\"\nshape = \"torus\"\n", &["scene \"t\": count:"]),
             ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 1\nsize = [9, 0]\n", &["scene \"t\": size:", "9x0"]),
             ("[[scene]]\nname = \"t\"\n", &["scene \"t\": shape:"]),
+            ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 1\nconfigs = [\"e\"]\n", &["configs:", "\"e\""]),
             ("[[scene]]\nname = \"t\"\nfile = \"a.ply\"\ncount = 1\n", &["count:", "file"]),
             ("[[scene]]\nname = \"t\"\nfile = \"a.ply\"\ntruth = true\n", &["truth:", "OBJ"]),
             ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = [1, \"x\"]\n", &["count:", "list of numbers"]),
@@ -234,6 +243,7 @@ mod tests {
             ),
             ("[[config]]\nname = \"d\"\nbackend = \"raster\"\naccumulator = \"fixed\"\n", &["accumulator:", "gpu"]),
             ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nerror_limit = -1\n", &["error_limit:"]),
+            ("[[config]]\nname = \"d\"\nbackend = \"raster\"\norganisation = \"tile\"\n", &["organisation:", "fixed"]),
             ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nmaps = [\"decision\"]\n", &["maps", "depth"]),
             ("size = [\n", &["line"]),
         ];

@@ -107,7 +107,8 @@ impl<'a> Case<'a> {
     }
 
     fn run(&self, outcome: &mut Outcome, progress: &dyn Progress) -> Result<()> {
-        let wanted = self.definition.configs.iter().filter(|config| config.takes(self.surfels()));
+        let wants = |config: &&Config| self.entry.configs.as_ref().is_none_or(|names| names.contains(&config.name));
+        let wanted = self.definition.configs.iter().filter(wants);
         let plans: Vec<(&Config, RenderOptions)> =
             wanted.map(|config| (config, config.options(self.entry.shading))).collect();
         let timed = self.time(&plans, &mut outcome.notes, progress)?;

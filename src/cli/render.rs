@@ -10,8 +10,8 @@ use epsplat::render::{Backend, Report, render};
 use epsplat::scene::camera::DEFAULT_FOV;
 use epsplat::scene::light::MAX_LIGHTS;
 use epsplat::scene::{
-    BlendFormat, Camera, Epsilon, Kernel, Lens, Light, LowPass, Maps, Raster, RasterDepth, RenderOptions, Scene,
-    Shading, Up,
+    BlendFormat, Camera, Epsilon, Kernel, Lens, Light, LowPass, Maps, Organisation, Raster, RasterDepth, RenderOptions,
+    Scene, Shading, Up,
 };
 use epsplat::{Error, Result, io, surfels};
 use glam::DVec3;
@@ -83,6 +83,10 @@ pub struct Arguments {
     /// How sums are kept on the device: fixed, fixed32, fixed64, packed64, float or cas (see the README)
     #[arg(long, value_name = "NAME", value_parser = parse_accumulator)]
     accumulator: Option<&'static str>,
+    /// How the device draws splats, to the same image: scatter (one by one), tile (by tiles of the image) or auto (large
+    /// ones by tiles) [default: auto]
+    #[arg(long, value_name = "HOW")]
+    organisation: Option<Organisation>,
     /// What --backend raster blends into: rgba8unorm, rgba16float or rgba32float [default: rgba16float]
     #[arg(long, value_name = "FORMAT")]
     blend_format: Option<BlendFormat>,
@@ -191,7 +195,7 @@ fn summary(report: &Report, output: &Path) -> String {
         _ => "",
     };
     format!(
-        "{}: {} of {} surfels in view, {:.1} ms ({}{clock})",
+        "{}: {} of {} surfels drawn, {:.1} ms ({}{clock})",
         output.display(),
         report.splats_drawn,
         report.surfels,
@@ -228,6 +232,7 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
             LowPassName::Ewa => LowPass::Ewa,
         },
         accumulator: arguments.accumulator.unwrap_or(default.accumulator),
+        organisation: organisation(arguments)?,
         raster: raster(arguments)?,
         shading: match arguments.shading {
             ShadingName::Unlit => Shading::Unlit,
@@ -237,6 +242,19 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
         background: arguments.background.unwrap_or(default.background),
         maps,
     })
+}
+
+/// How the compute kernels draw splats, of which only `fixed` has a choice.
+fn organisation(arguments: &Arguments) -> Result<Organisation> {
+    let kernels = matches!(arguments.backend, BackendName::Auto | BackendName::Gpu);
+    let fixed = arguments.accumulator.is_none_or(|name| name == RenderOptions::default().accumulator);
+    match arguments.organisation {
+        Some(_) if !kernels => Err(Error::Usage("--organisation is a choice of --backend gpu: leave it out".into())),
+        Some(Organisation::Tile) if !fixed => {
+            Err(Error::Usage("--organisation tile needs the accumulator fixed: leave one of them out".into()))
+        }
+        chosen => Ok(chosen.unwrap_or_default()),
+    }
 }
 
 /// The rasteriser's options, if it renders.

@@ -10,8 +10,12 @@ use crate::scene::{Bounds, Camera, Light, RenderOptions, Scene};
 /// Invocations of a workgroup, in every kernel.
 pub const WORKGROUP: u32 = 64;
 
-/// Splats whose bounds hold more pixels than this get a workgroup each instead of an invocation.
-pub const LARGE: u32 = 256;
+/// Splats whose bounds hold more pixels than this are drawn by tiles. Of 64, 128, 256, 512 and 1024 this gave the shortest
+/// frames of 30,000 and of 100,000 splats of a sphere on a software adapter.
+pub const LARGE_BY_TILES: u32 = 256;
+
+/// Where there are no tiles, splats whose bounds hold more pixels than this get a workgroup each instead of an invocation.
+pub const LARGE_BY_WORKGROUPS: u32 = 1024;
 
 /// Words at the start of a page's queue of large splats: how many there are, how many splats are out of view, and
 /// the grids that have a workgroup or an invocation for each of the large ones.

@@ -2,7 +2,7 @@
 //! [`accumulate`](super::accumulate) make, to the bit, a tile of the image at a time.
 //!
 //! A splat of a few pixels costs least if its invocation adds its fragments to memory (scatter); of one of thousands each
-//! fragment would wait for its atomics. So splats whose bounds hold more than [`LARGE`](crate::gpu::layout::LARGE) pixels are
+//! fragment would wait for its atomics. So splats whose bounds hold more than [`LARGE_BY_TILES`](crate::gpu::layout::LARGE_BY_TILES) pixels are
 //! binned: each tile of [`TILE_SIZE`] pixels has a list of those that may touch it, made by count, scan and place, and a
 //! workgroup that keeps its pixels' nearest depths, and then their sums, in registers. All splats share the nearest depths
 //! before any is accumulated. Opaque blending within epsilon does not ask for an order, so no list is sorted.

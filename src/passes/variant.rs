@@ -8,9 +8,11 @@ use super::lowpass::Design;
 use super::{cull, lowpass, raster};
 use crate::error::Result;
 use crate::gpu::kernel::Program;
-use crate::gpu::layout::LARGE;
+use crate::gpu::layout::{LARGE_BY_TILES, LARGE_BY_WORKGROUPS};
 use crate::gpu::{Gpu, Sources};
-use crate::scene::{ColorNeed, Kernel, KernelShape, LowPass, Projection, RasterDepth, RenderOptions, SceneNeeds};
+use crate::scene::{
+    ColorNeed, Kernel, KernelShape, LowPass, Organisation, Projection, RasterDepth, RenderOptions, SceneNeeds,
+};
 
 /// The entry points that a render with `needs` dispatches.
 fn stages(needs: &SceneNeeds) -> Vec<&'static str> {
@@ -205,11 +207,20 @@ pub fn color_channels(needs: &SceneNeeds) -> u32 {
     }
 }
 
+/// Splats whose bounds hold more pixels than this are large.
+fn large(needs: &SceneNeeds, options: &RenderOptions) -> u32 {
+    match (needs.tiles, options.organisation) {
+        (true, Organisation::Tile) => 0,
+        (true, _) => LARGE_BY_TILES,
+        (false, _) => LARGE_BY_WORKGROUPS,
+    }
+}
+
 /// The overridable constants of a render, by name.
 pub fn overrides(needs: &SceneNeeds, options: &RenderOptions, fraction_bits: u32) -> Vec<(&'static str, f64)> {
     let layout = PixelLayout::of(needs);
     let mut constants = vec![
-        ("LARGE", LARGE.into()),
+        ("LARGE", large(needs, options).into()),
         ("CHANNELS", layout.channels.into()),
         ("FRACTION_BITS", fraction_bits.into()),
         ("COLOR_CHANNELS", color_channels(needs).into()),

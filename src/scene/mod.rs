@@ -15,7 +15,7 @@ pub use camera::{Camera, Lens, Projection};
 pub use color::Colors;
 pub use light::Light;
 pub use needs::{ColorNeed, SceneNeeds};
-pub use options::{Epsilon, Kernel, KernelShape, LowPass, Maps, RenderOptions, Shading};
+pub use options::{Epsilon, Kernel, KernelShape, LowPass, Maps, Organisation, RenderOptions, Shading};
 pub use raster::{BlendFormat, Raster, RasterDepth};
 pub use scene::{Bounds, Scene, Up};
 pub use surfel::Surfel;

@@ -1,7 +1,8 @@
 //! What a scene and its options need, computed once: the only variant key of the kernels.
 
 use super::{
-    Camera, Colors, Epsilon, KernelShape, LowPass, Projection, Raster, RasterDepth, RenderOptions, Scene, Shading,
+    Camera, Colors, Epsilon, KernelShape, LowPass, Organisation, Projection, Raster, RasterDepth, RenderOptions, Scene,
+    Shading,
 };
 
 /// Where a surfel's colour comes from.
@@ -29,7 +30,7 @@ pub struct SceneNeeds {
     pub atomics_u64: bool,
     /// Batches of surfels that are out of view or hidden are left out.
     pub cull: bool,
-    /// Large splats are drawn by tiles.
+    /// Large splats are drawn by tiles: the accumulator is `fixed`, and the options do not say scatter.
     pub tiles: bool,
     /// A splat's record is read by a subgroup together, as the adapter's processor would else read it for each of its
     /// invocations.
@@ -95,7 +96,9 @@ impl SceneNeeds {
                 && (low[3] != high[3] || may_be_small(options)),
             atomics_u64: false,
             cull: false,
-            tiles: false,
+            tiles: options.accumulator == "fixed"
+                && options.raster.is_none()
+                && options.organisation != Organisation::Scatter,
             subgroups: false,
             raster: options.raster,
             triangles: options.raster.is_some() && 10 * scene.surfels.len() > camera.pixels(),
@@ -126,11 +129,9 @@ impl SceneNeeds {
         Self { cull: bands == 1 && self.raster.is_none(), ..self }
     }
 
-    /// The same with tiles for large splats, where the accumulator can: on an adapter whose `subgroups` should share what they
-    /// read, or not.
-    pub fn with_tiles(self, subgroups: bool) -> Self {
-        let tiles = self.accumulator == "fixed" && self.raster.is_none();
-        Self { tiles, subgroups: tiles && subgroups, ..self }
+    /// The same on an adapter whose `subgroups` should share what they read, or not.
+    pub fn with_subgroups(self, subgroups: bool) -> Self {
+        Self { subgroups: self.tiles && subgroups, ..self }
     }
 
     /// The needs by name, for people and JSON.

@@ -174,6 +174,31 @@ pub enum LowPass {
     Ewa,
 }
 
+/// How the compute kernels draw splats. The image is the same to the bit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Organisation {
+    /// Small ones one by one, large ones by tiles of the image.
+    #[default]
+    Auto,
+    /// One by one, large ones by a workgroup each.
+    Scatter,
+    /// All by tiles.
+    Tile,
+}
+
+impl FromStr for Organisation {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            "scatter" => Ok(Self::Scatter),
+            "tile" => Ok(Self::Tile),
+            _ => Err(Error::Usage(format!("there is no organisation {text:?}: take auto, scatter or tile"))),
+        }
+    }
+}
+
 /// How a resolved pixel gets its colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -212,6 +237,8 @@ pub struct RenderOptions {
     pub low_pass: LowPass,
     /// Name of the device's accumulator; see [`crate::passes::accumulate::ACCUMULATORS`].
     pub accumulator: &'static str,
+    /// How the device draws splats; accumulators other than `fixed` scatter.
+    pub organisation: Organisation,
     /// Sums by the rasteriser instead, on a GPU.
     pub raster: Option<Raster>,
     /// Shading model.
@@ -231,6 +258,7 @@ impl Default for RenderOptions {
             kernel: Kernel::Ellipse { a: 6.0, n: 3.0, smooth: false },
             low_pass: LowPass::None,
             accumulator: "fixed",
+            organisation: Organisation::Auto,
             raster: None,
             shading: Shading::Lambert,
             lights: vec![Light::Headlight { intensity: 1.0 }],

@@ -44,8 +44,6 @@ pub(super) struct Timed<'a> {
     passes: BTreeMap<String, Vec<f64>>,
     /// What the last run showed, a frame for each camera.
     pub frames: Vec<Frame>,
-    /// Splats drawn, mean over the cameras.
-    drawn: f64,
     bytes: DeviceBytes,
     /// Whether the last run has the bits of the first.
     stable: bool,
@@ -169,7 +167,6 @@ impl<'a> Case<'a> {
                 total_ms: Vec::new(),
                 passes: BTreeMap::new(),
                 frames: Vec::new(),
-                drawn: lap.drawn,
                 bytes: renderer.device_bytes(),
                 stable: true,
             };
@@ -219,7 +216,6 @@ impl<'a> Case<'a> {
                 other => Unfit::Failed(other),
             })?;
             lap.total_ms += share * report.total_ms;
-            lap.drawn += share * report.splats_drawn as f64;
             lap.overflows += report.overflows;
             for (pass, ms) in report.passes {
                 *lap.passes.entry(pass.trim_end_matches("_ms").to_owned()).or_default() += share * ms;
@@ -270,7 +266,7 @@ impl<'a> Case<'a> {
             height,
             total_ms,
             passes: passes.collect(),
-            splats_per_second: per_second(timed.drawn),
+            splats_per_second: per_second(self.surfels() as f64),
             fragments_per_second: Some(per_second(error.fragments)),
             bytes_per_splat: timed.bytes.splats as f64 / self.surfels().max(1) as f64,
             device_bytes: timed.bytes.splats + timed.bytes.pixels,
@@ -289,7 +285,6 @@ struct Lap {
     total_ms: f64,
     passes: BTreeMap<String, f64>,
     frames: Vec<Frame>,
-    drawn: f64,
     overflows: u64,
 }
 

@@ -71,7 +71,7 @@ pub struct Measurement {
     pub total_ms: Summary,
     /// Time of each pass by its name, milliseconds.
     pub passes: BTreeMap<String, Summary>,
-    /// Splats drawn per second of the median time.
+    /// Surfels of the scene per second of the median time, whether a backend draws all of them or finds some hidden.
     pub splats_per_second: f64,
     /// Fragments blended per second of the median time; none if they were not counted.
     pub fragments_per_second: Option<f64>,

@@ -23,7 +23,7 @@ fn generated(shape: Shape, count: u64) -> Scene {
         normals: Some(samples.iter().map(|s| s.normal).collect()),
         radii: Some(samples.iter().map(|s| s.radius).collect()),
         colors: Some(Colors::Srgb8(samples.iter().map(|s| [s.color[0], s.color[1], s.color[2], 255]).collect())),
-        up: None,
+        ..io::Points::default()
     };
     build(vec![points], &()).unwrap().0
 }

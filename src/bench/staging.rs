@@ -93,7 +93,7 @@ fn of_shape(shape: Shape, count: u64, radius: Option<f64>) -> Points {
         normals: Some(samples.clone().map(|sample| sample.normal).collect()),
         radii: Some(samples.clone().map(|sample| sample.radius * factor).collect()),
         colors: Some(Colors::Srgb8(samples.map(|sample| opaque(sample.color)).collect())),
-        up: None,
+        ..Points::default()
     }
 }
 

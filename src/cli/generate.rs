@@ -39,14 +39,21 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         if index % 65_536 == 65_535 {
             bars.advance(65_536);
         }
+        let [r, g, b] = sample.color;
         ply::Vertex {
             position: sample.position,
             normal: sample.normal,
             radius: sample.radius,
-            color: Some(sample.color),
+            color: Some(ply::Color::Srgb8([r, g, b, 255])),
+            ..ply::Vertex::default()
         }
     });
-    let properties = ply::Properties { double_coordinates: false, colors: true };
+    let properties = ply::Properties {
+        normals: true,
+        radii: true,
+        colors: ply::ColorProperties::Srgb8,
+        ..ply::Properties::default()
+    };
     ply::write(&arguments.output, properties, arguments.count, vertices)?;
     bars.end();
     note(&format!("{}: {} surfels", arguments.output.display(), arguments.count));

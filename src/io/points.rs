@@ -15,8 +15,13 @@ pub struct Points {
     pub normals: Option<Vec<[f32; 3]>>,
     /// One disk radius each, world units; not positive or not finite means missing.
     pub radii: Option<Vec<f32>>,
+    /// Half-axes s and t of one elliptical disk each, world units, with the normal s x t; they stand in for normal and radius
+    /// where they span an ellipse. Zero, parallel or non-finite ones mean missing.
+    pub axes: Option<Vec<[[f32; 3]; 2]>>,
     /// Colours, never [`Colors::Constant`].
     pub colors: Option<Colors>,
+    /// Texture coordinates (u, v), origin bottom left as in OBJ.
+    pub texture: Option<Vec<[f32; 2]>>,
     /// The direction that the format, by convention, calls up.
     pub up: Option<Up>,
 }

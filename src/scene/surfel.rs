@@ -29,6 +29,21 @@ impl Surfel {
         Self { center: center.to_array(), s: (s * radius).to_array(), t: (t * radius).to_array() }
     }
 
+    /// The ellipse `center + u s + v t`, `u² + v² <= 1`, for any s and t that are not parallel. Those that are not
+    /// perpendicular are turned, within the ellipse, into the half-axes that are.
+    pub fn ellipse(center: Vec3, s: Vec3, t: Vec3) -> Self {
+        // What f32 half-axes that were meant to be perpendicular miss it by.
+        const ROUNDING: f64 = 1e-6;
+        let (mut s, mut t) = (s.as_dvec3(), t.as_dvec3());
+        if s.dot(t).abs() > ROUNDING * s.length() * t.length() {
+            // (cos a, sin a) and (-sin a, cos a) are diametrically opposite to each other in (u, v) too, so they give the
+            // same ellipse with the same s x t; their images are perpendicular for this a.
+            let angle = 0.5 * (2.0 * s.dot(t)).atan2(s.length_squared() - t.length_squared());
+            (s, t) = (s * angle.cos() + t * angle.sin(), t * angle.cos() - s * angle.sin());
+        }
+        Self { center: center.to_array(), s: s.as_vec3().to_array(), t: t.as_vec3().to_array() }
+    }
+
     /// The unnormalised normal s x t; its length is the product of the half-axes for perpendicular axes.
     pub fn normal(&self) -> Vec3 {
         Vec3::from_array(self.s).cross(Vec3::from_array(self.t))
@@ -37,5 +52,31 @@ impl Surfel {
     /// The radius of the bounding sphere: the longer half-axis, for perpendicular axes.
     pub fn radius(&self) -> f32 {
         Vec3::from_array(self.s).length().max(Vec3::from_array(self.t).length())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn oblique_half_axes_become_perpendicular_ones_of_the_same_ellipse() {
+        let (s, t) = (Vec3::new(3.0, 1.0, 0.5), Vec3::new(2.0, -1.0, 0.25));
+        let surfel = Surfel::ellipse(Vec3::ONE, s, t);
+        let (major, minor) = (Vec3::from_array(surfel.s), Vec3::from_array(surfel.t));
+        assert!(major.dot(minor).abs() < 1e-6 * major.length() * minor.length());
+        assert!(surfel.normal().distance(s.cross(t)) < 1e-5 * s.cross(t).length());
+        for step in 0..100 {
+            let (sin, cos) = (step as f32 * 0.0628).sin_cos();
+            let rim = s * cos + t * sin;
+            let (u, v) = (rim.dot(major) / major.length_squared(), rim.dot(minor) / minor.length_squared());
+            assert!((u.hypot(v) - 1.0).abs() < 1e-5, "{u} {v}");
+        }
+        // The axes as they came miss it.
+        let rim = s * 0.8 + t * 0.6;
+        assert!((rim.dot(s) / s.length_squared()).hypot(rim.dot(t) / t.length_squared()) > 1.1);
+        let (s, t) = (Vec3::new(0.1, 0.0, 0.0), Vec3::new(0.0, 0.3, 0.7));
+        let kept = Surfel::ellipse(Vec3::ZERO, s, t);
+        assert_eq!((kept.s, kept.t), (s.to_array(), t.to_array()));
     }
 }

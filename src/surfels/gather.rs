@@ -14,6 +14,8 @@ pub(crate) struct Gathered {
     pub normals: Option<Vec<[f32; 3]>>,
     /// As given; zero where missing. None if no input has any.
     pub radii: Option<Vec<f32>>,
+    /// As given; zero where missing. None if no input has any.
+    pub axes: Option<Vec<[[f32; 3]; 2]>>,
     /// The colours of the points.
     pub colors: Colors,
     /// What the inputs say.
@@ -26,7 +28,7 @@ pub(crate) struct Gathered {
 pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
     let mut preparation = Preparation::default();
     let mut positions = Vec::new();
-    let (mut normals, mut radii) = (None, None);
+    let (mut normals, mut radii, mut axes) = (None, None, None);
     let mut colors = ColorGatherer::new();
     let mut up = None;
     let input_count = inputs.len();
@@ -40,6 +42,7 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
             retain(&mut input.positions, &keep);
             input.normals.iter_mut().for_each(|all| retain(all, &keep));
             input.radii.iter_mut().for_each(|all| retain(all, &keep));
+            input.axes.iter_mut().for_each(|all| retain(all, &keep));
             match &mut input.colors {
                 Some(Colors::Srgb8(codes)) => retain(codes, &keep),
                 Some(Colors::Linear(colors)) => retain(colors, &keep),
@@ -49,6 +52,7 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
         let before = positions.len();
         append(&mut normals, before, input.normals, kept);
         append(&mut radii, before, input.radii, kept);
+        append(&mut axes, before, input.axes, kept);
         colors.append(input.colors, kept);
         if positions.is_empty() {
             positions = input.positions;
@@ -76,7 +80,7 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
         *coordinate += 0.0;
     }
     preparation.replaced_colors = colors.replaced;
-    Ok(Gathered { positions, normals, radii, colors: colors.finish(), up, preparation })
+    Ok(Gathered { positions, normals, radii, axes, colors: colors.finish(), up, preparation })
 }
 
 fn is_usable(position: &[f64; 3]) -> bool {

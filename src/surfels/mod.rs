@@ -60,7 +60,7 @@ impl Preparation {
 
 /// Makes one scene of the points of all inputs.
 ///
-/// Surfels keep the order of the points, and each is a disk. What a point lacks is estimated from its neighbours among
+/// Surfels keep the order of the points. Each is the ellipse of its half-axes where they are given, else a disk. What a point lacks is estimated from its neighbours among
 /// all points; the result for a point does not depend on the order the points come in, to the last bit.
 ///
 /// # Errors
@@ -68,17 +68,20 @@ impl Preparation {
 /// [`Error::EmptyScene`](crate::Error::EmptyScene) if no input holds a usable point, and
 /// [`Error::Usage`](crate::Error::Usage) if normals or radii are missing and there are more than 2^32 - 1 points.
 pub fn build(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Preparation)> {
-    let Gathered { positions, normals, radii, colors, up, mut preparation } = gather::gather(inputs)?;
+    let Gathered { positions, normals, radii, axes, colors, up, mut preparation } = gather::gather(inputs)?;
     let bounds = bounds_of(&positions);
     let origin = origin_for(&bounds);
     let up = up.unwrap_or_else(|| guess_up(&bounds));
 
+    let given_axes = |i: usize| axes.as_ref().and_then(|all| usable_axes(*all.get(i)?));
     let given_normal = |i: usize| normals.as_ref().and_then(|all| unit(*all.get(i)?));
     let given_radius = |i: usize| radii.as_ref().and_then(|all| usable_radius(*all.get(i)?));
+    let lacks_normal = |i: usize| given_normal(i).is_none() && given_axes(i).is_none();
+    let lacks_radius = |i: usize| given_radius(i).is_none() && given_axes(i).is_none();
     let count = positions.len();
     preparation.surfels = count as u64;
-    preparation.estimated_normals = (0..count).into_par_iter().filter(|&i| given_normal(i).is_none()).count() as u64;
-    preparation.estimated_radii = (0..count).into_par_iter().filter(|&i| given_radius(i).is_none()).count() as u64;
+    preparation.estimated_normals = (0..count).into_par_iter().filter(|&i| lacks_normal(i)).count() as u64;
+    preparation.estimated_radii = (0..count).into_par_iter().filter(|&i| lacks_radius(i)).count() as u64;
 
     let mut estimates: Option<(DistinctPositions, Vec<Estimate>)> = None;
     if preparation.estimated_normals > 0 || preparation.estimated_radii > 0 {
@@ -89,7 +92,7 @@ pub fn build(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Pre
         let wanted = (!all).then(|| {
             let mut wanted = vec![false; distinct.len()];
             for (i, &position) in distinct.of_point().iter().enumerate() {
-                wanted[position as usize] |= given_normal(i).is_none() || given_radius(i).is_none();
+                wanted[position as usize] |= lacks_normal(i) || lacks_radius(i);
             }
             wanted
         });
@@ -111,6 +114,9 @@ pub fn build(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Pre
         .map(|(i, position)| {
             // Adding +0 makes -0 the same coordinate as 0.
             let center = (DVec3::from_array(*position) - origin).as_vec3() + Vec3::ZERO;
+            if let Some([s, t]) = given_axes(i) {
+                return Surfel::ellipse(center, s, t);
+            }
             let normal = given_normal(i).unwrap_or_else(|| Vec3::from_array(estimate_of(i).normal));
             let radius = given_radius(i).unwrap_or_else(|| estimate_of(i).radius);
             Surfel::disk(center, normal, radius)
@@ -132,6 +138,19 @@ fn unit(normal: [f32; 3]) -> Option<Vec3> {
 fn usable_radius(radius: f32) -> Option<f32> {
     let (smallest, largest) = RADIUS_RANGE;
     (radius.is_finite() && radius > 0.0).then(|| radius.clamp(smallest as f32, largest as f32))
+}
+
+/// The half-axes, or None if they span no ellipse that an f32 can say, or one outside [`RADIUS_RANGE`].
+fn usable_axes(axes: [[f32; 3]; 2]) -> Option<[Vec3; 2]> {
+    /// Below this sine of the angle between them, two half-axes are one.
+    const PARALLEL: f64 = 1e-6;
+    let (smallest, largest) = RADIUS_RANGE;
+    let [s, t] = axes.map(|axis| DVec3::from_array(axis.map(f64::from)));
+    let (shorter, longer) = (s.length().min(t.length()), s.length().max(t.length()));
+    // Half-axes that are not perpendicular stand for a shorter one, and for a longer one by at most a square root of two.
+    let shortest = s.cross(t).length() / (1.5 * longer);
+    let sound = longer <= largest / 1.5 && shortest >= smallest.max(PARALLEL * shorter);
+    sound.then(|| axes.map(Vec3::from_array))
 }
 
 /// The box of the positions, world units.

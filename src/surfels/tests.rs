@@ -52,7 +52,7 @@ fn unusable_points_are_dropped_with_their_attributes() {
         normals: Some(vec![[0.0, 0.0, 2.0], [1.0, 0.0, 0.0], [0.0, 1e-30, 0.0]]),
         radii: Some(vec![0.5, 1.0, 0.25]),
         colors: Some(Colors::Srgb8(vec![[1; 4], [2; 4], [3; 4]])),
-        up: None,
+        ..Points::default()
     };
     let (scene, preparation) = build(vec![input], &()).unwrap();
     assert_eq!(scene.colors, Colors::Srgb8(vec![[1; 4], [3; 4]]));
@@ -60,6 +60,34 @@ fn unusable_points_are_dropped_with_their_attributes() {
     assert_eq!(scene.surfels[1], Surfel::disk(Vec3::X, Vec3::Y, 0.25));
     let expected = Preparation { points: 3, dropped_non_finite: 1, surfels: 2, ..Preparation::default() };
     assert_eq!(preparation, expected);
+}
+
+#[test]
+fn half_axes_come_before_normals_and_radii() {
+    let unusable = [
+        [[0.0; 3]; 2],
+        [[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]],
+        [[f32::NAN, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        [[1e-30, 0.0, 0.0], [0.0, 1.0, 0.0]],
+    ];
+    let given = [[0.0, 3.0, 0.0], [0.0, 0.0, 0.5]];
+    let input = Points {
+        positions: (0..5).map(|i| [f64::from(i), 0.0, 0.0]).collect(),
+        normals: Some(vec![[0.0, 0.0, 1.0]; 5]),
+        radii: Some(vec![0.25; 5]),
+        axes: Some(unusable.into_iter().chain([given]).collect()),
+        ..Points::default()
+    };
+    let (scene, preparation) = build(vec![input.clone()], &()).unwrap();
+    assert_eq!((preparation.estimated_normals, preparation.estimated_radii, scene.oriented), (0, 0, true));
+    for (i, surfel) in scene.surfels[..4].iter().enumerate() {
+        assert_eq!(*surfel, Surfel::disk(Vec3::X * i as f32, Vec3::Z, 0.25));
+    }
+    assert_eq!((scene.surfels[4].s, scene.surfels[4].t), (given[0], given[1]));
+    assert_eq!(scene.surfels[4].normal().normalize(), Vec3::X);
+    let without = Points { normals: None, radii: None, ..input };
+    let (_, preparation) = build(vec![without], &()).unwrap();
+    assert_eq!((preparation.estimated_normals, preparation.estimated_radii), (4, 4));
 }
 
 #[test]
@@ -232,6 +260,7 @@ proptest! {
         collinear in any::<bool>(),
         normals in prop::option::of(prop::collection::vec(prop::array::uniform3(any::<f32>()), 0..60)),
         radii in prop::option::of(prop::collection::vec(any::<f32>(), 0..60)),
+        axes in prop::option::of(prop::collection::vec(prop::array::uniform2(prop::array::uniform3(any::<f32>())), 0..60)),
         colors in prop::option::of(prop::collection::vec(prop::array::uniform4(any::<f32>()), 0..60)),
         scale in prop_oneof![3 => Just(1.0), 1 => Just(1e-150), 1 => Just(1e-30), 1 => Just(1e17)],
     ) {
@@ -244,8 +273,9 @@ proptest! {
             positions: positions.iter().cycle().take(total).copied().collect(),
             normals,
             radii,
+            axes,
             colors: colors.map(Colors::Linear),
-            up: None,
+            ..Points::default()
         };
         match build(vec![input], &()) {
             Ok((scene, preparation)) => {

@@ -1,7 +1,8 @@
 //! PLY files that must be read, and what is written.
 
 use super::Folder;
-use epsplat::io::ply::{Properties, Vertex, write};
+use epsplat::io::Points;
+use epsplat::io::ply::{Color, ColorProperties, Properties, Vertex, write, write_points};
 use epsplat::scene::Colors;
 use epsplat::scene::color::srgb_to_linear;
 
@@ -241,6 +242,136 @@ fn many_blocks_of_rows_join_without_a_seam() {
 }
 
 #[test]
+fn half_axes_and_texture_coordinates_are_found_by_name() {
+    let folder = Folder::new();
+    let axes = ["sx", "sy", "sz", "tx", "ty", "tz"];
+    for encoding in ENCODINGS {
+        for names in [["texture_u", "texture_v"], ["texcoord_u", "texcoord_v"], ["s", "t"], ["u", "v"]] {
+            let mut properties = vec![("double", "x"), ("float", names[1]), ("float", "y"), ("float", "z")];
+            properties.extend(axes.iter().map(|name| ("float", *name)));
+            properties.push(("double", names[0]));
+            let row: &[f64] = &[1.0, 0.75, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 0.25];
+            let points = folder.read("a.ply", &file(encoding, &[("vertex", &properties, &[row])])).unwrap();
+            assert_eq!(points.axes.unwrap(), [[[4.0, 5.0, 6.0], [7.0, 8.0, 9.0]]], "{encoding}");
+            assert_eq!(points.texture.unwrap(), [[0.25, 0.75]], "{encoding} {names:?}");
+            // One name without its partner says nothing.
+            let points = folder.read("a.ply", &file(encoding, &[("vertex", &properties[..9], &[&row[..9]])])).unwrap();
+            assert_eq!((points.axes, points.texture), (None, None));
+        }
+    }
+}
+
+/// Vertices as MeshLab, CloudCompare, Open3D and the Point Cloud Library lay them out, with what else they write.
+#[test]
+fn files_of_other_programs_are_read() {
+    let folder = Folder::new();
+    let position = [("float", "x"), ("float", "y"), ("float", "z")];
+    let normal = [("float", "nx"), ("float", "ny"), ("float", "nz")];
+    let color = [("uchar", "red"), ("uchar", "green"), ("uchar", "blue"), ("uchar", "alpha")];
+    let meshlab = [("float", "quality"), ("float", "radius"), ("float", "texture_u"), ("float", "texture_v")];
+    let cloudcompare = [("float", "scalar_Intensity"), ("float", "scalar_Original cloud index"), ("float", "scalar_u")];
+    let pcl = [("float", "intensity"), ("float", "curvature"), ("int", "label")];
+    let face = [("list uchar int", "vertex_indices"), ("list uchar float", "texcoord"), ("int", "texnumber")];
+    let faces: [&[f64]; 1] = [&[3.0, 0.0, 0.0, 0.0, 6.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0]];
+    let camera = [("float", "view_px"), ("int", "viewportx"), ("float", "k2")];
+    let row = |values: &[&[f64]]| values.concat();
+    let (at, up, rgba) = (&[1.0, 2.0, 3.0][..], &[0.0, 0.0, 1.0][..], &[9.0, 8.0, 7.0, 255.0][..]);
+    for encoding in ENCODINGS {
+        let flags = [("int", "flags")];
+        let properties = [&position[..], &normal, &flags, &color, &meshlab].concat();
+        let vertex = row(&[at, up, &[0.0], rgba, &[0.5, 0.25, 0.125, 0.75]]);
+        let vertices: [&[f64]; 1] = [&vertex];
+        let elements = [("camera", &camera[..], &[&[1.0, 2.0, 3.0][..]][..]), ("vertex", &properties, &vertices)];
+        let points =
+            folder.read("a.ply", &file(encoding, &[elements[0], elements[1], ("face", &face, &faces)])).unwrap();
+        assert_eq!((points.normals, points.radii), (Some(vec![[0.0, 0.0, 1.0]]), Some(vec![0.25])), "{encoding}");
+        assert_eq!(
+            (points.colors, points.texture),
+            (Some(Colors::Srgb8(vec![[9, 8, 7, 255]])), Some(vec![[0.125, 0.75]]))
+        );
+
+        for fields in [&cloudcompare, &pcl] {
+            let properties = [&position[..], &color[..3], &normal, fields].concat();
+            let vertex = row(&[at, &rgba[..3], up, &[1.0, 2.0, 3.0]]);
+            let points = folder.read("a.ply", &file(encoding, &[("vertex", &properties, &[&vertex])])).unwrap();
+            assert_eq!((points.positions, points.texture, points.radii), (vec![[1.0, 2.0, 3.0]], None, None));
+            assert_eq!(
+                (points.normals, points.colors),
+                (Some(vec![[0.0, 0.0, 1.0]]), Some(Colors::Srgb8(vec![[9, 8, 7, 255]])))
+            );
+        }
+
+        let open3d = [&position[..], &normal].concat().into_iter().map(|(_, name)| ("double", name));
+        let properties = open3d.chain(color[..3].iter().copied()).collect::<Vec<_>>();
+        let vertex = row(&[at, up, &rgba[..3]]);
+        let points = folder.read("a.ply", &file(encoding, &[("vertex", &properties, &[&vertex])])).unwrap();
+        assert_eq!((points.normals, points.axes), (Some(vec![[0.0, 0.0, 1.0]]), None));
+    }
+}
+
+/// Points with every attribute, of which `attributes` chooses: a bit each.
+fn points_with(attributes: u32) -> Points {
+    let count = 300;
+    let all = 0..count;
+    let on = |bit: u32| attributes & 1 << bit != 0;
+    let real = |i: usize, k: usize| (i * 7 + k) as f32 * 0.1 - 3.0;
+    let wide = |i: usize| 6_123_456.001 + i as f64 * 1e-3;
+    Points {
+        positions: all.clone().map(|i| [if on(0) { wide(i) } else { i as f64 * 0.5 }, -0.25, 2.0]).collect(),
+        normals: on(1).then(|| all.clone().map(|i| [real(i, 0), real(i, 1), f32::NAN]).collect()),
+        radii: on(2).then(|| all.clone().map(|i| real(i, 2)).collect()),
+        axes: on(3).then(|| all.clone().map(|i| [[real(i, 3), 0.5, 0.0], [0.0, -0.0, real(i, 4)]]).collect()),
+        colors: match attributes >> 4 & 3 {
+            0 => None,
+            1 => Some(Colors::Srgb8(all.clone().map(|i| [i as u8, 2, 3, 255]).collect())),
+            2 => Some(Colors::Srgb8(all.clone().map(|i| [i as u8, 2, 3, 255 - i as u8]).collect())),
+            _ => Some(Colors::Linear(all.clone().map(|i| [real(i, 5), 1e6, 0.0, 0.5]).collect())),
+        },
+        texture: on(6).then(|| all.map(|i| [real(i, 6), real(i, 7)]).collect()),
+        up: None,
+    }
+}
+
+#[test]
+fn every_attribute_survives_to_the_byte() {
+    let folder = Folder::new();
+    let (first, second) = (folder.path("first.ply"), folder.path("second.ply"));
+    let mut contents = Vec::new();
+    for attributes in 0..1 << 7 {
+        let points = points_with(attributes);
+        write_points(&first, &points, &()).unwrap();
+        let read = epsplat::io::read(&first, &()).unwrap();
+        let text = |points: &Points| format!("{points:?}");
+        if points.axes.is_none() {
+            assert_eq!(text(&read), text(&points), "{attributes:b}");
+        } else {
+            // Half-axes bring a normal and a radius along.
+            let rest = Points { normals: read.normals.clone(), radii: read.radii.clone(), ..points };
+            assert_eq!(text(&read), text(&rest), "{attributes:b}");
+        }
+        write_points(&second, &read, &()).unwrap();
+        let bytes = std::fs::read(&first).unwrap();
+        assert_eq!(std::fs::read(&second).unwrap(), bytes, "{attributes:b}");
+        contents.push(bytes);
+    }
+    contents.sort();
+    contents.dedup();
+    // Only normals and radii that half-axes imply make no difference that is seen here, and those here differ.
+    assert_eq!(contents.len(), 1 << 7);
+}
+
+#[test]
+fn half_axes_bring_a_normal_and_the_longer_radius() {
+    let folder = Folder::new();
+    let path = folder.path("a.ply");
+    let axes = vec![[[0.0, 3.0, 0.0], [0.0, 0.0, 4.0]], [[2.0, 0.0, 0.0], [1.0, 0.0, 0.0]]];
+    let points = Points { positions: vec![[0.0; 3]; 2], axes: Some(axes), ..Points::default() };
+    write_points(&path, &points, &()).unwrap();
+    let read = epsplat::io::read(&path, &()).unwrap();
+    assert_eq!((read.normals.unwrap(), read.radii.unwrap()), (vec![[1.0, 0.0, 0.0], [0.0; 3]], vec![4.0, 2.0]));
+}
+
+#[test]
 fn what_is_written_is_read_again() {
     let folder = Folder::new();
     let path = folder.path("out.ply");
@@ -249,12 +380,14 @@ fn what_is_written_is_read_again() {
             position: [6_000_000.001 + f64::from(i), 0.5 * f64::from(i), -1.0],
             normal: [0.0, 0.6, 0.8],
             radius: 0.25 + i as f32,
-            color: (i % 2 == 0).then_some([i as u8, 2, 3]),
+            color: (i % 2 == 0).then_some(Color::Srgb8([i as u8, 2, 3, 255])),
+            ..Vertex::default()
         })
         .collect();
     for double_coordinates in [false, true] {
-        for colors in [false, true] {
-            let properties = Properties { double_coordinates, colors };
+        for colors in [ColorProperties::Absent, ColorProperties::Srgb8] {
+            let (normals, radii) = (true, true);
+            let properties = Properties { double_coordinates, normals, radii, colors, ..Properties::default() };
             write(&path, properties, 1000, vertices.iter().copied()).unwrap();
             let points = epsplat::io::read(&path, &()).unwrap();
             for (i, vertex) in vertices.iter().enumerate() {
@@ -264,8 +397,10 @@ fn what_is_written_is_read_again() {
             assert_eq!(points.normals.unwrap(), vec![[0.0, 0.6, 0.8]; 1000]);
             assert_eq!(points.radii.unwrap()[7], 7.25);
             match points.colors {
-                Some(Colors::Srgb8(codes)) if colors => assert_eq!(codes[..2], [[0, 2, 3, 255], [218, 218, 218, 255]]),
-                other => assert!(!colors && other.is_none()),
+                Some(Colors::Srgb8(codes)) if colors == ColorProperties::Srgb8 => {
+                    assert_eq!(codes[..2], [[0, 2, 3, 255], [218, 218, 218, 255]])
+                }
+                other => assert!(colors == ColorProperties::Absent && other.is_none()),
             }
         }
     }

@@ -116,6 +116,7 @@ fn points(lines: Lines, models: &[tobj::Model]) -> Points {
         radii: has_faces.then_some(radii),
         colors: (!lines.colors.is_empty()).then_some(Colors::Linear(lines.colors)),
         up: Some(Up::Y),
+        ..Points::default()
     }
 }
 

@@ -166,6 +166,7 @@ fn property<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Property> {
         }
         scalar => Kind::Scalar(Scalar::parse(scalar)?),
     };
-    let name = words.next()?.to_owned();
-    words.next().is_none().then_some(Property { name, kind })
+    // A name has no spaces, but a scalar field's name, which programs make properties of, may.
+    let name = words.collect::<Vec<_>>().join(" ");
+    (!name.is_empty()).then_some(Property { name, kind })
 }

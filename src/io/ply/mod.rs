@@ -1,4 +1,19 @@
 //! PLY: a streaming reader for clouds of tens of millions of vertices, and a writer of surfels.
+//!
+//! Written files are binary little-endian; each vertex has those of these properties that are known, in this order:
+//!
+//! | properties | type | what |
+//! |---|---|---|
+//! | `x y z` | `float`, or `double` where an f32 would lose digits | centre p, world units |
+//! | `nx ny nz` | `float` | normal, outward |
+//! | `radius` | `float` | radius of the disk, world units; of an ellipse its longer half-axis |
+//! | `sx sy sz tx ty tz` | `float` | half-axes s and t of the ellipse p + u s + v t, u² + v² <= 1, world units; its normal is s x t |
+//! | `red green blue` | `uchar`: 8-bit sRGB; `float`: linear light | colour |
+//! | `alpha` | as the colour | opacity, straight |
+//! | `texture_u texture_v` | `float` | texture coordinates, origin bottom left |
+//!
+//! The names of normals, colours and texture coordinates are those of MeshLab, which ignores the half-axes, as do
+//! CloudCompare and Open3D: to them such a file is a cloud with normals and colours.
 
 mod header;
 mod read;
@@ -6,4 +21,4 @@ mod vertex;
 mod write;
 
 pub use read::read;
-pub use write::{Properties, Vertex, write};
+pub use write::{Color, ColorProperties, Properties, Vertex, write, write_points};

@@ -19,6 +19,8 @@ const TOKEN_LIMIT: usize = 1 << 10;
 ///
 /// - `x y z` of any scalar type become f64 positions.
 /// - `nx ny nz` become normals, `radius` (or else `scale`) radii in world units.
+/// - `sx sy sz` and `tx ty tz`, all six, become half-axes in world units.
+/// - `texture_u texture_v` (also `texcoord_u texcoord_v`, `s t`, `u v`) become texture coordinates.
 /// - `red green blue` (also `r g b`, `diffuse_red ...`) with optional `alpha`: `uchar` are 8-bit sRGB codes and stay so;
 ///   `ushort` are 16-bit sRGB codes and become linear light; `float` and `double` are linear light as they are; other
 ///   integers are taken for 8-bit codes. Alpha is straight and linear in each case.

@@ -65,9 +65,15 @@ pub(super) struct Layout {
     position: [usize; 3],
     normal: Option<[usize; 3]>,
     radius: Option<usize>,
+    axes: Option<[[usize; 3]; 2]>,
     color: Option<[(usize, Coding); 3]>,
     alpha: Option<(usize, Coding)>,
+    texture: Option<[usize; 2]>,
 }
+
+/// What programs call texture coordinates, the most telling names first.
+const TEXTURE_NAMES: [[&str; 2]; 5] =
+    [["texture_u", "texture_v"], ["texcoord_u", "texcoord_v"], ["s", "t"], ["u", "v"], ["texcoord_s", "texcoord_t"]];
 
 impl Layout {
     pub(super) fn of(vertex: &Element) -> Result<Self, Fault> {
@@ -103,9 +109,23 @@ impl Layout {
             triple([&["red", "r", "diffuse_red"], &["green", "g", "diffuse_green"], &["blue", "b", "diffuse_blue"]]);
         let alpha = color.and_then(|_| column(&["alpha", "a", "diffuse_alpha"]));
         let radius = column(&["radius", "scale"]);
+        let mut axis = |names: [&str; 3]| Some([column(&names[..1])?, column(&names[1..2])?, column(&names[2..])?]);
+        let axes = axis(["sx", "sy", "sz"]).zip(axis(["tx", "ty", "tz"])).map(<[_; 2]>::from);
+        let texture = TEXTURE_NAMES.iter().find_map(|[u, v]| Some([column(&[u])?, column(&[v])?]));
         let coded = |index: usize| (index, Coding::of(columns[index].scalar));
         let (color, alpha) = (color.map(|color| color.map(coded)), alpha.map(coded));
-        Ok(Self { columns, scalars, row_size: offset, position: [x, y, z], normal, radius, color, alpha })
+        Ok(Self {
+            columns,
+            scalars,
+            row_size: offset,
+            position: [x, y, z],
+            normal,
+            radius,
+            axes,
+            color,
+            alpha,
+            texture,
+        })
     }
 
     /// Whether colours stay the 8-bit codes they are in the file.
@@ -121,6 +141,8 @@ pub(super) struct Vertices<'a> {
     positions: Vec<[f64; 3]>,
     normals: Vec<[f32; 3]>,
     radii: Vec<f32>,
+    axes: Vec<[[f32; 3]; 2]>,
+    texture: Vec<[f32; 2]>,
     srgb8: Vec<[u8; 4]>,
     linear: Vec<[f32; 4]>,
 }
@@ -129,10 +151,13 @@ impl<'a> Vertices<'a> {
     /// Room for `rows`, which must be a number that the file's length allows.
     pub(super) fn with_capacity(layout: &'a Layout, rows: u64) -> Result<Self, Fault> {
         let (mut positions, mut normals, mut radii) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut axes, mut texture) = (Vec::new(), Vec::new());
         let (mut srgb8, mut linear) = (Vec::new(), Vec::new());
         reserve(&mut positions, rows)?;
         reserve(&mut normals, if layout.normal.is_some() { rows } else { 0 })?;
         reserve(&mut radii, if layout.radius.is_some() { rows } else { 0 })?;
+        reserve(&mut axes, if layout.axes.is_some() { rows } else { 0 })?;
+        reserve(&mut texture, if layout.texture.is_some() { rows } else { 0 })?;
         let (codes, lights) = match (layout.color.is_some(), layout.is_srgb8()) {
             (false, _) => (0, 0),
             (true, true) => (rows, 0),
@@ -140,7 +165,7 @@ impl<'a> Vertices<'a> {
         };
         reserve(&mut srgb8, codes)?;
         reserve(&mut linear, lights)?;
-        Ok(Self { layout, positions, normals, radii, srgb8, linear })
+        Ok(Self { layout, positions, normals, radii, axes, texture, srgb8, linear })
     }
 
     pub(super) fn len(&self) -> u64 {
@@ -157,6 +182,12 @@ impl<'a> Vertices<'a> {
         }
         if let Some(radius) = layout.radius {
             self.radii.extend((0..rows).map(|row| value(radius, row) as f32));
+        }
+        if let Some(axes) = layout.axes {
+            self.axes.extend((0..rows).map(|row| axes.map(|axis| axis.map(|column| value(column, row) as f32))));
+        }
+        if let Some(texture) = layout.texture {
+            self.texture.extend((0..rows).map(|row| texture.map(|column| value(column, row) as f32)));
         }
         if let Some(color) = layout.color {
             if layout.is_srgb8() {
@@ -184,7 +215,9 @@ impl<'a> Vertices<'a> {
             positions: self.positions,
             normals: layout.normal.map(|_| self.normals),
             radii: layout.radius.map(|_| self.radii),
+            axes: layout.axes.map(|_| self.axes),
             colors,
+            texture: layout.texture.map(|_| self.texture),
             up: None,
         }
     }

@@ -1,34 +1,172 @@
 //! From surfels to PLY bytes.
 
-use crate::Result;
-use crate::io::atomic::write_whole;
-use crate::scene::color::{DEFAULT_COLOR, linear_to_srgb};
+use crate::io::Points;
+use crate::io::atomic::{Output, write_whole};
+use crate::scene::Colors;
+use crate::scene::color::{DEFAULT_COLOR, SRGB8_TO_LINEAR, linear_to_srgb};
+use crate::{Progress, Result};
 use std::io::{self, Write};
 use std::path::Path;
 
-/// One surfel as a PLY vertex.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// One surfel as a PLY vertex. What a file's [`Properties`] do not name is not written.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Vertex {
     /// World coordinates.
     pub position: [f64; 3],
     /// The normal, as it shall stand in the file.
     pub normal: [f32; 3],
-    /// The disk's radius, world units.
+    /// The disk's radius, world units; of an ellipse the longer half-axis.
     pub radius: f32,
-    /// 8-bit sRGB; where colours are written, a surfel without one gets [`DEFAULT_COLOR`].
-    pub color: Option<[u8; 3]>,
+    /// Half-axes s and t, world units.
+    pub axes: [[f32; 3]; 2],
+    /// Where colours are written, a surfel without one gets [`DEFAULT_COLOR`].
+    pub color: Option<Color>,
+    /// Texture coordinates (u, v), origin bottom left.
+    pub texture: [f32; 2],
 }
 
-/// Which types and properties a written file has.
+/// The colour of a vertex, alpha straight: 1 is opaque.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Color {
+    /// 8-bit sRGB and linear alpha.
+    Srgb8([u8; 4]),
+    /// Linear light.
+    Linear([f32; 4]),
+}
+
+impl Color {
+    /// 8-bit sRGB; linear light outside [0, 1] is clamped.
+    fn srgb8(self) -> [u8; 4] {
+        match self {
+            Self::Srgb8(codes) => codes,
+            Self::Linear([r, g, b, a]) => {
+                let code = |linear: f32| (linear_to_srgb(f64::from(linear)) * 255.0).round() as u8;
+                [code(r), code(g), code(b), (a.clamp(0.0, 1.0) * 255.0).round() as u8]
+            }
+        }
+    }
+
+    fn linear(self) -> [f32; 4] {
+        match self {
+            Self::Srgb8([r, g, b, a]) => {
+                let [r, g, b] = [r, g, b].map(|code| SRGB8_TO_LINEAR[usize::from(code)]);
+                [r, g, b, f32::from(a) / 255.0]
+            }
+            Self::Linear(color) => color,
+        }
+    }
+}
+
+/// How the colours of a file are coded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ColorProperties {
+    /// None are written.
+    #[default]
+    Absent,
+    /// `uchar red green blue`: 8-bit sRGB.
+    Srgb8,
+    /// The same with `uchar alpha`.
+    Srgb8Alpha,
+    /// `float red green blue alpha`: linear light, of any size.
+    Linear,
+}
+
+/// Which types and properties a written file has; the order is that of these fields.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Properties {
     /// Coordinates are `double`, not `float`: for coordinates whose last digits an f32 would lose.
     pub double_coordinates: bool,
-    /// `uchar red green blue` are written.
-    pub colors: bool,
+    /// `float nx ny nz` are written.
+    pub normals: bool,
+    /// `float radius` is written.
+    pub radii: bool,
+    /// `float sx sy sz tx ty tz` are written.
+    pub axes: bool,
+    /// How `red green blue` and `alpha` are written.
+    pub colors: ColorProperties,
+    /// `float texture_u texture_v` are written.
+    pub texture: bool,
 }
 
-/// Writes `count` vertices as binary little-endian PLY: `x y z nx ny nz radius` and, where asked for, `red green blue`.
+impl Properties {
+    /// What `points` need so that nothing of them is lost: `double` where a coordinate is not an f32, `alpha` where it is
+    /// not 1 everywhere. Half-axes bring normals and radii along, for programs that know only those.
+    pub fn of(points: &Points) -> Self {
+        Self {
+            double_coordinates: points.positions.iter().flatten().any(|c| f64::from(*c as f32) != *c && !c.is_nan()),
+            normals: points.normals.is_some() || points.axes.is_some(),
+            radii: points.radii.is_some() || points.axes.is_some(),
+            axes: points.axes.is_some(),
+            colors: match &points.colors {
+                None => ColorProperties::Absent,
+                Some(Colors::Srgb8(codes)) if codes.iter().all(|code| code[3] == 255) => ColorProperties::Srgb8,
+                Some(Colors::Srgb8(_)) => ColorProperties::Srgb8Alpha,
+                Some(Colors::Linear(_) | Colors::Constant(_)) => ColorProperties::Linear,
+            },
+            texture: points.texture.is_some(),
+        }
+    }
+
+    fn write_header(self, out: &mut Output<'_>, count: u64) -> io::Result<()> {
+        write!(out, "ply\nformat binary_little_endian 1.0\ncomment epsplat {}\n", env!("CARGO_PKG_VERSION"))?;
+        writeln!(out, "element vertex {count}")?;
+        let mut scalars =
+            |kind: &str, names: &[&str]| names.iter().try_for_each(|name| writeln!(out, "property {kind} {name}"));
+        scalars(if self.double_coordinates { "double" } else { "float" }, &["x", "y", "z"])?;
+        let groups: [(bool, &[&str]); 3] = [
+            (self.normals, &["nx", "ny", "nz"]),
+            (self.radii, &["radius"]),
+            (self.axes, &["sx", "sy", "sz", "tx", "ty", "tz"]),
+        ];
+        for (_, names) in groups.into_iter().filter(|(written, _)| *written) {
+            scalars("float", names)?;
+        }
+        const CHANNELS: [&str; 4] = ["red", "green", "blue", "alpha"];
+        match self.colors {
+            ColorProperties::Absent => {}
+            ColorProperties::Srgb8 => scalars("uchar", &CHANNELS[..3])?,
+            ColorProperties::Srgb8Alpha => scalars("uchar", &CHANNELS)?,
+            ColorProperties::Linear => scalars("float", &CHANNELS)?,
+        }
+        if self.texture {
+            scalars("float", &["texture_u", "texture_v"])?;
+        }
+        out.write_all(b"end_header\n")
+    }
+
+    /// Appends the bytes of `vertex`.
+    fn encode(self, vertex: &Vertex, row: &mut Vec<u8>) {
+        for coordinate in vertex.position {
+            if self.double_coordinates {
+                row.extend(coordinate.to_le_bytes());
+            } else {
+                row.extend((coordinate as f32).to_le_bytes());
+            }
+        }
+        let mut floats = |values: &[f32]| values.iter().for_each(|value| row.extend(value.to_le_bytes()));
+        if self.normals {
+            floats(&vertex.normal);
+        }
+        if self.radii {
+            floats(&[vertex.radius]);
+        }
+        if self.axes {
+            floats(vertex.axes.as_flattened());
+        }
+        let color = vertex.color.unwrap_or(Color::Linear(DEFAULT_COLOR));
+        match self.colors {
+            ColorProperties::Absent => {}
+            ColorProperties::Srgb8 => row.extend(&color.srgb8()[..3]),
+            ColorProperties::Srgb8Alpha => row.extend(color.srgb8()),
+            ColorProperties::Linear => floats(&color.linear()),
+        }
+        if self.texture {
+            vertex.texture.iter().for_each(|value| row.extend(value.to_le_bytes()));
+        }
+    }
+}
+
+/// Writes `count` vertices as binary little-endian PLY, in the format of [this module](super).
 ///
 /// The vertices are written as they come, so that they never lie in memory together; the file appears whole or not at
 /// all.
@@ -43,32 +181,12 @@ pub fn write(
     vertices: impl IntoIterator<Item = Vertex>,
 ) -> Result<()> {
     write_whole(path, |out| {
-        let real = if properties.double_coordinates { "double" } else { "float" };
-        write!(out, "ply\nformat binary_little_endian 1.0\ncomment epsplat {}\n", env!("CARGO_PKG_VERSION"))?;
-        write!(out, "element vertex {count}\nproperty {real} x\nproperty {real} y\nproperty {real} z\n")?;
-        out.write_all(b"property float nx\nproperty float ny\nproperty float nz\nproperty float radius\n")?;
-        if properties.colors {
-            out.write_all(b"property uchar red\nproperty uchar green\nproperty uchar blue\n")?;
-        }
-        out.write_all(b"end_header\n")?;
-        let [r, g, b, _] = DEFAULT_COLOR.map(|linear| (linear_to_srgb(f64::from(linear)) * 255.0).round() as u8);
+        properties.write_header(out, count)?;
         let mut written = 0;
-        let mut row = Vec::with_capacity(64);
+        let mut row = Vec::with_capacity(96);
         for vertex in vertices {
             row.clear();
-            for coordinate in vertex.position {
-                if properties.double_coordinates {
-                    row.extend(coordinate.to_le_bytes());
-                } else {
-                    row.extend((coordinate as f32).to_le_bytes());
-                }
-            }
-            for value in vertex.normal.into_iter().chain([vertex.radius]) {
-                row.extend(value.to_le_bytes());
-            }
-            if properties.colors {
-                row.extend(vertex.color.unwrap_or([r, g, b]));
-            }
+            properties.encode(&vertex, &mut row);
             out.write_all(&row)?;
             written += 1;
         }
@@ -78,4 +196,56 @@ pub fn write(
             Err(io::Error::other(format!("{count} vertices were announced, but {written} came")))
         }
     })
+}
+
+/// Writes all that `points` hold, so that [`read`](super::read) gives them back (their `up` is no part of a PLY file).
+///
+/// With half-axes, normals that are missing are their product s x t, and radii that are missing their longer one.
+///
+/// # Errors
+///
+/// [`Error::Write`](crate::Error::Write) where the system cannot write.
+pub fn write_points(path: &Path, points: &Points, progress: &dyn Progress) -> Result<()> {
+    const TOLD: usize = 1 << 16;
+    let count = points.positions.len();
+    progress.begin("writing points", count as u64);
+    let vertices = points.positions.iter().enumerate().map(|(index, position)| {
+        if index % TOLD == TOLD - 1 {
+            progress.advance(TOLD as u64);
+        }
+        let axes = of(&points.axes, index);
+        Vertex {
+            position: *position,
+            normal: of(&points.normals, index).unwrap_or_else(|| axes.map_or([0.0; 3], normal)),
+            radius: of(&points.radii, index).unwrap_or_else(|| axes.map_or(0.0, longer)),
+            axes: axes.unwrap_or_default(),
+            color: match &points.colors {
+                Some(Colors::Srgb8(codes)) => codes.get(index).map(|code| Color::Srgb8(*code)),
+                Some(Colors::Linear(colors)) => colors.get(index).map(|color| Color::Linear(*color)),
+                Some(Colors::Constant(color)) => Some(Color::Linear(*color)),
+                None => None,
+            },
+            texture: of(&points.texture, index).unwrap_or_default(),
+        }
+    });
+    let written = write(path, Properties::of(points), count as u64, vertices);
+    progress.end();
+    written
+}
+
+fn of<T: Copy>(all: &Option<Vec<T>>, index: usize) -> Option<T> {
+    all.as_ref()?.get(index).copied()
+}
+
+/// The unit normal of a disk with these half-axes, zero where they span none.
+fn normal([s, t]: [[f32; 3]; 2]) -> [f32; 3] {
+    // In f64 the product of f32 numbers neither overflows nor underflows.
+    let [s, t] = [s, t].map(|axis| glam::DVec3::from_array(axis.map(f64::from)));
+    s.cross(t).normalize_or_zero().as_vec3().to_array()
+}
+
+/// The length of the longer half-axis.
+fn longer(axes: [[f32; 3]; 2]) -> f32 {
+    let [s, t] = axes.map(|axis| glam::DVec3::from_array(axis.map(f64::from)).length());
+    s.max(t) as f32
 }

@@ -264,3 +264,44 @@ fn one_point_draws_and_so_do_coincident_and_collinear_ones() {
         assert!(covered > 8, "{count} points cover {covered} pixels");
     }
 }
+
+#[test]
+fn surfels_are_made_of_points_and_drawn() {
+    let folder = Folder::new();
+    let (made, image) = (folder.path("made.ply"), folder.path("made.exr"));
+    let rows: String = (0..900).map(|i| format!("{} {} {}\n", i % 30, i / 30, (i % 7) as f64 * 0.01)).collect();
+    let cloud = folder.file("cloud.ply", ply("x y z", 901, &(rows + "nan 0 0\n")));
+    let output = succeeds(&["surfels", text(&cloud), "-o", text(&made), "--size", "ellipse", "--orient", "-5,5,90"]);
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(stderr.contains("1 points were dropped") && stderr.contains("made.ply: 900 surfels"), "{stderr}");
+    let points = epsplat::io::read(&made, &()).unwrap();
+    assert!(points.normals.unwrap().iter().all(|n| n[2] > 0.9) && points.axes.is_some());
+    succeeds(&["render", text(&made), "-o", text(&image), "--backend", "reference", "--size", "64x64"]);
+    for orient in ["propagate", "up", "0,0,-9"] {
+        for size in ["knn", "bsp", "bsp:circumsphere"] {
+            succeeds(&[
+                "surfels",
+                text(&cloud),
+                "-o",
+                text(&made),
+                "--orient",
+                orient,
+                "--size",
+                size,
+                "--outliers",
+                "8",
+            ]);
+        }
+    }
+    let refuses = |more: &[&str], words: &[&str]| {
+        fails(&[&["surfels", text(&cloud), "-o", text(&made)], more].concat(), 2, words);
+    };
+    refuses(&["--size", "huge"], &["there is no size `huge`", "bsp:circumsphere"]);
+    refuses(&["--orient", "1,2"], &["position of a scanner", "three numbers"]);
+    refuses(&["--orient", "up", "--orient", "1,2,3"], &["once"]);
+    refuses(&["--max-radius", "0.5"], &["at least 1"]);
+    refuses(&["--outliers=-1"], &["not negative"]);
+    fails(&["surfels", text(&cloud), "-o", "made.obj"], 2, &["must end in .ply"]);
+    let empty = folder.file("empty.ply", ply("x y z", 0, ""));
+    fails(&["surfels", text(&empty), "-o", text(&made)], 1, &["holds no points"]);
+}

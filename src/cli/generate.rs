@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use epsplat::io::ply;
 use epsplat::surfels::analytic::{Shape, generate};
-use epsplat::{Error, Progress, Result};
+use epsplat::{Progress, Result};
 
 use super::note;
 use super::progress::Bars;
@@ -28,10 +28,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let is_ply = arguments.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply"));
-    if !is_ply {
-        return Err(Error::Usage(format!("the output must end in .ply, {} does not", arguments.output.display())));
-    }
+    ply::check_extension(&arguments.output)?;
     let bars = Bars::new();
     bars.begin("writing surfels", arguments.count);
     let vertices = generate(arguments.shape, arguments.count).enumerate().map(|(index, sample)| {

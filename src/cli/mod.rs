@@ -9,6 +9,7 @@ mod info;
 mod parse;
 mod progress;
 mod render;
+mod surfels;
 
 use std::io::Write;
 use std::path::Path;
@@ -33,6 +34,7 @@ enum Command {
     Render(Box<render::Arguments>),
     Compare(compare::Arguments),
     Generate(generate::Arguments),
+    Surfels(surfels::Arguments),
     Info(info::Arguments),
     Adapters(adapters::Arguments),
     Hardcases(hardcases::Arguments),
@@ -45,6 +47,7 @@ pub fn run() -> ExitCode {
         Command::Render(arguments) => render::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Generate(arguments) => generate::run(&arguments),
+        Command::Surfels(arguments) => surfels::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Adapters(arguments) => adapters::run(&arguments),
         Command::Hardcases(arguments) => hardcases::run(&arguments),

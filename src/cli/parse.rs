@@ -1,6 +1,7 @@
 //! Values of arguments: texts into numbers, or a sentence that says what is expected.
 
 use epsplat::passes::accumulate::accumulator;
+use epsplat::surfels::Orientation;
 use glam::DVec3;
 
 /// An accumulator's name.
@@ -31,6 +32,17 @@ pub(super) fn parse_vector(text: &str) -> Result<DVec3, String> {
     match parse_numbers(text)?[..] {
         [x, y, z] => Ok(DVec3::new(x, y, z)),
         _ => Err("three numbers are needed: X,Y,Z".into()),
+    }
+}
+
+/// `propagate`, `up`, or the `X,Y,Z` of a scanner.
+pub(super) fn parse_orientation(text: &str) -> Result<Orientation, String> {
+    match text {
+        "propagate" => Ok(Orientation::Propagate),
+        "up" => Ok(Orientation::Up),
+        _ => parse_vector(text)
+            .map(|scanner| Orientation::Toward(vec![scanner]))
+            .map_err(|what| format!("it is neither propagate nor up nor the position of a scanner: {what}")),
     }
 }
 

@@ -3,8 +3,7 @@
 use crate::scene::Colors;
 use crate::scene::color::{DEFAULT_COLOR, linear_to_srgb};
 
-/// Joins colours input by input. 8-bit colours stay so as long as nothing else comes; colours of one value become
-/// [`Colors::Constant`].
+/// Joins colours input by input. 8-bit colours stay so as long as nothing else comes.
 pub(crate) struct ColorGatherer {
     colors: Option<Colors>,
     /// Points so far, with colours or without.
@@ -83,16 +82,24 @@ impl ColorGatherer {
         self.colors = Some(Colors::Linear(colors));
     }
 
-    /// The colours of all points.
-    pub fn finish(self) -> Colors {
-        let Some(colors) = self.colors else { return Colors::Constant(DEFAULT_COLOR) };
-        let constant = match &colors {
-            Colors::Constant(_) => true,
-            Colors::Srgb8(codes) => codes.windows(2).all(|pair| pair[0] == pair[1]),
-            Colors::Linear(colors) => colors.windows(2).all(|pair| pair[0] == pair[1]),
-        };
-        if constant && self.count > 0 { Colors::Constant(colors.linear(0)) } else { colors }
+    /// The colours of all points. None if none came with any.
+    pub fn finish(self) -> Option<Colors> {
+        self.colors
     }
+}
+
+/// The same colours, as [`Colors::Constant`] where there is one only. The default where there are none.
+pub(crate) fn folded(colors: Option<Colors>) -> Colors {
+    let Some(colors) = colors else { return Colors::Constant(DEFAULT_COLOR) };
+    let first = match &colors {
+        Colors::Constant(color) => Some(*color),
+        Colors::Srgb8(codes) if codes.windows(2).all(|pair| pair[0] == pair[1]) => {
+            codes.first().map(|_| colors.linear(0))
+        }
+        Colors::Linear(all) if all.windows(2).all(|pair| pair[0] == pair[1]) => all.first().copied(),
+        _ => None,
+    };
+    first.map_or(colors, Colors::Constant)
 }
 
 /// Whether the colour, and its products and differences on the way through f32, stay finite. NaN is not usable.
@@ -117,7 +124,7 @@ mod tests {
             gatherer.append(colors, count);
         }
         let replaced = gatherer.replaced;
-        (gatherer.finish(), replaced)
+        (folded(gatherer.finish()), replaced)
     }
 
     #[test]

@@ -17,7 +17,7 @@ use crate::Progress;
 pub(crate) const NORMAL_NEIGHBOURS: usize = 16;
 
 /// How many neighbours a radius is the mean distance of: the first two rings of a square grid.
-const RADIUS_NEIGHBOURS: usize = 8;
+pub(crate) const RADIUS_NEIGHBOURS: usize = 8;
 
 /// Disk radius for each unit of mean distance to [`RADIUS_NEIGHBOURS`] neighbours. Gives 1.45 spacings on a square
 /// grid, and leaves 0.03 % of a random (Poisson) plane uncovered, where 1.0 leaves 0.4 % and 1.1 leaves 0.12 %.
@@ -28,10 +28,10 @@ const RADIUS_FACTOR: f64 = 1.2;
 const LARGEST_LOCAL_RATIO: f64 = 2.0;
 
 /// A radius is at most this many times the median of the estimated ones, so that sparse noise does not hide the scene.
-const LARGEST_MEDIAN_RATIO: f64 = 8.0;
+pub(crate) const LARGEST_MEDIAN_RATIO: f64 = 8.0;
 
 /// The radius in world units where there is one position only, and so no size to go by.
-const LONE_RADIUS: f64 = 0.5;
+pub(crate) const LONE_RADIUS: f64 = 0.5;
 
 /// The smallest and largest radius of any surfel, world units: products of half-axes stay normal f32 numbers.
 pub(crate) const RADIUS_RANGE: (f64, f64) = (1e-18, 1e18);
@@ -82,15 +82,15 @@ pub(crate) fn estimate(
         progress.advance(estimates.len() as u64);
     });
     progress.end();
-    let values = |of: fn(&Estimate) -> f32| -> Vec<f32> {
-        of_position.par_iter().enumerate().filter(|(index, _)| wanted(*index)).map(|(_, e)| of(e)).collect()
+    let values = |of: fn(&Estimate) -> f32| -> Vec<f64> {
+        of_position.par_iter().enumerate().filter(|(index, _)| wanted(*index)).map(|(_, e)| of(e).into()).collect()
     };
     if distinct.len() < 2 {
         return Estimates { of_position, median_spacing: None };
     }
-    let limit = median(values(|e| e.radius)).unwrap_or(f32::INFINITY) * LARGEST_MEDIAN_RATIO as f32;
-    let median_spacing = median(values(|e| e.spacing)).map(f64::from);
-    of_position.par_iter_mut().for_each(|e| e.radius = e.radius.min(limit));
+    let limit = median(values(|e| e.radius)).unwrap_or(f64::INFINITY) * LARGEST_MEDIAN_RATIO;
+    let median_spacing = median(values(|e| e.spacing));
+    of_position.par_iter_mut().for_each(|e| e.radius = e.radius.min(limit as f32));
     Estimates { of_position, median_spacing }
 }
 
@@ -116,7 +116,7 @@ fn estimate_at(distinct: &DistinctPositions, index: u32, neighbours: &[Neighbour
 }
 
 /// A radius from the offsets of the nearest neighbours, in their unit.
-fn fitted_radius(offsets: &[DVec3]) -> f64 {
+pub(crate) fn fitted_radius(offsets: &[DVec3]) -> f64 {
     let count = offsets.len() as f64;
     let mean_distance = offsets.iter().map(|o| o.length()).sum::<f64>() / count;
     if offsets.len() < RADIUS_NEIGHBOURS {
@@ -129,7 +129,7 @@ fn fitted_radius(offsets: &[DVec3]) -> f64 {
 
 /// The direction in which the offsets vary least, in the half-space of `up` (a unit vector). For offsets on a line it
 /// is the direction across the line nearest to `up`, for coincident ones it is `up`.
-fn fitted_normal(offsets: &[DVec3], up: DVec3) -> DVec3 {
+pub(crate) fn fitted_normal(offsets: &[DVec3], up: DVec3) -> DVec3 {
     let largest = offsets.iter().fold(0.0, |m: f64, o| m.max(o.abs().max_element()));
     if largest == 0.0 {
         return up;
@@ -152,9 +152,9 @@ fn fitted_normal(offsets: &[DVec3], up: DVec3) -> DVec3 {
 }
 
 /// The middle value (the upper one of two).
-fn median(mut values: Vec<f32>) -> Option<f32> {
+pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
     let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f32::total_cmp).1)
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 #[cfg(test)]

@@ -16,8 +16,10 @@ pub(crate) struct Gathered {
     pub radii: Option<Vec<f32>>,
     /// As given; zero where missing. None if no input has any.
     pub axes: Option<Vec<[[f32; 3]; 2]>>,
-    /// The colours of the points.
-    pub colors: Colors,
+    /// As given; zero where missing. None if no input has any.
+    pub texture: Option<Vec<[f32; 2]>>,
+    /// The colours of the points. None if no input has any.
+    pub colors: Option<Colors>,
     /// What the inputs say.
     pub up: Option<Up>,
     /// The counts so far.
@@ -28,7 +30,7 @@ pub(crate) struct Gathered {
 pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
     let mut preparation = Preparation::default();
     let mut positions = Vec::new();
-    let (mut normals, mut radii, mut axes) = (None, None, None);
+    let (mut normals, mut radii, mut axes, mut texture) = (None, None, None, None);
     let mut colors = ColorGatherer::new();
     let mut up = None;
     let input_count = inputs.len();
@@ -43,16 +45,14 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
             input.normals.iter_mut().for_each(|all| retain(all, &keep));
             input.radii.iter_mut().for_each(|all| retain(all, &keep));
             input.axes.iter_mut().for_each(|all| retain(all, &keep));
-            match &mut input.colors {
-                Some(Colors::Srgb8(codes)) => retain(codes, &keep),
-                Some(Colors::Linear(colors)) => retain(colors, &keep),
-                _ => {}
-            }
+            input.texture.iter_mut().for_each(|all| retain(all, &keep));
+            input.colors.iter_mut().for_each(|all| retain_colors(all, &keep));
         }
         let before = positions.len();
         append(&mut normals, before, input.normals, kept);
         append(&mut radii, before, input.radii, kept);
         append(&mut axes, before, input.axes, kept);
+        append(&mut texture, before, input.texture, kept);
         colors.append(input.colors, kept);
         if positions.is_empty() {
             positions = input.positions;
@@ -80,7 +80,19 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
         *coordinate += 0.0;
     }
     preparation.replaced_colors = colors.replaced;
-    Ok(Gathered { positions, normals, radii, axes, colors: colors.finish(), up, preparation })
+    Ok(Gathered { positions, normals, radii, axes, texture, colors: colors.finish(), up, preparation })
+}
+
+impl Gathered {
+    /// Keeps the points whose flag is set.
+    pub fn retain(&mut self, keep: &[bool]) {
+        retain(&mut self.positions, keep);
+        self.normals.iter_mut().for_each(|all| retain(all, keep));
+        self.radii.iter_mut().for_each(|all| retain(all, keep));
+        self.axes.iter_mut().for_each(|all| retain(all, keep));
+        self.texture.iter_mut().for_each(|all| retain(all, keep));
+        self.colors.iter_mut().for_each(|all| retain_colors(all, keep));
+    }
 }
 
 fn is_usable(position: &[f64; 3]) -> bool {
@@ -88,9 +100,17 @@ fn is_usable(position: &[f64; 3]) -> bool {
 }
 
 /// Keeps the values whose flag is set.
-fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
+pub(crate) fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
     let mut flags = keep.iter();
     values.retain(|_| flags.next().copied().unwrap_or(false));
+}
+
+fn retain_colors(colors: &mut Colors, keep: &[bool]) {
+    match colors {
+        Colors::Srgb8(codes) => retain(codes, keep),
+        Colors::Linear(colors) => retain(colors, keep),
+        Colors::Constant(_) => {}
+    }
 }
 
 /// Appends `count` values to the `before` values of earlier inputs; what is missing on either side becomes default.

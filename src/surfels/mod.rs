@@ -4,14 +4,24 @@ pub mod analytic;
 mod colors;
 mod eigen;
 mod estimate;
+mod forest;
+mod from_points;
 mod gather;
+mod graph;
 mod neighbours;
+mod orient;
+mod outliers;
 mod positions;
+mod sizes;
 #[cfg(test)]
 mod tests;
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+
+pub use self::from_points::{FromPoints, Surfels, from_points};
+pub use self::orient::Orientation;
+pub use self::sizes::{Size, Triangle};
 
 use self::estimate::{Estimate, Estimates, RADIUS_RANGE};
 use self::gather::Gathered;
@@ -68,7 +78,8 @@ impl Preparation {
 /// [`Error::EmptyScene`](crate::Error::EmptyScene) if no input holds a usable point, and
 /// [`Error::Usage`](crate::Error::Usage) if normals or radii are missing and there are more than 2^32 - 1 points.
 pub fn build(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Preparation)> {
-    let Gathered { positions, normals, radii, axes, colors, up, mut preparation } = gather::gather(inputs)?;
+    let Gathered { positions, normals, radii, axes, colors, up, mut preparation, .. } = gather::gather(inputs)?;
+    let colors = colors::folded(colors);
     let bounds = bounds_of(&positions);
     let origin = origin_for(&bounds);
     let up = up.unwrap_or_else(|| guess_up(&bounds));

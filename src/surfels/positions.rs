@@ -5,6 +5,7 @@ use std::cmp::Ordering;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::gather::retain;
 use crate::scene::Bounds;
 use crate::{Error, Result};
 
@@ -65,6 +66,19 @@ impl DistinctPositions {
             of_point[index as usize] = (positions.len() - 1) as u32;
         }
         Ok(Self { positions, of_point, scale })
+    }
+
+    /// Only those positions whose flag in `keep` is set, and the points at them.
+    pub fn retain(&mut self, keep: &[bool]) {
+        let mut numbers = Vec::with_capacity(keep.len());
+        let mut kept = 0;
+        for &keep in keep {
+            numbers.push(kept);
+            kept += u32::from(keep);
+        }
+        self.of_point.retain(|&position| keep[position as usize]);
+        self.of_point.par_iter_mut().for_each(|position| *position = numbers[*position as usize]);
+        retain(&mut self.positions, keep);
     }
 
     /// How many there are.

@@ -21,4 +21,4 @@ mod vertex;
 mod write;
 
 pub use read::read;
-pub use write::{Color, ColorProperties, Properties, Vertex, write, write_points};
+pub use write::{Color, ColorProperties, Properties, Vertex, check_extension, write, write_points};

@@ -4,7 +4,7 @@ use crate::io::Points;
 use crate::io::atomic::{Output, write_whole};
 use crate::scene::Colors;
 use crate::scene::color::{DEFAULT_COLOR, SRGB8_TO_LINEAR, linear_to_srgb};
-use crate::{Progress, Result};
+use crate::{Error, Progress, Result};
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -231,6 +231,19 @@ pub fn write_points(path: &Path, points: &Points, progress: &dyn Progress) -> Re
     let written = write(path, Properties::of(points), count as u64, vertices);
     progress.end();
     written
+}
+
+/// Whether the path is one of a PLY file, by its extension.
+///
+/// # Errors
+///
+/// [`Error::Usage`](Error::Usage) if it is not.
+pub fn check_extension(path: &Path) -> Result<()> {
+    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ply")) {
+        Ok(())
+    } else {
+        Err(Error::Usage(format!("the output must end in .ply, {} does not", path.display())))
+    }
 }
 
 fn of<T: Copy>(all: &Option<Vec<T>>, index: usize) -> Option<T> {

@@ -1,0 +1,83 @@
+//! `epsplat surfels`: oriented surfels from points.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use epsplat::io::{self, ply};
+use epsplat::surfels::{FromPoints, Orientation, Size, from_points};
+use epsplat::{Error, Result};
+
+use super::note;
+use super::parse::parse_orientation;
+use super::progress::Bars;
+
+/// Make surfels of points: normals with a side, and disks or ellipses that cover the surface, kept as PLY.
+///
+/// The inputs become one cloud. Normals that are given stay; the others are those of the plane through 16 neighbours.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  epsplat surfels scan.laz -o scan.ply\n  \
+    epsplat surfels left.ply right.ply -o room.ply --size ellipse --outliers 3 --orient 0,0,1.6 --orient 4.1,0,1.6")]
+pub struct Arguments {
+    /// Point clouds: PLY, LAS, LAZ, or the vertices of OBJ
+    #[arg(required = true)]
+    inputs: Vec<PathBuf>,
+    /// The file: .ply
+    #[arg(short, long)]
+    output: PathBuf,
+    /// knn: disks of 1.2 times the mean distance to 8 neighbours; ellipse: the ellipse that bounds 8 neighbours in the
+    /// tangent plane; bsp, bsp:circumsphere: disks from clusters of three points, by their mean edge or circumsphere
+    #[arg(long, default_value = "knn")]
+    size: Size,
+    /// Which side estimated normals point to: propagate from neighbour to neighbour, outward; X,Y,Z, toward the nearest
+    /// scanner (once for each); up
+    #[arg(long, value_name = "propagate|up|X,Y,Z", default_value = "propagate", value_parser = parse_orientation,
+        allow_hyphen_values = true)]
+    orient: Vec<Orientation>,
+    /// Estimate normals even where they are given
+    #[arg(long)]
+    estimate_normals: bool,
+    /// Drop points whose mean distance to 16 neighbours exceeds the mean of all by K standard deviations
+    #[arg(long, value_name = "K")]
+    outliers: Option<f64>,
+    /// No radius above FACTOR times the median of the neighbours'; inf for no limit
+    #[arg(long, value_name = "FACTOR", default_value = "2")]
+    max_radius: f64,
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    ply::check_extension(&arguments.output)?;
+    let options = FromPoints {
+        size: arguments.size,
+        orientation: orientation(&arguments.orient)?,
+        estimate_normals: arguments.estimate_normals,
+        outliers: arguments.outliers,
+        largest_ratio: arguments.max_radius,
+    };
+    let bars = Bars::new();
+    let inputs = arguments.inputs.iter().map(|path| io::read(path, &bars)).collect::<Result<_>>()?;
+    let surfels = from_points(inputs, &options, &bars)?;
+    ply::write_points(&arguments.output, &surfels.points, &bars)?;
+    for line in surfels.notes() {
+        note(&line);
+    }
+    let parts = surfels.parts.map_or(String::new(), |parts| format!(", {parts} connected parts oriented"));
+    note(&format!("{}: {} surfels{parts}", arguments.output.display(), surfels.preparation.surfels));
+    Ok(())
+}
+
+/// Several scanners make one orientation; nothing else can be said twice.
+fn orientation(given: &[Orientation]) -> Result<Orientation> {
+    if let [one] = given {
+        return Ok(one.clone());
+    }
+    let mut scanners = Vec::new();
+    for orientation in given {
+        let Orientation::Toward(positions) = orientation else {
+            return Err(Error::Usage(
+                "--orient is given once, or several times with the position of a scanner each".into(),
+            ));
+        };
+        scanners.extend(positions);
+    }
+    Ok(Orientation::Toward(scanners))
+}

@@ -1,0 +1,242 @@
+//! Surfels from points: what `epsplat surfels` does.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::estimate::{LONE_RADIUS, NORMAL_NEIGHBOURS, RADIUS_RANGE, fitted_normal};
+use super::gather::{Gathered, gather};
+use super::graph::NeighbourGraph;
+use super::orient::{self, Orientation};
+use super::outliers::inliers;
+use super::positions::DistinctPositions;
+use super::sizes::{
+    ELLIPSE_NEIGHBOURS, Size, bounding_ellipse, bsp_radii, ellipse_radii, knn_radii, local_limits, offsets,
+};
+use super::{Preparation, bounds_of, guess_up, origin_for, unit, usable_axes};
+use crate::io::Points;
+use crate::{Error, Progress, Result};
+
+/// How surfels are made of points.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FromPoints {
+    /// How large they are.
+    pub size: Size,
+    /// Which side estimated normals point to.
+    pub orientation: Orientation,
+    /// Normals are estimated even where they are given.
+    pub estimate_normals: bool,
+    /// Points are left out whose mean distance to their neighbours exceeds the mean of all by more than so many standard
+    /// deviations.
+    pub outliers: Option<f64>,
+    /// No half-axis is longer than this times the median of those of the neighbours; infinite for no limit.
+    pub largest_ratio: f64,
+}
+
+impl Default for FromPoints {
+    /// Disks by the distances of neighbours, normals outward, all points, no half-axis above twice those around it.
+    fn default() -> Self {
+        Self {
+            size: Size::Knn,
+            orientation: Orientation::Propagate,
+            estimate_normals: false,
+            outliers: None,
+            largest_ratio: 2.0,
+        }
+    }
+}
+
+/// The surfels of a cloud, and what was done to its points on the way.
+#[derive(Clone, Debug)]
+pub struct Surfels {
+    /// One surfel for each point that was kept, in the points' order, with normals and radii, and for
+    /// [`Size::Ellipse`] half-axes. Colours and texture coordinates are those given.
+    pub points: Points,
+    /// The counts that every scene has; its `surfels` are those kept.
+    pub preparation: Preparation,
+    /// Points left out as outliers.
+    pub dropped_outliers: u64,
+    /// Surfels that would have been larger than [`FromPoints::largest_ratio`] allows.
+    pub limited: u64,
+    /// Connected parts of the surface, each of which was oriented on its own; None if nothing was.
+    pub parts: Option<u64>,
+    /// Positions whose cluster of three spans no triangle, for [`Size::Bsp`]; else 0.
+    pub collinear: u64,
+}
+
+impl Surfels {
+    /// What a user should hear of: a sentence for everything that was lost or replaced.
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = self.preparation.notes();
+        let mut counted = |count: u64, what: &str| notes.extend((count > 0).then(|| format!("{count} points {what}")));
+        counted(self.dropped_outliers, "were dropped: they lie too far from their neighbours");
+        counted(self.limited, "would have had larger surfels than their neighbours allow");
+        counted(self.collinear, "are in clusters on a line and took the mean of its edges");
+        let distinct = self.preparation.distinct_positions.unwrap_or(self.preparation.surfels);
+        counted(self.preparation.surfels - distinct, "lie where another one does");
+        notes
+    }
+}
+
+/// Makes surfels of the points of all inputs, which become one cloud.
+///
+/// Neighbours are searched among all points; those at one position are one, and get equal sizes and estimated normals. The
+/// result for a point depends on no order of the points and no number of threads, to the last bit.
+///
+/// # Errors
+///
+/// [`Error::EmptyScene`] if no input holds a usable point, and [`Error::Usage`] for options out of range or more than
+/// 2^32 - 1 points.
+pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Progress) -> Result<Surfels> {
+    check(options)?;
+    let mut gathered = gather(inputs)?;
+    if options.estimate_normals {
+        (gathered.normals, gathered.axes) = (None, None);
+    }
+    let bounds = bounds_of(&gathered.positions);
+    let up = gathered.up.unwrap_or_else(|| guess_up(&bounds)).axis();
+    let origin = origin_for(&bounds);
+    progress.begin("sorting points", 0);
+    let mut distinct = DistinctPositions::new(&gathered.positions, &bounds, origin)?;
+    progress.end();
+    let mut graph = NeighbourGraph::new(&distinct, NORMAL_NEIGHBOURS, progress);
+    let mut dropped_outliers = 0;
+    if let Some(deviations) = options.outliers {
+        let inside = inliers(&distinct, &graph, deviations);
+        let keep: Vec<bool> = distinct.of_point().iter().map(|&position| inside[position as usize]).collect();
+        dropped_outliers = keep.iter().filter(|keep| !**keep).count() as u64;
+        if dropped_outliers > 0 {
+            gathered.retain(&keep);
+            distinct.retain(&inside);
+            graph = NeighbourGraph::new(&distinct, NORMAL_NEIGHBOURS, progress);
+        }
+    }
+    let given = given_normals(&gathered);
+    let count = gathered.positions.len();
+    let preparation = Preparation {
+        surfels: count as u64,
+        estimated_normals: given.as_ref().map_or(count, |all| all.iter().filter(|n| n.is_none()).count()) as u64,
+        estimated_radii: count as u64,
+        distinct_positions: Some(distinct.len() as u64),
+        median_spacing: median_spacing(&distinct, &graph),
+        ..gathered.preparation.clone()
+    };
+
+    progress.begin("fitting planes", 0);
+    let mut normals = fit_normals(&distinct, &graph, up);
+    progress.end();
+    let mut parts = None;
+    match &options.orientation {
+        _ if preparation.estimated_normals == 0 => {}
+        Orientation::Up => {}
+        Orientation::Toward(scanners) => {
+            let center = |index: usize| distinct.position(index as u32) / distinct.scale() + origin;
+            orient::toward(center, &mut normals, scanners);
+        }
+        Orientation::Propagate => {
+            let given = given.iter().flatten().zip(distinct.of_point());
+            let given: Vec<_> = given.filter_map(|(normal, &position)| Some((position, (*normal)?))).collect();
+            parts = Some(orient::propagate(&distinct, &graph, &mut normals, &given, up, progress));
+        }
+    }
+
+    progress.begin("measuring surfels", 0);
+    let mut collinear = 0;
+    let radii = match options.size {
+        Size::Knn => knn_radii(&distinct, &graph),
+        Size::Ellipse => ellipse_radii(&distinct, &graph, &normals),
+        Size::Bsp(triangle) => {
+            let (radii, degenerate) = bsp_radii(&distinct, triangle, progress);
+            collinear = degenerate;
+            radii
+        }
+    };
+    let limits = local_limits(&graph, &radii, options.largest_ratio);
+    progress.end();
+
+    let world = |length: f64| (length / distinct.scale()).clamp(RADIUS_RANGE.0, RADIUS_RANGE.1);
+    let limited = radii.iter().zip(&limits).filter(|(radius, limit)| radius > limit).count() as u64;
+    let normal_of = |point: usize, position: u32| {
+        given.as_ref().and_then(|all| *all.get(point)?).unwrap_or(normals[position as usize])
+    };
+    let of_point = distinct.of_point();
+    let point_normals: Vec<[f32; 3]> =
+        of_point.par_iter().enumerate().map(|(point, &position)| normal_of(point, position)).collect();
+    let size_of = |position: u32| {
+        let radius = radii[position as usize].min(limits[position as usize]);
+        if radius > 0.0 { world(radius) } else { LONE_RADIUS }
+    };
+    let axes = (options.size == Size::Ellipse).then(|| {
+        let ellipse = |(&position, normal): (&u32, &[f32; 3])| {
+            let normal = DVec3::from_array(normal.map(f64::from)).normalize();
+            let [s, t] = bounding_ellipse(offsets(&distinct, &graph, position, ELLIPSE_NEIGHBOURS), normal);
+            // The length that the position's own ellipse has, within its limit, also where a point has another normal.
+            let size = size_of(position);
+            let axes = if s == DVec3::ZERO {
+                let (a, b) = normal.any_orthonormal_pair();
+                [a * size, b * size]
+            } else {
+                let factor = size.min(world(s.length())) / s.length();
+                [s * factor, t * factor]
+            };
+            axes.map(|axis| axis.as_vec3().to_array())
+        };
+        of_point.par_iter().zip(&point_normals).map(ellipse).collect::<Vec<_>>()
+    });
+    let point_radii = match &axes {
+        Some(axes) => axes.par_iter().map(|[s, _]| DVec3::from_array(s.map(f64::from)).length() as f32).collect(),
+        None => of_point.par_iter().map(|&position| size_of(position) as f32).collect(),
+    };
+    let Gathered { positions, colors, texture, up, .. } = gathered;
+    let points =
+        Points { positions, normals: Some(point_normals), radii: Some(point_radii), axes, colors, texture, up };
+    Ok(Surfels { points, preparation, dropped_outliers, limited, parts, collinear })
+}
+
+fn check(options: &FromPoints) -> Result<()> {
+    if options.outliers.is_some_and(|deviations| !(deviations.is_finite() && deviations >= 0.0)) {
+        return Err(Error::Usage("outliers are beyond a number of standard deviations that is not negative".into()));
+    }
+    if options.largest_ratio.is_nan() || options.largest_ratio < 1.0 {
+        return Err(Error::Usage("the largest radius is at least 1 times that of the neighbours".into()));
+    }
+    match &options.orientation {
+        Orientation::Toward(scanners) if scanners.is_empty() || !scanners.iter().all(|at| at.is_finite()) => Err(
+            Error::Usage("normals can be turned toward finite positions only, of which at least one is needed".into()),
+        ),
+        _ => Ok(()),
+    }
+}
+
+/// The usable ones of the given normals, of unit length; those of half-axes come first. None if no input has any.
+fn given_normals(gathered: &Gathered) -> Option<Vec<Option<[f32; 3]>>> {
+    let Gathered { normals, axes, .. } = gathered;
+    (normals.is_some() || axes.is_some()).then(|| {
+        let of_axes = |i: usize| {
+            let [s, t] = usable_axes(*axes.as_ref()?.get(i)?)?.map(|axis| axis.as_dvec3());
+            Some(s.cross(t).normalize().as_vec3())
+        };
+        let of_normal = |i: usize| unit(*normals.as_ref()?.get(i)?);
+        let all = (0..gathered.positions.len()).into_par_iter();
+        all.map(|i| of_axes(i).or_else(|| of_normal(i)).map(|normal| normal.to_array())).collect()
+    })
+}
+
+/// The normal of the plane through each position and its neighbours, on the side of `up`.
+fn fit_normals(distinct: &DistinctPositions, graph: &NeighbourGraph, up: DVec3) -> Vec<[f32; 3]> {
+    (0..distinct.len() as u32)
+        .into_par_iter()
+        .map_init(Vec::new, |near, index| {
+            near.clear();
+            near.push(DVec3::ZERO);
+            near.extend(offsets(distinct, graph, index, NORMAL_NEIGHBOURS));
+            fitted_normal(near, up).as_vec3().to_array()
+        })
+        .collect()
+}
+
+/// The median distance to the nearest other position, world units. None if there is one only.
+fn median_spacing(distinct: &DistinctPositions, graph: &NeighbourGraph) -> Option<f64> {
+    let nearest = |index| offsets(distinct, graph, index, 1).next();
+    let spacings = (0..distinct.len() as u32).into_par_iter().filter_map(|index| Some(nearest(index)?.length()));
+    super::estimate::median(spacings.collect()).map(|spacing| spacing / distinct.scale())
+}

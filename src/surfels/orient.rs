@@ -1,0 +1,161 @@
+//! Which side of the surface a normal points to.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::forest::{Link, Membership, spanning_forest};
+use super::graph::NeighbourGraph;
+use super::positions::DistinctPositions;
+use crate::Progress;
+
+/// How normals that were estimated, and so have no side, get one.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Orientation {
+    /// Along the surface from neighbour to neighbour, outward for each connected part of it (Hoppe et al. 1992).
+    #[default]
+    Propagate,
+    /// Toward the nearest of these positions, world coordinates, from which the points were scanned.
+    Toward(Vec<DVec3>),
+    /// They keep the sign they were estimated with: the half-space of the up axis.
+    Up,
+}
+
+/// How many of its neighbours a normal is compared with. With 6 alone scan lines fall apart: `data/autzen.laz` has 23 parts
+/// by 6 and 3 by 10.
+const COMPARED: usize = 10;
+
+/// Neighbours up to this one come before all others: those farther on may lie beyond a thin part. They only join what would
+/// else be apart.
+const NEAREST: usize = 6;
+
+/// Where a mean normal is at least this long, the surface is a sheet and not closed: half a sphere's is 0.5.
+const SHEET: f64 = 0.5;
+
+/// Signs `normals` (unit vectors, one for each position) so that neighbours agree and the surface faces outward. Gives the
+/// number of its connected parts, each of which is oriented on its own.
+///
+/// Neighbours are compared along the minimum spanning forest of the doubts of [`continued`], over links to the nearest
+/// neighbours. A part of the surface then faces as most of the `given` normals in it do (pairs of position and normal).
+/// Without any, a sheet faces `up`, unless it stands upright; and all else faces outward where it is outermost, in a vote
+/// of the extreme positions in 26 directions, which lie on the convex hull.
+pub(crate) fn propagate(
+    distinct: &DistinctPositions,
+    graph: &NeighbourGraph,
+    normals: &mut [[f32; 3]],
+    given: &[(u32, [f32; 3])],
+    up: DVec3,
+    progress: &dyn Progress,
+) -> u64 {
+    progress.begin("orienting normals", 0);
+    let at = |normals: &[[f32; 3]], index: usize| DVec3::from_array(normals[index].map(f64::from));
+    let links: Vec<Link> = graph
+        .links(COMPARED)
+        .map(|(a, b)| {
+            let near = |a: u32, b: u32| graph.of(a).iter().take(NEAREST).any(|&other| other == b);
+            let along = distinct.position(b) - distinct.position(a);
+            let (cosine, doubt) = continued(along, at(normals, a as usize), at(normals, b as usize));
+            let weight = if near(a, b) || near(b, a) { 0.5 * doubt } else { 0.5 + 0.5 * doubt };
+            Link::new([a, b], weight, cosine < 0.0)
+        })
+        .collect();
+    let (members, parts) = spanning_forest(normals.len(), links);
+    turn(normals, |index| members[index].opposite);
+    let mut votes = vec![0i64; parts];
+    for (index, normal) in given {
+        let agrees = at(normals, *index as usize).dot(DVec3::from_array(normal.map(f64::from))) >= 0.0;
+        votes[members[*index as usize].tree as usize] += if agrees { 1 } else { -1 };
+    }
+    let outward = outward(distinct, normals, &members, parts, up);
+    let inverted: Vec<bool> =
+        votes.iter().zip(&outward).map(|(vote, outward)| if *vote == 0 { *outward < 0.0 } else { *vote < 0 }).collect();
+    turn(normals, |index| inverted[members[index].tree as usize]);
+    progress.end();
+    parts as u64
+}
+
+/// How a normal `n` goes on to a neighbour at the offset `along`, whose normal is `m` up to its sign: the cosine between
+/// what it becomes and m, and how doubtful that is, from 0 to 1.
+///
+/// The shortest smooth way between the two, an arc, takes n to its reflection across the plane that halves the offset. The
+/// doubt of Hoppe et al. 1992, 1 - |n . m|, knows nothing of where the neighbour lies, and so takes the two sides of a
+/// thin part for one, where the arc takes them for what they are. Where the offset is along a normal, noise and a far
+/// side look the same, so such links come last: the cosine counts by the fourth power of the sine between offset and
+/// normal. On the 1,839 points of `data/bunny.obj` this leaves 3 normals on the wrong side, all within 15 degrees of the
+/// tangent plane, where the doubt of Hoppe leaves 87.
+fn continued(along: DVec3, n: DVec3, m: DVec3) -> (f64, f64) {
+    let squared = along.length_squared();
+    let (p, q) = (along.dot(n), along.dot(m));
+    let cosine = n.dot(m) - 2.0 * p * q / squared;
+    let flat = 1.0 - (p * p).max(q * q) / squared;
+    (cosine, 1.0 - cosine.abs().min(1.0) * flat * flat)
+}
+
+/// For each part, how much it faces the way it should: negative if the other way.
+fn outward(
+    distinct: &DistinctPositions,
+    normals: &[[f32; 3]],
+    members: &[Membership],
+    parts: usize,
+    up: DVec3,
+) -> Vec<f64> {
+    let mut sums = vec![(DVec3::ZERO, 0.0); parts];
+    for (member, normal) in members.iter().zip(normals) {
+        let (sum, count) = &mut sums[member.tree as usize];
+        *sum += DVec3::from_array(normal.map(f64::from));
+        *count += 1.0;
+    }
+    // One of each pair of opposite directions, of those whose coordinates are -1, 0 or 1.
+    let directions: Vec<DVec3> = (14..27)
+        .map(|i| DVec3::new(f64::from(i % 3 - 1), f64::from(i / 3 % 3 - 1), f64::from(i / 9 - 1)).normalize())
+        .collect();
+    let votes: Vec<Vec<f64>> = directions
+        .into_par_iter()
+        .map(|direction| {
+            let mut extremes = vec![[(f64::NEG_INFINITY, 0u32); 2]; parts];
+            for (index, (position, member)) in distinct.as_slice().iter().zip(members).enumerate() {
+                let along = direction.dot(DVec3::from_array(*position));
+                for (extreme, along) in extremes[member.tree as usize].iter_mut().zip([along, -along]) {
+                    if along > extreme.0 {
+                        *extreme = (along, index as u32);
+                    }
+                }
+            }
+            let facing = |index: u32, direction: DVec3| {
+                let cosine = direction.dot(DVec3::from_array(normals[index as usize].map(f64::from)));
+                // At a tip a normal may be far off, and then it is nearly across: it counts for little.
+                cosine * cosine.abs()
+            };
+            extremes.iter().map(|[(_, far), (_, near)]| facing(*far, direction) + facing(*near, -direction)).collect()
+        })
+        .collect();
+    sums.into_iter()
+        .enumerate()
+        .map(|(part, (sum, count))| {
+            let upward = sum.dot(up);
+            let lies = sum.length() > SHEET * count && upward.abs() > 0.5 * sum.length();
+            if lies { upward } else { votes.iter().map(|of_parts| of_parts[part]).sum() }
+        })
+        .collect()
+}
+
+/// Turns each of `normals` (at `centers`, world coordinates) toward the nearest of `scanners`.
+pub(crate) fn toward(centers: impl Fn(usize) -> DVec3 + Sync, normals: &mut [[f32; 3]], scanners: &[DVec3]) {
+    let faces_away = |index: usize, normal: [f32; 3]| {
+        let center = centers(index);
+        let nearest =
+            scanners.iter().copied().min_by(|a, b| center.distance_squared(*a).total_cmp(&center.distance_squared(*b)));
+        nearest.is_some_and(|scanner| (scanner - center).dot(DVec3::from_array(normal.map(f64::from))) < 0.0)
+    };
+    normals.par_iter_mut().enumerate().for_each(|(index, normal)| {
+        if faces_away(index, *normal) {
+            *normal = normal.map(|c| -c);
+        }
+    });
+}
+
+/// Inverts the normals of which `inverted` says so.
+fn turn(normals: &mut [[f32; 3]], inverted: impl Fn(usize) -> bool + Sync) {
+    normals.par_iter_mut().enumerate().filter(|(index, _)| inverted(*index)).for_each(|(_, normal)| {
+        *normal = normal.map(|c| -c);
+    });
+}

@@ -1,0 +1,120 @@
+//! Sizes from clusters of three points, by a binary space partition along principal axes.
+//!
+//! From "a simple scheme to render point-sampled surfaces", section 3.3: a set of points is split by a plane across the
+//! eigenvector of its covariance's greatest eigenvalue, and its halves again, until a cluster holds exactly three points
+//! that are not collinear; the triangle they span gives the size of all three. The paper finds such clusters by their
+//! eigenvalues l0 <= l1 <= l2: three points have no surface variation, l0 / (l0 + l1 + l2) = 0, and they are collinear if
+//! l1 is zero as well. It does not say where the plane lies; here it parts off a multiple of three of the points, as near
+//! to the middle as there is one, so that all clusters but the last have three, and that one up to five.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::Triangle;
+use crate::Progress;
+use crate::surfels::eigen::Symmetric3;
+use crate::surfels::positions::DistinctPositions;
+
+/// A position in a cluster: how far it is along the axis that is split, and at last its size.
+#[derive(Clone, Copy)]
+struct Member {
+    value: f64,
+    index: u32,
+}
+
+/// Clusters up to this many points are split by one thread.
+const SEQUENTIAL: usize = 4096;
+
+/// A cluster of fewer points than this is not split.
+const TWO_TRIANGLES: usize = 6;
+
+/// Below this ratio of l1 to l2 three points are collinear, as far as rounded coordinates tell.
+const COLLINEAR: f64 = 1e-12;
+
+/// The radius of each position's disk, scaled units, and how many positions have only collinear ones in their cluster:
+/// those take the mean length of the edges. Zero for a position that is alone.
+pub(crate) fn bsp_radii(distinct: &DistinctPositions, triangle: Triangle, progress: &dyn Progress) -> (Vec<f64>, u64) {
+    progress.begin("splitting into clusters", distinct.len() as u64);
+    let mut members: Vec<Member> =
+        (0..distinct.len() as u32).into_par_iter().map(|index| Member { value: 0.0, index }).collect();
+    let collinear = split(distinct, triangle, &mut members, progress);
+    let mut radii = vec![0.0; distinct.len()];
+    for member in &members {
+        radii[member.index as usize] = member.value;
+    }
+    progress.end();
+    (radii, collinear)
+}
+
+/// Splits until the clusters are small enough, and gives their members sizes; how many of them are collinear.
+fn split(distinct: &DistinctPositions, triangle: Triangle, cluster: &mut [Member], progress: &dyn Progress) -> u64 {
+    let count = cluster.len();
+    if count < TWO_TRIANGLES {
+        return measure(distinct, triangle, cluster);
+    }
+    let at = |member: &Member| distinct.position(member.index);
+    let mean = cluster.iter().map(at).sum::<DVec3>() / count as f64;
+    let largest = cluster.iter().fold(0.0, |m: f64, member| m.max((at(member) - mean).abs().max_element()));
+    // Of about one, so that squares are as exact for small clusters as for large ones. Distinct positions have an extent.
+    let (_, axes) = Symmetric3::scatter(cluster.iter().map(|member| (at(member) - mean) / largest)).eigen();
+    for member in &mut *cluster {
+        member.value = axes[2].dot(at(member) - mean);
+    }
+    let middle = count / TWO_TRIANGLES * (TWO_TRIANGLES / 2);
+    cluster.select_nth_unstable_by(middle, |a, b| a.value.total_cmp(&b.value).then(a.index.cmp(&b.index)));
+    let (low, high) = cluster.split_at_mut(middle);
+    let mut low = || split(distinct, triangle, low, progress);
+    let mut high = || split(distinct, triangle, high, progress);
+    let (low, high) = if count > SEQUENTIAL { rayon::join(low, high) } else { (low(), high()) };
+    if count > SEQUENTIAL && count <= 2 * SEQUENTIAL {
+        progress.advance(count as u64);
+    }
+    low + high
+}
+
+/// Gives the members of a cluster of up to five points their sizes; how many of them are collinear.
+fn measure(distinct: &DistinctPositions, triangle: Triangle, cluster: &mut [Member]) -> u64 {
+    let corners: Vec<DVec3> = cluster.iter().map(|member| distinct.position(member.index)).collect();
+    let mut collinear = 0;
+    for (own, member) in corners.iter().zip(cluster) {
+        // In a cluster of three these are all of it.
+        let mut edges: Vec<DVec3> =
+            corners.iter().map(|corner| corner - own).filter(|edge| *edge != DVec3::ZERO).collect();
+        edges.sort_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
+        member.value = match edges[..] {
+            [] => 0.0,
+            [edge] => {
+                collinear += 1;
+                edge.length()
+            }
+            [a, b, ..] => {
+                let size = triangle_size(triangle, a, b);
+                collinear += u64::from(size.is_none());
+                size.unwrap_or_else(|| mean_edge(a, b))
+            }
+        };
+    }
+    collinear
+}
+
+fn mean_edge(a: DVec3, b: DVec3) -> f64 {
+    (a.length() + b.length() + a.distance(b)) / 3.0
+}
+
+/// The size of the triangle with corners at 0, `a` and `b`, or None if they are collinear.
+fn triangle_size(triangle: Triangle, a: DVec3, b: DVec3) -> Option<f64> {
+    let longest = a.length().max(b.length()).max(a.distance(b));
+    // In units of the longest edge: l1 l2 is the squared area over 3 of the scatter matrix, and l2 is 1/2 to 2/3.
+    let (a, b) = (a / longest, b / longest);
+    let doubled_area = a.cross(b).length();
+    if doubled_area * doubled_area <= COLLINEAR {
+        return None;
+    }
+    Some(
+        longest
+            * match triangle {
+                Triangle::MeanEdge => mean_edge(a, b),
+                Triangle::Circumsphere => a.length() * b.length() * a.distance(b) / doubled_area,
+            },
+    )
+}

@@ -1,0 +1,97 @@
+//! How large the surfel of a point is.
+
+mod bsp;
+mod ellipse;
+mod limit;
+
+use std::str::FromStr;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+pub(crate) use self::bsp::bsp_radii;
+pub(crate) use self::ellipse::{ELLIPSE_NEIGHBOURS, bounding_ellipse};
+pub(crate) use self::limit::local_limits;
+use super::estimate::{RADIUS_NEIGHBOURS, fitted_radius};
+use super::graph::NeighbourGraph;
+use super::positions::DistinctPositions;
+use crate::{Error, Result};
+
+/// How the size of a surfel follows from the points around it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Size {
+    /// A disk of 1.2 times the mean distance to 8 neighbours.
+    #[default]
+    Knn,
+    /// The ellipse that bounds 8 neighbours in the tangent plane, with the half-axes of their covariance there (Pajarola et
+    /// al. 2003, section 3.4).
+    Ellipse,
+    /// A disk from clusters of three points, by a binary space partition along principal axes ("a simple scheme to render
+    /// point-sampled surfaces", section 3.3).
+    Bsp(Triangle),
+}
+
+/// What is taken of a cluster of three points as its size.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Triangle {
+    /// The mean length of the triangle's edges.
+    #[default]
+    MeanEdge,
+    /// The diameter of the smallest sphere through its corners.
+    Circumsphere,
+}
+
+impl Size {
+    /// Every way to a size, with its name.
+    pub const ALL: [(Self, &'static str); 4] = [
+        (Self::Knn, "knn"),
+        (Self::Ellipse, "ellipse"),
+        (Self::Bsp(Triangle::MeanEdge), "bsp"),
+        (Self::Bsp(Triangle::Circumsphere), "bsp:circumsphere"),
+    ];
+}
+
+impl FromStr for Size {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        Self::ALL.iter().find(|(_, known)| *known == name).map(|(size, _)| *size).ok_or_else(|| {
+            let names = Self::ALL.map(|(_, known)| known).join(", ");
+            Error::Usage(format!("there is no size `{name}`: take one of {names}"))
+        })
+    }
+}
+
+/// The offsets of the `count` nearest neighbours of position `index`, scaled units, the nearest first.
+pub(crate) fn offsets<'a>(
+    distinct: &'a DistinctPositions,
+    graph: &'a NeighbourGraph,
+    index: u32,
+    count: usize,
+) -> impl Iterator<Item = DVec3> + Clone + 'a {
+    let center = distinct.position(index);
+    graph.of(index).iter().take(count).map(move |&other| distinct.position(other) - center)
+}
+
+/// The radius of each position's disk by the mean distance of its neighbours, scaled units; zero where it has none.
+pub(crate) fn knn_radii(distinct: &DistinctPositions, graph: &NeighbourGraph) -> Vec<f64> {
+    (0..distinct.len() as u32)
+        .into_par_iter()
+        .map_init(Vec::new, |near, index| {
+            near.clear();
+            near.extend(offsets(distinct, graph, index, RADIUS_NEIGHBOURS));
+            if near.is_empty() { 0.0 } else { fitted_radius(near) }
+        })
+        .collect()
+}
+
+/// The longer half-axis of each position's bounding ellipse, scaled units.
+pub(crate) fn ellipse_radii(distinct: &DistinctPositions, graph: &NeighbourGraph, normals: &[[f32; 3]]) -> Vec<f64> {
+    (0..distinct.len() as u32)
+        .into_par_iter()
+        .map(|index| {
+            let normal = DVec3::from_array(normals[index as usize].map(f64::from)).normalize();
+            bounding_ellipse(offsets(distinct, graph, index, ELLIPSE_NEIGHBOURS), normal)[0].length()
+        })
+        .collect()
+}

@@ -1,0 +1,388 @@
+//! Surfels from points: how far normals are off, on which side they are, how large surfels are, and clouds that are hard.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use std::path::Path;
+
+use epsplat::Error;
+use epsplat::io::{self, Points};
+use epsplat::scene::Colors;
+use epsplat::surfels::analytic::{Sample, Shape, generate};
+use epsplat::surfels::{FromPoints, Orientation, Size, Surfels, Triangle, from_points};
+use glam::DVec3;
+
+/// Numbers in [0, 1) that look random.
+fn noise(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed;
+    move || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+fn cloud(positions: Vec<[f64; 3]>) -> Points {
+    Points { positions, ..Points::default() }
+}
+
+fn samples(shape: Shape, count: u64) -> (Vec<[f64; 3]>, Vec<[f32; 3]>) {
+    generate(shape, count).map(|Sample { position, normal, .. }| (position, normal)).unzip()
+}
+
+fn surfels(points: Points, options: &FromPoints) -> Surfels {
+    from_points(vec![points], options, &()).unwrap()
+}
+
+/// The angles between true normals and those of `surfels`, radians.
+fn angles(surfels: &Surfels, truth: &[[f32; 3]]) -> Vec<f64> {
+    let vector = |n: &[f32; 3]| DVec3::from_array(n.map(f64::from)).normalize();
+    let normals = surfels.points.normals.as_ref().unwrap();
+    // By both products, as the cosine alone is blind to small angles.
+    let angle = |(a, b): (DVec3, DVec3)| a.cross(b).length().atan2(a.dot(b));
+    truth.iter().map(vector).zip(normals.iter().map(vector)).map(angle).collect()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+fn flipped(angles: &[f64]) -> usize {
+    angles.iter().filter(|angle| **angle > std::f64::consts::FRAC_PI_2).count()
+}
+
+fn up() -> FromPoints {
+    FromPoints { orientation: Orientation::Up, ..FromPoints::default() }
+}
+
+/// A surface of curvature at most k is within k h²/2 of the tangent plane where 16 neighbours reach as far as h. A plane's
+/// slope is cov(x, z)/var(x), so at most sd(z)/sd(x), of which the first is at most half the range, k h²/4, and the second
+/// half of h for points that fill a disk. The fitted normal is thus off by at most k h/2.
+#[test]
+fn normals_of_smooth_surfaces_are_within_their_curvature_and_outward() {
+    for (shape, curvature) in [(Shape::Sphere, 1.0), (Shape::Torus, 2.5)] {
+        let count = 20_000;
+        let (positions, truth) = samples(shape, count);
+        // 17 points stand for the disk of radius h; where the lattice is uneven it reaches half as far again.
+        let reach = 1.5 * (17.0 * shape.area() / count as f64 / std::f64::consts::PI).sqrt();
+        let bound = curvature * reach / 2.0;
+        let found = angles(&surfels(cloud(positions.clone()), &FromPoints::default()), &truth);
+        let worst = found.iter().copied().fold(0.0, f64::max);
+        println!(
+            "{shape:?}: mean {:.4} worst {:.4} bound {:.4} degrees",
+            mean(&found).to_degrees(),
+            worst.to_degrees(),
+            bound.to_degrees()
+        );
+        assert_eq!(flipped(&found), 0);
+        assert!(worst < bound, "{shape:?}: {worst} {bound}");
+        // A neighbourhood that noise has roughened is past the bound, and normals without a side are on either.
+        let mut next = noise(1);
+        let rough = positions.iter().map(|p| p.map(|c| c + 0.5 * reach * (next() - 0.5))).collect();
+        let control = angles(&surfels(cloud(rough), &FromPoints::default()), &truth);
+        assert!(control.iter().copied().fold(0.0, f64::max) > bound);
+        let control = flipped(&angles(&surfels(cloud(positions), &up()), &truth));
+        assert!(control > count as usize / 3, "{control}");
+    }
+}
+
+/// Noise of standard deviation s in z gives the slopes of a plane through n points the deviation s / sqrt(n var(x)) along
+/// each axis. 17 points at one a unit area fill a disk of radius h² = 17/pi, in which var(x) = h²/4. The angle is the
+/// length of two such slopes, Rayleigh distributed with a mean of sqrt(pi/2) of that: 0.262 s.
+#[test]
+fn noise_tilts_normals_as_least_squares_says() {
+    let mut next = noise(2);
+    let side = 250;
+    for deviation in [0.05, 0.1, 0.2] {
+        // One in each unit square, anywhere: on a grid many neighbours are equally far, and the choice falls on those that
+        // noise has moved least.
+        let positions = (0..side * side).map(|i| {
+            let normal = (0..12).map(|_| next()).sum::<f64>() - 6.0;
+            [f64::from(i % side) + next(), f64::from(i / side) + next(), deviation * normal]
+        });
+        let surfels = surfels(cloud(positions.collect()), &FromPoints::default());
+        let mut found = angles(&surfels, &vec![[0.0, 0.0, 1.0]; (side * side) as usize]);
+        assert_eq!(flipped(&found), 0, "a sheet that lies faces up");
+        // Only points that are surrounded: at the edge of the plane the spread is smaller.
+        let inside = |i: usize| (3..side as usize - 3).contains(&(i % 250)) && (3..247).contains(&(i / 250));
+        let mut index = 0..;
+        found.retain(|_| index.next().is_some_and(inside));
+        let expected = 0.262 * deviation;
+        let ratio = mean(&found) / expected;
+        println!("noise {deviation}: mean {:.3} degrees, {ratio:.3} of theory", mean(&found).to_degrees());
+        // With 8 neighbours the ratio would be 1.9.
+        assert!((0.9..1.1).contains(&ratio), "{ratio}");
+    }
+}
+
+#[test]
+fn coarse_models_with_thin_parts_face_outward() {
+    let mut points = io::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("data/bunny.obj"), &()).unwrap();
+    let truth = points.normals.take().unwrap();
+    let found = angles(&surfels(points.clone(), &FromPoints::default()), &truth);
+    let wrong: Vec<f64> = found.iter().copied().filter(|angle| *angle > 90f64.to_radians()).collect();
+    println!("bunny: mean {:.2} degrees, {} of {} past 90", mean(&found).to_degrees(), wrong.len(), found.len());
+    // The ears are three samples thick at their tips: there the planes themselves are across, and no side is right.
+    assert!(wrong.len() <= 3 && wrong.iter().all(|angle| angle.to_degrees() < 105.0), "{wrong:?}");
+    assert!(flipped(&angles(&surfels(points, &up()), &truth)) > 500);
+}
+
+#[test]
+fn every_part_faces_outward_on_its_own() {
+    let (mut positions, mut truth) = samples(Shape::Sphere, 3000);
+    for (shift, count) in [(5.0, 2000), (-4.0, 40)] {
+        let (more, normals) = samples(Shape::Torus, count);
+        positions.extend(more.into_iter().map(|[x, y, z]| [x, y + shift, z]));
+        truth.extend(normals);
+    }
+    let surfels = surfels(cloud(positions), &FromPoints::default());
+    assert_eq!(surfels.parts, Some(3));
+    assert_eq!(flipped(&angles(&surfels, &truth)[..5000]), 0);
+}
+
+#[test]
+fn normals_turn_toward_the_nearest_scanner() {
+    let (positions, truth) = samples(Shape::Sphere, 5000);
+    let toward = |scanners: &[[f64; 3]]| FromPoints {
+        orientation: Orientation::Toward(scanners.iter().map(|at| DVec3::from_array(*at)).collect()),
+        ..FromPoints::default()
+    };
+    let flips = |scanners: &[[f64; 3]]| flipped(&angles(&surfels(cloud(positions.clone()), &toward(scanners)), &truth));
+    assert_eq!(flips(&[[0.1, 0.0, 0.0]]), 5000, "all face a scanner inside");
+    assert_eq!(
+        flips(&[
+            [20.0, 0.0, 0.0],
+            [-20.0, 0.0, 0.0],
+            [0.0, 20.0, 0.0],
+            [0.0, -20.0, 0.0],
+            [0.0, 0.0, 20.0],
+            [0.0, 0.0, -20.0]
+        ]),
+        0
+    );
+    // From one side only, the far one faces the scanner too, and so inward: its horizon is at x = 1/20.
+    let one = flips(&[[20.0, 0.0, 0.0]]);
+    assert!((one as f64 - 5000.0 * (1.0 + 0.05) / 2.0).abs() < 50.0, "{one}");
+}
+
+#[test]
+fn given_normals_stay_and_say_which_side_is_which() {
+    let (positions, truth) = samples(Shape::Sphere, 4000);
+    let inward: Vec<[f32; 3]> = truth.iter().map(|n| n.map(|c| -c)).collect();
+    let mut points = cloud(positions);
+    // A few normals, all inward, one of an odd length and one of no direction.
+    let mut few = vec![[0.0; 3]; 4000];
+    few[..20].copy_from_slice(&inward[..20]);
+    few[7] = few[7].map(|c| c * 8.0);
+    points.normals = Some(few);
+    let made = surfels(points.clone(), &FromPoints::default());
+    assert_eq!(made.preparation.estimated_normals, 3980);
+    assert!(angles(&made, &inward)[..20].iter().all(|angle| *angle < 1e-6));
+    assert_eq!(flipped(&angles(&made, &inward)), 0);
+    let again = surfels(points, &FromPoints { estimate_normals: true, ..FromPoints::default() });
+    assert_eq!((again.preparation.estimated_normals, flipped(&angles(&again, &truth))), (4000, 0));
+    // Two normals at one position, as at an edge of a mesh, stay two.
+    let mut edge = cloud(samples(Shape::Plane, 400).0);
+    edge.positions.push(edge.positions[0]);
+    let mut normals = vec![[0.0, 0.0, 1.0]; 401];
+    normals[400] = [1.0, 0.0, 0.0];
+    edge.normals = Some(normals.clone());
+    let made = surfels(edge, &FromPoints { size: Size::Ellipse, ..FromPoints::default() });
+    assert_eq!(made.points.normals.as_ref().unwrap(), &normals);
+    for ([s, t], normal) in made.points.axes.unwrap().into_iter().zip(normals) {
+        let [s, t] = [s, t].map(|axis| DVec3::from_array(axis.map(f64::from)));
+        assert!(s.cross(t).normalize().distance(DVec3::from_array(normal.map(f64::from))) < 1e-6);
+    }
+}
+
+const SIZES: [Size; 4] = [Size::Knn, Size::Ellipse, Size::Bsp(Triangle::MeanEdge), Size::Bsp(Triangle::Circumsphere)];
+
+/// Checks that all is finite, and gives the surfels.
+fn sound(positions: Vec<[f64; 3]>, size: Size) -> Surfels {
+    let made = surfels(cloud(positions), &FromPoints { size, ..FromPoints::default() });
+    let Points { positions, normals, radii, axes, .. } = &made.points;
+    assert_eq!(positions.len() as u64, made.preparation.surfels);
+    let vector = |n: &[f32; 3]| DVec3::from_array(n.map(f64::from));
+    assert!(normals.as_ref().unwrap().iter().all(|n| (vector(n).length() - 1.0).abs() < 1e-6), "{size:?}");
+    assert!(radii.as_ref().unwrap().iter().all(|r| r.is_finite() && *r > 0.0), "{size:?} {radii:?}");
+    assert_eq!(axes.is_some(), size == Size::Ellipse);
+    for (([s, t], normal), radius) in axes.iter().flatten().zip(normals.as_ref().unwrap()).zip(radii.as_ref().unwrap())
+    {
+        let [s, t] = [vector(s), vector(t)];
+        assert!(s.cross(t).normalize().distance(vector(normal)) < 1e-5);
+        assert!((s.length().max(t.length()) / f64::from(*radius) - 1.0).abs() < 1e-6);
+    }
+    made
+}
+
+#[test]
+fn degenerate_clouds_have_surfels() {
+    for size in SIZES {
+        for count in 1..12 {
+            let line = (0..count).map(|i| [f64::from(i), f64::from(i) * 2.0, -1.0]).collect();
+            let made = sound(line, size);
+            let spans_none = matches!(size, Size::Bsp(_)) && count > 1;
+            assert_eq!(made.collinear, if spans_none { count as u64 } else { 0 }, "{size:?}");
+        }
+        let alone = sound(vec![[1.0, 2.0, 3.0]; 5000], size);
+        assert_eq!(alone.points.radii.as_ref().unwrap()[..2], [0.5, 0.5]);
+        assert!(
+            alone.notes().iter().any(|note| note == "4999 points lie where another one does"),
+            "{:?}",
+            alone.notes()
+        );
+        let mut many = samples(Shape::Sphere, 500).0;
+        many.extend(vec![[1.0, 0.0, 0.0]; 3000]);
+        many.extend([[f64::NAN, 0.0, 0.0], [0.0, f64::INFINITY, 0.0], [0.0, 0.0, 1e300]]);
+        let made = sound(many, size);
+        assert_eq!((made.preparation.dropped_non_finite, made.preparation.surfels), (3, 3500));
+        // The circle around a blunt triangle may be as large as the sphere.
+        let largest = if size == Size::Bsp(Triangle::Circumsphere) { 2.0 } else { 0.5 };
+        assert!(made.points.radii.unwrap().iter().all(|r| *r < largest), "{size:?}");
+        for scale in [1e-150, 1e-17, 1e17] {
+            sound(samples(Shape::Torus, 300).0.into_iter().map(|p| p.map(|c| c * scale)).collect(), size);
+        }
+    }
+    for points in [cloud(vec![]), cloud(vec![[f64::NAN; 3]; 3])] {
+        assert!(matches!(from_points(vec![points], &FromPoints::default(), &()), Err(Error::EmptyScene(_))));
+    }
+}
+
+#[test]
+fn options_out_of_range_are_refused() {
+    let usual = FromPoints::default;
+    for options in [
+        FromPoints { outliers: Some(-1.0), ..usual() },
+        FromPoints { outliers: Some(f64::NAN), ..usual() },
+        FromPoints { largest_ratio: 0.5, ..usual() },
+        FromPoints { largest_ratio: f64::NAN, ..usual() },
+        FromPoints { orientation: Orientation::Toward(vec![]), ..usual() },
+        FromPoints { orientation: Orientation::Toward(vec![DVec3::NAN]), ..usual() },
+    ] {
+        assert!(matches!(from_points(vec![cloud(vec![[0.0; 3]])], &options, &()), Err(Error::Usage(_))), "{options:?}");
+    }
+}
+
+#[test]
+fn outliers_are_dropped_and_counted_with_their_attributes() {
+    let (mut positions, truth) = samples(Shape::Sphere, 5000);
+    positions.insert(100, [4.0, 0.0, 0.0]);
+    positions.push([0.0, 0.0, -3.0]);
+    let colors = (0..5002).map(|i| [i as u8, (i >> 8) as u8, 0, 255]).collect();
+    let texture: Vec<_> = (0..5002).map(|i| [i as f32, 0.5]).collect();
+    let points = Points { colors: Some(Colors::Srgb8(colors)), texture: Some(texture), ..cloud(positions) };
+    let made = surfels(points.clone(), &FromPoints { outliers: Some(5.0), ..FromPoints::default() });
+    assert_eq!((made.dropped_outliers, made.preparation.surfels), (2, 5000));
+    assert_eq!(flipped(&angles(&made, &truth)), 0);
+    assert_eq!(made.points.texture.as_ref().unwrap()[99..101], [[99.0, 0.5], [101.0, 0.5]]);
+    assert!(matches!(made.points.colors, Some(Colors::Srgb8(ref codes)) if codes[100] == [101, 0, 0, 255]));
+    assert!(made.notes()[0].starts_with("2 points were dropped"), "{:?}", made.notes());
+    assert_eq!(surfels(points, &FromPoints { outliers: Some(1e3), ..FromPoints::default() }).dropped_outliers, 0);
+}
+
+#[test]
+fn no_disk_flies_past_its_neighbours() {
+    for size in SIZES {
+        let (mut positions, _) = samples(Shape::Plane, 10_000);
+        let usual = surfels(
+            cloud(positions.clone()),
+            &FromPoints { size, largest_ratio: f64::INFINITY, ..FromPoints::default() },
+        );
+        let typical = usual.points.radii.unwrap()[5000];
+        // Farther than any neighbour, nearer than what the limit by the median of all would catch.
+        positions.push([0.0, 0.0, 0.12]);
+        let last = |largest_ratio: f64| {
+            let made = surfels(cloud(positions.clone()), &FromPoints { size, largest_ratio, ..FromPoints::default() });
+            (made.points.radii.unwrap()[10_000], made.limited)
+        };
+        let ((free, none), (limited, some)) = (last(f64::INFINITY), last(2.0));
+        if let Size::Bsp(_) = size {
+            assert!(free > 2.5 * typical && some > 0 && none == 0, "{size:?} {free} {typical} {some} {none}");
+        }
+        // A mean distance has a limit of its own, and an ellipse in the plane does not see how far above it the point is.
+        assert!(limited <= free);
+        assert!(limited < 2.5 * typical && limited > 0.2 * typical, "{size:?} {limited} {typical}");
+    }
+}
+
+#[test]
+fn ellipses_follow_scan_lines() {
+    // Points 1 apart on lines 2.5 apart: their 8 nearest neighbours are on three lines.
+    let positions: Vec<_> = (0..10_000).map(|i| [f64::from(i % 100), 2.5 * f64::from(i / 100), 0.0]).collect();
+    let made = surfels(cloud(positions.clone()), &FromPoints { size: Size::Ellipse, ..FromPoints::default() });
+    let middle = 50 * 100 + 50;
+    let [s, t] = made.points.axes.as_ref().unwrap()[middle].map(|axis| DVec3::from_array(axis.map(f64::from)));
+    // 4 on the line, at 1 and 2; 2 on each line beside, at (0, 2.5) and, of the ties at (1, 2.5), one each.
+    assert!((s.normalize().dot(DVec3::Y)).abs() > 0.9 && s.length() / t.length() > 1.2, "{s} {t}");
+    let reach = |o: DVec3| (o.dot(s) / s.length_squared()).hypot(o.dot(t) / t.length_squared());
+    for offset in [DVec3::X * 2.0, DVec3::Y * 2.5, DVec3::X, DVec3::NEG_Y * 2.5] {
+        assert!(reach(offset) <= 1.0 + 1e-6, "{offset}");
+    }
+    // A disk that reaches the next line is larger in area.
+    assert!(s.length() * t.length() < 2.5 * 2.5 * 1.2, "{s} {t}");
+}
+
+#[test]
+fn clusters_of_three_give_the_sizes_of_their_triangles() {
+    // Triangles with edges 3, 4, 5, far from each other: every cluster is one, its circumcircle on the longest edge.
+    let triangle = [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+    let positions: Vec<_> = (0..300).map(|i| triangle[i % 3].map(|c| c + 100.0 * (i / 3) as f64)).collect();
+    for (measure, expected) in [(Triangle::MeanEdge, 4.0), (Triangle::Circumsphere, 5.0)] {
+        let options = FromPoints { size: Size::Bsp(measure), ..FromPoints::default() };
+        let made = surfels(cloud(positions.clone()), &options);
+        assert!(made.points.radii.as_ref().unwrap().iter().all(|r| (r - expected).abs() < 1e-5), "{measure:?}");
+        assert_eq!(made.collinear, 0);
+    }
+}
+
+#[test]
+fn no_order_and_no_number_of_threads_changes_a_bit() {
+    let mut positions = samples(Shape::Torus, 6000).0;
+    positions.extend(samples(Shape::Sphere, 500).0.into_iter().map(|p| p.map(|c| 4.0 + c * 0.1)));
+    positions.extend((0..900).map(|i| [f64::from(i % 30) * 0.1, f64::from(i / 30) * 0.1, 2.0]));
+    positions.extend(vec![[0.5, 0.25, 3.0]; 50]);
+    positions.iter_mut().for_each(|p| p[1] += 5.5e6);
+    for size in SIZES {
+        let options = FromPoints { size, outliers: Some(4.0), ..FromPoints::default() };
+        let rows = |made: Surfels| -> Vec<_> {
+            let Points { positions, normals, radii, axes, .. } = made.points;
+            let axes = axes.unwrap_or_else(|| vec![[[0.0; 3]; 2]; positions.len()]);
+            let rest = normals.unwrap().into_iter().zip(radii.unwrap()).zip(axes);
+            let bits = |((n, r), [s, t]): (([f32; 3], f32), [[f32; 3]; 2])| {
+                [n, s, t]
+                    .map(|v| v.map(f32::to_bits))
+                    .as_flattened()
+                    .iter()
+                    .copied()
+                    .chain([r.to_bits()])
+                    .collect::<Vec<_>>()
+            };
+            let mut rows: Vec<_> = positions.iter().map(|p| p.map(f64::to_bits)).zip(rest.map(bits)).collect();
+            rows.sort_unstable();
+            rows
+        };
+        let threads = |count| rayon::ThreadPoolBuilder::new().num_threads(count).build().unwrap();
+        let first = rows(threads(1).install(|| surfels(cloud(positions.clone()), &options)));
+        let mut next = noise(9);
+        for count in [2, 5] {
+            let mut shuffled = positions.clone();
+            for i in (1..shuffled.len()).rev() {
+                shuffled.swap(i, (next() * (i + 1) as f64) as usize);
+            }
+            assert!(rows(threads(count).install(|| surfels(cloud(shuffled), &options))) == first, "{size:?} {count}");
+        }
+    }
+}
+
+#[test]
+fn georeferenced_coordinates_stay_to_the_last_digit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("far.ply");
+    let positions: Vec<_> =
+        samples(Shape::Torus, 2000).0.into_iter().map(|[x, y, z]| [x + 636_000.001, y + 6_123_456.789, z]).collect();
+    let made = surfels(cloud(positions.clone()), &FromPoints { size: Size::Ellipse, ..FromPoints::default() });
+    assert_eq!(made.points.positions, positions);
+    io::ply::write_points(&path, &made.points, &()).unwrap();
+    let read = io::read(&path, &()).unwrap();
+    assert_eq!(read, Points { up: None, ..made.points });
+    // An f32 there is half a unit coarse.
+    assert!((f64::from(6_123_456.789f32) - 6_123_456.789).abs() > 0.01);
+}

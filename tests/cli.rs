@@ -305,3 +305,27 @@ fn surfels_are_made_of_points_and_drawn() {
     let empty = folder.file("empty.ply", ply("x y z", 0, ""));
     fails(&["surfels", text(&empty), "-o", text(&made)], 1, &["holds no points"]);
 }
+
+#[test]
+fn info_tells_what_is_missing_and_which_command_supplies_it() {
+    let folder = Folder::new();
+    let rows: String = (0..400).map(|i| format!("{} {} 0\n", i % 20, i / 20)).collect();
+    let cloud = folder.file("cloud.ply", ply("x y z", 400, &rows));
+    let info = |path: &Path| -> serde_json::Value {
+        serde_json::from_slice(&succeeds(&["info", text(path), "--json", "-"]).stdout).unwrap()
+    };
+    let before = info(&cloud);
+    let strings = |value: &serde_json::Value| -> Vec<String> { serde_json::from_value(value.clone()).unwrap() };
+    assert_eq!(strings(&before["lacks"]), ["normals", "a side for its normals", "radii", "colours"]);
+    assert!((before["coverage"]["spacing"].as_f64().unwrap() - 1.0).abs() < 1e-6);
+    let command = before["supplied_by"].as_str().unwrap().strip_prefix("epsplat ").unwrap().to_owned();
+    assert!(String::from_utf8(succeeds(&["info", text(&cloud)]).stdout).unwrap().contains(&command));
+    succeeds(&command.split(' ').collect::<Vec<_>>());
+    let after = info(&folder.path("cloud.surfels.ply"));
+    assert_eq!((strings(&after["lacks"]), after["supplied_by"].is_null()), (vec!["colours".to_owned()], true));
+    assert_eq!(after["coverage"]["covered"].as_f64(), Some(1.0));
+    // Disks too small to touch close nothing.
+    let rows: String = (0..400).map(|i| format!("{} {} 0 0 0 1 0.3\n", i % 20, i / 20)).collect();
+    let dots = folder.file("dots.ply", ply("x y z nx ny nz radius", 400, &rows));
+    assert_eq!(strings(&info(&dots)["lacks"]), ["surfels that close the surface", "colours"]);
+}

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use epsplat::io::{self, Points};
 use epsplat::scene::Colors;
-use epsplat::surfels::{self, Preparation};
+use epsplat::surfels::{self, Coverage, Preparation};
 use epsplat::{Error, Result};
 use serde::Serialize;
 
@@ -24,6 +24,9 @@ pub struct Arguments {
     json: Option<PathBuf>,
 }
 
+/// The share of surfels that covers a surface, but for its boundaries.
+const COVERED: f64 = 0.9;
+
 #[derive(Serialize)]
 struct Info {
     points: u64,
@@ -37,6 +40,12 @@ struct Info {
     /// Subtracted before coordinates become f32.
     origin: [f64; 3],
     largest_radius: f64,
+    /// None if all points are at one position.
+    coverage: Option<Coverage>,
+    /// What the file lacks, and a renderer has to guess or do without.
+    lacks: Vec<&'static str>,
+    /// The command that supplies what can be.
+    supplied_by: Option<String>,
     preparation: Preparation,
 }
 
@@ -47,6 +56,19 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let (scene, preparation) = surfels::build(vec![points], &bars)
         .map_err(|e| if let Error::EmptyScene(what) = e { Error::malformed(&arguments.input, what) } else { e })?;
     let bounds = scene.bounds();
+    let coverage = surfels::coverage(&scene, &bars)?;
+    let lacking = [
+        (preparation.estimated_normals > 0, "normals"),
+        (!scene.oriented, "a side for its normals"),
+        (preparation.estimated_radii > 0, "radii"),
+        (coverage.is_some_and(|coverage| coverage.covered < COVERED), "surfels that close the surface"),
+    ];
+    let mut lacks: Vec<_> = lacking.into_iter().filter(|(lacks, _)| *lacks).map(|(_, what)| what).collect();
+    let supplied_by = (!lacks.is_empty()).then(|| {
+        let input = arguments.input.display();
+        format!("epsplat surfels {input} -o {}", arguments.input.with_extension("surfels.ply").display())
+    });
+    lacks.extend((held.3 == "none").then_some("colours"));
     let info = Info {
         points: held.0,
         normals: held.1,
@@ -60,6 +82,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         max: (bounds.max + scene.origin).to_array(),
         origin: scene.origin.to_array(),
         largest_radius: scene.largest_radius().into(),
+        coverage,
+        lacks,
+        supplied_by,
         preparation,
     };
     match &arguments.json {
@@ -88,8 +113,13 @@ fn table(input: &std::path::Path, info: &Info) -> String {
     let _ = writeln!(text, "  colours   {}", info.colors);
     let _ = writeln!(text, "  box       {} to {}", vector(info.min), vector(info.max));
     let _ = writeln!(text, "  up        {}", info.up);
-    if let Some(spacing) = info.preparation.median_spacing {
+    if let Some(Coverage { spacing, covered }) = info.coverage {
         let _ = writeln!(text, "  spacing   {spacing:.4} (median distance to the nearest other point)");
+        let percent = 100.0 * covered;
+        let _ = writeln!(text, "  coverage  {percent:.1} % of the surfels reach far enough toward their neighbours");
+    }
+    if !info.lacks.is_empty() {
+        let _ = writeln!(text, "  lacks     {}", info.lacks.join(", "));
     }
     let _ = writeln!(
         text,
@@ -97,6 +127,10 @@ fn table(input: &std::path::Path, info: &Info) -> String {
         info.preparation.surfels, info.largest_radius
     );
     let _ = writeln!(text, "in f32 relative to the origin {}.", vector(info.origin));
+    if let Some(command) = &info.supplied_by {
+        let colors = if info.colors == "none" { " (but colours)" } else { "" };
+        let _ = writeln!(text, "What it lacks{colors} is estimated each time it is read; {command} keeps it.");
+    }
     for note in info.preparation.notes() {
         let _ = writeln!(text, "{note}");
     }

@@ -60,7 +60,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     for line in surfels.notes() {
         note(&line);
     }
-    let parts = surfels.parts.map_or(String::new(), |parts| format!(", {parts} connected parts oriented"));
+    let parts = surfels.parts.map_or(String::new(), |parts| {
+        format!(", oriented in {parts} connected part{}", if parts == 1 { "" } else { "s" })
+    });
     note(&format!("{}: {} surfels{parts}", arguments.output.display(), surfels.preparation.surfels));
     Ok(())
 }

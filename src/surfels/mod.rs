@@ -2,6 +2,7 @@
 
 pub mod analytic;
 mod colors;
+mod coverage;
 mod eigen;
 mod estimate;
 mod forest;
@@ -19,6 +20,7 @@ mod tests;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+pub use self::coverage::{Coverage, coverage};
 pub use self::from_points::{FromPoints, Surfels, from_points};
 pub use self::orient::Orientation;
 pub use self::sizes::{Size, Triangle};

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::neighbours::NeighbourSearch;
+use super::neighbours::{NeighbourSearch, Walk};
 use super::positions::DistinctPositions;
 use crate::Progress;
 
@@ -26,11 +26,11 @@ impl NeighbourGraph {
         }
         progress.begin("finding neighbours", distinct.len() as u64);
         let search = NeighbourSearch::new(distinct, degree);
-        neighbours.par_chunks_mut(CHUNK * degree).enumerate().for_each_init(Vec::new, |found, (chunk, rows)| {
+        neighbours.par_chunks_mut(CHUNK * degree).enumerate().for_each(|(chunk, rows)| {
             let first = chunk * CHUNK;
+            let mut walk = Walk::new(&search);
             for (index, row) in (first..).zip(rows.chunks_exact_mut(degree)) {
-                search.nearest(index as u32, found);
-                for (slot, neighbour) in row.iter_mut().zip(found.iter()) {
+                for (slot, neighbour) in row.iter_mut().zip(walk.nearest(index as u32)) {
                     *slot = neighbour.index;
                 }
             }

@@ -110,9 +110,14 @@ impl<'a> NeighbourSearch<'a> {
     /// Fills `found` with the nearest neighbours of position `index`, itself excluded, nearest first and equal
     /// distances in the order of [`DistinctPositions`].
     pub fn nearest(&self, index: u32, found: &mut Vec<Neighbour>) {
+        self.nearest_within(index, f64::MAX, found);
+    }
+
+    /// The same where it is known that all of them are within the squared distance `reach`, scaled units.
+    fn nearest_within(&self, index: u32, reach: f64, found: &mut Vec<Neighbour>) {
         found.clear();
         let index = index as usize;
-        let mut query = Query { search: self, index, at: self.positions[index], found, reach: f64::MAX };
+        let mut query = Query { search: self, index, at: self.positions[index], found, reach };
         // From the leaf of the query outward: most neighbours are found at once, and the rest is out of reach.
         let mut home = index / FAN;
         query.visit_leaf(home);
@@ -121,6 +126,38 @@ impl<'a> NeighbourSearch<'a> {
             query.visit_node(level, node, Some(home % FAN));
             home = node;
         }
+    }
+}
+
+/// Queries one after the other, of positions that are near each other.
+pub(crate) struct Walk<'a> {
+    search: &'a NeighbourSearch<'a>,
+    last: Option<u32>,
+    found: Vec<Neighbour>,
+}
+
+impl<'a> Walk<'a> {
+    pub fn new(search: &'a NeighbourSearch<'a>) -> Self {
+        Self { search, last: None, found: Vec::with_capacity(search.count + 1) }
+    }
+
+    /// The nearest neighbours of position `index`, as [`NeighbourSearch::nearest`] finds them.
+    ///
+    /// A ball of the last position's farthest neighbour, widened by the step from there, holds at least as many others, so
+    /// the search need not look beyond it.
+    pub fn nearest(&mut self, index: u32) -> &[Neighbour] {
+        /// More than the rounding of the few operations below.
+        const SLACK: f64 = 1.0 + 1e-12;
+        let full = self.found.get(self.search.count.wrapping_sub(1));
+        let reach = self.last.zip(full).map_or(f64::MAX, |(last, farthest)| {
+            let (from, to) = (self.search.positions[last as usize], self.search.positions[index as usize]);
+            let step = squared_length(std::array::from_fn(|axis| to[axis] - from[axis])).sqrt();
+            let radius = farthest.squared_distance.sqrt() + step;
+            radius * radius * SLACK
+        });
+        self.search.nearest_within(index, reach, &mut self.found);
+        self.last = Some(index);
+        &self.found
     }
 }
 
@@ -209,6 +246,7 @@ mod tests {
             assert_eq!((DVec3::from_array(*point) * distinct.scale()).to_array(), distinct.as_slice()[index as usize]);
         }
         let search = NeighbourSearch::new(&distinct, count);
+        let mut walk = Walk::new(&search);
         let (mut found, mut expected) = (Vec::new(), Vec::new());
         for index in (0..distinct.len() as u32).step_by(step) {
             search.nearest(index, &mut found);
@@ -220,6 +258,7 @@ mod tests {
             expected.sort_by(|a, b| a.squared_distance.total_cmp(&b.squared_distance).then(a.index.cmp(&b.index)));
             expected.truncate(count);
             assert_eq!(found, expected, "query {index}");
+            assert_eq!(walk.nearest(index), expected, "query {index} after the last");
         }
     }
 

@@ -70,7 +70,7 @@ mod tests {
             let (half_axis, slim) = (2f64.sqrt() * size, stretch);
             assert!((s.length() / (half_axis * slim) - 1.0).abs() < 1e-12, "{stretch}");
             assert!((t.length() / half_axis - 1.0).abs() < 1e-12, "{stretch}");
-            assert!(s.cross(t).normalize().distance(normal) < 1e-12);
+            assert!((s / size).cross(t / size).normalize().distance(normal) < 1e-12);
             if stretch > 1.0 {
                 assert!(s.normalize().cross(a).length() < 1e-12);
             }

@@ -107,8 +107,39 @@ fn a_render_reports_what_it_did() {
 }
 
 #[test]
+fn coverage_tells_a_whole_surface_from_one_with_holes() {
+    let folder = Folder::new();
+    let bunny = format!("{DATA}/bunny.obj");
+    let run = |surfels: &str| {
+        let few = ["--views", "6", "--side", "64"];
+        let output = succeeds(&[&["coverage", surfels, "--mesh", &bunny, "--json", "-"], &few[..]].concat());
+        serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()
+    };
+    // The reader's radii make disks that cover the triangles around each vertex.
+    let whole = run(&bunny);
+    assert_eq!((&whole["surfels"], &whole["triangles"], &whole["views"]), (&1839.into(), &3674.into(), &6.into()));
+    assert!(whole["hole_free"] == true && whole["holes"] == 0 && whole["worst_view"].is_null(), "{whole}");
+    assert!(whole["centers_to_mesh"]["max"].as_f64().unwrap() < 1e-6 && whole["rays"].as_u64().unwrap() > 4000);
+    assert!(whole["rims_to_mesh"]["mean"].as_f64().unwrap() > 1e-3);
+    // Disks too small to touch each other.
+    let text_of = std::fs::read_to_string(&bunny).unwrap();
+    let vertices: Vec<&str> = text_of.lines().filter_map(|line| line.strip_prefix("v ")).collect();
+    let rows: String = vertices.iter().map(|vertex| format!("{vertex} 0 0 1 0.01\n")).collect();
+    let specks = folder.file("specks.ply", ply("x y z nx ny nz radius", vertices.len(), &rows));
+    let holed = run(text(&specks));
+    assert!(holed["hole_free"] == false && holed["views_with_holes"] == 6, "{holed}");
+    assert!(holed["hole_share"].as_f64().unwrap() > 0.7, "{holed}");
+    let output = succeeds(&["coverage", &bunny, "--mesh", &bunny, "--views", "6", "--side", "64"]);
+    let table = String::from_utf8(output.stdout).unwrap();
+    assert!(table.contains("hole-free  from all 6 views") && table.contains("centres to mesh"), "{table}");
+    let cloud = folder.file("cloud.obj", "v 0 0 0\nv 1 0 0\n");
+    fails(&["coverage", &bunny, "--mesh", text(&cloud)], 1, &["cloud.obj", "no triangle"]);
+    fails(&["coverage", &bunny, "--mesh", &bunny, "--views", "0"], 2, &["--views"]);
+}
+
+#[test]
 fn every_command_has_help_with_an_example() {
-    for command in ["render", "compare", "generate", "info", "adapters"] {
+    for command in ["render", "compare", "coverage", "generate", "info", "adapters"] {
         let help = String::from_utf8(succeeds(&[command, "--help"]).stdout).unwrap();
         assert!(help.contains(&format!("epsplat {command}")) && help.contains("Example"), "{help}");
     }

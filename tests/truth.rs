@@ -1,10 +1,12 @@
 //! The ray-cast truth against closed forms, and a mesh against the surface that it approximates.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use std::collections::HashMap;
+mod common;
+
 use std::f64::consts::PI;
 use std::path::Path;
 
+use common::meshes::sphere;
 use epsplat::io::Mesh;
 use epsplat::metrics::{Reconstruction, reconstruction};
 use epsplat::render::{Backend, render};
@@ -29,35 +31,6 @@ fn depth(truth: &Truth, pixel: usize) -> f64 {
 /// Pixels that the surface covers, as an area.
 fn area(truth: &Truth) -> f64 {
     truth.coverage.iter().map(|&share| f64::from(share)).sum()
-}
-
-/// The unit sphere as an octahedron whose faces were cut in four `cuts` times, with normals at its corners or without.
-fn sphere(cuts: u32, smooth: bool) -> Mesh {
-    let mut positions = DVec3::AXES.iter().flat_map(|&axis| [axis, -axis]).collect::<Vec<_>>();
-    let mut triangles = Vec::new();
-    for (x, y, z) in [0, 1].into_iter().flat_map(|x| [2, 3].into_iter().flat_map(move |y| [(x, y, 4), (x, y, 5)])) {
-        // An even number of negative half-axes keeps the turn of (x, y, z).
-        triangles.push(if (x + y + z) % 2 == 0 { [x, y, z] } else { [x, z, y] });
-    }
-    for _ in 0..cuts {
-        let mut middles = HashMap::new();
-        let mut middle = |a: u32, b: u32| {
-            *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
-                positions.push((positions[a as usize] + positions[b as usize]).normalize());
-                positions.len() as u32 - 1
-            })
-        };
-        triangles = triangles
-            .iter()
-            .flat_map(|&[a, b, c]| {
-                let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
-                [[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]
-            })
-            .collect();
-    }
-    let corner = |vertex: u32| positions[vertex as usize].as_vec3().to_array();
-    let normals = smooth.then(|| triangles.iter().map(|triangle| triangle.map(corner)).collect());
-    Mesh { positions: positions.iter().map(DVec3::to_array).collect(), triangles, normals, colors: None }
 }
 
 #[test]

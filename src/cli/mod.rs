@@ -3,6 +3,7 @@
 mod adapters;
 mod bench;
 mod compare;
+mod coverage;
 mod generate;
 mod hardcases;
 mod info;
@@ -33,6 +34,7 @@ const EXIT_CODES: &str = "Exit codes: 0 done, 1 the run failed, 2 the arguments 
 enum Command {
     Render(Box<render::Arguments>),
     Compare(compare::Arguments),
+    Coverage(coverage::Arguments),
     Generate(generate::Arguments),
     Surfels(surfels::Arguments),
     Info(info::Arguments),
@@ -46,6 +48,7 @@ pub fn run() -> ExitCode {
     let outcome = match Arguments::parse().command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Coverage(arguments) => coverage::run(&arguments),
         Command::Generate(arguments) => generate::run(&arguments),
         Command::Surfels(arguments) => surfels::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),

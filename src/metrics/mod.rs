@@ -1,12 +1,17 @@
-//! Error measures: of one image against another ([`numeric`]), and of a render against the surface that its surfels stand
-//! for ([`reconstruction`](mod@reconstruction)).
+//! Error measures: of one image against another ([`numeric`]), of a render against the surface that its surfels stand for
+//! ([`reconstruction`](mod@reconstruction)), and of the surfels themselves against it, without any render: what they leave
+//! uncovered ([`coverage`](mod@coverage)), and how far they lie from it ([`distance`]).
 
+pub mod coverage;
+pub mod distance;
 pub mod numeric;
 pub mod reconstruction;
 mod ssim;
 
 use rayon::prelude::*;
 
+pub use coverage::{Coverage, coverage};
+pub use distance::{Distances, SurfaceDistances};
 pub use numeric::{Comparison, DECISION_MARGIN, MapError, compare};
 pub use reconstruction::{DepthError, NormalError, Reconstruction, reconstruction};
 

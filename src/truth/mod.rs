@@ -1,8 +1,11 @@
 //! What a surface looks like when no splat is asked: ray casting, the ground truth of reconstruction errors.
 //!
 //! Rays and hits are f64. An analytic [`Shape`] is met by its formula, a mesh by each triangle, found through a tree of
-//! boxes ([`triangles`]). Only the first surface on a ray is shaded: there are no layers of transparency, as in a render.
+//! boxes ([`triangles`]); the disks that stand for a surface are found in the same way ([`disks`]). Only the first surface
+//! on a ray is shaded: there are no layers of transparency, as in a render.
 
+pub mod disks;
+mod nearest;
 pub mod triangles;
 
 use std::path::Path;
@@ -10,6 +13,7 @@ use std::path::Path;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+pub use self::disks::DiskTree;
 pub use self::triangles::TriangleTree;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
@@ -36,6 +40,8 @@ pub struct Hit {
     pub distance: f64,
     /// Unit normal in world space, on the side that the surface says.
     pub normal: DVec3,
+    /// Unit normal of the surface's own tangent plane: of the triangle, between whose corners `normal` may be interpolated.
+    pub facet: DVec3,
     /// Linear RGB, straight alpha.
     pub color: [f32; 4],
 }
@@ -77,7 +83,8 @@ impl Surface {
                 let further = depth_along_ray(*shape, from, direction)?;
                 let p = from + direction * further;
                 let [r, g, b] = shape.color(p).map(|code| SRGB8_TO_LINEAR[usize::from(code)]);
-                Some(Hit { distance: beyond + further, normal: shape.normal(p), color: [r, g, b, 1.0] })
+                let normal = shape.normal(p);
+                Some(Hit { distance: beyond + further, normal, facet: normal, color: [r, g, b, 1.0] })
             }
             Self::Mesh(triangles) => triangles.first_hit(start, direction, beyond),
         }

@@ -15,6 +15,7 @@ use obvhs::bvh2::builder::build_bvh2;
 use obvhs::ray::{Ray, RayHit};
 
 use super::Hit;
+use super::nearest::{nearest, triangle_squared_distance};
 use crate::error::{Error, Result};
 use crate::io::Mesh;
 use crate::scene::color::DEFAULT_COLOR;
@@ -22,7 +23,7 @@ use crate::scene::{Bounds, Colors};
 
 /// How much a box is larger than its triangle on each side, in radii of the mesh. A ray starts within 2 radii of the
 /// centre and is followed for 3: its f32 origin, direction and box distances err by less than 2e-6 of a radius.
-const PADDING: f32 = 8e-6;
+pub(super) const PADDING: f32 = 8e-6;
 
 /// The distance of a ray's f32 start from its point nearest to the mesh's centre, radii.
 const STAND_OFF: f64 = 2.0;
@@ -99,6 +100,11 @@ impl TriangleTree {
         Ok(Self { tree, triangles, center, radius })
     }
 
+    /// The middle of the mesh's bounds, world coordinates.
+    pub fn center(&self) -> DVec3 {
+        self.center
+    }
+
     /// Half the diagonal of the mesh's bounds, world units; 0 for none.
     pub fn radius(&self) -> f64 {
         self.radius
@@ -114,8 +120,15 @@ impl TriangleTree {
         self.triangles.is_empty()
     }
 
+    /// The distance of a point from the nearest triangle, +inf if there is none. World coordinates and units.
+    pub fn distance(&self, point: DVec3) -> f64 {
+        let point = (point - self.center) / self.radius;
+        let squared = |index: usize| triangle_squared_distance(point, &self.triangles[index].corners);
+        nearest(&self.tree, point, squared).0.sqrt() * self.radius
+    }
+
     /// The first hit at a distance greater than `beyond`; see [`Surface::first_hit`](super::Surface::first_hit).
-    pub(super) fn first_hit(&self, start: DVec3, direction: DVec3, beyond: f64) -> Option<Hit> {
+    pub(crate) fn first_hit(&self, start: DVec3, direction: DVec3, beyond: f64) -> Option<Hit> {
         let line = Line::new((start - self.center) / self.radius, direction)?;
         let along = |distance: f64| distance * direction.length() / self.radius - line.shift;
         let after = along(beyond);
@@ -137,6 +150,7 @@ impl TriangleTree {
         Some(Hit {
             distance: (t + line.shift) * self.radius / direction.length(),
             normal: triangle.normal_at(weights),
+            facet: triangle.normal,
             color: triangle.color_at(weights),
         })
     }

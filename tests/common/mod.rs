@@ -3,6 +3,7 @@
 #![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 pub mod enclosure;
+pub mod meshes;
 pub mod scenes;
 
 use epsplat::frame::Frame;

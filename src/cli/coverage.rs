@@ -1,0 +1,132 @@
+//! `epsplat coverage`: whether surfels cover a mesh, and how far they lie from it.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use clap::Args;
+use epsplat::metrics::coverage::{Coverage, DEFAULT_SIDE, DEFAULT_VIEWS, coverage};
+use epsplat::metrics::{Distances, SurfaceDistances};
+use epsplat::surfels::build;
+use epsplat::truth::TriangleTree;
+use epsplat::{Error, Progress, Result, io};
+use serde::Serialize;
+
+use super::progress::Bars;
+use super::{note, print, write_json};
+
+/// Whether surfels cover the mesh that they stand for, and how far they lie from it.
+///
+/// Rays are cast at the mesh from all around. Where a ray first meets it, a disk must lie on the ray too, within its own
+/// radius of the mesh; else the ray is uncovered. Where the surface goes on around it, that is a hole; at an outline or a
+/// step in depth it is an edge, which flat disks cut off. Nothing is rendered, so no filter and no epsilon hides a hole.
+#[derive(Args)]
+#[command(after_help = "Example:\n  epsplat coverage surfels.ply --mesh bunny.obj --json -")]
+pub struct Arguments {
+    /// Files of surfels, or of points, whose radii are estimated
+    #[arg(required = true)]
+    surfels: Vec<PathBuf>,
+    /// The mesh that they stand for: .obj
+    #[arg(long)]
+    mesh: PathBuf,
+    /// Directions to look from
+    #[arg(long, default_value_t = DEFAULT_VIEWS, value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    views: u32,
+    /// Rays along each side of a view
+    #[arg(long, value_name = "RAYS", default_value_t = DEFAULT_SIDE, value_parser = clap::value_parser!(u32).range(1..=8192))]
+    side: u32,
+    /// The same as JSON, to a file or - for stdout (then without the table)
+    #[arg(long, value_name = "FILE|-")]
+    json: Option<PathBuf>,
+}
+
+#[derive(Serialize)]
+struct Outcome {
+    surfels: u64,
+    triangles: u64,
+    /// Of the mesh's bounds, world units.
+    diagonal: f64,
+    hole_free: bool,
+    #[serde(flatten)]
+    coverage: Coverage,
+    #[serde(flatten)]
+    distances: SurfaceDistances,
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let bars = Bars::new();
+    let points = arguments.surfels.iter().map(|path| io::read(path, &bars)).collect::<Result<Vec<_>>>()?;
+    let (scene, preparation) = build(points, &bars)?;
+    preparation.notes().iter().for_each(|line| note(line));
+    if preparation.estimated_radii > 0 {
+        note(&format!("{} surfels had no radius: theirs are estimated from neighbours", preparation.estimated_radii));
+    }
+    let mesh = TriangleTree::new(&io::obj::read_mesh(&arguments.mesh, &bars)?)?;
+    if mesh.is_empty() {
+        return Err(Error::malformed(&arguments.mesh, "it has no triangle with an area, so there is nothing to cover"));
+    }
+    let coverage = coverage(&mesh, &scene, arguments.views, arguments.side, &bars)?;
+    bars.begin("measuring distances", 0);
+    let distances = SurfaceDistances::of(&scene, &mesh);
+    bars.end();
+    let outcome = Outcome {
+        surfels: scene.surfels.len() as u64,
+        triangles: mesh.len() as u64,
+        diagonal: 2.0 * mesh.radius(),
+        hole_free: coverage.is_hole_free(),
+        coverage,
+        distances,
+    };
+    match &arguments.json {
+        Some(path) => write_json(path, &outcome),
+        None => print(&table(&outcome)),
+    }
+}
+
+fn table(outcome: &Outcome) -> String {
+    let mut text = String::new();
+    let Outcome { coverage: seen, distances, diagonal, .. } = outcome;
+    let percent = |share: f64| format!("{:.4} %", 100.0 * share);
+    // Writing to a string cannot fail.
+    let _ = writeln!(text, "{} surfels on {} triangles", outcome.surfels, outcome.triangles);
+    let _ = writeln!(
+        text,
+        "{} views of {}x{} rays, {:.3e} apart: {} of the diagonal\n",
+        seen.views,
+        seen.side,
+        seen.side,
+        seen.ray_spacing,
+        percent(seen.ray_spacing / diagonal)
+    );
+    let counted = |part: u64, share: Option<f64>| {
+        format!("{part:>9} of {} rays, {}", seen.seen.rays, percent(share.unwrap_or(0.0)))
+    };
+    let _ = writeln!(text, "uncovered  {}", counted(seen.seen.uncovered, seen.uncovered_share));
+    let _ = writeln!(text, "holes      {}", counted(seen.seen.holes, seen.hole_share));
+    match &seen.worst_view {
+        None => {
+            let _ = writeln!(text, "hole-free  from all {} views; what is uncovered are edges", seen.views);
+        }
+        Some(worst) => {
+            let [x, y, z] = worst.from;
+            let _ = writeln!(
+                text,
+                "           in {} of {} views; most, {}, from the direction {x:.3},{y:.3},{z:.3}",
+                seen.views_with_holes,
+                seen.views,
+                percent(worst.hole_share)
+            );
+        }
+    }
+    let _ = writeln!(text, "\n{:18}  {:>9}  {:>9}  {:>9}  {:>9}", "distance", "mean", "rms", "99 %", "max");
+    let mut row = |name: &str, distances: &Option<Distances>, unit: f64| {
+        if let Some(d) = distances {
+            let [mean, rms, percentile, max] = [d.mean, d.rms, d.percentile_99, d.max].map(|value| value / unit);
+            let _ = writeln!(text, "{name:18}  {mean:>9.2e}  {rms:>9.2e}  {percentile:>9.2e}  {max:>9.2e}");
+        }
+    };
+    row("centres to mesh", &distances.centers_to_mesh, 1.0);
+    row("  of the diagonal", &distances.centers_to_mesh, *diagonal);
+    row("rims to mesh", &distances.rims_to_mesh, 1.0);
+    row("  of the diagonal", &distances.rims_to_mesh, *diagonal);
+    text
+}

@@ -1,0 +1,201 @@
+//! Whether surfels have holes: what they leave uncovered of the surface that they stand for, seen from all around.
+
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+use crate::progress::Progress;
+use crate::scene::{Camera, Lens, Scene, Up};
+use crate::surfels::analytic::{Shape, generate};
+use crate::truth::{DiskTree, TriangleTree};
+
+/// Views when nobody says how many.
+pub const DEFAULT_VIEWS: u32 = 64;
+
+/// Rays along each side of a view when nobody says how many.
+pub const DEFAULT_SIDE: u32 = 512;
+
+/// How far before or behind the surface, along the ray, a disk may lie to cover it: this many of its own longer half-axes,
+/// as with the epsilon `radius:1`, within which a renderer takes depths for one surface. A disk on the far side of the
+/// body is no cover, however many lie there; one that is off by the sag of a curved surface is.
+pub const REACH: f64 = 1.0;
+
+/// The width of the strip along an outline that flat disks may cut off, in radii of the disk that is nearest there.
+const EDGE: f64 = 0.5;
+
+/// The surface has a step between two rays if one meets it deeper than the plane through the other's hit by more than so
+/// many times their distance.
+const STEP: f64 = 2.0;
+
+/// What surfels leave uncovered of a mesh.
+///
+/// The mesh is seen from `views` directions (a Fibonacci lattice on the sphere), each an orthographic image of `side` x
+/// `side` rays that shows the ball around its bounds. The first hit of a ray is *covered* if the ray meets a disk within
+/// [`REACH`] of it. What is not covered is a *hole* where the surface goes on around it, and an *edge* where it ends, or steps
+/// back, within half the radius of the disk nearest to it: flat disks do not reach into the ridge that makes an outline, so
+/// they draw it a little further in, which is an error of shape and no gap between disks. A gap at an outline of one view
+/// is none of another, which sees it from the front.
+///
+/// Shares are of rays, so of the visible surface as it is seen: parts that face a view count by their area, parts aslant
+/// by less, and hidden ones not at all. Without holes there is none, in these views, in which a circle of diameter
+/// `sqrt(2) * ray_spacing` has room.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Coverage {
+    /// Directions of view.
+    pub views: u32,
+    /// Rays along each side of a view's image.
+    pub side: u32,
+    /// Distance of neighbouring rays, world units.
+    pub ray_spacing: f64,
+    /// What all views see.
+    #[serde(flatten)]
+    pub seen: Seen,
+    /// `uncovered / rays`; None where no ray meets the mesh.
+    pub uncovered_share: Option<f64>,
+    /// `holes / rays`; None where no ray meets the mesh.
+    pub hole_share: Option<f64>,
+    /// Views that see a hole.
+    pub views_with_holes: u32,
+    /// The view with the largest share of holes, if any has one.
+    pub worst_view: Option<WorstView>,
+}
+
+/// Rays, counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Seen {
+    /// Those that meet the mesh.
+    pub rays: u64,
+    /// Of these, those that no disk covers.
+    pub uncovered: u64,
+    /// Of these, those that are not at an edge.
+    pub holes: u64,
+}
+
+impl Seen {
+    fn and(self, other: Self) -> Self {
+        Self {
+            rays: self.rays + other.rays,
+            uncovered: self.uncovered + other.uncovered,
+            holes: self.holes + other.holes,
+        }
+    }
+
+    fn share(self, part: u64) -> Option<f64> {
+        (self.rays > 0).then(|| part as f64 / self.rays as f64)
+    }
+}
+
+/// Where to look at the holes from.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct WorstView {
+    /// The unit vector from the mesh toward the viewer.
+    pub from: [f64; 3],
+    /// Holes over rays that meet the mesh, in this view.
+    pub hole_share: f64,
+}
+
+impl Coverage {
+    /// Whether the mesh was seen, and no hole.
+    pub fn is_hole_free(&self) -> bool {
+        self.seen.rays > 0 && self.seen.holes == 0
+    }
+}
+
+/// Looks at `mesh` from all around and counts where no disk of `scene` covers it.
+///
+/// # Errors
+///
+/// [`Error::Usage`] for no views, an image of no rays, or more than a camera can have.
+pub fn coverage(
+    mesh: &TriangleTree,
+    scene: &Scene,
+    views: u32,
+    side: u32,
+    progress: &dyn Progress,
+) -> Result<Coverage> {
+    if views == 0 {
+        return Err(Error::Usage("coverage is measured from at least one view".into()));
+    }
+    // A mesh of one point has no ball; no ray meets it, whatever the camera.
+    let radius = if mesh.radius() > 0.0 { mesh.radius() } else { 1.0 };
+    let toward: Vec<DVec3> =
+        generate(Shape::Sphere, views.into()).map(|sample| DVec3::from_array(sample.position)).collect();
+    let camera = |toward: &DVec3| {
+        let eye = mesh.center() + 2.0 * radius * toward;
+        Camera::look_at(
+            (side, side),
+            Lens::OrthographicHeight(2.0 * radius),
+            eye,
+            mesh.center(),
+            None,
+            Up::Y,
+            0.1 * radius,
+        )
+    };
+    let cameras = toward.iter().map(camera).collect::<Result<Vec<_>>>()?;
+    let disks = DiskTree::new(scene);
+    progress.begin("casting rays", u64::from(views) * u64::from(side));
+    let row = |camera: &Camera, y: u32| {
+        let mut seen = Seen::default();
+        for x in 0..side {
+            let Some(hit) = meet(mesh, camera, x.into(), y.into()) else { continue };
+            seen.rays += 1;
+            if !disks.covers(hit.point, hit.direction, REACH) {
+                seen.uncovered += 1;
+                seen.holes += u64::from(!is_at_edge(mesh, &disks, camera, &hit, x.into(), y.into()));
+            }
+        }
+        progress.advance(1);
+        seen
+    };
+    let in_view = |camera: &Camera| (0..side).into_par_iter().map(|y| row(camera, y)).reduce(Seen::default, Seen::and);
+    let of_views: Vec<Seen> = cameras.par_iter().map(in_view).collect();
+    progress.end();
+    let seen = of_views.iter().copied().fold(Seen::default(), Seen::and);
+    let with_holes = of_views.iter().zip(&toward).filter(|(seen, _)| seen.holes > 0);
+    let worst = with_holes.clone().filter_map(|(seen, toward)| Some((seen.share(seen.holes)?, toward)));
+    let worst = worst.max_by(|a, b| a.0.total_cmp(&b.0));
+    Ok(Coverage {
+        views,
+        side,
+        ray_spacing: 2.0 * mesh.radius() / f64::from(side),
+        seen,
+        uncovered_share: seen.share(seen.uncovered),
+        hole_share: seen.share(seen.holes),
+        views_with_holes: with_holes.count() as u32,
+        worst_view: worst.map(|(hole_share, toward)| WorstView { from: toward.to_array(), hole_share }),
+    })
+}
+
+/// Where a ray first meets the mesh.
+struct Meeting {
+    point: DVec3,
+    /// Of the ray, unit.
+    direction: DVec3,
+    /// Of the triangle that is met, unit.
+    normal: DVec3,
+}
+
+/// By the ray of pixel (x, y).
+fn meet(mesh: &TriangleTree, camera: &Camera, x: f64, y: f64) -> Option<Meeting> {
+    let (start, direction) = (camera.ray_start(x + 0.5, y + 0.5), camera.ray(x + 0.5, y + 0.5));
+    let hit = mesh.first_hit(start, direction, 0.0)?;
+    Some(Meeting { point: start + direction * hit.distance, direction, normal: hit.facet })
+}
+
+/// By rays around that of pixel (x, y), in eight directions, at half the width of the strip and at its whole.
+fn is_at_edge(mesh: &TriangleTree, disks: &DiskTree, camera: &Camera, hit: &Meeting, x: f64, y: f64) -> bool {
+    let Some(radius) = disks.radius_near(hit.point) else { return false };
+    (0..16).any(|k| {
+        let across = EDGE * radius * if k < 8 { 0.5 } else { 1.0 };
+        let (sin, cos) = (TAU * f64::from(k) / 8.0).sin_cos();
+        let (dx, dy) = (across * cos * camera.fx, across * sin * camera.fy);
+        let Some(beside) = meet(mesh, camera, x + dx, y + dy) else { return true };
+        // How much deeper the ray beside goes than the plane through the hit.
+        let below = (beside.point - hit.point).dot(hit.normal) / hit.direction.dot(hit.normal);
+        below > STEP * across
+    })
+}

@@ -1,0 +1,281 @@
+//! The disks of a scene as rays and points meet them: flat ellipses, neither blended nor filtered.
+//!
+//! As for triangles, a tree of padded f32 boxes finds candidates, and each is decided in f64.
+
+use std::time::Duration;
+
+use glam::{DVec3, Vec3, Vec3A};
+use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::builder::build_bvh2;
+use obvhs::ray::Ray;
+use rayon::prelude::*;
+
+use super::nearest::nearest;
+use super::triangles::PADDING;
+use crate::scene::{Bounds, Scene, Surfel};
+
+/// The shorter half-axis is taken for at least this part of the longer: a disk seen as a line has a distance all the same.
+const THINNEST: f64 = 1e-9;
+
+/// The disks of a scene in a tree of boxes.
+#[derive(Clone)]
+pub struct DiskTree {
+    tree: Bvh2,
+    disks: Vec<Disk>,
+    /// The middle of all disks, world coordinates.
+    center: DVec3,
+    /// Half the diagonal of their bounds, world units.
+    radius: f64,
+    /// The longest half-axis, in units of `radius`.
+    longest: f64,
+}
+
+/// In units of the tree's radius, relative to its centre.
+#[derive(Clone, Debug)]
+struct Disk {
+    center: DVec3,
+    /// Unit directions of the longer and of the shorter half-axis, and of the normal.
+    axes: [DVec3; 3],
+    /// Lengths of the half-axes, the longer one first.
+    half: [f64; 2],
+}
+
+impl DiskTree {
+    /// Builds the tree. Surfels that are not finite or have no size are left out.
+    pub fn new(scene: &Scene) -> Self {
+        let world = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
+        let extent = |surfel: &Surfel| (world(surfel.s).powf(2.0) + world(surfel.t).powf(2.0)).map(f64::sqrt);
+        let sized = |surfel: &&Surfel| {
+            let numbers = [surfel.center, surfel.s, surfel.t];
+            numbers.as_flattened().iter().all(|c| c.is_finite()) && surfel.radius() > 0.0
+        };
+        let surfels: Vec<&Surfel> = scene.surfels.iter().filter(sized).collect();
+        let bounds = surfels.par_iter().fold(
+            || Bounds::EMPTY,
+            |bounds, surfel| {
+                let (center, reach) = (world(surfel.center), extent(surfel));
+                bounds.with_point(center - reach).with_point(center + reach)
+            },
+        );
+        let bounds = bounds.reduce(|| Bounds::EMPTY, Bounds::union);
+        let (center, extent) = (bounds.center(), bounds.extent().length());
+        let radius = if extent > 0.0 { 0.5 * extent } else { 1.0 };
+        let disk = |surfel: &&Surfel| {
+            Disk::new((world(surfel.center) - center) / radius, world(surfel.s) / radius, world(surfel.t) / radius)
+        };
+        let disks: Vec<Disk> = surfels.par_iter().map(disk).collect();
+        let boxes: Vec<Aabb> = disks.iter().map(Disk::padded_box).collect();
+        // The builder takes no empty list in all of its steps.
+        let tree = if boxes.is_empty() {
+            Bvh2::default()
+        } else {
+            build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut Duration::default())
+        };
+        let longest = disks.iter().map(|disk| disk.half[0]).fold(0.0, f64::max);
+        Self { tree, disks, center: scene.origin + center, radius, longest }
+    }
+
+    /// How many disks there are.
+    pub fn len(&self) -> usize {
+        self.disks.len()
+    }
+
+    /// No surfel has a size.
+    pub fn is_empty(&self) -> bool {
+        self.disks.is_empty()
+    }
+
+    /// Whether the line through `point` along `direction` (of unit length) meets a disk, no farther from `point` than
+    /// `reach` times the disk's own longer half-axis. World coordinates.
+    pub fn covers(&self, point: DVec3, direction: DVec3, reach: f64) -> bool {
+        let point = (point - self.center) / self.radius;
+        let farthest = reach * self.longest + f64::from(PADDING);
+        // Nothing is met from outside the ball of the boxes; the f32 numbers below are thus small.
+        if self.is_empty() || point.is_nan() || point.length() > 1.1 + farthest {
+            return false;
+        }
+        let start = (point - direction * farthest).as_vec3a();
+        let segment = Ray::new(start, direction.as_vec3a(), 0.0, (2.0 * farthest) as f32);
+        !self.tree.ray_traverse_miss(segment, |_, entry| {
+            let disk = &self.disks[self.tree.primitive_indices[entry] as usize];
+            if disk.met_at(point, direction).is_some_and(|t| t.abs() <= reach * disk.half[0]) {
+                0.0
+            } else {
+                f32::INFINITY
+            }
+        })
+    }
+
+    /// The distance of a point from the nearest disk, +inf if there is none. World coordinates and units.
+    pub fn distance(&self, point: DVec3) -> f64 {
+        let point = (point - self.center) / self.radius;
+        let squared = |index: usize| self.disks[index].squared_distance(point);
+        nearest(&self.tree, point, squared).0.sqrt() * self.radius
+    }
+
+    /// The longer half-axis of the disk nearest to a point, None if there is no disk. World coordinates and units.
+    pub fn radius_near(&self, point: DVec3) -> Option<f64> {
+        let point = (point - self.center) / self.radius;
+        let squared = |index: usize| self.disks[index].squared_distance(point);
+        nearest(&self.tree, point, squared).1.map(|index| self.disks[index].half[0] * self.radius)
+    }
+
+    /// The distance of a point from the nearest disk's centre, +inf if there is none. World coordinates and units.
+    pub fn distance_to_center(&self, point: DVec3) -> f64 {
+        let point = (point - self.center) / self.radius;
+        let squared = |index: usize| self.disks[index].center.distance_squared(point);
+        nearest(&self.tree, point, squared).0.sqrt() * self.radius
+    }
+}
+
+impl Disk {
+    /// Half-axes that are not perpendicular are conjugate ones of the same ellipse; its principal ones are found here.
+    fn new(center: DVec3, s: DVec3, t: DVec3) -> Self {
+        // The rotation by which (s, t) become perpendicular: tan 2x = 2 s.t / (s.s - t.t).
+        let turn = 0.5 * (2.0 * s.dot(t)).atan2(s.length_squared() - t.length_squared());
+        let (sin, cos) = turn.sin_cos();
+        let (long, short) = (s * cos + t * sin, t * cos - s * sin);
+        let half = [long.length(), short.length().max(THINNEST * long.length())];
+        let long = long.normalize_or(DVec3::X);
+        let short = short.try_normalize().unwrap_or_else(|| long.any_orthonormal_vector());
+        Self { center, axes: [long, short, long.cross(short)], half }
+    }
+
+    fn padded_box(&self) -> Aabb {
+        let [long, short] = [self.axes[0] * self.half[0], self.axes[1] * self.half[1]];
+        let reach = (long * long + short * short).map(f64::sqrt) + f64::from(PADDING);
+        let corner = |at: DVec3| Vec3A::from(at.as_vec3());
+        Aabb::new(corner(self.center - reach), corner(self.center + reach))
+    }
+
+    /// Where on the line `point + t * direction` the disk lies; None where it does not, or is seen edge-on.
+    fn met_at(&self, point: DVec3, direction: DVec3) -> Option<f64> {
+        let [long, short, normal] = self.axes;
+        let t = (self.center - point).dot(normal) / direction.dot(normal);
+        let offset = point + direction * t - self.center;
+        let (u, v) = (offset.dot(long) / self.half[0], offset.dot(short) / self.half[1]);
+        (u * u + v * v <= 1.0).then_some(t)
+    }
+
+    /// Beyond the rim the nearest point (x', y') of the ellipse with half-axes a and b has the normal through (x, y):
+    /// `x' = a² x / (t + a²)`, `y' = b² y / (t + b²)`, where t is the root of `(a x / (t + a²))² + (b y / (t + b²))² = 1`.
+    /// That function is convex and falls, so Newton's method comes to the root from below and never passes it.
+    fn squared_distance(&self, point: DVec3) -> f64 {
+        let offset = point - self.center;
+        let [x, y] = [offset.dot(self.axes[0]).abs(), offset.dot(self.axes[1]).abs()];
+        let height = offset.dot(self.axes[2]);
+        let [a, b] = self.half;
+        if (x / a).powi(2) + (y / b).powi(2) <= 1.0 {
+            return height * height;
+        }
+        let mut t = (a * x - a * a).max(b * y - b * b).max(0.0);
+        for _ in 0..60 {
+            let (p, q) = (a * x / (t + a * a), b * y / (t + b * b));
+            let slope = p * p / (t + a * a) + q * q / (t + b * b);
+            let step = 0.5 * (p * p + q * q - 1.0) / slope;
+            if step.is_nan() || step <= 1e-14 * (t + b * b) {
+                break;
+            }
+            t += step;
+        }
+        let (dx, dy) = (x * t / (t + a * a), y * t / (t + b * b));
+        dx * dx + dy * dy + height * height
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Colors, Up};
+
+    fn noise(seed: u64) -> impl FnMut() -> f64 {
+        let mut state = seed;
+        move || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            2.0 * ((state >> 11) as f64 / (1u64 << 53) as f64) - 1.0
+        }
+    }
+
+    /// Disks of all shapes: round, long, needles, and ones whose half-axes are not perpendicular; far from the origin.
+    fn scene() -> Scene {
+        let mut next = noise(1);
+        let mut vector = || Vec3::new(next() as f32, next() as f32, next() as f32);
+        let surfels = (0..300).map(|k| {
+            let (center, s, t) = (vector() * 3.0, vector() * 0.3, vector() * 0.3);
+            let t = if k % 3 == 0 { t } else { s.cross(t).normalize().cross(s) * [1.0, 0.2, 1e-3, 0.0][k % 4] };
+            Surfel { center: center.to_array(), s: s.to_array(), t: t.to_array() }
+        });
+        let mut surfels: Vec<Surfel> = surfels.collect();
+        surfels[7].center[0] = f32::NAN;
+        (surfels[8].s, surfels[8].t) = ([0.0; 3], [0.0; 3]);
+        let origin = DVec3::new(6e5, 5e6, 0.0);
+        Scene { origin, surfels, colors: Colors::Constant([1.0; 4]), oriented: true, up: Up::Y }
+    }
+
+    #[test]
+    fn distances_are_those_of_points_on_the_disks() {
+        let scene = scene();
+        let tree = DiskTree::new(&scene);
+        assert_eq!((tree.len(), tree.is_empty()), (298, false));
+        let mut next = noise(2);
+        for _ in 0..40 {
+            let point = DVec3::new(next(), next(), next()) * 3.5;
+            let (mut sampled, mut to_center) = (f64::INFINITY, f64::INFINITY);
+            for surfel in &scene.surfels {
+                let [center, s, t] = [surfel.center, surfel.s, surfel.t].map(|v| Vec3::from_array(v).as_dvec3());
+                if s == DVec3::ZERO {
+                    continue;
+                }
+                to_center = to_center.min(center.distance(point));
+                for k in 0..20 * 200 {
+                    let (sin, cos) = (f64::from(k % 200) / 200.0 * std::f64::consts::TAU).sin_cos();
+                    let rho = f64::from(k / 200 + 1) / 20.0;
+                    sampled = sampled.min((center + rho * (s * cos + t * sin)).distance(point));
+                }
+            }
+            let world = scene.origin + point;
+            let distance = tree.distance(world);
+            assert!(distance < sampled + 1e-8 && sampled < distance.hypot(0.02), "{distance} {sampled}");
+            assert!((tree.distance_to_center(world) - to_center).abs() < 1e-8);
+        }
+    }
+
+    #[test]
+    fn a_line_is_covered_by_the_disks_that_it_meets_within_reach() {
+        let scene = scene();
+        let tree = DiskTree::new(&scene);
+        let mut next = noise(2);
+        let (mut covered, mut near) = (0, 0);
+        for _ in 0..3000 {
+            let point = DVec3::new(next(), next(), next()) * 3.0;
+            let direction = DVec3::new(next(), next(), next()).normalize();
+            // By Cramer's rule on point + t direction = center + u s + v t, which knows no principal axes.
+            let met = |surfel: &Surfel| {
+                let [center, s, t] = [surfel.center, surfel.s, surfel.t].map(|v| Vec3::from_array(v).as_dvec3());
+                let (offset, determinant) = (point - center, -direction.dot(s.cross(t)));
+                let u = offset.dot(t.cross(-direction)) / determinant;
+                let v = offset.dot((-direction).cross(s)) / determinant;
+                let along = offset.dot(s.cross(t)) / determinant;
+                let half = [s.length_squared(), t.length_squared(), 2.0 * s.dot(t)];
+                let longest = (0.5 * (half[0] + half[1] + (half[0] - half[1]).hypot(half[2]))).sqrt();
+                (u * u + v * v <= 1.0).then_some(along.abs() / longest)
+            };
+            let reaches = scene.surfels.iter().filter_map(met).fold(f64::INFINITY, f64::min);
+            for reach in [0.5, 1.0, 30.0] {
+                assert_eq!(tree.covers(scene.origin + point, direction, reach), reaches <= reach, "{reaches}");
+            }
+            covered += u32::from(reaches <= 30.0);
+            near += u32::from(reaches <= 1.0);
+        }
+        assert!(near > 20 && covered > 5 * near, "{near} {covered}");
+    }
+
+    #[test]
+    fn no_disks_cover_nothing_and_are_far() {
+        let tree = DiskTree::new(&Scene { surfels: vec![], ..scene() });
+        assert!(tree.is_empty() && !tree.covers(DVec3::ZERO, DVec3::X, 1.0));
+        assert_eq!(tree.distance(DVec3::ZERO), f64::INFINITY);
+    }
+}

@@ -1,0 +1,93 @@
+//! How far a point is from what a tree of boxes holds, and from a triangle.
+
+use glam::{DVec3, Vec3A};
+use obvhs::bvh2::Bvh2;
+
+/// The least `squared_distance` over the tree's primitives, and of which it is; +inf and none of them for none. The boxes
+/// must hold what the distances are measured to: a box that is farther than what was found already is passed over.
+pub(super) fn nearest(tree: &Bvh2, point: DVec3, squared_distance: impl Fn(usize) -> f64) -> (f64, Option<usize>) {
+    let mut least = f64::INFINITY;
+    let mut nearest = None;
+    let to_box =
+        |node: u32| tree.nodes.get(node as usize).map(|found| (box_squared_distance(found.aabb(), point), node));
+    let mut open = Vec::with_capacity(64);
+    open.extend(to_box(0));
+    while let Some((bound, node)) = open.pop() {
+        // NaN, of a point that is not finite, is passed over too.
+        if bound.partial_cmp(&least) != Some(std::cmp::Ordering::Less) {
+            continue;
+        }
+        let node = &tree.nodes[node as usize];
+        if node.is_leaf() {
+            let entries = node.first_index as usize..(node.first_index + node.prim_count) as usize;
+            for primitive in &tree.primitive_indices[entries] {
+                let squared = squared_distance(*primitive as usize);
+                if squared < least {
+                    (least, nearest) = (squared, Some(*primitive as usize));
+                }
+            }
+        } else {
+            let mut children = [to_box(node.first_index), to_box(node.first_index + 1)];
+            // The nearer child is popped first.
+            children.sort_by(|a, b| b.map_or(0.0, |b| b.0).total_cmp(&a.map_or(0.0, |a| a.0)));
+            open.extend(children.into_iter().flatten());
+        }
+    }
+    (least, nearest)
+}
+
+fn box_squared_distance(bounds: &obvhs::aabb::Aabb, point: DVec3) -> f64 {
+    let [low, high] = [bounds.min, bounds.max].map(|corner: Vec3A| corner.as_dvec3());
+    (low - point).max(point - high).max(DVec3::ZERO).length_squared()
+}
+
+/// The squared distance of a point from a triangle that has an area.
+pub(super) fn triangle_squared_distance(point: DVec3, corners: &[DVec3; 3]) -> f64 {
+    let [a, b, c] = *corners;
+    let normal = (b - a).cross(c - a);
+    // Above the triangle the nearest point is the foot of the perpendicular, else it lies on an edge.
+    let above = [(a, b), (b, c), (c, a)].iter().all(|(from, to)| (to - from).cross(point - from).dot(normal) >= 0.0);
+    if above {
+        return (point - a).dot(normal).powi(2) / normal.length_squared();
+    }
+    let to_edge = |from: DVec3, to: DVec3| {
+        let along = ((point - from).dot(to - from) / from.distance_squared(to)).clamp(0.0, 1.0);
+        point.distance_squared(from.lerp(to, along))
+    };
+    to_edge(a, b).min(to_edge(b, c)).min(to_edge(c, a))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_triangle_is_as_far_as_its_nearest_point() {
+        let corners = [DVec3::new(0.1, 0.2, 0.0), DVec3::new(2.0, 0.1, 0.5), DVec3::new(0.4, 1.5, -0.3)];
+        let mut state = 1u64;
+        let mut next = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let (mut faces, mut edges) = (0, 0);
+        for _ in 0..300 {
+            let point = DVec3::new(4.0 * next() - 1.0, 4.0 * next() - 1.0, 2.0 * next() - 1.0);
+            let mut sampled = f64::INFINITY;
+            let (mut on_edge, n) = (false, 200);
+            for i in 0..=n {
+                for j in 0..=n - i {
+                    let (u, v) = (f64::from(i) / f64::from(n), f64::from(j) / f64::from(n));
+                    let at = corners[0] + (corners[1] - corners[0]) * u + (corners[2] - corners[0]) * v;
+                    if point.distance(at) < sampled {
+                        (sampled, on_edge) = (point.distance(at), i == 0 || j == 0 || i + j == n);
+                    }
+                }
+            }
+            let distance = triangle_squared_distance(point, &corners).sqrt();
+            // The nearest sample lies within half a step of the nearest point.
+            assert!(distance <= sampled + 1e-12 && sampled < distance.hypot(0.01), "{distance} {sampled}");
+            if on_edge { edges += 1 } else { faces += 1 }
+        }
+        assert!(faces > 20 && edges > 100);
+    }
+}

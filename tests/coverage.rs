@@ -1,0 +1,132 @@
+//! What surfels leave uncovered of a mesh, and how far they are from it, where both have a formula.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use std::f64::consts::PI;
+
+use common::meshes::sphere;
+use epsplat::io::{Mesh, Points};
+use epsplat::metrics::{Coverage, SurfaceDistances, coverage};
+use epsplat::scene::Scene;
+use epsplat::surfels::analytic::{Sample, Shape, generate};
+use epsplat::surfels::build;
+use epsplat::truth::TriangleTree;
+
+/// The generated surfels of a shape for which `keep` holds.
+fn surfels(shape: Shape, count: u64, keep: impl Fn(&Sample) -> bool) -> Scene {
+    let samples: Vec<Sample> = generate(shape, count).filter(keep).collect();
+    let points = Points {
+        positions: samples.iter().map(|sample| sample.position).collect(),
+        normals: Some(samples.iter().map(|sample| sample.normal).collect()),
+        radii: Some(samples.iter().map(|sample| sample.radius).collect()),
+        ..Points::default()
+    };
+    build(vec![points], &()).unwrap().0
+}
+
+fn square() -> Mesh {
+    Mesh {
+        positions: vec![[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..Mesh::default()
+    }
+}
+
+fn seen(mesh: &Mesh, scene: &Scene) -> Coverage {
+    coverage(&TriangleTree::new(mesh).unwrap(), scene, 64, 128, &()).unwrap()
+}
+
+#[test]
+fn a_sphere_is_covered_until_surfels_are_missing() {
+    let mesh = sphere(6, false);
+    let whole = seen(&mesh, &surfels(Shape::Sphere, 5000, |_| true));
+    // Each view sees a disk of area pi.
+    let expected = 64.0 * PI / whole.ray_spacing.powi(2);
+    assert!((whole.seen.rays as f64 / expected - 1.0).abs() < 0.01, "{whole:?}");
+    assert!(whole.seen.uncovered == 0 && (whole.views_with_holes, whole.worst_view) == (0, None), "{whole:?}");
+    // From all around, a convex body's surface is seen evenly: the share of rays is that of the area. The disks around
+    // the missing cap reach into it by their radius, 0.075.
+    let cap = |angle: f64| 0.5 * (1.0 - angle.cos());
+    for angle in [0.3, 0.8, 0.5 * PI] {
+        let holed = seen(&mesh, &surfels(Shape::Sphere, 5000, |sample| sample.position[2] < angle.cos()));
+        let share = holed.hole_share.unwrap();
+        // The mesh is closed, so behind the hole there are disks on each ray: those of the far side do not count.
+        assert!(
+            cap(angle - 0.08) < share && share < cap(angle),
+            "{angle}: {share}, {} to {}",
+            cap(angle - 0.08),
+            cap(angle)
+        );
+        let worst = holed.worst_view.unwrap();
+        assert!(!holed.is_hole_free() && worst.from[2] > 0.9 && worst.hole_share > 1.9 * share, "{worst:?}");
+    }
+}
+
+#[test]
+fn a_single_missing_surfel_of_a_sparse_sphere_is_a_hole() {
+    // At 0.7 of the spacing square cells of four samples are just closed; the lattice's cells are others, so some gape.
+    let scene = |factor: f32| {
+        let mut scene = surfels(Shape::Sphere, 2000, |_| true);
+        for surfel in &mut scene.surfels {
+            (surfel.s, surfel.t) = (surfel.s.map(|c| c * factor), surfel.t.map(|c| c * factor));
+        }
+        scene
+    };
+    let mesh = sphere(5, false);
+    assert!(seen(&mesh, &scene(1.0)).is_hole_free());
+    let gaping = seen(&mesh, &scene(0.4));
+    // Disks of 0.6 spacings' radius cover at most 0.36 pi of the surface where they do not overlap: 1.13, with gaps.
+    assert!(gaping.hole_share.unwrap() > 0.005 && gaping.views_with_holes == 64, "{gaping:?}");
+    let touching = seen(&mesh, &scene(0.2));
+    // Of 0.3 spacings: they do not overlap and cover 0.09 pi.
+    assert!((touching.hole_share.unwrap() - (1.0 - 0.09 * PI)).abs() < 0.02, "{touching:?}");
+}
+
+#[test]
+fn a_hole_in_a_square_has_its_area() {
+    let keep = |radius: f64| surfels(Shape::Plane, 20_000, move |s| s.position[0].hypot(s.position[1]) > radius);
+    assert!(seen(&square(), &keep(0.0)).is_hole_free());
+    // The disks' radius is 0.0212.
+    let holed = seen(&square(), &keep(0.4)).hole_share.unwrap();
+    assert!((PI * 0.375f64.powi(2) / 4.0..PI * 0.4f64.powi(2) / 4.0).contains(&holed), "{holed}");
+    // Off the surface by more than a radius, disks cover nothing, though a render from the front would show no hole.
+    let lifted = |height: f32| {
+        let mut scene = keep(0.0);
+        scene.surfels.iter_mut().for_each(|surfel| surfel.center[2] = height);
+        seen(&square(), &scene).uncovered_share.unwrap()
+    };
+    assert!(lifted(0.022) == 1.0 && lifted(0.005) < 0.3, "{}", lifted(0.005));
+}
+
+#[test]
+fn distances_are_those_by_which_surfels_are_moved() {
+    let mesh = TriangleTree::new(&square()).unwrap();
+    let mut scene = surfels(Shape::Plane, 1000, |s| s.position.iter().all(|c| c.abs() < 0.8));
+    let on = SurfaceDistances::of(&scene, &mesh).centers_to_mesh.unwrap();
+    assert_eq!((on.mean, on.max), (0.0, 0.0));
+    for (k, surfel) in scene.surfels.iter_mut().enumerate() {
+        surfel.center[2] = if k % 50 == 0 { -0.5 } else { 0.25 };
+    }
+    let moved = SurfaceDistances::of(&scene, &mesh);
+    let (centers, rims) = (moved.centers_to_mesh.unwrap(), moved.rims_to_mesh.unwrap());
+    let far = scene.surfels.len().div_ceil(50) as f64 / scene.surfels.len() as f64;
+    assert!((centers.mean - (0.25 + 0.25 * far)).abs() < 1e-12 && centers.rms > centers.mean, "{centers:?}");
+    assert!((centers.percentile_99 - 0.5).abs().max((centers.max - 0.5).abs()) < 1e-12, "{centers:?}");
+    // The disks lie parallel to the square and within it.
+    assert!((rims.mean - centers.mean).abs() < 1e-7);
+
+    // A disk of radius r on a sphere leaves it by sqrt(1 + r r) - 1 at the rim.
+    let ball = TriangleTree::new(&sphere(7, false)).unwrap();
+    let scene = surfels(Shape::Sphere, 500, |_| true);
+    let rims = SurfaceDistances::of(&scene, &ball).rims_to_mesh.unwrap();
+    let expected = f64::from(scene.surfels[0].radius()).hypot(1.0) - 1.0;
+    // The facets lie up to 1e-4 inside the sphere.
+    assert!((rims.mean - expected).abs() < 1e-4 && (rims.max - expected).abs() < 1.5e-4, "{rims:?} {expected}");
+
+    let nothing = TriangleTree::new(&Mesh::default()).unwrap();
+    assert_eq!(SurfaceDistances::of(&scene, &nothing).centers_to_mesh, None);
+    let unseen = coverage(&nothing, &scene, 2, 8, &()).unwrap();
+    assert!((unseen.seen.rays, unseen.uncovered_share) == (0, None) && !unseen.is_hole_free());
+    assert!(coverage(&nothing, &scene, 0, 8, &()).is_err() && coverage(&nothing, &scene, 1, 0, &()).is_err());
+}

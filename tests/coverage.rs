@@ -101,14 +101,15 @@ fn a_hole_in_a_square_has_its_area() {
 
 #[test]
 fn distances_are_those_by_which_surfels_are_moved() {
-    let mesh = TriangleTree::new(&square()).unwrap();
+    let distances =
+        |scene: &Scene, mesh: &Mesh| SurfaceDistances::of(scene, mesh, &TriangleTree::new(mesh).unwrap()).unwrap();
     let mut scene = surfels(Shape::Plane, 1000, |s| s.position.iter().all(|c| c.abs() < 0.8));
-    let on = SurfaceDistances::of(&scene, &mesh).centers_to_mesh.unwrap();
+    let on = distances(&scene, &square()).centers_to_mesh.unwrap();
     assert_eq!((on.mean, on.max), (0.0, 0.0));
     for (k, surfel) in scene.surfels.iter_mut().enumerate() {
         surfel.center[2] = if k % 50 == 0 { -0.5 } else { 0.25 };
     }
-    let moved = SurfaceDistances::of(&scene, &mesh);
+    let moved = distances(&scene, &square());
     let (centers, rims) = (moved.centers_to_mesh.unwrap(), moved.rims_to_mesh.unwrap());
     let far = scene.surfels.len().div_ceil(50) as f64 / scene.surfels.len() as f64;
     assert!((centers.mean - (0.25 + 0.25 * far)).abs() < 1e-12 && centers.rms > centers.mean, "{centers:?}");
@@ -117,15 +118,14 @@ fn distances_are_those_by_which_surfels_are_moved() {
     assert!((rims.mean - centers.mean).abs() < 1e-7);
 
     // A disk of radius r on a sphere leaves it by sqrt(1 + r r) - 1 at the rim.
-    let ball = TriangleTree::new(&sphere(7, false)).unwrap();
     let scene = surfels(Shape::Sphere, 500, |_| true);
-    let rims = SurfaceDistances::of(&scene, &ball).rims_to_mesh.unwrap();
+    let rims = distances(&scene, &sphere(7, false)).rims_to_mesh.unwrap();
     let expected = f64::from(scene.surfels[0].radius()).hypot(1.0) - 1.0;
     // The facets lie up to 1e-4 inside the sphere.
     assert!((rims.mean - expected).abs() < 1e-4 && (rims.max - expected).abs() < 1.5e-4, "{rims:?} {expected}");
 
     let nothing = TriangleTree::new(&Mesh::default()).unwrap();
-    assert_eq!(SurfaceDistances::of(&scene, &nothing).centers_to_mesh, None);
+    assert!(SurfaceDistances::of(&scene, &Mesh::default(), &nothing).is_err());
     let unseen = coverage(&nothing, &scene, 2, 8, &()).unwrap();
     assert!((unseen.seen.rays, unseen.uncovered_share) == (0, None) && !unseen.is_hole_free());
     assert!(coverage(&nothing, &scene, 0, 8, &()).is_err() && coverage(&nothing, &scene, 1, 0, &()).is_err());

@@ -60,18 +60,19 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if preparation.estimated_radii > 0 {
         note(&format!("{} surfels had no radius: theirs are estimated from neighbours", preparation.estimated_radii));
     }
-    let mesh = TriangleTree::new(&io::obj::read_mesh(&arguments.mesh, &bars)?)?;
-    if mesh.is_empty() {
+    let mesh = io::read_mesh(&arguments.mesh, &bars)?;
+    let triangles = TriangleTree::new(&mesh)?;
+    if triangles.is_empty() {
         return Err(Error::malformed(&arguments.mesh, "it has no triangle with an area, so there is nothing to cover"));
     }
-    let coverage = coverage(&mesh, &scene, arguments.views, arguments.side, &bars)?;
+    let coverage = coverage(&triangles, &scene, arguments.views, arguments.side, &bars)?;
     bars.begin("measuring distances", 0);
-    let distances = SurfaceDistances::of(&scene, &mesh);
+    let distances = SurfaceDistances::of(&scene, &mesh, &triangles)?;
     bars.end();
     let outcome = Outcome {
         surfels: scene.surfels.len() as u64,
-        triangles: mesh.len() as u64,
-        diagonal: 2.0 * mesh.radius(),
+        triangles: triangles.len() as u64,
+        diagonal: 2.0 * triangles.radius(),
         hole_free: coverage.is_hole_free(),
         coverage,
         distances,
@@ -117,16 +118,22 @@ fn table(outcome: &Outcome) -> String {
             );
         }
     }
-    let _ = writeln!(text, "\n{:18}  {:>9}  {:>9}  {:>9}  {:>9}", "distance", "mean", "rms", "99 %", "max");
-    let mut row = |name: &str, distances: &Option<Distances>, unit: f64| {
+    let columns = ["mean", "rms", "99 %", "max"].map(|column| format!("  {column:>9} {:>9}", "of diag."));
+    let _ = writeln!(text, "\n{:18}{}", "distance", columns.concat());
+    let rows = [
+        ("centres to mesh", &distances.centers_to_mesh),
+        ("rims to mesh", &distances.rims_to_mesh),
+        ("mesh to centres", &distances.mesh_to_centers),
+        ("mesh to disks", &distances.mesh_to_disks),
+    ];
+    for (name, distances) in rows {
         if let Some(d) = distances {
-            let [mean, rms, percentile, max] = [d.mean, d.rms, d.percentile_99, d.max].map(|value| value / unit);
-            let _ = writeln!(text, "{name:18}  {mean:>9.2e}  {rms:>9.2e}  {percentile:>9.2e}  {max:>9.2e}");
+            let _ = write!(text, "{name:18}");
+            for value in [d.mean, d.rms, d.percentile_99, d.max] {
+                let _ = write!(text, "  {value:>9.2e} {:>9}", percent(value / diagonal));
+            }
+            text.push('\n');
         }
-    };
-    row("centres to mesh", &distances.centers_to_mesh, 1.0);
-    row("  of the diagonal", &distances.centers_to_mesh, *diagonal);
-    row("rims to mesh", &distances.rims_to_mesh, 1.0);
-    row("  of the diagonal", &distances.rims_to_mesh, *diagonal);
+    }
     text
 }

@@ -11,6 +11,7 @@ mod parse;
 mod progress;
 mod render;
 mod surfels;
+mod sample;
 
 use std::io::Write;
 use std::path::Path;
@@ -37,6 +38,7 @@ enum Command {
     Coverage(coverage::Arguments),
     Generate(generate::Arguments),
     Surfels(surfels::Arguments),
+    Sample(sample::Arguments),
     Info(info::Arguments),
     Adapters(adapters::Arguments),
     Hardcases(hardcases::Arguments),
@@ -51,6 +53,7 @@ pub fn run() -> ExitCode {
         Command::Coverage(arguments) => coverage::run(&arguments),
         Command::Generate(arguments) => generate::run(&arguments),
         Command::Surfels(arguments) => surfels::run(&arguments),
+        Command::Sample(arguments) => sample::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Adapters(arguments) => adapters::run(&arguments),
         Command::Hardcases(arguments) => hardcases::run(&arguments),

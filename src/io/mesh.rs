@@ -1,6 +1,10 @@
 //! The triangles of one input file, as they are.
 
-use crate::scene::Colors;
+use std::sync::Arc;
+
+use super::Texture;
+use crate::error::{Error, Result};
+use crate::scene::{Colors, Up};
 
 /// A triangle mesh as a file gives it: f64 world coordinates and whatever attributes exist.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -14,4 +18,69 @@ pub struct Mesh {
     pub normals: Option<Vec<[[f32; 3]; 3]>>,
     /// One colour for each vertex.
     pub colors: Option<Colors>,
+    /// Texture coordinates (u, v) for each corner of each triangle, origin bottom left.
+    pub texture: Option<Vec<[[f32; 2]; 3]>>,
+    /// What triangles may be made of.
+    pub materials: Vec<Material>,
+    /// For each triangle an index into `materials`; one past its end means none.
+    pub material: Option<Vec<u32>>,
+    /// The direction that the format, by convention, calls up.
+    pub up: Option<Up>,
+    /// What belongs to the mesh and could not be read, a sentence each.
+    pub notes: Vec<String>,
+}
+
+/// What a triangle is made of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// As the file calls it.
+    pub name: String,
+    /// Diffuse reflectivity: linear RGB, straight alpha.
+    pub diffuse: [f32; 4],
+    /// An image that `diffuse` is multiplied by.
+    pub texture: Option<Arc<Texture>>,
+}
+
+impl Mesh {
+    /// Whether the parts fit each other.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] if a triangle names a vertex that does not exist, or something that vertices or triangles have one of
+    /// each is not as many.
+    pub fn check(&self) -> Result<()> {
+        let (vertices, triangles) = (self.positions.len(), self.triangles.len());
+        let named = self.triangles.as_flattened().iter().all(|&vertex| (vertex as usize) < vertices);
+        let colored = match &self.colors {
+            Some(Colors::Srgb8(colors)) => colors.len() == vertices,
+            Some(Colors::Linear(colors)) => colors.len() == vertices,
+            Some(Colors::Constant(_)) | None => true,
+        };
+        let lengths = [
+            self.normals.as_ref().map(Vec::len),
+            self.texture.as_ref().map(Vec::len),
+            self.material.as_ref().map(Vec::len),
+        ];
+        let each = lengths.into_iter().flatten().all(|length| length == triangles);
+        if named && colored && each && u32::try_from(triangles).is_ok() {
+            return Ok(());
+        }
+        Err(Error::Usage(
+            "a mesh has fewer than 2^32 triangles, each names three of its vertices, its colours are as many as its \
+             vertices, and its normals, texture coordinates and materials as many as its triangles"
+                .into(),
+        ))
+    }
+
+    /// Gives every triangle one material, which is `texture` alone.
+    pub fn paint(&mut self, texture: Texture) {
+        let name = "texture".to_owned();
+        self.materials = vec![Material { name, diffuse: [1.0; 4], texture: Some(Arc::new(texture)) }];
+        self.material = Some(vec![0; self.triangles.len()]);
+    }
+
+    /// The material of a triangle, by its index in `triangles`.
+    pub fn material_of(&self, triangle: usize) -> Option<&Material> {
+        self.materials.get(*self.material.as_ref()?.get(triangle)? as usize)
+    }
 }

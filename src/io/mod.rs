@@ -10,10 +10,12 @@ pub mod obj;
 pub mod ply;
 pub mod png;
 pub mod points;
+pub mod texture;
 mod values;
 
-pub use mesh::Mesh;
+pub use mesh::{Material, Mesh};
 pub use points::{Points, Up};
+pub use texture::Texture;
 
 use crate::{Error, Progress, Result};
 use std::fs::File;
@@ -39,6 +41,19 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
             b"LASF" => las::read(path, progress),
             _ => Err(Error::malformed(path, "its format is not known; PLY, LAS, LAZ and OBJ files are read")),
         },
+    }
+}
+
+/// Reads the triangles of a mesh: OBJ, by its extension in either case.
+///
+/// # Errors
+///
+/// As [`read`].
+pub fn read_mesh(path: &Path, progress: &dyn Progress) -> Result<Mesh> {
+    let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
+    match extension.as_deref() {
+        Some("obj") => obj::read_mesh(path, progress),
+        _ => Err(Error::malformed(path, "only OBJ files are read as meshes; convert it to one")),
     }
 }
 

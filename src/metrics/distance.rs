@@ -2,16 +2,25 @@
 
 use std::f64::consts::TAU;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::Sorted;
+use crate::error::Result;
+use crate::io::Mesh;
 use crate::scene::{Scene, Surfel};
-use crate::truth::TriangleTree;
+use crate::surfels::sampling::{Method, sample};
+use crate::truth::{DiskTree, TriangleTree};
 
 /// Points at which a rim is measured, one at each end of both half-axes.
 const RIM_POINTS: u32 = 8;
+
+/// Points of the mesh at which its distance from the surfels is measured.
+pub const MESH_POINTS: usize = 200_000;
+
+/// Of those points; another one than that of any sampling.
+const SEED: u64 = 0x6d65_6173_7572_6521;
 
 /// Distances of points from a surface, world units, none negative.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -33,6 +42,10 @@ pub struct SurfaceDistances {
     pub centers_to_mesh: Option<Distances>,
     /// Of eight points on each disk's rim from the mesh: a disk on a curved surface leaves it toward the rim.
     pub rims_to_mesh: Option<Distances>,
+    /// Of [`MESH_POINTS`] random points of the mesh, evenly by area, from the nearest surfel's centre: how finely it is sampled.
+    pub mesh_to_centers: Option<Distances>,
+    /// Of the same points from the nearest disk: 0 where a disk passes through them, so what the surfels miss of the shape.
+    pub mesh_to_disks: Option<Distances>,
 }
 
 impl Distances {
@@ -51,8 +64,12 @@ impl Distances {
 }
 
 impl SurfaceDistances {
-    /// Measures all surfels; without surfels or triangles there are no distances.
-    pub fn of(scene: &Scene, mesh: &TriangleTree) -> Self {
+    /// Measures all surfels against `mesh`, of which `triangles` is the tree; without surfels there are no distances.
+    ///
+    /// # Errors
+    ///
+    /// As [`sample`] for a mesh that has no area.
+    pub fn of(scene: &Scene, mesh: &Mesh, triangles: &TriangleTree) -> Result<Self> {
         let world = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
         let center = |surfel: &Surfel| scene.origin + world(surfel.center);
         let rim = |surfel: &Surfel, k: u32| {
@@ -60,9 +77,19 @@ impl SurfaceDistances {
             center(surfel) + world(surfel.s) * cos + world(surfel.t) * sin
         };
         let surfels = scene.surfels.par_iter();
-        let centers = surfels.clone().map(center).map(|point| mesh.distance(point));
-        let rims = surfels.flat_map_iter(|surfel| (0..RIM_POINTS).map(move |k| mesh.distance(rim(surfel, k))));
-        let finite = |distances: Vec<f64>| if mesh.is_empty() { None } else { Distances::of(distances) };
-        Self { centers_to_mesh: finite(centers.collect()), rims_to_mesh: finite(rims.collect()) }
+        let centers = surfels.clone().map(center).map(|point| triangles.distance(point));
+        let rims = surfels.flat_map_iter(|surfel| (0..RIM_POINTS).map(move |k| triangles.distance(rim(surfel, k))));
+        let disks = DiskTree::new(scene);
+        let (on_mesh, _) = sample(mesh, MESH_POINTS, &Method::Uniform, SEED, &())?;
+        let points = on_mesh.positions.par_iter().map(|point| DVec3::from_array(*point));
+        let to_centers = points.clone().map(|point| disks.distance_to_center(point));
+        let to_disks = points.map(|point| disks.distance(point));
+        let of = |distances: Vec<f64>| if disks.is_empty() { None } else { Distances::of(distances) };
+        Ok(Self {
+            centers_to_mesh: of(centers.collect()),
+            rims_to_mesh: of(rims.collect()),
+            mesh_to_centers: of(to_centers.collect()),
+            mesh_to_disks: of(to_disks.collect()),
+        })
     }
 }

@@ -14,6 +14,7 @@ mod orient;
 mod outliers;
 mod positions;
 mod sizes;
+pub mod sampling;
 #[cfg(test)]
 mod tests;
 

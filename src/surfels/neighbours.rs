@@ -6,6 +6,7 @@
 //! [`squared_length`] is monotone, so a box is never rounded to be farther than a position inside it. Ties are decided
 //! by the order of the positions. The result is thus exactly the first `count` by (distance, order).
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::positions::DistinctPositions;
@@ -127,6 +128,14 @@ impl<'a> NeighbourSearch<'a> {
             home = node;
         }
     }
+
+    /// Fills `found` with the nearest positions to `at`, scaled units, in the same order.
+    pub fn nearest_to(&self, at: DVec3, found: &mut Vec<Neighbour>) {
+        found.clear();
+        // No position has this index, so none is excluded.
+        let mut query = Query { search: self, index: usize::MAX, at: at.to_array(), found, reach: f64::MAX };
+        query.visit_node(self.levels.len() - 1, 0, None);
+    }
 }
 
 /// Queries one after the other, of positions that are near each other.
@@ -229,8 +238,6 @@ impl Query<'_> {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use glam::DVec3;
-
     use super::*;
     use crate::scene::Bounds;
 

@@ -5,7 +5,7 @@
 //! on a ray is shaded: there are no layers of transparency, as in a render.
 
 pub mod disks;
-mod nearest;
+pub(crate) mod nearest;
 pub mod triangles;
 
 use std::path::Path;

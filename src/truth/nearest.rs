@@ -43,18 +43,32 @@ fn box_squared_distance(bounds: &obvhs::aabb::Aabb, point: DVec3) -> f64 {
 
 /// The squared distance of a point from a triangle that has an area.
 pub(super) fn triangle_squared_distance(point: DVec3, corners: &[DVec3; 3]) -> f64 {
+    let weights = closest_weights(point, corners);
+    point.distance_squared(corners[0] * weights.x + corners[1] * weights.y + corners[2] * weights.z)
+}
+
+/// The weights of the corners at the point of a triangle that is nearest to `point`. The triangle has an area.
+pub(crate) fn closest_weights(point: DVec3, corners: &[DVec3; 3]) -> DVec3 {
     let [a, b, c] = *corners;
     let normal = (b - a).cross(c - a);
+    // Twice the areas that the point makes with each edge, as it is seen along the normal.
+    let area = |from: DVec3, to: DVec3| (to - from).cross(point - from).dot(normal);
+    let areas = DVec3::new(area(b, c), area(c, a), area(a, b));
     // Above the triangle the nearest point is the foot of the perpendicular, else it lies on an edge.
-    let above = [(a, b), (b, c), (c, a)].iter().all(|(from, to)| (to - from).cross(point - from).dot(normal) >= 0.0);
-    if above {
-        return (point - a).dot(normal).powi(2) / normal.length_squared();
+    if areas.min_element() >= 0.0 {
+        return areas / areas.element_sum();
     }
-    let to_edge = |from: DVec3, to: DVec3| {
-        let along = ((point - from).dot(to - from) / from.distance_squared(to)).clamp(0.0, 1.0);
-        point.distance_squared(from.lerp(to, along))
+    let on_edge = |from: usize, to: usize| {
+        let (start, edge) = (corners[from], corners[to] - corners[from]);
+        let along = ((point - start).dot(edge) / edge.length_squared()).clamp(0.0, 1.0);
+        let mut weights = [0.0; 3];
+        (weights[from], weights[to]) = (1.0 - along, along);
+        (point.distance_squared(start + edge * along), DVec3::from(weights))
     };
-    to_edge(a, b).min(to_edge(b, c)).min(to_edge(c, a))
+    let edges = [on_edge(0, 1), on_edge(1, 2), on_edge(2, 0)];
+    let nearest =
+        edges.into_iter().fold((f64::INFINITY, DVec3::X), |best, edge| if edge.0 < best.0 { edge } else { best });
+    nearest.1
 }
 
 #[cfg(test)]

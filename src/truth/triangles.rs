@@ -16,10 +16,10 @@ use obvhs::ray::{Ray, RayHit};
 
 use super::Hit;
 use super::nearest::{nearest, triangle_squared_distance};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::io::Mesh;
+use crate::scene::Bounds;
 use crate::scene::color::DEFAULT_COLOR;
-use crate::scene::{Bounds, Colors};
 
 /// How much a box is larger than its triangle on each side, in radii of the mesh. A ray starts within 2 radii of the
 /// centre and is followed for 3: its f32 origin, direction and box distances err by less than 2e-6 of a radius.
@@ -57,24 +57,9 @@ impl TriangleTree {
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] if a triangle names a vertex that does not exist, or there are not as many colours as vertices or
-    /// corner normals as triangles.
+    /// As [`Mesh::check`].
     pub fn new(mesh: &Mesh) -> Result<Self> {
-        let vertices = mesh.positions.len();
-        let named = mesh.triangles.as_flattened().iter().all(|&vertex| (vertex as usize) < vertices);
-        let colored = match &mesh.colors {
-            Some(Colors::Srgb8(colors)) => colors.len() == vertices,
-            Some(Colors::Linear(colors)) => colors.len() == vertices,
-            Some(Colors::Constant(_)) | None => true,
-        };
-        let oriented = mesh.normals.as_ref().is_none_or(|normals| normals.len() == mesh.triangles.len());
-        if !(named && colored && oriented && u32::try_from(mesh.triangles.len()).is_ok()) {
-            return Err(Error::Usage(
-                "a mesh has fewer than 2^32 triangles, each names three of its vertices, and its colours and normals are \
-                 as many as its vertices and triangles"
-                    .into(),
-            ));
-        }
+        mesh.check()?;
         let corner = |vertex: u32| DVec3::from(mesh.positions[vertex as usize]);
         let finite = |triangle: &[u32; 3]| triangle.iter().all(|&vertex| corner(vertex).is_finite());
         let used = mesh.triangles.iter().filter(|triangle| finite(triangle)).flatten();

@@ -31,5 +31,5 @@ pub fn sphere(cuts: u32, smooth: bool) -> Mesh {
     }
     let corner = |vertex: u32| positions[vertex as usize].as_vec3().to_array();
     let normals = smooth.then(|| triangles.iter().map(|triangle| triangle.map(corner)).collect());
-    Mesh { positions: positions.iter().map(DVec3::to_array).collect(), triangles, normals, colors: None }
+    Mesh { positions: positions.iter().map(DVec3::to_array).collect(), triangles, normals, ..Mesh::default() }
 }

@@ -132,5 +132,7 @@ fn mesh(lines: Lines, models: &[tobj::Model]) -> Mesh {
         triangles,
         positions: lines.positions,
         colors: (!lines.colors.is_empty()).then_some(Colors::Linear(lines.colors)),
+        up: Some(Up::Y),
+        ..Mesh::default()
     }
 }

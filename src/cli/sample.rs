@@ -1,0 +1,79 @@
+//! `epsplat sample`: surfels from the triangles of a mesh.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use epsplat::io::{self, Texture};
+use epsplat::surfels::sampling::{MOST, MeshSurface, Method, Priority, sample, voxels::Voxel};
+use epsplat::{Error, Result};
+
+use super::note;
+use super::progress::Bars;
+
+/// Write surfels that cover a mesh as PLY: on its triangles, with normals, radii, and its colours and texture coordinates.
+///
+/// The mesh is divided into voxels, and a heap hands out the samples by the voxels' priority: triangles (as many as the
+/// mesh has there), area (evenly), curvature (where the surface bends) or texture (where the colour changes).
+#[derive(Args)]
+#[command(after_help = "Example:\n  epsplat sample bunny.obj -o surfels.ply --count 60000")]
+pub struct Arguments {
+    /// The mesh: .obj
+    mesh: PathBuf,
+    /// The file: .ply
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Samples
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..=MOST as u64))]
+    count: u64,
+    /// triangles, area, curvature or texture
+    #[arg(long, default_value = "triangles")]
+    priority: Priority,
+    /// How samples are placed
+    #[arg(long, value_enum, default_value = "stratified")]
+    method: Placement,
+    /// How often the mesh's box is halved; else until there is a voxel for every four samples
+    #[arg(long, value_name = "HALVINGS", value_parser = clap::value_parser!(u32).range(0..=60))]
+    depth: Option<u32>,
+    /// An image for the whole mesh, in place of its own materials: .png
+    #[arg(long, value_name = "FILE")]
+    texture: Option<PathBuf>,
+    /// Another seed gives other samples
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Placement {
+    /// By the priority of voxels, and spread evenly
+    Stratified,
+    /// Independent random points, by area: a baseline without radii
+    Uniform,
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    if !arguments.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply")) {
+        return Err(Error::Usage(format!("the output must end in .ply, {} does not", arguments.output.display())));
+    }
+    let bars = Bars::new();
+    let mut mesh = io::read_mesh(&arguments.mesh, &bars)?;
+    mesh.notes.iter().for_each(|line| note(line));
+    if let Some(path) = &arguments.texture {
+        if mesh.texture.is_none() {
+            return Err(Error::malformed(&arguments.mesh, "it has no texture coordinates, so it cannot be textured"));
+        }
+        mesh.paint(Texture::read(path)?);
+    }
+    let priority = |surface: &MeshSurface<'_>, voxels: &[Voxel]| arguments.priority.of(surface, voxels);
+    let method = match arguments.method {
+        Placement::Stratified => Method::Stratified { priority: &priority, depth: arguments.depth },
+        Placement::Uniform => Method::Uniform,
+    };
+    let (points, sampling) = sample(&mesh, arguments.count as usize, &method, arguments.seed, &bars)
+        .map_err(|e| if let Error::EmptyScene(what) = e { Error::malformed(&arguments.mesh, what) } else { e })?;
+    sampling.notes().iter().for_each(|line| note(line));
+    io::ply::write_points(&arguments.output, &points, &bars)?;
+    let voxels = if sampling.voxels > 0 { format!(" in {} voxels", sampling.voxels) } else { String::new() };
+    let (samples, triangles) = (sampling.samples, sampling.triangles);
+    note(&format!("{}: {samples} surfels from {triangles} triangles{voxels}", arguments.output.display()));
+    Ok(())
+}

@@ -1,0 +1,93 @@
+//! Points that stand for the surface while samples are placed on it: many for each sample, evenly in each voxel.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::random::Random;
+use super::surface::{MeshSurface, Place};
+use super::voxels::{Voxel, fan_share};
+
+/// Candidates for each sample. More follow the surface between samples more closely: of the bunny's mean distance to the
+/// nearest sample 8 lose 1 %, 4 lose 3 % against 32.
+const FOR_EACH: f64 = 8.0;
+
+/// A point of the surface, and how much of it the point stands for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Candidate {
+    triangle: u32,
+    /// Of the first two corners.
+    weights: [f32; 2],
+    /// Square world units.
+    pub(super) area: f32,
+}
+
+impl Candidate {
+    pub(super) fn place(&self) -> Place {
+        let [a, b] = self.weights.map(f64::from);
+        Place { triangle: self.triangle, weights: DVec3::new(a, b, 1.0 - a - b) }
+    }
+
+    pub(super) fn point(&self, surface: &MeshSurface<'_>) -> DVec3 {
+        surface.point(self.place())
+    }
+}
+
+/// The candidates of all voxels, and the places at which `quotas` samples begin: every so many-th candidate of a voxel.
+///
+/// There are as many candidates as a voxel's `priority`, the share of all samples that it should have, asks for, at least one.
+pub(super) fn candidates(
+    voxels: &[Voxel],
+    quotas: &[usize],
+    priority: &[f64],
+    seed: u64,
+) -> (Vec<Candidate>, Vec<Place>) {
+    let of_voxel = |(index, voxel): (usize, &Voxel)| {
+        let quota = quotas[index];
+        let count = (FOR_EACH * priority[index].max(quota as f64)).ceil().max(1.0) as usize;
+        let mut random = Random::stream(seed, index as u64);
+        let shift = [random.number(), random.number(), random.number()];
+        let area = (voxel.area / count as f64) as f32;
+        let candidates: Vec<Candidate> = spread(voxel, count, shift)
+            .map(|(triangle, weights)| Candidate { triangle, weights: [weights.x as f32, weights.y as f32], area })
+            .collect();
+        let first = |sample: usize| candidates[(2 * sample + 1) * candidates.len() / (2 * quota)].place();
+        let places: Vec<Place> = (0..quota).map(first).collect();
+        (candidates, places)
+    };
+    let (candidates, places): (Vec<_>, Vec<_>) = voxels.par_iter().enumerate().map(of_voxel).unzip();
+    (candidates.into_iter().flatten().collect(), places.into_iter().flatten().collect())
+}
+
+/// `count` points of a voxel's surface, as triangles and corner weights: equal steps of area through the list of its patches,
+/// and in each patch the plane lattice R2 (Roberts 2018), moved by `shift`.
+pub(super) fn spread(voxel: &Voxel, count: usize, shift: [f64; 3]) -> impl Iterator<Item = (u32, DVec3)> {
+    /// The root of x^3 = x + 1.
+    const PLASTIC: f64 = 1.324_717_957_244_746;
+    // Each patch as a fan of triangles, with the area up to its end.
+    let mut end = 0.0;
+    let mut fans = Vec::with_capacity(voxel.patches.len());
+    for patch in &voxel.patches {
+        let whole = patch.outline.windows(2).map(|pair| fan_share(patch.outline[0], pair[0], pair[1])).sum::<f64>();
+        for pair in patch.outline.windows(2) {
+            let [a, b, c] = [patch.outline[0], pair[0], pair[1]];
+            let area = patch.area * fan_share(a, b, c) / whole;
+            if area > 0.0 {
+                end += area;
+                fans.push((end, patch.triangle, [a, b, c]));
+            }
+        }
+    }
+    let step = end / count as f64;
+    (0..count).filter_map(move |k| {
+        let upto = (k as f64 + shift[0]) * step;
+        let at = fans.partition_point(|(end, ..)| *end <= upto).min(fans.len().checked_sub(1)?);
+        let (_, triangle, [a, b, c]) = fans[at];
+        let turns = (k + 1) as f64;
+        let (mut u, mut v) = ((turns / PLASTIC + shift[1]).fract(), (turns / (PLASTIC * PLASTIC) + shift[2]).fract());
+        // The far half of the unit square, turned over, is the near half.
+        if u + v > 1.0 {
+            (u, v) = (1.0 - u, 1.0 - v);
+        }
+        Some((triangle, a + (b - a) * u + (c - a) * v))
+    })
+}

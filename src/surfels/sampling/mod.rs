@@ -1,0 +1,153 @@
+//! From a mesh to points on it, by priority and evenly (Tien 2008, chapter 3).
+//!
+//! 1. [`voxels`]: a tree of boxes, halved across their longest side where triangles are ([`overlap`]), ends in voxels.
+//! 2. [`priority`]: each voxel has a priority; any function of voxels will do.
+//! 3. [`distribute`]: a heap hands out the samples, always to the voxel of the highest priority, which then falls.
+//! 4. [`candidates`]: each voxel's samples begin evenly spread over the triangles in it.
+//! 5. [`relax`]: they move apart, also from those of other voxels, and stay on the triangles.
+//!
+//! Then each sample gets what the surface says there, and a disk that covers the part of the surface nearest to it.
+//!
+//! The thesis projects one point a voxel, or several, onto its triangles and does not say which. Where these lie decides
+//! how well a surface is sampled: independent random points leave gaps three times as wide as needed.
+
+mod candidates;
+mod distribute;
+mod overlap;
+pub mod priority;
+mod random;
+mod relax;
+pub mod surface;
+mod uniform;
+pub mod voxels;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+pub use self::priority::{Priority, PriorityFunction};
+pub use self::surface::MeshSurface;
+use self::surface::Place;
+use crate::error::{Error, Result};
+use crate::io::{Mesh, Points};
+use crate::progress::Progress;
+use crate::scene::Colors;
+
+/// The most samples.
+pub const MOST: usize = 1 << 28;
+
+/// Samples for each voxel where the depth of the tree is not given. Fewer voxels follow the priority less closely; with
+/// more, many a voxel's share is less than one sample.
+const FOR_EACH_VOXEL: usize = 4;
+
+/// How samples are placed.
+pub enum Method<'a> {
+    /// By the priority of voxels.
+    Stratified {
+        /// The priority function.
+        priority: &'a PriorityFunction<'a>,
+        /// How often boxes are halved; None for as many voxels as samples allow.
+        depth: Option<u32>,
+    },
+    /// Independent random points, evenly by area: a baseline. Their radii are left to [`build`](super::build).
+    Uniform,
+}
+
+/// What was done to a mesh on the way to samples.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Sampling {
+    /// Points.
+    pub samples: u64,
+    /// Triangles that have an area.
+    pub triangles: u64,
+    /// Triangles left out because a coordinate is not finite or too large.
+    pub dropped_non_finite: u64,
+    /// Triangles left out because they have no area.
+    pub dropped_flat: u64,
+    /// Voxels that hold some of the surface; 0 for [`Method::Uniform`].
+    pub voxels: u64,
+    /// Of these, voxels that got no sample.
+    pub empty_voxels: u64,
+}
+
+impl Sampling {
+    /// What a user should hear of: a sentence for everything that was left out.
+    pub fn notes(&self) -> Vec<String> {
+        let counted = |count: u64, what: &str| (count > 0).then(|| format!("{count} {what}"));
+        let notes = [
+            counted(self.dropped_non_finite, "triangles were dropped: a coordinate is not finite or too large"),
+            counted(self.dropped_flat, "triangles were dropped: they have no area"),
+        ];
+        notes.into_iter().flatten().collect()
+    }
+}
+
+/// Samples a mesh at `count` points: with positions on its triangles, normals, texture coordinates and colours as far as the
+/// mesh has them, and, by [`Method::Stratified`], radii with which the disks cover it.
+///
+/// The same seed gives the same points, whatever the machine's number of threads.
+///
+/// # Errors
+///
+/// [`Error::EmptyScene`] for a mesh without a triangle that has an area, [`Error::Usage`] for a count of none or more than
+/// [`MOST`], or for a mesh whose parts do not fit each other.
+pub fn sample(
+    mesh: &Mesh,
+    count: usize,
+    method: &Method<'_>,
+    seed: u64,
+    progress: &dyn Progress,
+) -> Result<(Points, Sampling)> {
+    if !(1..=MOST).contains(&count) {
+        return Err(Error::Usage(format!("a mesh is sampled at 1 to {MOST} points, not {count}")));
+    }
+    let surface = MeshSurface::new(mesh)?;
+    let mut sampling = Sampling {
+        samples: count as u64,
+        triangles: surface.triangles.len() as u64,
+        dropped_non_finite: surface.dropped_non_finite,
+        dropped_flat: surface.dropped_flat,
+        ..Sampling::default()
+    };
+    let points = match method {
+        Method::Uniform => {
+            let places = uniform::places(&surface, count, seed);
+            let colors = surface.is_colored().then(|| places.par_iter().map(|place| surface.color(*place)).collect());
+            points(&surface, &places, None, colors)
+        }
+        Method::Stratified { priority, depth } => {
+            progress.begin("dividing the mesh", 0);
+            let voxels = voxels::voxels(&surface, *depth, count / FOR_EACH_VOXEL);
+            let priorities = priority(&surface, &voxels);
+            let quotas = distribute::distribute(&priorities, count);
+            progress.end();
+            sampling.voxels = voxels.len() as u64;
+            sampling.empty_voxels = quotas.iter().filter(|quota| **quota == 0).count() as u64;
+            let sum: f64 = priorities.iter().filter(|priority| priority.is_finite()).sum();
+            let fair: Vec<f64> = priorities.iter().map(|priority| count as f64 * priority / sum).collect();
+            let (candidates, mut places) = candidates::candidates(&voxels, &quotas, &fair, seed);
+            let cells = relax::relax(&surface, &candidates, &mut places, progress)?;
+            let radii = relax::radii(&surface, &candidates, &places, &cells);
+            let colors = surface.is_colored().then(|| relax::colors(&surface, &candidates, &places, &cells));
+            points(&surface, &places, Some(radii), colors)
+        }
+    };
+    Ok((points, sampling))
+}
+
+fn points(
+    surface: &MeshSurface<'_>,
+    places: &[Place],
+    radii: Option<Vec<f32>>,
+    colors: Option<Vec<[f32; 4]>>,
+) -> Points {
+    let places = places.par_iter();
+    Points {
+        positions: places.clone().map(|place| (surface.center + surface.point(*place)).to_array()).collect(),
+        normals: Some(places.clone().map(|place| surface.normal(*place).as_vec3().to_array()).collect()),
+        radii,
+        colors: colors.map(Colors::Linear),
+        texture: places.map(|place| surface.texture(*place)).collect(),
+        up: surface.mesh.up,
+        ..Points::default()
+    }
+}

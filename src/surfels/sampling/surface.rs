@@ -1,0 +1,153 @@
+//! The surface that is sampled: the triangles of a mesh that have an area, and what the mesh says at a point of them.
+
+use glam::{DVec2, DVec3};
+
+use crate::error::{Error, Result};
+use crate::io::Mesh;
+use crate::scene::Bounds;
+use crate::scene::color::DEFAULT_COLOR;
+use crate::surfels::LARGEST_COORDINATE;
+
+/// A triangle that has an area.
+#[derive(Clone, Debug)]
+pub struct Facet {
+    /// Relative to the surface's centre, world units.
+    pub corners: [DVec3; 3],
+    /// Unit.
+    pub normal: DVec3,
+    /// Square world units.
+    pub area: f64,
+    /// Which of the mesh's triangles.
+    pub index: usize,
+}
+
+/// The triangles of a mesh that can be sampled.
+pub struct MeshSurface<'a> {
+    /// Where they are from.
+    pub mesh: &'a Mesh,
+    /// World coordinates of the point that all others are relative to.
+    pub center: DVec3,
+    /// Of the triangles, relative to the centre.
+    pub bounds: Bounds,
+    /// The triangles.
+    pub triangles: Vec<Facet>,
+    /// Triangles left out because a coordinate is not finite or exceeds [`LARGEST_COORDINATE`].
+    pub dropped_non_finite: u64,
+    /// Triangles left out because they have no area.
+    pub dropped_flat: u64,
+}
+
+impl<'a> MeshSurface<'a> {
+    /// The triangles of `mesh` that have an area.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::EmptyScene`] if there is none, and what [`Mesh::check`] fails with.
+    pub fn new(mesh: &'a Mesh) -> Result<Self> {
+        mesh.check()?;
+        let corner = |vertex: &u32| DVec3::from(mesh.positions[*vertex as usize]);
+        let finite = |corners: &[DVec3; 3]| {
+            corners.iter().all(|corner| corner.abs().cmple(DVec3::splat(LARGEST_COORDINATE)).all())
+        };
+        let all = mesh.triangles.iter().enumerate().map(|(index, vertices)| (index, vertices.each_ref().map(corner)));
+        let within = all.clone().filter(|(_, corners)| finite(corners));
+        let bounds = within
+            .clone()
+            .flat_map(|(_, corners)| corners)
+            .fold(Bounds::EMPTY, |bounds, corner| bounds.with_point(corner));
+        let center = bounds.center();
+        let triangles: Vec<Facet> = within
+            .clone()
+            .filter_map(|(index, corners)| {
+                let [a, b, c] = corners.map(|corner| corner - center);
+                let double = (b - a).cross(c - a);
+                let normal = double.try_normalize()?;
+                Some(Facet { corners: [a, b, c], normal, area: 0.5 * double.length(), index })
+            })
+            .collect();
+        let usable = within.count();
+        if triangles.is_empty() {
+            return Err(Error::EmptyScene(match mesh.triangles.len() {
+                0 => "the mesh has no triangles, so there is nothing to sample".to_owned(),
+                count => format!("none of the mesh's {count} triangles has an area, so there is nothing to sample"),
+            }));
+        }
+        let bounds = Bounds { min: bounds.min - center, max: bounds.max - center };
+        let dropped_non_finite = (mesh.triangles.len() - usable) as u64;
+        let dropped_flat = (usable - triangles.len()) as u64;
+        Ok(Self { mesh, center, bounds, triangles, dropped_non_finite, dropped_flat })
+    }
+
+    /// Square world units.
+    pub fn area(&self) -> f64 {
+        self.triangles.iter().map(|triangle| triangle.area).sum()
+    }
+
+    /// The point with these corner weights, relative to the centre.
+    pub(super) fn point(&self, at: Place) -> DVec3 {
+        let [a, b, c] = self.triangles[at.triangle as usize].corners;
+        a * at.weights.x + b * at.weights.y + c * at.weights.z
+    }
+
+    /// The unit normal there: that of the corners, interpolated, or, where they are missing or cancel, the triangle's.
+    pub(super) fn normal(&self, at: Place) -> DVec3 {
+        let facet = &self.triangles[at.triangle as usize];
+        let unit = |n: [f32; 3]| DVec3::from(n.map(f64::from)).normalize_or_zero();
+        let named = self.mesh.normals.as_ref().map(|normals| normals[facet.index].map(unit));
+        let mean = named.map(|[a, b, c]| a * at.weights.x + b * at.weights.y + c * at.weights.z);
+        mean.and_then(DVec3::try_normalize).unwrap_or(facet.normal)
+    }
+
+    /// Texture coordinates there, if the mesh has any.
+    pub(super) fn texture(&self, at: Place) -> Option<[f32; 2]> {
+        let [a, b, c] = self.mesh.texture.as_ref()?[self.triangles[at.triangle as usize].index]
+            .map(|[u, v]| DVec2::new(u.into(), v.into()));
+        Some((a * at.weights.x + b * at.weights.y + c * at.weights.z).as_vec2().to_array())
+    }
+
+    /// Whether the mesh says anything of colours.
+    pub fn is_colored(&self) -> bool {
+        self.mesh.colors.is_some() || self.mesh.material.is_some()
+    }
+
+    /// The colour there: linear RGB, straight alpha. A texture times its material's diffuse colour, if there is one; else the
+    /// interpolated colours of the vertices; else the diffuse colour.
+    pub(super) fn color(&self, at: Place) -> [f32; 4] {
+        let index = self.triangles[at.triangle as usize].index;
+        let material = self.mesh.material_of(index);
+        let textured = material.and_then(|material| Some((material, material.texture.as_ref()?)));
+        if let (Some((material, texture)), Some([u, v])) = (textured, self.texture(at)) {
+            let texel = texture.at(u, v);
+            return std::array::from_fn(|k| texel[k] * material.diffuse[k]);
+        }
+        match &self.mesh.colors {
+            Some(colors) => {
+                let corners = self.mesh.triangles[index].map(|vertex| colors.linear(vertex as usize));
+                mean_color(corners.into_iter().zip(at.weights.to_array()))
+            }
+            None => material.map_or(DEFAULT_COLOR, |material| material.diffuse),
+        }
+    }
+}
+
+/// The weighted mean of straight colours, premultiplied as splats are blended.
+pub(super) fn mean_color(colors: impl Iterator<Item = ([f32; 4], f64)>) -> [f32; 4] {
+    let (mut sum, mut weights) = ([0.0; 4], 0.0);
+    for (color, weight) in colors {
+        let [r, g, b, alpha] = color.map(f64::from);
+        let covers = weight * alpha;
+        sum = [sum[0] + covers * r, sum[1] + covers * g, sum[2] + covers * b, sum[3] + covers];
+        weights += weight;
+    }
+    let [r, g, b, alpha] = sum;
+    if alpha > 0.0 { [r / alpha, g / alpha, b / alpha, alpha / weights].map(|c| c as f32) } else { [0.0; 4] }
+}
+
+/// A point of the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Place {
+    /// Which of [`MeshSurface::triangles`].
+    pub triangle: u32,
+    /// Of its corners; their sum is 1.
+    pub weights: DVec3,
+}

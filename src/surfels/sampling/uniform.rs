@@ -1,0 +1,32 @@
+//! Independent random points, evenly by area: the baseline of every other way to sample.
+
+use glam::DVec3;
+
+use super::random::Random;
+use super::surface::{MeshSurface, Place};
+
+/// `count` points of the surface: each a triangle with a probability in proportion to its area, and in it a point evenly
+/// (Turk 1990).
+pub(super) fn places(surface: &MeshSurface<'_>, count: usize, seed: u64) -> Vec<Place> {
+    let mut end = 0.0;
+    let ends: Vec<f64> = surface
+        .triangles
+        .iter()
+        .map(|triangle| {
+            end += triangle.area;
+            end
+        })
+        .collect();
+    let last = ends.len().saturating_sub(1);
+    let mut random = Random::stream(seed, 0);
+    let place = |_| {
+        let upto = random.number() * end;
+        let triangle = ends.partition_point(|end| *end <= upto).min(last);
+        let (mut u, mut v) = (random.number(), random.number());
+        if u + v > 1.0 {
+            (u, v) = (1.0 - u, 1.0 - v);
+        }
+        Place { triangle: triangle as u32, weights: DVec3::new(1.0 - u - v, u, v) }
+    };
+    (0..count).map(place).collect()
+}

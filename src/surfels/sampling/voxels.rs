@@ -1,0 +1,152 @@
+//! A mesh as the voxels that it passes through, and the part of it in each.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::overlap::overlaps;
+use super::surface::MeshSurface;
+use crate::scene::Bounds;
+
+/// A leaf of the tree: a box, and what of the surface lies in it.
+#[derive(Clone, Debug)]
+pub struct Voxel {
+    /// World units, relative to the surface's centre.
+    pub bounds: Bounds,
+    /// The parts of triangles in the box; the parts of all voxels together are the surface.
+    pub patches: Vec<Patch>,
+    /// Their area, square world units.
+    pub area: f64,
+}
+
+/// The part of a triangle that lies in a voxel.
+#[derive(Clone, Debug)]
+pub struct Patch {
+    /// Which of the surface's triangles.
+    pub triangle: u32,
+    /// Square world units.
+    pub area: f64,
+    /// The corners of a convex polygon, each as the weights of the triangle's corners.
+    pub(super) outline: Vec<DVec3>,
+}
+
+/// A node of the tree on its way to become voxels.
+struct Cell {
+    bounds: Bounds,
+    triangles: Vec<u32>,
+}
+
+/// How often boxes are halved at most: 2^60 times the volume.
+const DEEPEST: u32 = 60;
+
+/// The voxels of a surface (Tien 2008, section 3.1): its box is halved across its longest side, and the halves in turn, those
+/// that no triangle meets left out. It ends after `depth` halvings, or, without, before there would be more than `most` voxels.
+pub(super) fn voxels(surface: &MeshSurface<'_>, depth: Option<u32>, most: usize) -> Vec<Voxel> {
+    let all = (0..surface.triangles.len() as u32).collect();
+    let mut cells = vec![Cell { bounds: surface.bounds, triangles: all }];
+    for _ in 0..depth.unwrap_or(DEEPEST).min(DEEPEST) {
+        let halves: Vec<Cell> = cells.par_iter().flat_map_iter(|cell| halves(surface, cell)).collect();
+        if depth.is_none() && halves.len() > most.max(1) {
+            break;
+        }
+        cells = halves;
+    }
+    let voxels = cells.into_par_iter().map(|cell| voxel(surface, cell));
+    voxels.filter(|voxel| voxel.area > 0.0).collect()
+}
+
+/// A triangle that lies in the plane between the halves belongs to the upper one.
+fn halves(surface: &MeshSurface<'_>, cell: &Cell) -> impl Iterator<Item = Cell> + use<> {
+    let extent = cell.bounds.extent();
+    let axis = if extent.x >= extent.y.max(extent.z) {
+        DVec3::X
+    } else if extent.y >= extent.z {
+        DVec3::Y
+    } else {
+        DVec3::Z
+    };
+    let middle = cell.bounds.center().dot(axis);
+    let at_middle = |corner: DVec3| corner * (DVec3::ONE - axis) + axis * middle;
+    let lower = Bounds { min: cell.bounds.min, max: at_middle(cell.bounds.max) };
+    let upper = Bounds { min: at_middle(cell.bounds.min), max: cell.bounds.max };
+    let inside = |bounds: &Bounds, triangle: &u32| overlaps(&surface.triangles[*triangle as usize].corners, bounds);
+    let below =
+        |triangle: &u32| surface.triangles[*triangle as usize].corners.iter().any(|corner| corner.dot(axis) < middle);
+    let of = |bounds: Bounds, keep: &dyn Fn(&u32) -> bool| {
+        let triangles = cell.triangles.iter().copied().filter(|triangle| keep(triangle) && inside(&bounds, triangle));
+        Cell { bounds, triangles: triangles.collect() }
+    };
+    [of(lower, &below), of(upper, &|_| true)].into_iter().filter(|cell| !cell.triangles.is_empty())
+}
+
+fn voxel(surface: &MeshSurface<'_>, cell: Cell) -> Voxel {
+    let patches: Vec<Patch> = cell
+        .triangles
+        .into_iter()
+        .filter_map(|triangle| {
+            let whole = &surface.triangles[triangle as usize];
+            let outline = clipped(&whole.corners, &cell.bounds);
+            let area = whole.area * share(&outline);
+            (area > 0.0).then_some(Patch { triangle, area, outline })
+        })
+        .collect();
+    Voxel { bounds: cell.bounds, area: patches.iter().map(|patch| patch.area).sum(), patches }
+}
+
+/// The part of a triangle in a box, as corner weights: the triangle is cut by each of the six planes in turn.
+fn clipped(corners: &[DVec3; 3], bounds: &Bounds) -> Vec<DVec3> {
+    let mut outline = vec![DVec3::X, DVec3::Y, DVec3::Z];
+    for axis in DVec3::AXES {
+        let coordinate = DVec3::new(corners[0].dot(axis), corners[1].dot(axis), corners[2].dot(axis));
+        for (sign, limit) in [(1.0, bounds.max.dot(axis)), (-1.0, bounds.min.dot(axis))] {
+            // Not positive inside.
+            let beyond = |weights: DVec3| sign * (coordinate.dot(weights) - limit);
+            let mut kept = Vec::with_capacity(outline.len() + 1);
+            for (k, &at) in outline.iter().enumerate() {
+                let next = outline[(k + 1) % outline.len()];
+                let (here, there) = (beyond(at), beyond(next));
+                if here <= 0.0 {
+                    kept.push(at);
+                }
+                if (here < 0.0 && there > 0.0) || (here > 0.0 && there < 0.0) {
+                    kept.push(at.lerp(next, here / (here - there)));
+                }
+            }
+            outline = kept;
+        }
+    }
+    outline
+}
+
+/// The area of a polygon of corner weights, as a share of the triangle.
+fn share(outline: &[DVec3]) -> f64 {
+    let Some(&first) = outline.first() else { return 0.0 };
+    outline.windows(2).map(|pair| fan_share(first, pair[0], pair[1])).sum()
+}
+
+/// The same of a triangle in it. Weights sum to one, so the plane of the first two shows areas as twice their share.
+pub(super) fn fan_share(a: DVec3, b: DVec3, c: DVec3) -> f64 {
+    (b - a).truncate().perp_dot((c - a).truncate()).abs()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_of_a_triangle_in_boxes_are_the_triangle() {
+        let corners = [DVec3::new(0.1, 0.2, 0.3), DVec3::new(3.7, 0.5, 1.0), DVec3::new(1.0, 3.9, 3.0)];
+        let mut whole = 0.0;
+        for k in 0..64 {
+            let low = DVec3::new(f64::from(k % 4), f64::from(k / 4 % 4), f64::from(k / 16));
+            let bounds = Bounds { min: low, max: low + 1.0 };
+            let outline = clipped(&corners, &bounds);
+            for weights in &outline {
+                let p = corners[0] * weights.x + corners[1] * weights.y + corners[2] * weights.z;
+                assert!((p - low).min(low + 1.0 - p).min_element() > -1e-12 && weights.min_element() > -1e-12);
+            }
+            assert!(share(&outline) == 0.0 || overlaps(&corners, &bounds));
+            whole += share(&outline);
+        }
+        assert!((whole - 1.0).abs() < 1e-12, "{whole}");
+    }
+}

@@ -138,8 +138,28 @@ fn coverage_tells_a_whole_surface_from_one_with_holes() {
 }
 
 #[test]
+fn sample_writes_surfels_that_cover_the_mesh() {
+    let folder = Folder::new();
+    let (bunny, surfels) = (format!("{DATA}/bunny.obj"), folder.path("s.ply"));
+    let output = succeeds(&["sample", &bunny, "-o", text(&surfels), "--count", "3000", "--priority", "area"]);
+    assert!(String::from_utf8_lossy(&output.stderr).contains("3000 surfels from 3674 triangles"), "{output:?}");
+    let output = succeeds(&["coverage", text(&surfels), "--mesh", &bunny, "--side", "64", "--json", "-"]);
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(report["surfels"] == 3000 && report["hole_share"].as_f64().unwrap() < 1e-3, "{report}");
+    succeeds(&["sample", &bunny, "-o", text(&surfels), "--count", "10", "--method", "uniform", "--seed", "7"]);
+    fails(&["sample", &bunny, "-o", text(&surfels), "--count", "0"], 2, &["--count"]);
+    fails(&["sample", &bunny, "-o", "s.obj", "--count", "9"], 2, &[".ply"]);
+    fails(&["sample", &bunny, "-o", "s.ply", "--count", "9", "--priority", "beauty"], 2, &["beauty", "curvature"]);
+    let textured = ["sample", &bunny, "-o", "s.ply", "--count", "9", "--texture", "none.png"];
+    fails(&textured, 1, &["bunny.obj", "no texture coordinates"]);
+    let flat = folder.file("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
+    fails(&["sample", text(&flat), "-o", text(&surfels), "--count", "9"], 1, &["flat.obj", "has an area"]);
+    fails(&["sample", text(&surfels), "-o", "t.ply", "--count", "9"], 1, &["s.ply", "no triangles"]);
+}
+
+#[test]
 fn every_command_has_help_with_an_example() {
-    for command in ["render", "compare", "coverage", "generate", "info", "adapters"] {
+    for command in ["render", "compare", "coverage", "generate", "info", "sample", "adapters"] {
         let help = String::from_utf8(succeeds(&[command, "--help"]).stdout).unwrap();
         assert!(help.contains(&format!("epsplat {command}")) && help.contains("Example"), "{help}");
     }

@@ -50,7 +50,7 @@ fn a_sphere_is_covered_until_surfels_are_missing() {
     let cap = |angle: f64| 0.5 * (1.0 - angle.cos());
     for angle in [0.3, 0.8, 0.5 * PI] {
         let holed = seen(&mesh, &surfels(Shape::Sphere, 5000, |sample| sample.position[2] < angle.cos()));
-        let share = holed.hole_share.unwrap();
+        let share = holed.uncovered_share.unwrap();
         // The mesh is closed, so behind the hole there are disks on each ray: those of the far side do not count.
         assert!(
             cap(angle - 0.08) < share && share < cap(angle),
@@ -58,8 +58,10 @@ fn a_sphere_is_covered_until_surfels_are_missing() {
             cap(angle - 0.08),
             cap(angle)
         );
+        // All but what lies at the outline are holes.
+        assert!(holed.hole_share.unwrap() > 0.9 * share);
         let worst = holed.worst_view.unwrap();
-        assert!(!holed.is_hole_free() && worst.from[2] > 0.9 && worst.hole_share > 1.9 * share, "{worst:?}");
+        assert!(!holed.is_hole_free() && worst.from[2] > 0.9 && worst.hole_share > 1.5 * share, "{worst:?}");
     }
 }
 
@@ -80,7 +82,7 @@ fn a_single_missing_surfel_of_a_sparse_sphere_is_a_hole() {
     assert!(gaping.hole_share.unwrap() > 0.005 && gaping.views_with_holes == 64, "{gaping:?}");
     let touching = seen(&mesh, &scene(0.2));
     // Of 0.3 spacings: they do not overlap and cover 0.09 pi.
-    assert!((touching.hole_share.unwrap() - (1.0 - 0.09 * PI)).abs() < 0.02, "{touching:?}");
+    assert!((touching.uncovered_share.unwrap() - (1.0 - 0.09 * PI)).abs() < 0.02, "{touching:?}");
 }
 
 #[test]
@@ -88,7 +90,7 @@ fn a_hole_in_a_square_has_its_area() {
     let keep = |radius: f64| surfels(Shape::Plane, 20_000, move |s| s.position[0].hypot(s.position[1]) > radius);
     assert!(seen(&square(), &keep(0.0)).is_hole_free());
     // The disks' radius is 0.0212.
-    let holed = seen(&square(), &keep(0.4)).hole_share.unwrap();
+    let holed = seen(&square(), &keep(0.4)).uncovered_share.unwrap();
     assert!((PI * 0.375f64.powi(2) / 4.0..PI * 0.4f64.powi(2) / 4.0).contains(&holed), "{holed}");
     // Off the surface by more than a radius, disks cover nothing, though a render from the front would show no hole.
     let lifted = |height: f32| {
@@ -105,7 +107,7 @@ fn distances_are_those_by_which_surfels_are_moved() {
         |scene: &Scene, mesh: &Mesh| SurfaceDistances::of(scene, mesh, &TriangleTree::new(mesh).unwrap()).unwrap();
     let mut scene = surfels(Shape::Plane, 1000, |s| s.position.iter().all(|c| c.abs() < 0.8));
     let on = distances(&scene, &square()).centers_to_mesh.unwrap();
-    assert_eq!((on.mean, on.max), (0.0, 0.0));
+    assert!(on.mean <= on.max && on.max < 1e-14, "{on:?}");
     for (k, surfel) in scene.surfels.iter_mut().enumerate() {
         surfel.center[2] = if k % 50 == 0 { -0.5 } else { 0.25 };
     }

@@ -91,7 +91,7 @@ pub struct SceneEntry {
     pub views: u32,
     /// The configurations that render it, by name; else all.
     pub configs: Option<Vec<String>>,
-    /// Compare with ground truth by rays: of the shape, or of the triangles of an OBJ file.
+    /// Compare with ground truth by rays: of the shape, or of the triangles of a mesh.
     #[serde(default)]
     pub truth: bool,
     /// The shading of configurations that choose none.

@@ -4,8 +4,8 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
+use epsplat::metrics::SurfaceDistances;
 use epsplat::metrics::coverage::{Coverage, DEFAULT_SIDE, DEFAULT_VIEWS, coverage};
-use epsplat::metrics::{Distances, SurfaceDistances};
 use epsplat::surfels::build;
 use epsplat::truth::TriangleTree;
 use epsplat::{Error, Progress, Result, io};
@@ -25,7 +25,7 @@ pub struct Arguments {
     /// Files of surfels, or of points, whose radii are estimated
     #[arg(required = true)]
     surfels: Vec<PathBuf>,
-    /// The mesh that they stand for: .obj
+    /// The mesh that they stand for: .obj or .ply
     #[arg(long)]
     mesh: PathBuf,
     /// Directions to look from

@@ -17,7 +17,7 @@ use super::progress::Bars;
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat sample bunny.obj -o surfels.ply --count 60000")]
 pub struct Arguments {
-    /// The mesh: .obj
+    /// The mesh: .obj or .ply
     mesh: PathBuf,
     /// The file: .ply
     #[arg(short, long)]

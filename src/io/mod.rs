@@ -11,6 +11,7 @@ pub mod ply;
 pub mod png;
 pub mod points;
 pub mod texture;
+mod triangles;
 mod values;
 
 pub use mesh::{Material, Mesh};
@@ -44,7 +45,7 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
     }
 }
 
-/// Reads the triangles of a mesh: OBJ, by its extension in either case.
+/// Reads the triangles of a mesh: OBJ or PLY, by its extension in either case.
 ///
 /// # Errors
 ///
@@ -53,7 +54,8 @@ pub fn read_mesh(path: &Path, progress: &dyn Progress) -> Result<Mesh> {
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
     match extension.as_deref() {
         Some("obj") => obj::read_mesh(path, progress),
-        _ => Err(Error::malformed(path, "only OBJ files are read as meshes; convert it to one")),
+        Some("ply") => ply::read_mesh(path, progress),
+        _ => Err(Error::malformed(path, "only OBJ and PLY files are read as meshes; convert it to one")),
     }
 }
 

@@ -57,16 +57,13 @@ const LARGEST_GRID: u32 = 64;
 const SAME_SURFACE: f64 = 1e-9;
 
 impl Surface {
-    /// Reads the triangles of an OBJ file; see [`io::obj::read_mesh`].
+    /// Reads the triangles of a mesh; see [`io::read_mesh`].
     ///
     /// # Errors
     ///
-    /// As that, and [`Error::Malformed`] for a file of another extension.
+    /// As that.
     pub fn read(path: &Path, progress: &dyn Progress) -> Result<Self> {
-        if !path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj")) {
-            return Err(Error::malformed(path, "only OBJ files are read as surfaces; convert it to one"));
-        }
-        Self::mesh(&io::obj::read_mesh(path, progress)?)
+        Self::mesh(&io::read_mesh(path, progress)?)
     }
 
     /// The triangles of a mesh; see [`TriangleTree::new`].

@@ -3,6 +3,7 @@
 
 mod las;
 mod las_damage;
+mod mesh;
 mod obj;
 mod ply;
 mod ply_damage;

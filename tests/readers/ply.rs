@@ -30,14 +30,14 @@ fn encode(value: f64, kind: &str, encoding: &str) -> Vec<u8> {
     }
 }
 
-const ENCODINGS: [&str; 3] = ["ascii", "binary_little_endian", "binary_big_endian"];
+pub const ENCODINGS: [&str; 3] = ["ascii", "binary_little_endian", "binary_big_endian"];
 const KINDS: [&str; 16] = [
     "char", "int8", "uchar", "uint8", "short", "int16", "ushort", "uint16", "int", "int32", "uint", "uint32", "float",
     "float32", "double", "float64",
 ];
 
 /// An element: name, properties (type, name; a list's type is `list COUNT ITEM`), and rows of numbers.
-type Element<'a> = (&'a str, &'a [(&'a str, &'a str)], &'a [&'a [f64]]);
+pub type Element<'a> = (&'a str, &'a [(&'a str, &'a str)], &'a [&'a [f64]]);
 
 pub fn file(encoding: &str, elements: &[Element]) -> Vec<u8> {
     let mut bytes = format!("ply\nformat {encoding} 1.0\ncomment made for a test\nobj_info none\n").into_bytes();

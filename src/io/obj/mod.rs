@@ -1,9 +1,10 @@
 //! Wavefront OBJ: the vertices of a mesh as points, with normals and radii from its faces; or its triangles as they are.
 
+mod material;
 mod source;
-mod triangles;
 
 use crate::io::fault::{self, Fault};
+use crate::io::triangles::Triangles;
 use crate::io::{Mesh, Points, Up};
 use crate::scene::Colors;
 use crate::{Progress, Result};
@@ -11,7 +12,6 @@ use source::{Lines, Source};
 use std::fs::File;
 use std::io::{self, BufReader};
 use std::path::Path;
-use triangles::Triangles;
 
 /// Reads the vertices of an OBJ file, one point for each `v` line and in their order, whatever groups and materials
 /// the faces are in.
@@ -30,29 +30,39 @@ use triangles::Triangles;
 /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where
 /// a number is none or a face names a vertex or normal that does not exist.
 pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
-    read_with(path, progress, points)
+    read_with(path, false, progress, points)
 }
 
 /// Reads the triangles of an OBJ file, those of all groups and materials as one mesh, with every `v` line a vertex.
 ///
 /// Polygons are fanned into triangles. Corners have the `vn` they name where every corner of the file names one, else the
-/// mesh is faceted. Colours are read as by [`read`], and lines, points, curves and materials are passed over too. A file
-/// without faces is a mesh without triangles, and no error here.
+/// mesh is faceted; and so with `vt`. Colours are read as by [`read`], and lines, points and curves are passed over too. A
+/// file without faces is a mesh without triangles, and no error here.
+///
+/// Of the materials in the MTL files beside it the diffuse colour `Kd` (linear light), the opacity `d` and the image
+/// `map_Kd` (PNG, sRGB) are read. Files that cannot be read are left out and named in [`Mesh::notes`].
 ///
 /// # Errors
 ///
-/// As [`read`].
+/// As [`read`], and where a face names texture coordinates that do not exist.
 pub fn read_mesh(path: &Path, progress: &dyn Progress) -> Result<Mesh> {
-    read_with(path, progress, mesh)
+    let (mut mesh, libraries, names) = read_with(path, true, progress, mesh)?;
+    mesh.materials = material::read(path, &libraries, &names, &mut mesh.notes);
+    Ok(mesh)
 }
 
 /// Opens the file and makes of its lines and faces what is asked for.
-fn read_with<T>(path: &Path, progress: &dyn Progress, make: impl Fn(Lines, &[tobj::Model]) -> T) -> Result<T> {
+fn read_with<T>(
+    path: &Path,
+    surface: bool,
+    progress: &dyn Progress,
+    make: impl Fn(Lines, &[tobj::Model]) -> T,
+) -> Result<T> {
     let in_file = |fault: Fault| fault.of(path);
     let file = File::open(path).map_err(Fault::Io).map_err(in_file)?;
     let length = file.metadata().map_err(Fault::Io).map_err(in_file)?.len();
     progress.begin(&format!("reading {}", fault::name(path)), length);
-    let parsed = parse(Source::new(BufReader::with_capacity(1 << 18, file), progress));
+    let parsed = parse(Source::new(BufReader::with_capacity(1 << 18, file), surface, progress));
     let made = parsed.map(|(lines, models)| make(lines, &models));
     progress.end();
     made.map_err(in_file)
@@ -72,6 +82,7 @@ fn parse<R: io::BufRead>(mut source: Source<'_, R>) -> Result<(Lines, Vec<tobj::
     let (models, _) = loaded.map_err(|error| {
         Fault::Malformed(match error {
             tobj::LoadError::FaceVertexOutOfBounds => "a face names a vertex that does not exist".into(),
+            tobj::LoadError::FaceTexCoordOutOfBounds => "a face names texture coordinates that do not exist".into(),
             tobj::LoadError::FaceNormalOutOfBounds => "a face names a normal that does not exist".into(),
             other => format!("line {}: {other}", lines.count),
         })
@@ -120,19 +131,35 @@ fn points(lines: Lines, models: &[tobj::Model]) -> Points {
     }
 }
 
-fn mesh(lines: Lines, models: &[tobj::Model]) -> Mesh {
+/// The mesh without its materials, the libraries they are in, and their names.
+fn mesh(lines: Lines, models: &[tobj::Model]) -> (Mesh, Vec<String>, Vec<String>) {
     let (mut triangles, mut normals) = (Vec::new(), Vec::new());
     for (corners, named) in faces(&lines, models) {
         // The parser refuses a face whose vertex does not exist, so every number is one of `positions`.
         triangles.push(corners.map(|corner| u32::try_from(corner).unwrap_or(u32::MAX)));
         normals.extend(named.map(|named| named.map(|n| n.map_or([0.0; 3], |n| n.map(|c| c as f32)))));
     }
-    Mesh {
+    let (mut texture, mut material) = (Vec::new(), Vec::new());
+    for tobj::Model { mesh, name } in models {
+        let at = |index: &u32| {
+            let found = mesh.texcoords.get(2 * *index as usize..).and_then(|rest| rest.first_chunk());
+            found.map_or([0.0; 2], |uv: &[f64; 2]| uv.map(|c| c as f32))
+        };
+        texture.extend(mesh.texcoord_indices.as_chunks::<3>().0.iter().map(|corners| corners.each_ref().map(at)));
+        // The name of a group is the number of its material; faces before the first have another.
+        let number = name.parse().unwrap_or(u32::MAX);
+        material.extend(mesh.indices.as_chunks::<3>().0.iter().map(|_| number));
+    }
+    let textured = lines.every_corner_has_texture && !texture.is_empty() && texture.len() == triangles.len();
+    let mesh = Mesh {
         normals: (!normals.is_empty() && normals.len() == triangles.len()).then_some(normals),
+        texture: textured.then_some(texture),
+        material: (!lines.materials.is_empty()).then_some(material),
         triangles,
         positions: lines.positions,
         colors: (!lines.colors.is_empty()).then_some(Colors::Linear(lines.colors)),
         up: Some(Up::Y),
         ..Mesh::default()
-    }
+    };
+    (mesh, lines.libraries, lines.materials)
 }

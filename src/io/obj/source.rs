@@ -17,6 +17,12 @@ pub(super) struct Lines {
     pub(super) colors: Vec<[f32; 4]>,
     pub(super) normals: Vec<[f32; 3]>,
     pub(super) every_corner_has_a_normal: bool,
+    /// Only if they are wanted, and so for all that follows.
+    pub(super) every_corner_has_texture: bool,
+    /// What `mtllib` names.
+    pub(super) libraries: Vec<String>,
+    /// What `usemtl` names, each once.
+    pub(super) materials: Vec<String>,
     /// Lines read.
     pub(super) count: u64,
 }
@@ -25,9 +31,12 @@ pub(super) struct Lines {
 ///
 /// The parser renumbers vertices by first use, drops those of no face, repeats those of several groups or materials,
 /// and stops at text that is not UTF-8. So vertices are kept here; the parser gets each one's number in place of its
-/// coordinates, and sees neither groups nor materials, texture coordinates or comments.
+/// coordinates, and sees no comments. Of a mesh it is given texture coordinates too, and each material as a group whose name
+/// is the material's number; of points neither.
 pub(super) struct Source<'a, R> {
     reader: R,
+    /// Whether texture coordinates and materials are wanted.
+    surface: bool,
     progress: &'a dyn Progress,
     unreported: u64,
     lines: Lines,
@@ -39,10 +48,10 @@ pub(super) struct Source<'a, R> {
 }
 
 impl<'a, R: BufRead> Source<'a, R> {
-    pub(super) fn new(reader: R, progress: &'a dyn Progress) -> Self {
-        let lines = Lines { every_corner_has_a_normal: true, ..Lines::default() };
+    pub(super) fn new(reader: R, surface: bool, progress: &'a dyn Progress) -> Self {
+        let lines = Lines { every_corner_has_a_normal: true, every_corner_has_texture: surface, ..Lines::default() };
         let (line, passed) = (Vec::new(), Vec::new());
-        Self { reader, progress, unreported: 0, lines, line, passed, taken: 0, fault: None }
+        Self { reader, surface, progress, unreported: 0, lines, line, passed, taken: 0, fault: None }
     }
 
     /// What was read, unless reading is why the parser stopped.
@@ -85,7 +94,7 @@ impl<'a, R: BufRead> Source<'a, R> {
     }
 
     fn take_line(&mut self) -> Result<(), Fault> {
-        let Self { lines, line, passed, .. } = self;
+        let Self { lines, line, passed, surface, .. } = self;
         let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
         match words.next() {
             Some(b"v") => {
@@ -101,18 +110,41 @@ impl<'a, R: BufRead> Source<'a, R> {
                 let [x, y, z] = normal;
                 passed.extend(format!("vn {x} {y} {z}\n").bytes());
             }
+            Some(b"vt") if *surface => {
+                let (u, v) = (lines.number(words.next())? as f32, words.next());
+                let v = if v.is_some() { lines.number(v)? as f32 } else { 0.0 };
+                passed.extend(format!("vt {u} {v}\n").bytes());
+            }
+            Some(b"mtllib") if *surface => {
+                lines.libraries.push(rest_of(line, b"mtllib"));
+            }
+            Some(b"usemtl") if *surface => {
+                let name = rest_of(line, b"usemtl");
+                let known = lines.materials.iter().position(|material| *material == name);
+                let number = known.unwrap_or(lines.materials.len());
+                if known.is_none() {
+                    lines.materials.push(name);
+                }
+                passed.extend(format!("g {number}\n").bytes());
+            }
             // A face of one or two corners has no area, and one of none is refused by the parser.
             Some(b"f") if words.clone().count() > 2 => {
                 passed.push(b'f');
                 for word in words.take_while(|word| !word.starts_with(b"#")) {
                     let mut indices = word.split(|&byte| byte == b'/');
-                    let (vertex, _, normal) = (indices.next(), indices.next(), indices.next());
-                    let normal = normal.filter(|normal| !normal.is_empty());
+                    let (vertex, texture, normal) = (indices.next(), indices.next(), indices.next());
+                    let [texture, normal] = [texture, normal].map(|index| index.filter(|index| !index.is_empty()));
                     lines.every_corner_has_a_normal &= normal.is_some();
+                    lines.every_corner_has_texture &= texture.is_some();
                     passed.push(b' ');
                     passed.extend(vertex.unwrap_or_default());
+                    let texture = texture.filter(|_| *surface);
+                    if texture.is_some() || normal.is_some() {
+                        passed.push(b'/');
+                        passed.extend(texture.unwrap_or_default());
+                    }
                     if let Some(normal) = normal {
-                        passed.extend(b"//");
+                        passed.push(b'/');
                         passed.extend(normal);
                     }
                 }
@@ -122,6 +154,12 @@ impl<'a, R: BufRead> Source<'a, R> {
         }
         Ok(())
     }
+}
+
+/// What follows the keyword on a line, which may hold spaces.
+fn rest_of(line: &[u8], keyword: &[u8]) -> String {
+    let rest = line.trim_ascii().strip_prefix(keyword).unwrap_or_default();
+    String::from_utf8_lossy(rest.trim_ascii()).into_owned()
 }
 
 impl Lines {

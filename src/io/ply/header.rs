@@ -1,5 +1,6 @@
 //! The header of a PLY file (Turk 1994): encoding, elements and their properties.
 
+use super::faces::Faces;
 use crate::io::fault::Fault;
 use crate::io::values::shown;
 use std::io::{BufRead, Read};
@@ -88,6 +89,14 @@ pub(super) struct Header {
     pub(super) elements: Vec<Element>,
     /// Lines, `end_header` included: the first value of an ASCII file is on the next.
     pub(super) lines: u64,
+}
+
+impl Header {
+    /// The elements up to the last one that is read.
+    pub(super) fn needed(&self) -> &[Element] {
+        let read = |element: &Element| element.name == "vertex" || Faces::list(element).is_some();
+        &self.elements[..self.elements.iter().rposition(read).map_or(0, |last| last + 1)]
+    }
 }
 
 /// Reads up to and including the line `end_header`.

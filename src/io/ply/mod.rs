@@ -1,4 +1,4 @@
-//! PLY: a streaming reader for clouds of tens of millions of vertices, and a writer of surfels.
+//! PLY: a streaming reader for clouds of tens of millions of vertices and for meshes, and a writer of surfels.
 //!
 //! Written files are binary little-endian; each vertex has those of these properties that are known, in this order:
 //!
@@ -15,10 +15,13 @@
 //! The names of normals, colours and texture coordinates are those of MeshLab, which ignores the half-axes, as do
 //! CloudCompare and Open3D: to them such a file is a cloud with normals and colours.
 
+mod ascii;
+mod binary;
+mod faces;
 mod header;
 mod read;
 mod vertex;
 mod write;
 
-pub use read::read;
+pub use read::{read, read_mesh};
 pub use write::{Color, ColorProperties, Properties, Vertex, check_extension, write, write_points};

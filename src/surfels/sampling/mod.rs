@@ -122,8 +122,10 @@ pub fn sample(
             progress.end();
             sampling.voxels = voxels.len() as u64;
             sampling.empty_voxels = quotas.iter().filter(|quota| **quota == 0).count() as u64;
-            let sum: f64 = priorities.iter().filter(|priority| priority.is_finite()).sum();
-            let fair: Vec<f64> = priorities.iter().map(|priority| count as f64 * priority / sum).collect();
+            // As the heap takes them; where none is positive, quotas alone decide.
+            let usable = |priority: &f64| if priority.is_finite() && *priority > 0.0 { *priority } else { 0.0 };
+            let sum = priorities.iter().map(usable).sum::<f64>().max(f64::MIN_POSITIVE);
+            let fair: Vec<f64> = priorities.iter().map(|priority| count as f64 * (usable(priority) / sum)).collect();
             let (candidates, mut places) = candidates::candidates(&voxels, &quotas, &fair, seed);
             let cells = relax::relax(&surface, &candidates, &mut places, progress)?;
             let radii = relax::radii(&surface, &candidates, &places, &cells);

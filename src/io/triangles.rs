@@ -1,4 +1,4 @@
-//! Normals and radii of vertices from the triangles around them.
+//! Normals and radii of a mesh's vertices from the triangles around them: how a mesh becomes points.
 
 use glam::DVec3;
 

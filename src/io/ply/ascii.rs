@@ -1,0 +1,186 @@
+//! PLY in text: words between white space, wherever lines end.
+
+use super::faces::Faces;
+use super::header::{Element, Header, Kind};
+use super::read::{Contents, ends_early, negative_list};
+use super::vertex::{Layout, Vertices};
+use crate::Progress;
+use crate::io::Points;
+use crate::io::fault::Fault;
+use crate::io::values::{parse_number, shown};
+use std::io::{self, BufRead};
+
+/// A number in text is shorter.
+const TOKEN_LIMIT: usize = 1 << 10;
+
+/// Reads vertices and faces; the reader is behind the header.
+pub(super) fn read(
+    reader: impl BufRead,
+    header: &Header,
+    length: u64,
+    progress: &dyn Progress,
+) -> Result<Contents, Fault> {
+    let mut tokens = Tokens { reader, line: header.lines + 1, token: Vec::new() };
+    let mut contents = Contents::default();
+    for element in header.needed() {
+        if element.name == "vertex" {
+            contents.points = vertices(&mut tokens, element, length, progress)?;
+        } else {
+            others(&mut tokens, element, &mut contents.faces)?;
+        }
+    }
+    Ok(contents)
+}
+
+/// Reads faces, and passes over what is none.
+fn others(tokens: &mut Tokens<impl BufRead>, element: &Element, faces: &mut Faces) -> Result<(), Fault> {
+    let list = Faces::list(element).map(|(list, ..)| list);
+    for row in 0..if element.properties.is_empty() { 0 } else { element.count } {
+        for (index, property) in element.properties.iter().enumerate() {
+            let whole = if list == Some(index) {
+                faces.begin(element);
+                tokens.list(element, row, |number| faces.take(element, row, number))?
+            } else {
+                tokens.skip(element, row, property.kind)?
+            };
+            if !whole {
+                return Err(ends_early(element, row));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn vertices(
+    tokens: &mut Tokens<impl BufRead>,
+    vertex: &Element,
+    length: u64,
+    progress: &dyn Progress,
+) -> Result<Points, Fault> {
+    let layout = Layout::of(vertex)?;
+    // Each number takes a digit and a separator at least.
+    let possible = length / (2 * layout.scalars.len().max(1)) as u64;
+    let mut vertices = Vertices::with_capacity(&layout, vertex.count.min(possible))?;
+    let mut used = vec![None; layout.scalars.len()];
+    for (index, column) in layout.columns.iter().enumerate() {
+        used[column.slot] = Some(index);
+    }
+    let mut values = vec![0.0; layout.columns.len()];
+    let mut unreported = 0;
+    for row in 0..vertex.count {
+        let mut slots = used.iter();
+        for property in &vertex.properties {
+            let column = match property.kind {
+                Kind::Scalar(_) => slots.next().copied().flatten(),
+                Kind::List { .. } => None,
+            };
+            let whole = match column {
+                Some(column) => tokens.number()?.map(|number| values[column] = number).is_some(),
+                None => tokens.skip(vertex, row, property.kind)?,
+            };
+            if !whole {
+                return Err(ends_early(vertex, row));
+            }
+        }
+        vertices.extend(1, |column, _| values[column]);
+        unreported += 1;
+        if unreported == 1 << 16 {
+            progress.advance(unreported);
+            unreported = 0;
+        }
+    }
+    progress.advance(unreported);
+    Ok(vertices.into_points())
+}
+
+/// The words of a text, with the line they are on.
+struct Tokens<R> {
+    reader: R,
+    line: u64,
+    token: Vec<u8>,
+}
+
+impl<R: BufRead> Tokens<R> {
+    /// Moves to the next word; `false` at the end of the file.
+    fn advance(&mut self) -> Result<bool, Fault> {
+        self.token.clear();
+        loop {
+            let buffer = match self.reader.fill_buf() {
+                Ok(buffer) => buffer,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+                Err(error) => return Err(error.into()),
+            };
+            if buffer.is_empty() {
+                return Ok(!self.token.is_empty());
+            }
+            let mut start = 0;
+            if self.token.is_empty() {
+                start = buffer.iter().position(|byte| !byte.is_ascii_whitespace()).unwrap_or(buffer.len());
+                self.line += buffer[..start].iter().filter(|&&byte| byte == b'\n').count() as u64;
+            }
+            let word = &buffer[start..];
+            let length = word.iter().position(u8::is_ascii_whitespace);
+            let end = start + length.unwrap_or(word.len());
+            let room = TOKEN_LIMIT.saturating_sub(self.token.len());
+            self.token.extend(buffer[start..end].iter().take(room));
+            self.reader.consume(end);
+            if length.is_some() && !self.token.is_empty() {
+                return Ok(true);
+            }
+        }
+    }
+
+    /// The next number; `None` at the end of the file.
+    fn number(&mut self) -> Result<Option<f64>, Fault> {
+        if !self.advance()? {
+            return Ok(None);
+        }
+        match parse_number(&self.token) {
+            Some(number) => Ok(Some(number)),
+            None => Err(Fault::Malformed(format!("line {}: '{}' is not a number", self.line, shown(&self.token)))),
+        }
+    }
+
+    /// Passes over one property; `false` where the file ends in it.
+    fn skip(&mut self, element: &Element, row: u64, kind: Kind) -> Result<bool, Fault> {
+        if matches!(kind, Kind::Scalar(_)) {
+            return self.advance();
+        }
+        self.length(element, row)?.map_or(Ok(false), |items| {
+            for _ in 0..items {
+                if !self.advance()? {
+                    return Ok(false);
+                }
+            }
+            Ok(true)
+        })
+    }
+
+    /// Gives each number of a list to `take`; `false` where the file ends in it.
+    fn list(
+        &mut self,
+        element: &Element,
+        row: u64,
+        mut take: impl FnMut(f64) -> Result<(), Fault>,
+    ) -> Result<bool, Fault> {
+        let Some(items) = self.length(element, row)? else { return Ok(false) };
+        for _ in 0..items {
+            let Some(number) = self.number()? else { return Ok(false) };
+            take(number)?;
+        }
+        Ok(true)
+    }
+
+    /// The length of a list; `None` at the end of the file.
+    fn length(&mut self, element: &Element, row: u64) -> Result<Option<u64>, Fault> {
+        let Some(items) = self.number()? else { return Ok(None) };
+        if items < 0.0 {
+            return Err(negative_list(element, row));
+        }
+        if items.fract() != 0.0 {
+            let token = shown(&self.token);
+            return Err(Fault::Malformed(format!("line {}: '{token}' is not the length of a list", self.line)));
+        }
+        Ok(Some(items as u64))
+    }
+}

@@ -1,0 +1,237 @@
+//! Binary PLY: blocks of rows, decoded column by column.
+
+use super::faces::Faces;
+use super::header::{Element, Header, Kind, Scalar};
+use super::read::{Contents, ends_early, negative_list};
+use super::vertex::{Layout, Vertices};
+use crate::Progress;
+use crate::io::Points;
+use crate::io::fault::Fault;
+use std::io::{self, BufRead, Read};
+
+/// Bytes of rows, or of a list, that are decoded together.
+const BLOCK: usize = 1 << 19;
+
+/// Reads vertices and faces; the reader is behind the header.
+pub(super) fn read<const BIG: bool>(
+    mut reader: impl BufRead,
+    header: &Header,
+    length: u64,
+    progress: &dyn Progress,
+) -> Result<Contents, Fault> {
+    let mut contents = Contents::default();
+    for element in header.needed() {
+        if element.name == "vertex" {
+            contents.points = vertices::<BIG>(&mut reader, element, length, progress)?;
+        } else if let Some(list) = Faces::list(element) {
+            faces::<BIG>(&mut reader, element, list, &mut contents.faces)?;
+        } else {
+            skip::<BIG>(&mut reader, element)?;
+        }
+    }
+    Ok(contents)
+}
+
+fn vertices<const BIG: bool>(
+    mut reader: impl BufRead,
+    vertex: &Element,
+    length: u64,
+    progress: &dyn Progress,
+) -> Result<Points, Fault> {
+    let layout = Layout::of(vertex)?;
+    let possible = length / layout.row_size.max(1) as u64;
+    let mut vertices = Vertices::with_capacity(&layout, vertex.count.min(possible))?;
+    let has_lists = vertex.properties.iter().any(|property| matches!(property.kind, Kind::List { .. }));
+    let block_rows = (BLOCK / layout.row_size).max(1);
+    let mut block = vec![0; block_rows * layout.row_size];
+    let mut columns = vec![Vec::with_capacity(block_rows); layout.columns.len()];
+    while vertices.len() < vertex.count {
+        let wanted = (vertex.count - vertices.len()).min(block_rows as u64) as usize;
+        let rows = if has_lists {
+            compact_rows::<BIG>(&mut reader, vertex, vertices.len(), &mut block, wanted, layout.row_size)?
+        } else {
+            read_until_end(&mut reader, &mut block[..wanted * layout.row_size])? / layout.row_size
+        };
+        let decoded = &block[..rows * layout.row_size];
+        for (values, column) in columns.iter_mut().zip(&layout.columns) {
+            decode::<BIG>(decoded, layout.row_size, column.offset, column.scalar, values);
+        }
+        vertices.extend(rows, |column, row| columns[column][row]);
+        progress.advance(rows as u64);
+        if rows < wanted {
+            return Err(ends_early(vertex, vertices.len()));
+        }
+    }
+    Ok(vertices.into_points())
+}
+
+/// The numbers of one column of a block, in place of what `values` held.
+fn decode<const BIG: bool>(block: &[u8], row_size: usize, offset: usize, scalar: Scalar, values: &mut Vec<f64>) {
+    fn strided<const N: usize>(block: &[u8], row_size: usize, offset: usize) -> impl Iterator<Item = [u8; N]> {
+        block.chunks_exact(row_size).filter_map(move |row| row.get(offset..)?.first_chunk().copied())
+    }
+    macro_rules! numbers {
+        ($type:ty) => {
+            values.extend(strided(block, row_size, offset).map(|bytes| {
+                f64::from(if BIG { <$type>::from_be_bytes(bytes) } else { <$type>::from_le_bytes(bytes) })
+            }))
+        };
+    }
+    values.clear();
+    match scalar {
+        Scalar::I8 => numbers!(i8),
+        Scalar::U8 => numbers!(u8),
+        Scalar::I16 => numbers!(i16),
+        Scalar::U16 => numbers!(u16),
+        Scalar::I32 => numbers!(i32),
+        Scalar::U32 => numbers!(u32),
+        Scalar::F32 => numbers!(f32),
+        Scalar::F64 => numbers!(f64),
+    }
+}
+
+/// Fills `block` with the scalar properties of up to `wanted` rows, skipping lists; how many rows were whole.
+fn compact_rows<const BIG: bool>(
+    reader: &mut impl BufRead,
+    element: &Element,
+    first: u64,
+    block: &mut [u8],
+    wanted: usize,
+    row_size: usize,
+) -> Result<usize, Fault> {
+    for (index, row) in block.chunks_exact_mut(row_size).take(wanted).enumerate() {
+        let mut rest = row;
+        for property in &element.properties {
+            let whole = match property.kind {
+                Kind::Scalar(scalar) => {
+                    let (bytes, after) = rest.split_at_mut(scalar.size());
+                    rest = after;
+                    read_until_end(reader, bytes)? == bytes.len()
+                }
+                Kind::List { count, item } => skip_list::<BIG>(reader, element, first + index as u64, count, item)?,
+            };
+            if !whole {
+                return Ok(index);
+            }
+        }
+    }
+    Ok(wanted)
+}
+
+/// The length of a list; `None` where the file ends in it.
+fn list_length<const BIG: bool>(
+    reader: &mut impl BufRead,
+    element: &Element,
+    row: u64,
+    count: Scalar,
+) -> Result<Option<u64>, Fault> {
+    let mut bytes = [0; 4];
+    let bytes = &mut bytes[..count.size().min(4)];
+    if read_until_end(reader, bytes)? < bytes.len() {
+        return Ok(None);
+    }
+    let mut items = Vec::with_capacity(1);
+    decode::<BIG>(bytes, bytes.len(), 0, count, &mut items);
+    let items = items.first().copied().unwrap_or(0.0);
+    if items < 0.0 { Err(negative_list(element, row)) } else { Ok(Some(items as u64)) }
+}
+
+/// Skips one list; `false` where the file ends in it.
+fn skip_list<const BIG: bool>(
+    reader: &mut impl BufRead,
+    element: &Element,
+    row: u64,
+    count: Scalar,
+    item: Scalar,
+) -> Result<bool, Fault> {
+    let Some(items) = list_length::<BIG>(reader, element, row, count)? else { return Ok(false) };
+    let size = items * item.size() as u64;
+    Ok(skip_bytes(reader, size)? == size)
+}
+
+/// Reads one list of vertices; `false` where the file ends in it.
+fn face<const BIG: bool>(
+    reader: &mut impl BufRead,
+    element: &Element,
+    row: u64,
+    (count, item): (Scalar, Scalar),
+    faces: &mut Faces,
+) -> Result<bool, Fault> {
+    let Some(mut items) = list_length::<BIG>(reader, element, row, count)? else { return Ok(false) };
+    faces.begin(element);
+    let (mut block, mut numbers) = (Vec::new(), Vec::new());
+    while items > 0 {
+        let wanted = items.min((BLOCK / item.size()) as u64);
+        block.resize(wanted as usize * item.size(), 0);
+        if read_until_end(reader, &mut block)? < block.len() {
+            return Ok(false);
+        }
+        decode::<BIG>(&block, item.size(), 0, item, &mut numbers);
+        numbers.iter().try_for_each(|number| faces.take(element, row, *number))?;
+        items -= wanted;
+    }
+    Ok(true)
+}
+
+fn faces<const BIG: bool>(
+    reader: &mut impl BufRead,
+    element: &Element,
+    (list, count, item): (usize, Scalar, Scalar),
+    faces: &mut Faces,
+) -> Result<(), Fault> {
+    for row in 0..element.count {
+        for (index, property) in element.properties.iter().enumerate() {
+            let whole = match property.kind {
+                _ if index == list => face::<BIG>(reader, element, row, (count, item), faces)?,
+                Kind::Scalar(scalar) => skip_bytes(reader, scalar.size() as u64)? == scalar.size() as u64,
+                Kind::List { count, item } => skip_list::<BIG>(reader, element, row, count, item)?,
+            };
+            if !whole {
+                return Err(ends_early(element, row));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn skip<const BIG: bool>(reader: &mut impl BufRead, element: &Element) -> Result<(), Fault> {
+    let row_size = element.properties.iter().try_fold(0u64, |size, property| match property.kind {
+        Kind::Scalar(scalar) => Some(size + scalar.size() as u64),
+        Kind::List { .. } => None,
+    });
+    if let Some(row_size) = row_size {
+        let size = element.count.saturating_mul(row_size);
+        let skipped = skip_bytes(reader, size)?;
+        return if skipped < size { Err(ends_early(element, skipped / row_size)) } else { Ok(()) };
+    }
+    for row in 0..element.count {
+        for property in &element.properties {
+            let whole = match property.kind {
+                Kind::Scalar(scalar) => skip_bytes(reader, scalar.size() as u64)? == scalar.size() as u64,
+                Kind::List { count, item } => skip_list::<BIG>(reader, element, row, count, item)?,
+            };
+            if !whole {
+                return Err(ends_early(element, row));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn skip_bytes(reader: &mut impl BufRead, count: u64) -> io::Result<u64> {
+    io::copy(&mut reader.take(count), &mut io::sink())
+}
+
+/// Fills `bytes`; fewer only where the file ends.
+fn read_until_end(reader: &mut impl Read, bytes: &mut [u8]) -> io::Result<usize> {
+    let mut filled = 0;
+    while filled < bytes.len() {
+        match reader.read(&mut bytes[filled..]) {
+            Ok(0) => break,
+            Ok(count) => filled += count,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(filled)
+}

@@ -1,0 +1,143 @@
+//! Meshes: faces of PLY files, materials and textures of OBJ files.
+
+use super::ply::{ENCODINGS, file};
+use super::{Folder, sentence};
+use epsplat::io::{self, Mesh};
+use epsplat::scene::Colors;
+
+const XYZ: [(&str, &str); 3] = [("float", "x"), ("float", "y"), ("float", "z")];
+
+/// The unit square, and a point above it.
+const CORNERS: [&[f64]; 5] = [&[0.0, 0.0, 0.0], &[1.0, 0.0, 0.0], &[1.0, 1.0, 0.0], &[0.0, 1.0, 0.0], &[0.0, 0.0, 1.0]];
+
+fn read(folder: &Folder, name: &str, bytes: &[u8]) -> Mesh {
+    std::fs::write(folder.path(name), bytes).unwrap();
+    io::read_mesh(&folder.path(name), &()).unwrap()
+}
+
+#[test]
+fn polygons_and_strips_are_triangles_in_every_encoding() {
+    let folder = Folder::new();
+    for encoding in ENCODINGS {
+        for (list, name) in [("list uchar int", "vertex_indices"), ("list int ushort", "vertex_index")] {
+            let face = [("float", "quality"), (list, name), ("list uchar float", "texcoord")];
+            let faces: [&[f64]; 3] = [
+                &[0.5, 4.0, 0.0, 1.0, 2.0, 3.0, 1.0, 0.5],
+                &[0.5, 3.0, 0.0, 1.0, 4.0, 0.0],
+                &[0.5, 2.0, 0.0, 1.0, 0.0],
+            ];
+            // A strip of a square, one vertex twice as strips turn corners, and another after a restart.
+            let strips: [&[f64]; 1] = [&[9.0, 0.0, 1.0, 3.0, 2.0, 2.0, -1.0, 0.0, 1.0, 4.0]];
+            let strip = [("list int int", "vertex_indices")];
+            let elements =
+                [("vertex", &XYZ[..], &CORNERS[..]), ("face", &face, &faces), ("tristrips", &strip, &strips)];
+            let mesh = read(&folder, "a.ply", &file(encoding, &elements));
+            let expected = [[0, 1, 2], [0, 2, 3], [0, 1, 4], [0, 1, 3], [3, 1, 2], [0, 1, 4]];
+            assert_eq!(mesh.triangles, expected, "{encoding}");
+            assert_eq!((mesh.positions.len(), &mesh.normals, &mesh.texture), (5, &None, &None));
+            // Faces may come first too.
+            let turned = [elements[1], elements[0]];
+            assert_eq!(read(&folder, "a.ply", &file(encoding, &turned)).triangles, expected[..3]);
+
+            // As points the vertices have what an OBJ file's would have.
+            let points = io::read(&folder.path("a.ply"), &()).unwrap();
+            let text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nf 1 2 3 4\nf 1 2 5\n";
+            let same = folder.read("a.obj", text.as_bytes()).unwrap();
+            assert_eq!((points.normals, points.radii), (same.normals, same.radii));
+        }
+    }
+}
+
+#[test]
+fn what_vertices_have_corners_have_and_radii_of_the_file_stay() {
+    let folder = Folder::new();
+    let names = ["x", "y", "z", "nx", "ny", "nz", "radius", "u", "v"].map(|name| ("float", name));
+    let rows: [&[f64]; 3] = [
+        &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.25, 0.0, 0.0],
+        &[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.5, 1.0, 0.0],
+        &[0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.75, 0.0, 1.0],
+    ];
+    let face = [("list uchar int", "vertex_indices")];
+    let elements = [("vertex", &names[..], &rows[..]), ("face", &face, &[&[3.0, 2.0, 0.0, 1.0]])];
+    let mesh = read(&folder, "a.ply", &file("ascii", &elements));
+    assert_eq!(mesh.normals.unwrap(), [[[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]]);
+    assert_eq!(mesh.texture.unwrap(), [[[0.0, 1.0], [0.0, 0.0], [1.0, 0.0]]]);
+    let points = io::read(&folder.path("a.ply"), &()).unwrap();
+    assert_eq!(points.radii.unwrap(), [0.25, 0.5, 0.75]);
+    assert_eq!(points.normals.unwrap()[1], [0.0, 1.0, 0.0]);
+}
+
+#[test]
+fn faces_that_cannot_be_are_said() {
+    let folder = Folder::new();
+    let face = [("list uchar int", "vertex_indices")];
+    for encoding in ENCODINGS {
+        let refuse = |faces: &[&[f64]], cut: usize| {
+            let mut bytes = file(encoding, &[("vertex", &XYZ, &CORNERS), ("face", &face, faces)]);
+            bytes.truncate(bytes.len() - cut);
+            folder.refusal("a.ply", &bytes)
+        };
+        assert_eq!(refuse(&[&[3.0, 0.0, 1.0, 5.0]], 0), "a face names the vertex 5, but there are 5");
+        assert_eq!(
+            refuse(&[&[3.0, 0.0, 1.0, 2.0], &[3.0, 0.0, -1.0, 2.0]], 0),
+            "row 2 of element 'face' names the vertex -1, which cannot be"
+        );
+        let cut = refuse(&[&[3.0, 0.0, 1.0, 2.0], &[3.0, 0.0, 1.0, 2.0]], 4);
+        assert_eq!(cut, "the header promises 2 rows of element 'face', the file ends after 1");
+    }
+    let none = read(&folder, "a.ply", &file("ascii", &[("vertex", &XYZ, &CORNERS)]));
+    assert_eq!((none.positions.len(), none.triangles.len()), (5, 0));
+}
+
+#[test]
+fn materials_textures_and_what_of_them_is_missing() {
+    let folder = Folder::new();
+    let image = epsplat::frame::Frame {
+        width: 1,
+        height: 1,
+        color: vec![[0.0, 1.0, 0.0, 1.0]],
+        depth: None,
+        normal: None,
+        weight: None,
+        count: None,
+        decision: None,
+    };
+    io::png::write(&folder.path("a green.png"), &image).unwrap();
+    let library = "newmtl red\nKd 0.5 0 0\nd 0.25\n\nnewmtl painted\nKd 1 0.5 1\nmap_Kd a green.png\nnewmtl lost\nmap_Kd none.png\n";
+    std::fs::write(folder.path("my colours.mtl"), library).unwrap();
+    let text = "mtllib my colours.mtl\nmtllib none.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0.25\nvt 1\nvt 0.5 0.75 0\n\
+                f 1/1 2/2 3/3\nusemtl painted\nf 1/1 2/2 3/3\nf 3/-1 2/2 1/1\nusemtl red\ng part\nf 1/1 2/2 3/3\n\
+                usemtl unknown\nf 1/1 2/2 3/3\nusemtl lost\nf 1/1 2/2 3/3\nusemtl painted\nf 1/1 2/2 3/3\n";
+    let mesh = read(&folder, "a.obj", text.as_bytes());
+    let names: Vec<&str> = (0..7).map(|k| mesh.material_of(k).map_or("-", |material| material.name.as_str())).collect();
+    assert_eq!(names, ["-", "painted", "painted", "red", "unknown", "lost", "painted"]);
+    let corners = [[0.0, 0.25], [1.0, 0.0], [0.5, 0.75]];
+    let texture = mesh.texture.as_ref().unwrap();
+    assert_eq!((texture[0], texture[2]), (corners, [corners[2], corners[1], corners[0]]));
+    assert_eq!(mesh.material_of(3).unwrap().diffuse, [0.5, 0.0, 0.0, 0.25]);
+    assert_eq!(mesh.material_of(4).unwrap().diffuse, [1.0; 4]);
+    let painted = mesh.material_of(1).unwrap();
+    assert_eq!(
+        (painted.diffuse, painted.texture.as_ref().unwrap().at(0.3, 0.3)),
+        ([1.0, 0.5, 1.0, 1.0], [0.0, 1.0, 0.0, 1.0])
+    );
+    assert!(mesh.material_of(5).unwrap().texture.is_none());
+    assert!(
+        mesh.notes.len() == 2 && mesh.notes[0].contains("none.mtl") && mesh.notes[1].contains("none.png"),
+        "{:?}",
+        mesh.notes
+    );
+
+    // One corner without coordinates: none can be relied on. The points of the file are what they were.
+    let partly = format!("{text}f 1 2 3\n");
+    assert_eq!(read(&folder, "a.obj", partly.as_bytes()).texture, None);
+    assert_eq!(folder.read("a.obj", text.as_bytes()).unwrap().positions.len(), 3);
+    std::fs::write(folder.path("a.obj"), "v 0 0 0\nvt 0 0\nf 1/1 1/1 1/2\n").unwrap();
+    let error = io::read_mesh(&folder.path("a.obj"), &()).unwrap_err();
+    assert_eq!(sentence(&error, &folder.path("a.obj")), "a face names texture coordinates that do not exist");
+    assert!(folder.read("a.obj", b"v 0 0 0\nvt 0 0\nf 1/1 1/1 1/2\n").is_ok());
+
+    let colored = read(&folder, "a.obj", b"v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 0\nf 1 2 3\n");
+    assert_eq!(colored.colors, Some(Colors::Linear(vec![[1.0, 0.0, 0.0, 1.0]; 3])));
+    assert!(colored.material.is_none() && colored.notes.is_empty());
+}

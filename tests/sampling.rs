@@ -1,0 +1,243 @@
+//! Sampling of meshes: evenly, by priority, on the surface, without holes; and the baseline that it must beat.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use std::f64::consts::PI;
+use std::path::Path;
+
+use common::meshes::sphere;
+use epsplat::Error;
+use epsplat::io::{Mesh, Points, Texture};
+use epsplat::metrics::{SurfaceDistances, coverage};
+use epsplat::scene::Colors;
+use epsplat::surfels::build;
+use epsplat::surfels::sampling::voxels::Voxel;
+use epsplat::surfels::sampling::{MeshSurface, Method, Priority, Sampling, sample};
+use epsplat::truth::TriangleTree;
+use glam::DVec3;
+
+fn stratified(mesh: &Mesh, count: usize, priority: Priority, depth: Option<u32>, seed: u64) -> (Points, Sampling) {
+    let priority = |surface: &MeshSurface<'_>, voxels: &[Voxel]| priority.of(surface, voxels);
+    sample(mesh, count, &Method::Stratified { priority: &priority, depth }, seed, &()).unwrap()
+}
+
+fn by(mesh: &Mesh, count: usize, priority: Priority) -> Points {
+    stratified(mesh, count, priority, None, 0).0
+}
+
+fn uniform(mesh: &Mesh, count: usize) -> Points {
+    sample(mesh, count, &Method::Uniform, 0, &()).unwrap().0
+}
+
+/// The distance of each point from the nearest other one.
+fn spacings(points: &Points) -> Vec<f64> {
+    let all: Vec<DVec3> = points.positions.iter().map(|p| DVec3::from(*p)).collect();
+    let nearest = |(i, a): (usize, &DVec3)| {
+        let others = all.iter().enumerate().filter(|(j, _)| *j != i);
+        others.map(|(_, b)| a.distance(*b)).fold(f64::INFINITY, f64::min)
+    };
+    all.iter().enumerate().map(nearest).collect()
+}
+
+/// The square [0, 2] x [0, 1], whose right half is cut into `cuts` x `cuts` times as many triangles as the left one's two.
+fn strip(cuts: u32) -> Mesh {
+    let mut mesh = Mesh::default();
+    let mut quad = |low: [f64; 2], size: f64| {
+        let first = mesh.positions.len() as u32;
+        for [x, y] in [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]] {
+            mesh.positions.push([low[0] + size * x, low[1] + size * y, 0.0]);
+        }
+        mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+    };
+    quad([0.0, 0.0], 1.0);
+    for k in 0..cuts * cuts {
+        let at = [k % cuts, k / cuts].map(|c| f64::from(c) / f64::from(cuts));
+        quad([1.0 + at[0], at[1]], 1.0 / f64::from(cuts));
+    }
+    mesh
+}
+
+fn right_of(points: &Points, x: f64) -> usize {
+    points.positions.iter().filter(|p| p[0] > x).count()
+}
+
+#[test]
+fn the_bunny_is_sampled_better_than_by_independent_points() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/bunny.obj");
+    let mesh = epsplat::io::read_mesh(&path, &()).unwrap();
+    let tree = TriangleTree::new(&mesh).unwrap();
+    let measured = |points: Points| {
+        assert_eq!(points.positions.len(), 5000);
+        let (scene, _) = build(vec![points], &()).unwrap();
+        let distances = SurfaceDistances::of(&scene, &mesh, &tree).unwrap();
+        (distances, coverage(&tree, &scene, 64, 128, &()).unwrap())
+    };
+    let (ours, seen) = measured(by(&mesh, 5000, Priority::default()));
+    let (theirs, seen_theirs) = measured(uniform(&mesh, 5000));
+    // Both lie on the triangles, to the rounding of f32 coordinates.
+    for distances in [&ours, &theirs] {
+        assert!(distances.centers_to_mesh.unwrap().max < 1e-6 * tree.radius());
+    }
+    // From the mesh to the nearest centre. Independent points are 0.5 / sqrt(density) away in the mean; a hexagonal
+    // lattice, which is the best there is, 0.377.
+    let (near, far) = (ours.mesh_to_centers.unwrap(), theirs.mesh_to_centers.unwrap());
+    assert!(near.mean < 0.82 * far.mean && near.percentile_99 < 0.7 * far.percentile_99, "{near:?} {far:?}");
+    // From the mesh to the nearest disk, and from the disks to the mesh.
+    let (near, far) = (ours.mesh_to_disks.unwrap(), theirs.mesh_to_disks.unwrap());
+    assert!(near.mean < 0.5 * far.mean && near.percentile_99 < 0.5 * far.percentile_99, "{near:?} {far:?}");
+    let (near, far) = (ours.rims_to_mesh.unwrap(), theirs.rims_to_mesh.unwrap());
+    assert!(near.mean < 0.9 * far.mean && near.percentile_99 < far.percentile_99, "{near:?} {far:?}");
+    // And with smaller disks fewer holes.
+    assert!(seen.hole_share.unwrap() < 1e-4, "{seen:?}");
+    assert!(seen_theirs.seen.holes > 5 * seen.seen.holes, "{seen:?} {seen_theirs:?}");
+}
+
+#[test]
+fn a_sphere_is_covered_evenly() {
+    let mesh = sphere(5, true);
+    let count = 2000;
+    let points = by(&mesh, count, Priority::Area);
+    let spacing = (4.0 * PI / count as f64).sqrt();
+    let even = spacings(&points);
+    let smallest = |spacings: &[f64]| spacings.iter().copied().fold(f64::INFINITY, f64::min) / spacing;
+    // No two samples coincide, nor come near to it: the nearest two are 0.45 apart. Of independent points some are.
+    assert!(smallest(&even) > 0.4, "{}", smallest(&even));
+    assert!(smallest(&spacings(&uniform(&mesh, count))) < 0.1);
+    for (position, normal) in points.positions.iter().zip(points.normals.as_ref().unwrap()) {
+        let normal = DVec3::from(normal.map(f64::from));
+        assert!(DVec3::from(*position).normalize().distance(normal) < 2e-3, "{position:?} {normal}");
+    }
+    let radii = points.radii.clone().unwrap();
+    let in_spacings = |radius: &f32| f64::from(*radius) / spacing;
+    assert!(radii.iter().all(|radius| (0.2..2.0).contains(&in_spacings(radius))));
+    let ordinary = radii.iter().filter(|radius| (0.7..1.5).contains(&in_spacings(radius))).count();
+    assert!(ordinary > count * 97 / 100, "{ordinary}");
+    let tree = TriangleTree::new(&mesh).unwrap();
+    let (mut scene, _) = build(vec![points], &()).unwrap();
+    assert!(coverage(&tree, &scene, 64, 128, &()).unwrap().is_hole_free());
+    // The radii are no larger than they must be: with half of them there are holes.
+    for surfel in &mut scene.surfels {
+        (surfel.s, surfel.t) = (surfel.s.map(|c| 0.5 * c), surfel.t.map(|c| 0.5 * c));
+    }
+    assert!(coverage(&tree, &scene, 64, 128, &()).unwrap().hole_share.unwrap() > 0.01);
+}
+
+#[test]
+fn samples_follow_the_priority() {
+    // The right half has 32 triangles for every one of the left half, and the same area.
+    let mesh = strip(4);
+    let even = right_of(&by(&mesh, 1000, Priority::Area), 1.0);
+    assert!((490..=510).contains(&even), "{even}");
+    // 32 of 34 triangles are right: 941 samples, of which the border's move over a little.
+    let many = right_of(&by(&mesh, 1000, Priority::Triangles), 1.0);
+    assert!((915..=945).contains(&many), "{many}");
+    // Any function of voxels will do.
+    let only_left = |_: &MeshSurface<'_>, voxels: &[Voxel]| {
+        voxels.iter().map(|voxel| if voxel.bounds.center().x < 0.0 { voxel.area } else { 0.0 }).collect()
+    };
+    let method = Method::Stratified { priority: &only_left, depth: Some(3) };
+    let (points, sampling) = sample(&mesh, 100, &method, 0, &()).unwrap();
+    assert_eq!((right_of(&points, 1.0), sampling.voxels, sampling.empty_voxels), (0, 8, 4));
+
+    // A flat square beside a sphere of the same area: the sphere bends.
+    let mut both = sphere(4, false);
+    let side = (4.0 * PI).sqrt();
+    let first = both.positions.len() as u32;
+    both.positions.extend([[2.0, 0.0, 0.0], [2.0 + side, 0.0, 0.0], [2.0 + side, side, 0.0], [2.0, side, 0.0]]);
+    both.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+    let flat = right_of(&by(&both, 2000, Priority::Curvature), 1.5);
+    assert!((200..300).contains(&flat), "{flat}");
+    assert!((980..1020).contains(&right_of(&by(&both, 2000, Priority::Area), 1.5)));
+}
+
+/// The square with a texture: its left half one colour, its right half with stripes.
+fn striped() -> Mesh {
+    let mut mesh = strip(1);
+    let uv = |vertex: u32| mesh.positions[vertex as usize];
+    mesh.texture = Some(mesh.triangles.iter().map(|t| t.map(|v| [0.5 * uv(v)[0] as f32, uv(v)[1] as f32])).collect());
+    let texel = |k: u32| if k % 64 < 32 { [0, 0, 255, 255] } else { [[255; 4], [0, 0, 0, 255]][k as usize % 8 / 4] };
+    mesh.paint(Texture::new(64, 64, (0..64 * 64).map(texel).collect()).unwrap());
+    mesh
+}
+
+#[test]
+fn textures_give_colours_coordinates_and_priority() {
+    let mesh = striped();
+    let points = by(&mesh, 1000, Priority::Texture);
+    let striped = right_of(&points, 1.0);
+    // A quarter of the samples is spread by area, half of it on the left; and the colour changes at the left half's own
+    // two borders, where the image is repeated.
+    assert!((750..875).contains(&striped), "{striped}");
+    assert!((490..=510).contains(&right_of(&by(&mesh, 1000, Priority::Area), 1.0)));
+    let (texture, Some(Colors::Linear(colors))) = (points.texture.as_ref().unwrap(), &points.colors) else {
+        panic!("{:?}", points.colors)
+    };
+    for ((position, uv), color) in points.positions.iter().zip(texture).zip(colors) {
+        assert!((f64::from(uv[0]) - 0.5 * position[0]).abs() < 1e-6 && (f64::from(uv[1]) - position[1]).abs() < 1e-6);
+        if (0.2..0.8).contains(&position[0]) {
+            assert_eq!(*color, [0.0, 0.0, 1.0, 1.0]);
+        }
+    }
+    // Stripes finer than the samples blend to their mean: no sample is black or white by chance.
+    let coarse = by(&mesh, 40, Priority::Area);
+    let Some(Colors::Linear(colors)) = &coarse.colors else { panic!() };
+    let right: Vec<f32> =
+        coarse.positions.iter().zip(colors).filter(|(p, _)| p[0] > 1.3).map(|(_, color)| color[0]).collect();
+    assert!(right.len() > 8 && right.iter().all(|c| (0.2..0.8).contains(c)), "{right:?}");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("s.ply");
+    epsplat::io::ply::write_points(&path, &points, &()).unwrap();
+    let read = epsplat::io::read(&path, &()).unwrap();
+    assert_eq!((&read.texture, &read.colors, &read.radii), (&points.texture, &points.colors, &points.radii));
+}
+
+#[test]
+fn a_seed_gives_the_same_points_on_any_number_of_threads() {
+    let mesh = sphere(3, false);
+    let run = |threads: usize, seed: u64| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| stratified(&mesh, 700, Priority::Triangles, None, seed).0)
+    };
+    assert_eq!(run(1, 5), run(4, 5));
+    assert_ne!(run(4, 5), run(4, 6));
+    assert_ne!(uniform(&mesh, 50), sample(&mesh, 50, &Method::Uniform, 1, &()).unwrap().0);
+}
+
+#[test]
+fn any_count_and_depth_gives_as_many_samples() {
+    let mesh = strip(4);
+    for (count, depth) in [(1, None), (3, Some(12)), (50, Some(0)), (50, Some(60)), (777, Some(5)), (777, None)] {
+        let (points, sampling) = stratified(&mesh, count, Priority::Area, depth.map(|d: u32| d.min(20)), 0);
+        assert_eq!((points.positions.len(), sampling.samples), (count, count as u64), "{depth:?}");
+        assert!(points.radii.unwrap().iter().all(|radius| *radius > 0.0 && radius.is_finite()), "{count} {depth:?}");
+    }
+    let (_, deep) = stratified(&mesh, 3, Priority::Area, Some(8), 0);
+    assert_eq!((deep.voxels, deep.empty_voxels), (256, 253));
+    assert!(matches!(sample(&mesh, 0, &Method::Uniform, 0, &()), Err(Error::Usage(_))));
+}
+
+#[test]
+fn what_cannot_be_sampled_is_counted_or_said() {
+    let mut mesh = strip(2);
+    let good = mesh.triangles.len() as u64;
+    let first = mesh.positions.len() as u32;
+    mesh.positions.extend([[f64::NAN, 0.0, 0.0], [1e300, 0.0, 0.0], [0.0; 3], [0.0; 3]]);
+    // Two that are not finite, three without an area, and two triangles that are there twice, once turned over.
+    let bad = [[first, 0, 1], [first + 1, 0, 1], [0, 0, 1], [first + 2, first + 3, 1], [0, first + 2, 0]];
+    mesh.triangles.extend(bad);
+    mesh.triangles.extend([mesh.triangles[0], [2, 1, 0]]);
+    let (points, sampling) = stratified(&mesh, 300, Priority::Area, None, 0);
+    assert_eq!((sampling.triangles, sampling.dropped_non_finite, sampling.dropped_flat), (good + 2, 2, 3));
+    assert_eq!(sampling.notes().len(), 2);
+    assert!(points.positions.iter().flatten().all(|c| c.is_finite()) && points.positions.len() == 300);
+    for (mesh, said) in [
+        (Mesh { triangles: vec![], ..mesh.clone() }, "no triangles"),
+        (Mesh { triangles: bad.to_vec(), ..mesh.clone() }, "none of the mesh's 5 triangles has an area"),
+        (Mesh { triangles: vec![[0, 1, 99_999]], ..mesh.clone() }, "names three of its vertices"),
+        (Mesh { material: Some(vec![]), ..mesh.clone() }, "materials"),
+    ] {
+        let error = sample(&mesh, 10, &Method::Uniform, 0, &()).unwrap_err().to_string();
+        assert!(error.contains(said), "{error}");
+    }
+}

@@ -148,7 +148,8 @@ fn samples_follow_the_priority() {
     both.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
     let flat = right_of(&by(&both, 2000, Priority::Curvature), 1.5);
     assert!((200..300).contains(&flat), "{flat}");
-    assert!((980..1020).contains(&right_of(&by(&both, 2000, Priority::Area), 1.5)));
+    let even = right_of(&by(&both, 2000, Priority::Area), 1.5);
+    assert!((980..1020).contains(&even), "{even}");
 }
 
 /// The square with a texture: its left half one colour, its right half with stripes.
@@ -156,7 +157,7 @@ fn striped() -> Mesh {
     let mut mesh = strip(1);
     let uv = |vertex: u32| mesh.positions[vertex as usize];
     mesh.texture = Some(mesh.triangles.iter().map(|t| t.map(|v| [0.5 * uv(v)[0] as f32, uv(v)[1] as f32])).collect());
-    let texel = |k: u32| if k % 64 < 32 { [0, 0, 255, 255] } else { [[255; 4], [0, 0, 0, 255]][k as usize % 8 / 4] };
+    let texel = |k: u32| if k % 64 < 32 { [0, 0, 255, 255] } else { [[255; 4], [0, 0, 0, 255]][k as usize % 2] };
     mesh.paint(Texture::new(64, 64, (0..64 * 64).map(texel).collect()).unwrap());
     mesh
 }
@@ -184,7 +185,7 @@ fn textures_give_colours_coordinates_and_priority() {
     let Some(Colors::Linear(colors)) = &coarse.colors else { panic!() };
     let right: Vec<f32> =
         coarse.positions.iter().zip(colors).filter(|(p, _)| p[0] > 1.3).map(|(_, color)| color[0]).collect();
-    assert!(right.len() > 8 && right.iter().all(|c| (0.2..0.8).contains(c)), "{right:?}");
+    assert!(right.len() > 8 && right.iter().all(|c| (0.1..0.9).contains(c)), "{right:?}");
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("s.ply");
     epsplat::io::ply::write_points(&path, &points, &()).unwrap();

@@ -12,6 +12,7 @@ mod progress;
 mod render;
 mod surfels;
 mod sample;
+mod simplify;
 
 use std::io::Write;
 use std::path::Path;
@@ -43,6 +44,7 @@ enum Command {
     Adapters(adapters::Arguments),
     Hardcases(hardcases::Arguments),
     Bench(bench::Arguments),
+    Simplify(simplify::Arguments),
 }
 
 /// Runs the command line and says how it ended.
@@ -58,6 +60,7 @@ pub fn run() -> ExitCode {
         Command::Adapters(arguments) => adapters::run(&arguments),
         Command::Hardcases(arguments) => hardcases::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),
+        Command::Simplify(arguments) => simplify::run(&arguments),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

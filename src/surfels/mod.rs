@@ -15,6 +15,7 @@ mod outliers;
 mod positions;
 mod sizes;
 pub mod sampling;
+pub mod simplify;
 #[cfg(test)]
 mod tests;
 

@@ -1,0 +1,114 @@
+//! `epsplat simplify`: fewer, larger surfels for the same surface.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use epsplat::io::{self, Points, ply};
+use epsplat::scene::{Colors, Scene, Surfel};
+use epsplat::surfels;
+use epsplat::surfels::simplify::{Options, Report, SplatShape, Tolerance, simplify};
+use epsplat::{Error, Result};
+use glam::Vec3;
+
+use super::progress::Bars;
+use super::{note, print, write_json};
+
+/// Replace the surfels of a smooth surface by fewer, larger ones that lie within a tolerance of them, without holes.
+///
+/// Around each point the largest disk is grown that no point inside is farther from than the tolerance. Of these as few
+/// as possible are taken that cover the surface together. Flat parts keep few surfels, edges and details keep theirs.
+#[derive(Args)]
+#[command(after_help = "Example:\n  epsplat simplify scan.ply -o small.ply --tolerance rel:0.0005 --shape ellipse --relax 3")]
+pub struct Arguments {
+    /// Point clouds or meshes, of which the vertices are taken: .ply, .las, .laz, .obj
+    #[arg(required = true)]
+    inputs: Vec<PathBuf>,
+    /// The file: .ply
+    #[arg(short, long)]
+    output: PathBuf,
+    /// How far points may lie from their surfel: rel:E (fraction of the diagonal of their box) or abs:E (world units)
+    #[arg(long, default_value = "rel:0.0005")]
+    tolerance: Tolerance,
+    /// What surfels grow to
+    #[arg(long, value_enum, default_value_t = ShapeName::Disk)]
+    shape: ShapeName,
+    /// Rounds in which surfels move until some are not needed; more than 3 hardly change anything
+    #[arg(long, value_name = "ROUNDS", default_value_t = 0)]
+    relax: u32,
+    /// Counts and deviations as JSON, to a file or - for stdout
+    #[arg(long, value_name = "FILE|-")]
+    json: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum ShapeName {
+    /// Circles
+    Disk,
+    /// Ellipses along the principal curvatures where they cover more: a fifth fewer
+    Ellipse,
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    if !arguments.output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ply")) {
+        return Err(Error::Usage(format!("the output must end in .ply, {} does not", arguments.output.display())));
+    }
+    let bars = Bars::new();
+    let inputs = arguments.inputs.iter().map(|path| io::read(path, &bars)).collect::<Result<Vec<_>>>()?;
+    let (scene, preparation) = surfels::build(inputs, &bars)?;
+    preparation.notes().iter().for_each(|line| note(line));
+    if preparation.estimated_normals > 0 {
+        note(&format!(
+            "{} normals are missing: estimated ones have no side, so sheets that lie closer than points do may become one",
+            preparation.estimated_normals
+        ));
+    }
+    let shape = match arguments.shape {
+        ShapeName::Disk => SplatShape::Disk,
+        ShapeName::Ellipse => SplatShape::Ellipse,
+    };
+    let options = Options { tolerance: arguments.tolerance, shape, relaxations: arguments.relax };
+    let (simplified, report) = simplify(&scene, &options, &bars)?;
+    ply::write_points(&arguments.output, &points(&simplified, shape), &bars)?;
+    match &arguments.json {
+        Some(path) => write_json(path, &report),
+        None => print(&summary(&report)),
+    }
+}
+
+fn points(scene: &Scene, shape: SplatShape) -> Points {
+    let surfels = &scene.surfels;
+    let normal = |surfel: &Surfel| surfel.normal().normalize_or_zero().to_array();
+    Points {
+        positions: surfels
+            .iter()
+            .map(|surfel| (scene.origin + Vec3::from_array(surfel.center).as_dvec3()).to_array())
+            .collect(),
+        normals: (shape == SplatShape::Disk).then(|| surfels.iter().map(normal).collect()),
+        radii: (shape == SplatShape::Disk).then(|| surfels.iter().map(|surfel| surfel.radius()).collect()),
+        axes: (shape == SplatShape::Ellipse).then(|| surfels.iter().map(|surfel| [surfel.s, surfel.t]).collect()),
+        colors: match &scene.colors {
+            Colors::Constant(color) => Some(Colors::Linear(vec![*color; surfels.len()])),
+            colors => Some(colors.clone()),
+        },
+        ..Points::default()
+    }
+}
+
+fn summary(report: &Report) -> String {
+    let share = 100.0 * report.selected as f64 / report.surfels.max(1) as f64;
+    let mut text = format!("{} of {} surfels, {share:.1} %", report.selected, report.surfels);
+    if report.before_relaxation > report.selected {
+        text += &format!(" ({} before relaxation)", report.before_relaxation);
+    }
+    text += &format!(
+        "\ntolerance {:.3e}, deviation of the points at most {:.3e}, on average {:.3e}\n",
+        report.tolerance, report.max_deviation, report.mean_deviation
+    );
+    if report.beyond_tolerance > 0 {
+        text += &format!(
+            "{} surfels hold a point beyond the tolerance: there the surface bends more than that from a point to the next\n",
+            report.beyond_tolerance
+        );
+    }
+    text
+}

@@ -1,0 +1,88 @@
+//! The splats to select from.
+//!
+//! Wu and Kobbelt grow one from every point. Where splats are large, most of those are nearly the same, and growing all takes
+//! time with the square of their size. Here points come in rounds, each spread evenly over the surface and as many as all before
+//! together; a point that enough splats of earlier rounds cover is passed over.
+
+use rayon::prelude::*;
+
+use super::SplatShape;
+use super::cells::Cells;
+use super::growing::{Cover, Grower, Splat};
+use super::samples::Samples;
+use crate::Progress;
+
+/// A point covered by so many splats needs none of its own.
+pub(super) const ENOUGH: u32 = 48;
+
+/// In the first round every so many-th point.
+const FIRST_STRIDE: u32 = 64;
+
+/// Splats and what each covers.
+pub(super) struct Candidates {
+    pub splats: Vec<Splat>,
+    /// Where the covers of each splat begin; one more at the end.
+    first_cover: Vec<u64>,
+    covers: Vec<Cover>,
+}
+
+impl Candidates {
+    /// Grows splats until each cell is covered by [`ENOUGH`] of them or has its own.
+    pub fn grow(samples: &Samples, cells: &Cells, tolerance: f64, shape: SplatShape, progress: &dyn Progress) -> Self {
+        const CHUNK: usize = 256;
+        progress.begin("growing splats", samples.len() as u64);
+        let mut candidates = Self { splats: Vec::new(), first_cover: vec![0], covers: Vec::new() };
+        let mut covered = vec![0u32; samples.len()];
+        let count = samples.len() as u32;
+        let mut stride = FIRST_STRIDE;
+        let mut first = 0;
+        loop {
+            let round: Vec<u32> = (first..count).step_by(stride as usize).collect();
+            progress.advance(round.len() as u64);
+            let wanted: Vec<u32> = round.into_iter().filter(|&point| covered[point as usize] < ENOUGH).collect();
+            let grown: Vec<(Vec<Splat>, Vec<u64>, Vec<Cover>)> = wanted
+                .par_chunks(CHUNK)
+                .map_init(
+                    || Grower::new(samples, cells, tolerance, shape),
+                    |grower, points| {
+                        let (mut splats, mut ends, mut covers) = (Vec::new(), Vec::new(), Vec::new());
+                        for &point in points {
+                            splats.push(grower.grow(point, &mut covers));
+                            ends.push(covers.len() as u64);
+                        }
+                        (splats, ends, covers)
+                    },
+                )
+                .collect();
+            for (splats, ends, covers) in grown {
+                let before = candidates.covers.len() as u64;
+                for cover in &covers {
+                    covered[cover.cell as usize] += u32::from(cover.pieces == cells.pieces(cover.cell));
+                }
+                candidates.splats.extend(splats);
+                candidates.first_cover.extend(ends.into_iter().map(|end| before + end));
+                candidates.covers.extend(covers);
+            }
+            if first == 0 && stride == FIRST_STRIDE {
+                first = stride / 2;
+            } else if stride == 2 {
+                break;
+            } else {
+                stride /= 2;
+                first = stride / 2;
+            }
+        }
+        progress.end();
+        candidates
+    }
+
+    /// What a splat covers, in the order of cells.
+    pub fn covers(&self, splat: u32) -> &[Cover] {
+        let [first, end] = [splat as usize, splat as usize + 1].map(|i| self.first_cover[i] as usize);
+        &self.covers[first..end]
+    }
+
+    pub fn cover_count(&self) -> usize {
+        self.covers.len()
+    }
+}

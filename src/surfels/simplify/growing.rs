@@ -1,0 +1,261 @@
+//! Splat growing: the largest disk around a point that the points in it allow.
+//!
+//! Thesis section 4.2, after Wu and Kobbelt 2004: from the point outward, in the order of distance in the tangent plane, along
+//! the graph, until the next point would make the heights of those inside spread over more than twice the tolerance. The disk
+//! then moves along its normal to the middle of their heights, so none is farther from it than the tolerance.
+//! The points inside are the conquered set, those seen but not yet reached the confront set.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use glam::{DMat3, DVec2, DVec3};
+
+use super::SplatShape;
+use super::cells::{Cells, piece_of, tangent_basis};
+use super::samples::Samples;
+
+/// Half-axes of an ellipse are at most so many times as long as each other, and a disk unless they are this much.
+const LARGEST_RATIO: f64 = 4.0;
+const SMALLEST_RATIO: f64 = 1.1;
+
+/// A disk or ellipse grown around a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Splat {
+    /// The point it grew from.
+    pub point: u32,
+    /// How far its centre lies from that point along the point's normal.
+    pub shift: f64,
+    /// Half-axes, perpendicular to each other and to the normal. All in scaled units.
+    pub axes: [DVec3; 2],
+    /// The largest distance of a point inside from its plane. It exceeds the tolerance where the point's own cell, which must
+    /// be covered all the same, reaches past a point that bent too far.
+    pub deviation: f64,
+}
+
+/// What a splat covers of a cell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Cover {
+    pub cell: u32,
+    /// The pieces that lie in the splat entirely; at least one.
+    pub pieces: u16,
+}
+
+/// The distance of a point in a splat's plane, where the splat is a circle.
+#[derive(Clone, Copy, Debug)]
+struct Distance(f64);
+
+impl PartialEq for Distance {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Distance {}
+
+impl PartialOrd for Distance {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Distance {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.0.total_cmp(&other.0)
+    }
+}
+
+/// A point inside.
+#[derive(Clone, Copy)]
+struct Conquered {
+    point: u32,
+    distance: f64,
+    height: f64,
+}
+
+/// Grows splats, one at a time; each thread has its own.
+pub(super) struct Grower<'a> {
+    samples: &'a Samples,
+    cells: &'a Cells,
+    /// Scaled units.
+    tolerance: f64,
+    shape: SplatShape,
+    confront: BinaryHeap<Reverse<(Distance, u32)>>,
+    conquered: Vec<Conquered>,
+    /// Which points the splat that is growing has seen: those with its number.
+    seen: Vec<u32>,
+    number: u32,
+}
+
+impl<'a> Grower<'a> {
+    /// With the tolerance in scaled units.
+    pub fn new(samples: &'a Samples, cells: &'a Cells, tolerance: f64, shape: SplatShape) -> Self {
+        let seen = vec![0; samples.len()];
+        Self { samples, cells, tolerance, shape, confront: BinaryHeap::new(), conquered: Vec::new(), seen, number: 0 }
+    }
+
+    /// Grows a splat from `point` and appends what it covers, in the order of cells.
+    pub fn grow(&mut self, point: u32, covers: &mut Vec<Cover>) -> Splat {
+        let first = covers.len();
+        let disk = self.grow_shape(point, tangent_basis(self.samples.normals[point as usize]), covers);
+        let Some(axes) = (self.shape == SplatShape::Ellipse).then(|| self.principal_axes(point)).flatten() else {
+            return disk;
+        };
+        let middle = covers.len();
+        let ellipse = self.grow_shape(point, axes, covers);
+        let area = |covers: &[Cover]| -> f64 { covers.iter().map(|c| self.cells.area(c.cell, c.pieces)).sum() };
+        // One that must be larger than it grew, to cover its own cell, reaches far past it along its longer axis.
+        let fits = ellipse.deviation <= self.tolerance.max(disk.deviation);
+        if fits && area(&covers[middle..]) > area(&covers[first..middle]) {
+            covers.drain(first..middle);
+            ellipse
+        } else {
+            covers.truncate(middle);
+            disk
+        }
+    }
+
+    /// Half-axes with the ratio and the directions in which the surface bends equally far from the tangent plane: along
+    /// those of the principal curvatures, as the inverse root of their sizes. From the paraboloid of least squares through the
+    /// conquered and the confront set of the splat that grew last, which must be a disk around `point`. None where it is
+    /// nearly a circle.
+    fn principal_axes(&self, point: u32) -> Option<[DVec3; 2]> {
+        let [s, t] = tangent_basis(self.samples.normals[point as usize]);
+        let center = self.samples.positions.position(point);
+        let normal = self.samples.normals[point as usize];
+        let inside = self.conquered.iter().map(|conquered| conquered.point);
+        let around = self.confront.iter().map(|Reverse((_, point))| *point);
+        let offsets = || inside.clone().chain(around.clone()).map(|point| self.samples.positions.position(point) - center);
+        let reach = offsets().map(|offset| offset.length()).fold(0.0, f64::max);
+        let (mut matrix, mut heights) = (DMat3::ZERO, DVec3::ZERO);
+        for offset in offsets() {
+            let offset = offset / reach;
+            let (u, v) = (offset.dot(s), offset.dot(t));
+            let row = DVec3::new(u * u, u * v, v * v);
+            matrix += DMat3::from_cols(row * row.x, row * row.y, row * row.z);
+            heights += row * offset.dot(normal);
+        }
+        // A matrix without an inverse makes this NaN, which is no ratio.
+        let quadric = matrix.inverse() * heights;
+        let (mean, half_difference) = (0.5 * (quadric.x + quadric.z), 0.5 * (quadric.x - quadric.z));
+        let deviation = half_difference.hypot(0.5 * quadric.y);
+        let (strong, weak) = (mean.abs() + deviation, (mean.abs() - deviation).abs());
+        let ratio = (strong / weak).sqrt().min(LARGEST_RATIO);
+        if !(ratio > SMALLEST_RATIO) {
+            return None;
+        }
+        // The direction of the larger curvature is that of the larger eigenvalue where their mean is positive, else of the
+        // smaller one, across it.
+        let angle = 0.5 * (0.5 * quadric.y).atan2(half_difference);
+        let along = s * angle.cos() + t * angle.sin();
+        let across = normal.cross(along);
+        let [strong, weak] = if mean >= 0.0 { [along, across] } else { [across, -along] };
+        let stretch = ratio.sqrt();
+        // Right-handed with the normal: weak x (normal x weak) = normal.
+        Some([weak * stretch, normal.cross(weak).dot(strong).signum() * strong / stretch])
+    }
+
+    /// The same for the shape of an ellipse with half-axes along `shape`: distances and radii are in units of them.
+    fn grow_shape(&mut self, point: u32, shape: [DVec3; 2], covers: &mut Vec<Cover>) -> Splat {
+        let radius = self.conquer(point, shape);
+        let normal = self.samples.normals[point as usize];
+        let center = self.samples.positions.position(point);
+        let inverse = shape.map(|axis| axis / axis.length_squared());
+        let flat = |p: DVec3| DVec2::new(p.dot(inverse[0]), p.dot(inverse[1]));
+        let basis = tangent_basis(normal);
+        let own = self.cells.corners(point).iter().map(|c| flat(basis[0] * c.x + basis[1] * c.y).length());
+        let own = own.fold(0.0, f64::max);
+        let (low, high) = self.heights();
+        let shift = 0.5 * (low + high);
+        let radius = radius.max(own);
+        let confront = self.confront.iter().map(|Reverse((Distance(distance), point))| (*distance, *point));
+        let deviation = confront
+            .filter(|(distance, _)| *distance < radius)
+            .map(|(_, point)| ((self.samples.positions.position(point) - center).dot(normal) - shift).abs())
+            .fold(0.5 * (high - low), f64::max);
+        let first = covers.len();
+        for conquered in &self.conquered {
+            let pieces = self.covered_pieces(conquered, center, flat, radius);
+            if pieces != 0 {
+                covers.push(Cover { cell: conquered.point, pieces });
+            }
+        }
+        covers[first..].sort_unstable_by_key(|cover| cover.cell);
+        Splat { point, shift, axes: shape.map(|axis| axis * radius), deviation }
+    }
+
+    /// The range of heights over the tangent plane of the points inside.
+    fn heights(&self) -> (f64, f64) {
+        self.conquered.iter().fold((0.0, 0.0), |(low, high): (f64, f64), c| (low.min(c.height), high.max(c.height)))
+    }
+
+    /// Fills the conquered set and returns the radius.
+    fn conquer(&mut self, point: u32, shape: [DVec3; 2]) -> f64 {
+        self.confront.clear();
+        self.conquered.clear();
+        if self.number == u32::MAX {
+            self.seen.fill(0);
+            self.number = 0;
+        }
+        self.number += 1;
+        let normal = self.samples.normals[point as usize];
+        let center = self.samples.positions.position(point);
+        let inverse = shape.map(|axis| axis / axis.length_squared());
+        let shortest = shape[0].length().min(shape[1].length());
+        let (mut low, mut high) = (0f64, 0f64);
+        // The surface ends there.
+        let mut end = f64::INFINITY;
+        self.seen[point as usize] = self.number;
+        self.confront.push(Reverse((Distance(0.0), point)));
+        while let Some(Reverse((Distance(distance), next))) = self.confront.pop() {
+            if distance >= end {
+                return end;
+            }
+            let offset = self.samples.positions.position(next) - center;
+            let height = offset.dot(normal);
+            (low, high) = (low.min(height), high.max(height));
+            if high - low > 2.0 * self.tolerance {
+                // A way along the graph may lead back inward: what is farther out than this point is not inside.
+                self.conquered.retain(|conquered| conquered.distance < distance);
+                self.confront.push(Reverse((Distance(distance), next)));
+                return distance;
+            }
+            self.conquered.push(Conquered { point: next, distance, height });
+            let overhang = self.cells.overhangs[next as usize];
+            if overhang.is_finite() {
+                end = end.min(distance + overhang / shortest);
+            }
+            for &neighbour in self.cells.neighbours(next) {
+                if self.seen[neighbour as usize] != self.number && self.samples.same_side(point, neighbour) {
+                    self.seen[neighbour as usize] = self.number;
+                    let offset = self.samples.positions.position(neighbour) - center;
+                    let distance = DVec2::new(offset.dot(inverse[0]), offset.dot(inverse[1])).length();
+                    self.confront.push(Reverse((Distance(distance), neighbour)));
+                }
+            }
+        }
+        // All of a surface is inside: the disk ends with the last cell.
+        let reach = self.conquered.iter().map(|c| c.distance + self.cells.radii[c.point as usize] / shortest);
+        end.min(reach.fold(0.0, f64::max))
+    }
+
+    fn covered_pieces(&self, of: &Conquered, center: DVec3, flat: impl Fn(DVec3) -> DVec2, radius: f64) -> u16 {
+        if of.distance > radius {
+            return 0;
+        }
+        let corners = self.cells.corners(of.point);
+        let offset = self.samples.positions.position(of.point) - center;
+        let [s, t] = tangent_basis(self.samples.normals[of.point as usize]);
+        let inside = |corner: &DVec2| flat(offset + s * corner.x + t * corner.y).length() <= radius;
+        let Some(last) = corners.last() else { return 0 };
+        let mut pieces = self.cells.pieces(of.point);
+        let mut before = (corners.len() - 1, inside(last));
+        for (k, corner) in corners.iter().enumerate() {
+            let now = inside(corner);
+            if !(before.1 && now) {
+                pieces &= !(1 << piece_of(before.0, corners.len()));
+            }
+            before = (k, now);
+        }
+        pieces
+    }
+}

@@ -1,0 +1,145 @@
+//! Fewer, larger surfels for the same surface, within a tolerance: splat growing and selection (Tien 2008, chapter 4, after Wu
+//! and Kobbelt 2004, "Optimized sub-sampling of point sets for surface splatting").
+//!
+//! ```text
+//! samples    = distinct(surfels)                  one position, normal and colour each
+//! cells      = voronoi(samples)                   the surface element of each sample; neighbours share an edge
+//! candidates = grow(samples, cells, tolerance)    the largest disk around a sample with heights within 2 tolerance
+//! selected   = select(candidates)                 greedily by area, until each piece of each cell lies in a disk
+//! selected   = relax(selected)                    moves that leave fewer (optional)
+//! ```
+//!
+//! Each stage is a file. The result depends on no order of the surfels and no number of threads.
+//!
+//! **Hole-free.** A point is in a disk or not; a surface that lies between points needs more. The thesis counts as covered
+//! what lies within a constant share of the radius (0.5 to 0.7), Wu and Kobbelt what does not lie on the convex hull of the points
+//! inside. Here a cell is cut, from its point, into a triangle for each edge, and a disk covers those triangles that lie in it.
+//! As disks are convex and the triangles tile the surface, selected disks that cover all triangles leave no hole, and two disks
+//! may share a cell. Of 57,000 random samples of the Stanford bunny at a tolerance of 0.00025 diagonals, with disks exactly as
+//! large as they grew, rays from 64 sides that miss all disks, and disks selected: constant share 0.6 0.427 % with
+//! 15,369; convex hull 0.0123 % with 20,933; whole cells 0.0127 % with 15,977; triangles 0.0133 % with 14,826. What
+//! is left is seen aslant, where disks of different heights meet: [`OVERLAP`] closes it.
+
+mod candidates;
+mod cells;
+mod growing;
+mod outcome;
+mod relaxation;
+mod samples;
+mod selection;
+
+use std::str::FromStr;
+
+use self::candidates::Candidates;
+use self::cells::Cells;
+pub use self::outcome::{OVERLAP, Report};
+use self::samples::Samples;
+use crate::error::{Error, Result};
+use crate::progress::Progress;
+use crate::scene::Scene;
+
+/// How far points may lie from the splat that stands for them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Tolerance {
+    /// A fraction of the diagonal of the box around the surfels' centres.
+    Relative(f64),
+    /// World units.
+    Absolute(f64),
+}
+
+impl Tolerance {
+    /// In world units, for surfels in a box of this diagonal.
+    pub fn in_world(self, diagonal: f64) -> f64 {
+        match self {
+            Self::Relative(fraction) => fraction * diagonal,
+            Self::Absolute(distance) => distance,
+        }
+    }
+}
+
+impl FromStr for Tolerance {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let bad = || {
+            Error::Usage(format!("a tolerance is rel:E (fraction of the diagonal) or abs:E (world units), not {text:?}"))
+        };
+        let (kind, value) = text.split_once(':').ok_or_else(bad)?;
+        let value: f64 = value.parse().map_err(|_| bad())?;
+        if !(value.is_finite() && value >= 0.0) {
+            return Err(bad());
+        }
+        match kind {
+            "rel" => Ok(Self::Relative(value)),
+            "abs" => Ok(Self::Absolute(value)),
+            _ => Err(bad()),
+        }
+    }
+}
+
+/// What splats grow to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SplatShape {
+    /// Circular disks, as in the thesis.
+    #[default]
+    Disk,
+    /// Ellipses along the principal curvatures where these cover more, as in Wu and Kobbelt.
+    Ellipse,
+}
+
+/// How to simplify.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// How far points may lie from the splat that stands for them.
+    pub tolerance: Tolerance,
+    /// What splats grow to.
+    pub shape: SplatShape,
+    /// Rounds of relaxation, at most.
+    pub relaxations: u32,
+}
+
+/// Selects few large surfels that stand for all surfels of `scene`.
+///
+/// Each comes from a surfel: it has its normal, and its centre lies on the line through it along the normal, halfway between the
+/// highest and the lowest of the surfels inside, so that each is within the tolerance. Its colour is the mean of what
+/// it covers, by area (linear light, weighted by alpha).
+///
+/// The surface is where a scene's surfels are, and between them where they surround a gap that is no more than a few
+/// spacings wide; where it ends, it goes on as far as its surfels do. Normals that face apart by a right angle or more belong
+/// to different surfaces, unless they were estimated and have no side.
+///
+/// # Errors
+///
+/// [`Error::Usage`] for a tolerance that is negative or not finite, or more than 2^32 - 1 surfels.
+pub fn simplify(scene: &Scene, options: &Options, progress: &dyn Progress) -> Result<(Scene, Report)> {
+    let tolerance = options.tolerance.in_world(scene.bounds().extent().length());
+    if !(tolerance.is_finite() && tolerance >= 0.0) {
+        return Err(Error::Usage(format!("a tolerance is finite and not negative, {tolerance} is not")));
+    }
+    progress.begin("sorting points", 0);
+    let samples = Samples::new(scene)?;
+    progress.end();
+    let cells = Cells::new(&samples, progress);
+    let scaled = tolerance * samples.positions.scale();
+    let candidates = Candidates::grow(&samples, &cells, scaled, options.shape, progress);
+    let mut selected = selection::select(&cells, &candidates, progress);
+    let before_relaxation = selected.len() as u64;
+    if options.relaxations > 0 {
+        selected = relaxation::relax(&cells, &candidates, &selected, options.relaxations, progress);
+    }
+    let (simplified, deviations) = outcome::scene(scene, &samples, &cells, &candidates, &selected);
+    // Rounding aside.
+    let beyond = |&&index: &&u32| candidates.splats[index as usize].deviation > scaled * (1.0 + 1e-9);
+    let beyond_tolerance = selected.iter().filter(beyond).count() as u64;
+    let report = Report {
+        surfels: scene.surfels.len() as u64,
+        distinct_positions: samples.len() as u64,
+        selected: selected.len() as u64,
+        before_relaxation,
+        tolerance,
+        max_deviation: deviations.max,
+        mean_deviation: deviations.mean,
+        beyond_tolerance,
+    };
+    Ok((simplified, report))
+}

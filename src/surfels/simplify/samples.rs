@@ -1,0 +1,83 @@
+//! The points as the algorithm sees them: distinct positions with a normal, a radius and a colour each.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::Result;
+use crate::scene::Scene;
+use crate::surfels::positions::DistinctPositions;
+
+/// The surfels of a scene, one for each distinct position, in an order that depends on the set of positions alone.
+/// Lengths are in scaled units: see [`DistinctPositions::scale`].
+pub(super) struct Samples {
+    pub positions: DistinctPositions,
+    /// Unit normals: the mean over the surfels at a position, or, where they cancel, the first of them by coordinates.
+    pub normals: Vec<DVec3>,
+    /// The largest half-axis of the surfels at a position.
+    pub radii: Vec<f64>,
+    /// Mean linear colour of the surfels at a position, premultiplied by alpha.
+    pub colors: Vec<[f64; 4]>,
+    /// Whether the side that a normal points to means something.
+    pub oriented: bool,
+}
+
+impl Samples {
+    pub fn new(scene: &Scene) -> Result<Self> {
+        let centers: Vec<[f64; 3]> = scene.surfels.par_iter().map(|surfel| surfel.center.map(f64::from)).collect();
+        let positions = DistinctPositions::new(&centers, &scene.bounds(), DVec3::ZERO)?;
+        let count = positions.len();
+        // The surfels of each position together; within one in an order of their own content, so that sums come out the
+        // same for any order of the scene.
+        let attributes = |surfel: u32| {
+            let normal = unit_normal(&scene.surfels[surfel as usize]);
+            let color = scene.colors.linear(surfel as usize).map(f64::from);
+            (normal, color)
+        };
+        let mut of_position: Vec<(u32, u32)> = positions.of_point().iter().copied().zip(0..).collect();
+        of_position.par_sort_unstable_by(|a, b| {
+            a.0.cmp(&b.0).then_with(|| {
+                let ((a, a_color), (b, b_color)) = (attributes(a.1), attributes(b.1));
+                let key = |n: DVec3, color: [f64; 4]| [n.x, n.y, n.z, color[0], color[1], color[2], color[3]];
+                let pairs = key(a, a_color).into_iter().zip(key(b, b_color));
+                pairs.map(|(a, b)| a.total_cmp(&b)).find(|order| order.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
+            })
+        });
+        let mut normals = Vec::with_capacity(count);
+        let mut radii = Vec::with_capacity(count);
+        let mut colors = Vec::with_capacity(count);
+        for group in of_position.chunk_by(|a, b| a.0 == b.0) {
+            let (mut normal, mut color, mut radius) = (DVec3::ZERO, [0.0; 4], 0f64);
+            for &(_, surfel) in group {
+                let (n, [r, g, b, alpha]) = attributes(surfel);
+                normal += n;
+                for (sum, value) in color.iter_mut().zip([r * alpha, g * alpha, b * alpha, alpha]) {
+                    *sum += value / group.len() as f64;
+                }
+                radius = radius.max(f64::from(scene.surfels[surfel as usize].radius()));
+            }
+            let first = group.first().map_or(DVec3::Z, |&(_, surfel)| attributes(surfel).0);
+            // A sum this short is what rounding leaves of normals that cancel.
+            let cancelled = normal.length() < 1e-3;
+            normals.push(if cancelled { first } else { normal.normalize() });
+            radii.push(radius * positions.scale());
+            colors.push(color);
+        }
+        Ok(Self { positions, normals, radii, colors, oriented: scene.oriented })
+    }
+
+    pub fn len(&self) -> usize {
+        self.normals.len()
+    }
+
+    /// Whether two points may lie on one side of one surface. Points of opposite sides of a thin body, or of faces that
+    /// meet at a right angle or a sharper one, may not, however close they are. Normals without a side cannot tell.
+    pub fn same_side(&self, a: u32, b: u32) -> bool {
+        !self.oriented || self.normals[a as usize].dot(self.normals[b as usize]) > 0.0
+    }
+}
+
+/// In f64, where the product of half-axes does not underflow.
+fn unit_normal(surfel: &crate::scene::Surfel) -> DVec3 {
+    let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
+    s.cross(t).try_normalize().unwrap_or(DVec3::Z)
+}

@@ -1,0 +1,309 @@
+//! Fewer surfels for the same surface: numbers against closed forms, coverage of the whole surface and not of its points only,
+//! and inputs that have nothing to grow on.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use std::f64::consts::PI;
+
+use common::Random;
+use epsplat::Error;
+use epsplat::io::Points;
+use epsplat::scene::{Colors, Scene, Surfel};
+use epsplat::surfels::analytic::{Shape, generate};
+use epsplat::surfels::build;
+use epsplat::surfels::simplify::{OVERLAP, Options, Report, SplatShape, Tolerance, simplify};
+use glam::{DVec3, Vec3};
+
+const DISKS: Options = Options { tolerance: Tolerance::Absolute(0.0), shape: SplatShape::Disk, relaxations: 0 };
+
+fn within(tolerance: f64) -> Options {
+    Options { tolerance: Tolerance::Absolute(tolerance), ..DISKS }
+}
+
+fn scene(positions: Vec<[f64; 3]>, normals: Option<Vec<[f32; 3]>>) -> Scene {
+    build(vec![Points { positions, normals, ..Points::default() }], &()).unwrap().0
+}
+
+fn shape(shape: Shape, count: u64) -> Scene {
+    let samples: Vec<_> = generate(shape, count).collect();
+    let points = Points {
+        positions: samples.iter().map(|sample| sample.position).collect(),
+        normals: Some(samples.iter().map(|sample| sample.normal).collect()),
+        radii: Some(samples.iter().map(|sample| sample.radius).collect()),
+        ..Points::default()
+    };
+    build(vec![points], &()).unwrap().0
+}
+
+fn run(scene: &Scene, options: Options) -> (Vec<Surfel>, Report) {
+    let (simplified, report) = simplify(scene, &options, &()).unwrap();
+    assert_eq!(report.selected, simplified.surfels.len() as u64);
+    assert_eq!(report.surfels, scene.surfels.len() as u64);
+    assert!(report.mean_deviation <= report.max_deviation && report.selected <= report.before_relaxation);
+    (simplified.surfels, report)
+}
+
+fn center(surfel: &Surfel) -> DVec3 {
+    Vec3::from_array(surfel.center).as_dvec3()
+}
+
+/// Coordinates in the disk (u, v) and the height over it, along its normal, in world units.
+fn place(surfel: &Surfel, p: DVec3) -> DVec3 {
+    let offset = p - center(surfel);
+    let [s, t] = [surfel.s, surfel.t].map(|axis| Vec3::from_array(axis).as_dvec3());
+    DVec3::new(offset.dot(s) / s.length_squared(), offset.dot(t) / t.length_squared(), offset.dot(s.cross(t).normalize()))
+}
+
+/// Of points spread over the surface, those above no disk: a disk shrunk by `shrink` holds a point if it is within it and at most
+/// `height` away.
+fn uncovered(surface: Shape, surfels: &[Surfel], shrink: f64, height: f64) -> usize {
+    // More than there are samples in any test, so most lie between them.
+    let points = generate(surface, 60_000).map(|sample| DVec3::from_array(sample.position));
+    let holds = |surfel: &Surfel, p: DVec3| {
+        let at = place(surfel, p);
+        at.truncate().length() <= shrink && at.z.abs() <= height
+    };
+    points.filter(|&p| !surfels.iter().any(|surfel| holds(surfel, p))).count()
+}
+
+#[test]
+fn a_sphere_needs_as_many_disks_as_its_sagitta_says() {
+    let tolerance = 0.004;
+    let count = 20_000;
+    let sphere = shape(Shape::Sphere, count);
+    let (surfels, report) = run(&sphere, within(tolerance));
+    assert_eq!(report.beyond_tolerance, 0);
+    assert!(report.max_deviation <= tolerance * (1.0 + 1e-6), "{}", report.max_deviation);
+    // A disk halfway between the heights 1 and 1 - 2 E of a cap has the radius sqrt(1 - (1 - 2 E)²); the first point that it
+    // cannot hold is at most a spacing farther out.
+    let sagitta = (1.0 - (1.0 - 2.0 * tolerance).powi(2)).sqrt();
+    let spacing = (Shape::Sphere.area() / count as f64).sqrt();
+    let grown = |surfel: &Surfel| f64::from(surfel.radius()) / OVERLAP;
+    let largest = surfels.iter().map(grown).fold(0.0, f64::max);
+    let smallest = surfels.iter().map(grown).fold(f64::INFINITY, f64::min);
+    assert!(smallest >= sagitta - 1e-6 && largest <= sagitta + spacing, "{smallest} to {largest}: {sagitta}, {spacing}");
+    for surfel in &surfels {
+        let distance = center(surfel).length();
+        assert!((distance - (1.0 - tolerance)).abs() < 0.25 * tolerance, "{distance}");
+        let normal = surfel.normal().as_dvec3().normalize();
+        assert!(normal.dot(center(surfel) / distance) > 1.0 - 1e-6);
+    }
+    // A cap over a disk of radius r has the area 2 pi (1 - sqrt(1 - r²)): no fewer can cover the sphere. Circles that cover a
+    // plane overlap by at least 2 pi / sqrt(27) (Kershner 1939); greedy selection takes less than twice that.
+    let cap = |radius: f64| 2.0 * PI * (1.0 - (1.0 - radius * radius).sqrt());
+    let (fewest, kershner) = (Shape::Sphere.area() / cap(largest), 2.0 * PI / 27f64.sqrt());
+    let number = surfels.len() as f64;
+    assert!(number >= fewest && number <= 2.0 * kershner * fewest, "{number} of {fewest}");
+    // The area of a disk goes with the tolerance, so four times as many are needed for a quarter.
+    let finer = run(&sphere, within(tolerance / 4.0)).0.len() as f64;
+    assert!((3.2..5.0).contains(&(finer / number)), "{number}, {finer}");
+}
+
+#[test]
+fn no_hole_is_left_between_the_points_either() {
+    for (surface, count, tolerance) in [(Shape::Sphere, 6_000, 0.004), (Shape::Torus, 12_000, 0.004)] {
+        let sampled = shape(surface, count);
+        for (splats, relaxations) in [(SplatShape::Disk, 0), (SplatShape::Disk, 3), (SplatShape::Ellipse, 3)] {
+            let options = Options { shape: splats, relaxations, ..within(tolerance) };
+            let (surfels, _) = run(&sampled, options);
+            // Cells of neighbours are cut in different planes, which is off by the square of their size over that of the surface.
+            let grown = 1.005 / OVERLAP;
+            assert_eq!(uncovered(surface, &surfels, grown, 3.0 * tolerance), 0, "{surface:?} {splats:?} {relaxations}");
+            // Controls: with smaller disks there are holes, and with three in four of them.
+            assert!(uncovered(surface, &surfels, 0.85 / OVERLAP, 3.0 * tolerance) > 0);
+            let fewer: Vec<Surfel> = surfels.chunks(4).flat_map(|four| &four[1..]).copied().collect();
+            assert!(uncovered(surface, &fewer, grown, 3.0 * tolerance) > 0);
+        }
+    }
+}
+
+#[test]
+fn ellipses_and_relaxation_leave_fewer_where_they_can() {
+    let number = |scene: &Scene, shape, relaxations| {
+        let (_, report) = run(scene, Options { shape, relaxations, ..within(0.002) });
+        assert_eq!(report.beyond_tolerance, 0);
+        report.selected as f64
+    };
+    let torus = shape(Shape::Torus, 30_000);
+    let disks = number(&torus, SplatShape::Disk, 0);
+    assert!(number(&torus, SplatShape::Ellipse, 0) < 0.85 * disks);
+    assert!(number(&torus, SplatShape::Disk, 3) < 0.95 * disks);
+    // A sphere bends the same way everywhere, so there ellipses are none.
+    let sphere = shape(Shape::Sphere, 30_000);
+    let ratio = number(&sphere, SplatShape::Ellipse, 0) / number(&sphere, SplatShape::Disk, 0);
+    assert!((0.98..1.02).contains(&ratio), "{ratio}");
+}
+
+/// Two sheets of a slab, one spacing apart or less, with normals outward or all upward.
+fn slab(gap: f64, outward: bool) -> Scene {
+    let (mut positions, mut normals) = (Vec::new(), Vec::new());
+    // Different lattices, or the points of one would lie exactly above those of the other.
+    for (z, up, count) in [(gap, 1.0, 4_000), (0.0, if outward { -1.0 } else { 1.0 }, 3_700)] {
+        for sample in generate(Shape::Plane, count) {
+            positions.push([sample.position[0], sample.position[1], z]);
+            normals.push([0.0, 0.0, up]);
+        }
+    }
+    scene(positions, Some(normals))
+}
+
+#[test]
+fn splats_do_not_bridge_to_another_sheet() {
+    let gap = 0.01;
+    let options = within(0.05);
+    let (surfels, report) = run(&slab(gap, true), options);
+    let off_sheet = |surfels: &[Surfel]| {
+        let off = |s: &&Surfel| f64::from(s.center[2]).abs() > 1e-6 && (f64::from(s.center[2]) - gap).abs() > 1e-6;
+        surfels.iter().filter(off).count()
+    };
+    assert_eq!(off_sheet(&surfels), 0);
+    assert!(report.max_deviation < 1e-6);
+    for (z, up) in [(0.0, -1.0), (gap, 1.0)] {
+        let sheet: Vec<Surfel> = surfels.iter().filter(|s| s.normal().z * up > 0.0).copied().collect();
+        assert!(!sheet.is_empty() && sheet.iter().all(|s| (f64::from(s.center[2]) - z).abs() < 1e-6));
+        assert_eq!(uncovered(Shape::Plane, &sheet, 1.0 / OVERLAP, 0.02), 0);
+    }
+    // Control: it is the normals that keep them apart.
+    assert!(off_sheet(&run(&slab(gap, false), options).0) > 0);
+}
+
+#[test]
+fn a_surface_with_edges_is_neither_shortened_nor_drawn_out() {
+    let plane = shape(Shape::Plane, 10_000);
+    let (surfels, report) = run(&plane, within(0.0));
+    assert!(report.max_deviation == 0.0 && surfels.len() < 1_000, "{}", surfels.len());
+    assert_eq!(uncovered(Shape::Plane, &surfels, 1.0 / OVERLAP, 1e-9), 0);
+    // The surface goes on for the 1.5 spacings of an input disk past the last point, and from any place on the edge it is at most
+    // a spacing to one of the last points.
+    let spacing = (Shape::Plane.area() / 10_000.0).sqrt();
+    for surfel in &surfels {
+        let grown = f64::from(surfel.radius()) / OVERLAP;
+        let past = center(surfel).truncate().abs().max_element() + grown - 1.0;
+        assert!(past <= 2.5 * spacing, "{past} of {spacing}");
+    }
+    // Two faces of a box: no disk leaves its face for the other.
+    let (mut positions, mut normals) = (Vec::new(), Vec::new());
+    for sample in generate(Shape::Plane, 4_000) {
+        let [x, y, _] = sample.position;
+        positions.extend([[x, y, 1.0], [1.0, y, x]]);
+        normals.extend([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]);
+    }
+    let (surfels, report) = run(&scene(positions, Some(normals)), within(0.001));
+    assert!(report.max_deviation < 1e-6 && surfels.len() < 1_000, "{} {}", surfels.len(), report.max_deviation);
+    let top: Vec<Surfel> = surfels.iter().filter(|s| s.normal().z > s.normal().x).copied().collect();
+    assert!(top.iter().all(|s| (s.center[2] - 1.0).abs() < 1e-6));
+    let top: Vec<Surfel> = top.into_iter().map(|s| Surfel { center: [s.center[0], s.center[1], 0.0], ..s }).collect();
+    assert_eq!(uncovered(Shape::Plane, &top, 1.0 / OVERLAP, 1e-5), 0);
+}
+
+#[test]
+fn the_order_of_points_and_the_number_of_threads_change_nothing() {
+    let samples: Vec<_> = generate(Shape::Torus, 5_000).collect();
+    let mut order: Vec<usize> = (0..samples.len()).collect();
+    let result = |order: &[usize]| {
+        let points = Points {
+            positions: order.iter().map(|&i| samples[i].position).collect(),
+            normals: Some(order.iter().map(|&i| samples[i].normal).collect()),
+            colors: Some(Colors::Linear(order.iter().map(|&i| [i as f32, 0.5, 1.0, 1.0]).collect())),
+            ..Points::default()
+        };
+        let (scene, _) = build(vec![points], &()).unwrap();
+        simplify(&scene, &Options { shape: SplatShape::Ellipse, relaxations: 2, ..within(0.003) }, &()).unwrap()
+    };
+    let expected = result(&order);
+    Random(7).shuffle(&mut order);
+    assert_eq!(result(&order), expected);
+    for threads in [1, 3] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        assert_eq!(pool.install(|| result(&order)), expected);
+    }
+}
+
+#[test]
+fn inputs_with_nothing_to_grow_on_keep_their_points() {
+    let alike = scene(vec![[3.0, 4.0, 5.0]; 5_000], Some(vec![[0.0, 1.0, 0.0]; 5_000]));
+    let (surfels, report) = run(&alike, within(0.1));
+    assert_eq!((surfels.len(), report.distinct_positions), (1, 1));
+    assert!(center(&surfels[0]).distance(DVec3::new(3.0, 4.0, 5.0) - alike.origin) < 1e-6);
+    // Normals that cancel leave one of them.
+    let both: Vec<[f32; 3]> = (0..100).map(|i| [0.0, 0.0, if i % 2 == 0 { 1.0 } else { -1.0 }]).collect();
+    let (surfels, _) = run(&scene(vec![[0.0; 3]; 100], Some(both)), within(0.1));
+    assert!(surfels.len() == 1 && surfels[0].normal().z.abs() > 0.0);
+    for count in 1..=3 {
+        let few = (0..count).map(|i| [f64::from(i), f64::from(i * i), 0.0]).collect();
+        let (surfels, _) = run(&scene(few, None), within(0.0));
+        assert!((1..=count as usize).contains(&surfels.len()));
+    }
+    // Far from everything, each in its own direction: no disk of the sphere can hold one, and none gets a disk out to it.
+    let mut positions: Vec<[f64; 3]> = generate(Shape::Sphere, 2_000).map(|sample| sample.position).collect();
+    let lone = [[50.0, 0.0, 0.0], [0.0, -70.0, 1.0], [20.0, 20.0, 90.0]];
+    positions.extend(lone);
+    let normals = positions.iter().map(|&p| DVec3::from_array(p).normalize().as_vec3().to_array()).collect();
+    let sampled = scene(positions, Some(normals));
+    let (surfels, _) = run(&sampled, within(0.02));
+    for p in lone {
+        let at = surfels.iter().filter(|s| (center(s) + sampled.origin).distance(DVec3::from_array(p)) < 1e-3).count();
+        assert_eq!(at, 1, "{p:?}");
+    }
+    let largest = surfels.iter().max_by(|a, b| a.radius().total_cmp(&b.radius())).unwrap();
+    assert!(largest.radius() < 2.0 && surfels.len() < 300, "{largest:?} of {}", surfels.len());
+    // Not a number, and on a line.
+    let odd = vec![[f64::NAN, 0.0, 0.0], [0.0; 3], [1.0, 0.0, 0.0], [0.0, f64::INFINITY, 0.0]];
+    assert!(!run(&scene(odd, None), within(0.5)).0.is_empty());
+    let line: Vec<[f64; 3]> = (0..500).map(|i| [f64::from(i), 0.0, 0.0]).collect();
+    let (surfels, _) = run(&scene(line.clone(), None), within(0.1));
+    for p in line {
+        assert!(surfels.iter().any(|s| place(s, DVec3::from_array(p)).truncate().length() <= 1.0));
+    }
+}
+
+#[test]
+fn colours_are_means_over_what_is_covered() {
+    let samples: Vec<_> = generate(Shape::Plane, 5_000).collect();
+    let color = |x: f64| if x < 0.0 { [4.0, 0.0, 0.0, 1.0] } else { [0.0, 0.0, 2.0, 1.0] };
+    let points = Points {
+        positions: samples.iter().map(|sample| sample.position).collect(),
+        normals: Some(samples.iter().map(|sample| sample.normal).collect()),
+        colors: Some(Colors::Linear(samples.iter().map(|sample| color(sample.position[0])).collect())),
+        ..Points::default()
+    };
+    let (sampled, _) = build(vec![points], &()).unwrap();
+    let (simplified, _) = simplify(&sampled, &within(0.01), &()).unwrap();
+    let mut mixed = 0;
+    for (index, surfel) in simplified.surfels.iter().enumerate() {
+        let [r, g, b, a] = simplified.colors.linear(index).map(f64::from);
+        // Shares of red and blue.
+        let (red, blue) = (r / 4.0, b / 2.0);
+        assert!((red + blue - 1.0).abs() < 1e-5 && g == 0.0 && (a - 1.0).abs() < 1e-6);
+        let (x, radius) = (f64::from(surfel.center[0]), f64::from(surfel.radius()) / OVERLAP);
+        if x.abs() > radius {
+            assert_eq!(red.round(), f64::from(u8::from(x < 0.0)));
+            assert!(red.min(blue) < 1e-6);
+        } else if x.abs() < 0.5 * radius && radius > 0.2 {
+            // The segment of a disk beyond a chord, as a share of it.
+            let c = x / radius;
+            let share = (c.acos() - c * (1.0 - c * c).sqrt()) / PI;
+            assert!((red - share).abs() < 0.1, "{red} {share}");
+            mixed += 1;
+        }
+    }
+    assert!(mixed > 0);
+}
+
+#[test]
+fn tolerances_are_read_and_refused() {
+    assert_eq!("rel:0.001".parse::<Tolerance>().unwrap(), Tolerance::Relative(0.001));
+    assert_eq!("abs:2".parse::<Tolerance>().unwrap(), Tolerance::Absolute(2.0));
+    for bad in ["", "1", "rel:", "abs:-1", "abs:nan", "abs:inf", "radius:1"] {
+        assert!(matches!(bad.parse::<Tolerance>(), Err(Error::Usage(_))), "{bad}");
+    }
+    let plane = shape(Shape::Plane, 100);
+    for bad in [-1.0, f64::NAN, f64::INFINITY] {
+        assert!(matches!(simplify(&plane, &within(bad), &()), Err(Error::Usage(_))));
+    }
+    let diagonal = plane.bounds().extent().length();
+    let relative = simplify(&plane, &Options { tolerance: Tolerance::Relative(0.01), ..DISKS }, &()).unwrap();
+    assert_eq!(relative, simplify(&plane, &within(0.01 * diagonal), &()).unwrap());
+}

@@ -380,3 +380,34 @@ fn info_tells_what_is_missing_and_which_command_supplies_it() {
     let dots = folder.file("dots.ply", ply("x y z nx ny nz radius", 400, &rows));
     assert_eq!(strings(&info(&dots)["lacks"]), ["surfels that close the surface", "colours"]);
 }
+
+#[test]
+fn simplify_keeps_the_picture_with_fewer_surfels() {
+    let folder = Folder::new();
+    let (dense, sparse, report) = (folder.path("torus.ply"), folder.path("few.ply"), folder.path("report.json"));
+    succeeds(&["generate", "torus", "--count", "20000", "-o", text(&dense)]);
+    let simplify = ["simplify", text(&dense), "-o", text(&sparse), "--tolerance", "rel:0.001"];
+    let output = succeeds(&[&simplify[..], &["--shape", "ellipse", "--relax", "2", "--json", text(&report)]].concat());
+    assert!(output.stdout.is_empty());
+    let report: serde_json::Value = serde_json::from_slice(&std::fs::read(&report).unwrap()).unwrap();
+    let info: serde_json::Value =
+        serde_json::from_slice(&succeeds(&["info", text(&sparse), "--json", "-"]).stdout).unwrap();
+    assert_eq!(report["surfels"], 20_000);
+    assert_eq!(report["selected"], info["points"]);
+    assert!(report["selected"].as_u64().unwrap() < 4_000, "{report}");
+    assert!(report["max_deviation"].as_f64().unwrap() <= report["tolerance"].as_f64().unwrap() * (1.0 + 1e-9));
+    let alpha = |cloud: &Path, name: &str| {
+        let image = folder.path(name);
+        let eye = ["--eye", "0,-3,2", "--target", "0,0,0", "--size", "128x128", "--backend", "reference"];
+        succeeds(&[&["render", text(cloud), "-o", text(&image)][..], &eye].concat());
+        epsplat::io::exr::read(&image).unwrap().color.iter().map(|c| c[3] > 0.0).collect::<Vec<_>>()
+    };
+    let pairs = alpha(&dense, "dense.exr").into_iter().zip(alpha(&sparse, "sparse.exr")).collect::<Vec<_>>();
+    let (covered, different) = (pairs.iter().filter(|p| p.0).count(), pairs.iter().filter(|p| p.0 != p.1).count());
+    assert!(covered > 3_000 && different < covered / 50, "{different} of {covered}");
+    let text = String::from_utf8(succeeds(&simplify).stdout).unwrap();
+    assert!(text.contains("of 20000 surfels") && text.contains("deviation"), "{text}");
+    fails(&["simplify", "x.ply", "-o", "y.obj"], 2, &[".ply"]);
+    fails(&["simplify", "x.ply", "-o", "y.ply", "--tolerance", "0.1"], 2, &["rel:E", "abs:E"]);
+    fails(&["simplify", "no.ply", "-o", "y.ply"], 1, &["no.ply"]);
+}

@@ -53,7 +53,11 @@ fn center(surfel: &Surfel) -> DVec3 {
 fn place(surfel: &Surfel, p: DVec3) -> DVec3 {
     let offset = p - center(surfel);
     let [s, t] = [surfel.s, surfel.t].map(|axis| Vec3::from_array(axis).as_dvec3());
-    DVec3::new(offset.dot(s) / s.length_squared(), offset.dot(t) / t.length_squared(), offset.dot(s.cross(t).normalize()))
+    DVec3::new(
+        offset.dot(s) / s.length_squared(),
+        offset.dot(t) / t.length_squared(),
+        offset.dot(s.cross(t).normalize()),
+    )
 }
 
 /// Of points spread over the surface, those above no disk: a disk shrunk by `shrink` holds a point if it is within it and at most
@@ -83,7 +87,10 @@ fn a_sphere_needs_as_many_disks_as_its_sagitta_says() {
     let grown = |surfel: &Surfel| f64::from(surfel.radius()) / OVERLAP;
     let largest = surfels.iter().map(grown).fold(0.0, f64::max);
     let smallest = surfels.iter().map(grown).fold(f64::INFINITY, f64::min);
-    assert!(smallest >= sagitta - 1e-6 && largest <= sagitta + spacing, "{smallest} to {largest}: {sagitta}, {spacing}");
+    assert!(
+        smallest >= sagitta - 1e-6 && largest <= sagitta + spacing,
+        "{smallest} to {largest}: {sagitta}, {spacing}"
+    );
     for surfel in &surfels {
         let distance = center(surfel).length();
         assert!((distance - (1.0 - tolerance)).abs() < 0.25 * tolerance, "{distance}");

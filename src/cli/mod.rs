@@ -10,9 +10,9 @@ mod info;
 mod parse;
 mod progress;
 mod render;
-mod surfels;
 mod sample;
 mod simplify;
+mod surfels;
 
 use std::io::Write;
 use std::path::Path;

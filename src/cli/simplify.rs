@@ -18,7 +18,9 @@ use super::{note, print, write_json};
 /// Around each point the largest disk is grown that no point inside is farther from than the tolerance. Of these as few
 /// as possible are taken that cover the surface together. Flat parts keep few surfels, edges and details keep theirs.
 #[derive(Args)]
-#[command(after_help = "Example:\n  epsplat simplify scan.ply -o small.ply --tolerance rel:0.0005 --shape ellipse --relax 3")]
+#[command(
+    after_help = "Example:\n  epsplat simplify scan.ply -o small.ply --tolerance rel:0.0005 --shape ellipse --relax 3"
+)]
 pub struct Arguments {
     /// Point clouds or meshes, of which the vertices are taken: .ply, .las, .laz, .obj
     #[arg(required = true)]

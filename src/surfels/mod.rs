@@ -13,9 +13,9 @@ mod neighbours;
 mod orient;
 mod outliers;
 mod positions;
-mod sizes;
 pub mod sampling;
 pub mod simplify;
+mod sizes;
 #[cfg(test)]
 mod tests;
 

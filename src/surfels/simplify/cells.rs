@@ -12,8 +12,8 @@ use super::samples::Samples;
 use crate::Progress;
 use crate::surfels::neighbours::{Neighbour, NeighbourSearch};
 
-/// Nearest neighbours that a cell is cut out by. The thesis takes 10, for its graph alone; of a random sampling, where
-/// 16 close all but one cell in 300, the rest needs [`MORE_NEIGHBOURS`].
+/// Nearest neighbours that a cell is cut out by. The thesis takes 10, for its graph alone; more close more cells of a random
+/// sampling, and the rest is cut out by [`MORE_NEIGHBOURS`].
 const NEIGHBOURS: usize = 16;
 
 /// The same where [`NEIGHBOURS`] leave a cell open: unevenly spaced points, or another sheet among them.
@@ -26,6 +26,9 @@ const SPACING_NEIGHBOURS: usize = 16;
 /// A cell that reaches farther than this many local spacings is open there: the surface ends. In a random sampling one
 /// Voronoi vertex in ten million lies so far from its points.
 const REACH: f64 = 2.5;
+
+/// The cosine of the elevation over the tangent plane up to which a point is beside another: 60 degrees.
+const STEEPEST: f64 = 0.5;
 
 /// Corners of a cell that has no neighbours.
 const OUTLINE: usize = 8;
@@ -204,13 +207,13 @@ struct Bisector {
 }
 
 impl Bisector {
-    /// None for a neighbour on another side of the surface, or straight above or below.
+    /// None for a neighbour on another side of the surface, or above or below more than beside: it bounds no cell.
     fn new(samples: &Samples, index: u32, neighbour: &Neighbour) -> Option<Self> {
         let offset = samples.positions.position(neighbour.index) - samples.positions.position(index);
         let [s, t] = tangent_basis(samples.normals[index as usize]);
         let distance = neighbour.squared_distance.sqrt();
         let flat = DVec2::new(offset.dot(s), offset.dot(t)) / distance;
-        let toward = flat.try_normalize().filter(|_| flat.length() > 1e-6)?;
+        let toward = flat.try_normalize().filter(|_| flat.length() > STEEPEST)?;
         samples.same_side(index, neighbour.index).then_some(Self {
             toward,
             distance: 0.5 * distance,

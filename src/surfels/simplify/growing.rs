@@ -124,7 +124,8 @@ impl<'a> Grower<'a> {
         let normal = self.samples.normals[point as usize];
         let inside = self.conquered.iter().map(|conquered| conquered.point);
         let around = self.confront.iter().map(|Reverse((_, point))| *point);
-        let offsets = || inside.clone().chain(around.clone()).map(|point| self.samples.positions.position(point) - center);
+        let offsets =
+            || inside.clone().chain(around.clone()).map(|point| self.samples.positions.position(point) - center);
         let reach = offsets().map(|offset| offset.length()).fold(0.0, f64::max);
         let (mut matrix, mut heights) = (DMat3::ZERO, DVec3::ZERO);
         for offset in offsets() {
@@ -134,15 +135,15 @@ impl<'a> Grower<'a> {
             matrix += DMat3::from_cols(row * row.x, row * row.y, row * row.z);
             heights += row * offset.dot(normal);
         }
-        // A matrix without an inverse makes this NaN, which is no ratio.
         let quadric = matrix.inverse() * heights;
         let (mean, half_difference) = (0.5 * (quadric.x + quadric.z), 0.5 * (quadric.x - quadric.z));
         let deviation = half_difference.hypot(0.5 * quadric.y);
         let (strong, weak) = (mean.abs() + deviation, (mean.abs() - deviation).abs());
-        let ratio = (strong / weak).sqrt().min(LARGEST_RATIO);
-        if !(ratio > SMALLEST_RATIO) {
+        // A matrix without an inverse says nothing, nor does a plane.
+        if !quadric.is_finite() || strong <= SMALLEST_RATIO * SMALLEST_RATIO * weak {
             return None;
         }
+        let ratio = (strong / weak).sqrt().min(LARGEST_RATIO);
         // The direction of the larger curvature is that of the larger eigenvalue where their mean is positive, else of the
         // smaller one, across it.
         let angle = 0.5 * (0.5 * quadric.y).atan2(half_difference);

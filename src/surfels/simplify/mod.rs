@@ -62,7 +62,9 @@ impl FromStr for Tolerance {
 
     fn from_str(text: &str) -> Result<Self> {
         let bad = || {
-            Error::Usage(format!("a tolerance is rel:E (fraction of the diagonal) or abs:E (world units), not {text:?}"))
+            Error::Usage(format!(
+                "a tolerance is rel:E (fraction of the diagonal) or abs:E (world units), not {text:?}"
+            ))
         };
         let (kind, value) = text.split_once(':').ok_or_else(bad)?;
         let value: f64 = value.parse().map_err(|_| bad())?;

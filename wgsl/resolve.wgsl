@@ -33,8 +33,12 @@ fn resolve(
     let x = pixel % view.width;
     let y = pixel / view.width + band.first_row;
     let out = pixel * IMAGE_WORDS;
-    let weight = sum_at(pixel, WEIGHT_CHANNEL);
     let front = front_at(pixel);
+    // Where nothing is, no sum need be read.
+    var weight = 0.0;
+    if (bitcast<u32>(front) != NOTHING) {
+        weight = sum_at(pixel, WEIGHT_CHANNEL);
+    }
     if (weight == 0.0) {
         write_color(out, view.background);
         write_normal(out, vec3<f32>(0.0));

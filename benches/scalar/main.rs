@@ -46,7 +46,7 @@ fn sphere(count: u64, scale: f32) -> Result<Scene> {
         normals: Some(samples.iter().map(|s| s.normal).collect()),
         radii: Some(samples.iter().map(|s| scale * s.radius).collect()),
         colors: Some(Colors::Srgb8(samples.iter().map(|s| opaque(s.color)).collect())),
-        up: None,
+        ..Points::default()
     };
     let (scene, _) = build(vec![points], &())?;
     Ok(scene)

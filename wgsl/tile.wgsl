@@ -233,11 +233,13 @@ fn tile_visibility(
         }
     }
     var place = list.x;
+    var found = false;
     loop {
         let next = next_entry(&place, list.y, row, local, farthest_of(a, b));
         if (!next.found) {
             break;
         }
+        found = true;
         a.x = nearer(a.x, next.splat, next.filter_, row.x, row.y);
         a.y = nearer(a.y, next.splat, next.filter_, row.x + 1u, row.y);
         a.z = nearer(a.z, next.splat, next.filter_, row.x + 2u, row.y);
@@ -246,6 +248,9 @@ fn tile_visibility(
         b.y = nearer(b.y, next.splat, next.filter_, row.x + 5u, row.y);
         b.z = nearer(b.z, next.splat, next.filter_, row.x + 6u, row.y);
         b.w = nearer(b.w, next.splat, next.filter_, row.x + 7u, row.y);
+    }
+    if (!found) {
+        return;
     }
     for (var k = 0u; k < 4u; k++) {
         if (k < row.pixels) {
@@ -288,11 +293,13 @@ fn tile_accumulate(
     let b = vec4<f32>(front_of(row, 4u), front_of(row, 5u), front_of(row, 6u), front_of(row, 7u));
     let farthest = farthest_of(a, b);
     var place = list.x;
+    var found = false;
     loop {
         let next = next_entry(&place, list.y, row, local, deepest_accepted(farthest));
         if (!next.found) {
             break;
         }
+        found = true;
         let attributes = shared_attributes(next.place, local);
         gather(0u, next, attributes, a.x, row.x, row.y);
         gather(1u, next, attributes, a.y, row.x + 1u, row.y);
@@ -302,6 +309,9 @@ fn tile_accumulate(
         gather(5u, next, attributes, b.y, row.x + 5u, row.y);
         gather(6u, next, attributes, b.z, row.x + 6u, row.y);
         gather(7u, next, attributes, b.w, row.x + 7u, row.y);
+    }
+    if (!found) {
+        return;
     }
     if (row.pixels > 0u) { deposit(0u, row.pixel); }
     if (row.pixels > 1u) { deposit(1u, row.pixel + 1u); }

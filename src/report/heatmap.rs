@@ -135,12 +135,13 @@ pub(super) struct Map {
 }
 
 impl Map {
-    pub fn of(image: &Frame, reference: &Frame) -> Result<Self> {
+    /// Of a picture whose sides are at most `side`.
+    pub fn of(image: &Frame, reference: &Frame, side: u32) -> Result<Self> {
         let differences = differences(image, reference)?;
         let largest = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
         let differing = differences.iter().filter(|difference| **difference > 0.0).count();
         Ok(Self {
-            shown: picture::shrink(image.width, image.height, &differences, largest),
+            shown: picture::shrink([image.width, image.height, side], &differences, largest),
             largest: largest(&differences),
             share: differing as f64 / differences.len().max(1) as f64,
         })
@@ -202,7 +203,7 @@ mod tests {
         assert_eq!(differences(&frame(2, 1, 0.5), &frame(2, 1, 0.25)).unwrap(), [0.0, 0.25]);
         let message = differences(&frame(2, 1, 0.5), &frame(1, 2, 0.5)).unwrap_err().to_string();
         assert_eq!(message, "an image of 2x1 cannot be compared with a reference of 1x2");
-        let map = Map::of(&frame(1024, 2, 0.0), &frame(1024, 2, 0.5)).unwrap();
+        let map = Map::of(&frame(1024, 2, 0.0), &frame(1024, 2, 0.5), 512).unwrap();
         assert_eq!((map.shown.width, map.shown.height), (512, 1));
         assert_eq!((map.shown.values[0], map.shown.values[511]), (0.0, 0.5));
         assert_eq!((map.largest, map.share), (0.5, 1.0 / 2048.0));

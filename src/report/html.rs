@@ -60,12 +60,13 @@ fn images(sets: &[ImageSet]) -> Result<String> {
     if sets.is_empty() {
         return Ok(String::new());
     }
-    let compare = |set: &ImageSet| set.reference.as_ref().map(|truth| Map::of(&set.image, truth)).transpose();
+    let side = picture::largest_side(sets.len());
+    let compare = |set: &ImageSet| set.reference.as_ref().map(|truth| Map::of(&set.image, truth, side)).transpose();
     let maps: Vec<Option<Map>> = sets.iter().map(compare).collect::<Result<_>>()?;
     let scale = Scale::over(maps.iter().flatten().flat_map(|map| map.shown.values.iter().copied()));
     let mut scenes: Vec<(&str, String)> = Vec::new();
     for (set, map) in sets.iter().zip(&maps) {
-        let figure = figure(set, map.as_ref(), scale)?;
+        let figure = figure(set, map.as_ref(), scale, side)?;
         match scenes.iter_mut().find(|(scene, _)| *scene == set.scene) {
             Some((_, figures)) => figures.push_str(&figure),
             None => scenes.push((&set.scene, figure)),
@@ -82,9 +83,9 @@ fn images(sets: &[ImageSet]) -> Result<String> {
     ))
 }
 
-fn figure(set: &ImageSet, map: Option<&Map>, scale: Scale) -> Result<String> {
+fn figure(set: &ImageSet, map: Option<&Map>, scale: Scale, side: u32) -> Result<String> {
     let what = format!("{} by {}", set.scene, set.config);
-    let image = picture::of_frame(&set.image, &what)?;
+    let image = picture::of_frame(&set.image, side, &what)?;
     let (heat, said) = match map {
         None => (String::new(), "not compared".to_owned()),
         Some(map) => {
@@ -97,7 +98,7 @@ fn figure(set: &ImageSet, map: Option<&Map>, scale: Scale) -> Result<String> {
             (map.picture(scale, &format!("Difference of {what} from its reference: {said}"))?, said)
         }
     };
-    let factor = picture::shrink_factor(set.image.width, set.image.height);
+    let factor = picture::shrink_factor(set.image.width, set.image.height, side);
     let shrunk = match factor {
         1 => String::new(),
         _ => format!(

@@ -8,8 +8,18 @@ use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::io::png;
 
-/// Larger pictures are shrunk by a whole factor: the page shows them no larger, and a sweep has hundreds.
+/// Larger pictures are shrunk by a whole factor: the page shows them no larger.
 const LARGEST_SIDE: u32 = 512;
+
+/// So many pictures are kept as large as that. Of more, each is smaller, down to a quarter: a sweep has hundreds, and the
+/// page is one file.
+const MANY: usize = 32;
+
+/// The largest side of each of `pictures` pictures.
+pub(super) fn largest_side(pictures: usize) -> u32 {
+    let share = (MANY as f64 / pictures.max(1) as f64).sqrt().clamp(0.25, 1.0);
+    (f64::from(LARGEST_SIDE) * share) as u32
+}
 
 /// A grid of values, row by row from the top.
 pub(super) struct Grid<T> {
@@ -18,14 +28,14 @@ pub(super) struct Grid<T> {
     pub values: Vec<T>,
 }
 
-/// By how much a picture of this size is shrunk.
-pub(super) fn shrink_factor(width: u32, height: u32) -> u32 {
-    width.max(height).div_ceil(LARGEST_SIDE).max(1)
+/// By how much a picture of this size is shrunk for its sides to be at most `side`.
+pub(super) fn shrink_factor(width: u32, height: u32, side: u32) -> u32 {
+    width.max(height).div_ceil(side).max(1)
 }
 
 /// Reduces each block of pixels to one; blocks at the right and bottom edge may be smaller.
-pub(super) fn shrink<T: Copy>(width: u32, height: u32, values: &[T], reduce: impl Fn(&[T]) -> T) -> Grid<T> {
-    let factor = shrink_factor(width, height) as usize;
+pub(super) fn shrink<T: Copy>([width, height, side]: [u32; 3], values: &[T], reduce: impl Fn(&[T]) -> T) -> Grid<T> {
+    let factor = shrink_factor(width, height, side) as usize;
     if factor == 1 {
         return Grid { width, height, values: values.to_vec() };
     }
@@ -46,8 +56,8 @@ pub(super) fn shrink<T: Copy>(width: u32, height: u32, values: &[T], reduce: imp
 }
 
 /// The colour of a frame, sRGB.
-pub(super) fn of_frame(frame: &Frame, alt: &str) -> Result<String> {
-    let small = shrink(frame.width, frame.height, &frame.color, mean);
+pub(super) fn of_frame(frame: &Frame, side: u32, alt: &str) -> Result<String> {
+    let small = shrink([frame.width, frame.height, side], &frame.color, mean);
     image(small.width, small.height, &png::srgb_bytes(&small.values), alt)
 }
 
@@ -77,16 +87,21 @@ mod tests {
     #[test]
     fn small_pictures_are_kept_and_large_ones_shrunk_in_blocks() {
         assert_eq!(
-            [shrink_factor(1, 1), shrink_factor(512, 10), shrink_factor(513, 10), shrink_factor(5000, 9)],
+            [(1, 1), (512, 10), (513, 10), (5000, 9)].map(|(width, height)| shrink_factor(width, height, 512)),
             [1, 1, 2, 10]
         );
         let values: Vec<u32> = (0..513 * 3).collect();
         let largest = |block: &[u32]| block.iter().copied().max().unwrap_or(0);
-        let small = shrink(513, 3, &values, largest);
+        let small = shrink([513, 3, 512], &values, largest);
         assert_eq!((small.width, small.height, small.values.len()), (257, 2, 257 * 2));
         assert_eq!((small.values[0], small.values[256]), (514, 513 + 512));
         assert_eq!(small.values.last(), Some(&(513 * 3 - 1)));
-        assert_eq!(shrink(2, 1, &[4, 5], largest).values, [4, 5]);
+        assert_eq!(shrink([2, 1, 512], &[4, 5], largest).values, [4, 5]);
+    }
+
+    #[test]
+    fn many_pictures_are_smaller() {
+        assert_eq!([1, 32, 128, 100_000].map(largest_side), [512, 512, 256, 128]);
     }
 
     #[test]

@@ -36,10 +36,13 @@ impl Surfel {
         const ROUNDING: f64 = 1e-6;
         let (mut s, mut t) = (s.as_dvec3(), t.as_dvec3());
         if s.dot(t).abs() > ROUNDING * s.length() * t.length() {
-            // (cos a, sin a) and (-sin a, cos a) are diametrically opposite to each other in (u, v) too, so they give the
-            // same ellipse with the same s x t; their images are perpendicular for this a.
+            // (cos a, sin a) and (-sin a, cos a) are perpendicular in (u, v) too, so they give the same ellipse with the same
+            // s x t; their images are perpendicular for this a, the first of them the longer. The second follows from
+            // s x t: as t cos a - s sin a it would be lost to rounding where it is much the shorter.
+            let normal = s.cross(t);
             let angle = 0.5 * (2.0 * s.dot(t)).atan2(s.length_squared() - t.length_squared());
-            (s, t) = (s * angle.cos() + t * angle.sin(), t * angle.cos() - s * angle.sin());
+            s = s * angle.cos() + t * angle.sin();
+            t = normal.cross(s) / s.length_squared();
         }
         Self { center: center.to_array(), s: s.as_vec3().to_array(), t: t.as_vec3().to_array() }
     }
@@ -75,6 +78,13 @@ mod tests {
         // The axes as they came miss it.
         let rim = s * 0.8 + t * 0.6;
         assert!((rim.dot(s) / s.length_squared()).hypot(rim.dot(t) / t.length_squared()) > 1.1);
+        // However much one is longer.
+        let (s, t) = (Vec3::new(0.0, 1.25e-12, 0.0), Vec3::new(0.0, -6e16, -8e15));
+        let long = Surfel::ellipse(Vec3::ZERO, s, t);
+        let [major, minor] = [long.s, long.t].map(|axis| Vec3::from_array(axis).as_dvec3());
+        assert!(major.normalize().dot(minor.normalize()).abs() < 1e-6 && major.length() > 6e16, "{long:?}");
+        let area = s.as_dvec3().cross(t.as_dvec3()).length();
+        assert!((major.length() * minor.length() / area - 1.0).abs() < 1e-5, "{long:?}");
         let (s, t) = (Vec3::new(0.1, 0.0, 0.0), Vec3::new(0.0, 0.3, 0.7));
         let kept = Surfel::ellipse(Vec3::ZERO, s, t);
         assert_eq!((kept.s, kept.t), (s.to_array(), t.to_array()));

@@ -6,24 +6,12 @@ mod common;
 use std::f64::consts::PI;
 
 use common::meshes::sphere;
-use epsplat::io::{Mesh, Points};
+use common::scenes::generated;
+use epsplat::io::Mesh;
 use epsplat::metrics::{Coverage, SurfaceDistances, coverage};
 use epsplat::scene::Scene;
-use epsplat::surfels::analytic::{Sample, Shape, generate};
-use epsplat::surfels::build;
+use epsplat::surfels::analytic::Shape;
 use epsplat::truth::TriangleTree;
-
-/// The generated surfels of a shape for which `keep` holds.
-fn surfels(shape: Shape, count: u64, keep: impl Fn(&Sample) -> bool) -> Scene {
-    let samples: Vec<Sample> = generate(shape, count).filter(keep).collect();
-    let points = Points {
-        positions: samples.iter().map(|sample| sample.position).collect(),
-        normals: Some(samples.iter().map(|sample| sample.normal).collect()),
-        radii: Some(samples.iter().map(|sample| sample.radius).collect()),
-        ..Points::default()
-    };
-    build(vec![points], &()).unwrap().0
-}
 
 fn square() -> Mesh {
     Mesh {
@@ -40,7 +28,7 @@ fn seen(mesh: &Mesh, scene: &Scene) -> Coverage {
 #[test]
 fn a_sphere_is_covered_until_surfels_are_missing() {
     let mesh = sphere(6, false);
-    let whole = seen(&mesh, &surfels(Shape::Sphere, 5000, |_| true));
+    let whole = seen(&mesh, &generated(Shape::Sphere, 5000, |_| true));
     // Each view sees a disk of area pi.
     let expected = 64.0 * PI / whole.ray_spacing.powi(2);
     assert!((whole.seen.rays as f64 / expected - 1.0).abs() < 0.01, "{whole:?}");
@@ -49,7 +37,7 @@ fn a_sphere_is_covered_until_surfels_are_missing() {
     // the missing cap reach into it by their radius, 0.075.
     let cap = |angle: f64| 0.5 * (1.0 - angle.cos());
     for angle in [0.3, 0.8, 0.5 * PI] {
-        let holed = seen(&mesh, &surfels(Shape::Sphere, 5000, |sample| sample.position[2] < angle.cos()));
+        let holed = seen(&mesh, &generated(Shape::Sphere, 5000, |sample| sample.position[2] < angle.cos()));
         let share = holed.uncovered_share.unwrap();
         // The mesh is closed, so behind the hole there are disks on each ray: those of the far side do not count.
         assert!(
@@ -69,7 +57,7 @@ fn a_sphere_is_covered_until_surfels_are_missing() {
 fn a_single_missing_surfel_of_a_sparse_sphere_is_a_hole() {
     // At 0.7 of the spacing square cells of four samples are just closed; the lattice's cells are others, so some gape.
     let scene = |factor: f32| {
-        let mut scene = surfels(Shape::Sphere, 2000, |_| true);
+        let mut scene = generated(Shape::Sphere, 2000, |_| true);
         for surfel in &mut scene.surfels {
             (surfel.s, surfel.t) = (surfel.s.map(|c| c * factor), surfel.t.map(|c| c * factor));
         }
@@ -87,7 +75,7 @@ fn a_single_missing_surfel_of_a_sparse_sphere_is_a_hole() {
 
 #[test]
 fn a_hole_in_a_square_has_its_area() {
-    let keep = |radius: f64| surfels(Shape::Plane, 20_000, move |s| s.position[0].hypot(s.position[1]) > radius);
+    let keep = |radius: f64| generated(Shape::Plane, 20_000, move |s| s.position[0].hypot(s.position[1]) > radius);
     assert!(seen(&square(), &keep(0.0)).is_hole_free());
     // The disks' radius is 0.0212.
     let holed = seen(&square(), &keep(0.4)).uncovered_share.unwrap();
@@ -105,7 +93,7 @@ fn a_hole_in_a_square_has_its_area() {
 fn distances_are_those_by_which_surfels_are_moved() {
     let distances =
         |scene: &Scene, mesh: &Mesh| SurfaceDistances::of(scene, mesh, &TriangleTree::new(mesh).unwrap()).unwrap();
-    let mut scene = surfels(Shape::Plane, 1000, |s| s.position.iter().all(|c| c.abs() < 0.8));
+    let mut scene = generated(Shape::Plane, 1000, |s| s.position.iter().all(|c| c.abs() < 0.8));
     let on = distances(&scene, &square()).centers_to_mesh.unwrap();
     assert!(on.mean <= on.max && on.max < 1e-14, "{on:?}");
     for (k, surfel) in scene.surfels.iter_mut().enumerate() {
@@ -120,7 +108,7 @@ fn distances_are_those_by_which_surfels_are_moved() {
     assert!((rims.mean - centers.mean).abs() < 1e-7);
 
     // A disk of radius r on a sphere leaves it by sqrt(1 + r r) - 1 at the rim.
-    let scene = surfels(Shape::Sphere, 500, |_| true);
+    let scene = generated(Shape::Sphere, 500, |_| true);
     let rims = distances(&scene, &sphere(7, false)).rims_to_mesh.unwrap();
     let expected = f64::from(scene.surfels[0].radius()).hypot(1.0) - 1.0;
     // The facets lie up to 1e-4 inside the sphere.

@@ -8,6 +8,7 @@ mod common;
 use std::f64::consts::PI;
 
 use common::Random;
+use common::scenes::generated;
 use epsplat::Error;
 use epsplat::io::Points;
 use epsplat::scene::{Colors, Scene, Surfel};
@@ -27,14 +28,7 @@ fn scene(positions: Vec<[f64; 3]>, normals: Option<Vec<[f32; 3]>>) -> Scene {
 }
 
 fn shape(shape: Shape, count: u64) -> Scene {
-    let samples: Vec<_> = generate(shape, count).collect();
-    let points = Points {
-        positions: samples.iter().map(|sample| sample.position).collect(),
-        normals: Some(samples.iter().map(|sample| sample.normal).collect()),
-        radii: Some(samples.iter().map(|sample| sample.radius).collect()),
-        ..Points::default()
-    };
-    build(vec![points], &()).unwrap().0
+    generated(shape, count, |_| true)
 }
 
 fn run(scene: &Scene, options: Options) -> (Vec<Surfel>, Report) {

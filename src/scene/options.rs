@@ -32,6 +32,13 @@ impl Epsilon {
     }
 }
 
+/// The parts of `KIND:AMOUNT`, an amount that is finite and not negative.
+pub(crate) fn kind_and_amount(text: &str) -> Option<(&str, f64)> {
+    let (kind, amount) = text.split_once(':')?;
+    let amount: f64 = amount.parse().ok()?;
+    (amount.is_finite() && amount >= 0.0).then_some((kind, amount))
+}
+
 impl FromStr for Epsilon {
     type Err = Error;
 
@@ -41,15 +48,10 @@ impl FromStr for Epsilon {
                 "an epsilon is rel:E (fraction of depth), abs:E (world units) or radius:K (times the surfel's), not {text:?}"
             ))
         };
-        let (kind, value) = text.split_once(':').ok_or_else(bad)?;
-        let value: f64 = value.parse().map_err(|_| bad())?;
-        if !(value.is_finite() && value >= 0.0) {
-            return Err(bad());
-        }
-        match kind {
-            "rel" => Ok(Self::Relative(value)),
-            "abs" => Ok(Self::Absolute(value)),
-            "radius" => Ok(Self::Radius(value)),
+        match kind_and_amount(text).ok_or_else(bad)? {
+            ("rel", value) => Ok(Self::Relative(value)),
+            ("abs", value) => Ok(Self::Absolute(value)),
+            ("radius", value) => Ok(Self::Radius(value)),
             _ => Err(bad()),
         }
     }

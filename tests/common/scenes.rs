@@ -1,7 +1,10 @@
 //! Seeded scenes of surfels of many kinds, made in camera space so that each kind is what its name says.
 
+use epsplat::io::Points;
 use epsplat::scene::camera::Lens;
 use epsplat::scene::{Camera, Colors, Projection, Scene, Surfel, Up};
+use epsplat::surfels::analytic::{Sample, Shape, generate};
+use epsplat::surfels::build;
 use glam::{DMat3, DVec2, DVec3, Vec3};
 
 use super::Random;
@@ -228,4 +231,16 @@ pub fn stack(count: usize, value: f32) -> (Scene, Camera) {
     }
     let scene = Scene { origin: DVec3::ZERO, surfels, colors: Colors::Linear(colors), oriented: true, up: Up::Y };
     (scene, front(4))
+}
+
+/// The generated surfels of a shape for which `keep` holds, without colours.
+pub fn generated(shape: Shape, count: u64, keep: impl Fn(&Sample) -> bool) -> Scene {
+    let samples: Vec<Sample> = generate(shape, count).filter(keep).collect();
+    let points = Points {
+        positions: samples.iter().map(|sample| sample.position).collect(),
+        normals: Some(samples.iter().map(|sample| sample.normal).collect()),
+        radii: Some(samples.iter().map(|sample| sample.radius).collect()),
+        ..Points::default()
+    };
+    build(vec![points], &()).unwrap().0
 }

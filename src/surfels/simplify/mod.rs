@@ -37,6 +37,7 @@ use self::samples::Samples;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 use crate::scene::Scene;
+use crate::scene::options::kind_and_amount;
 
 /// How far points may lie from the splat that stands for them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,14 +67,9 @@ impl FromStr for Tolerance {
                 "a tolerance is rel:E (fraction of the diagonal) or abs:E (world units), not {text:?}"
             ))
         };
-        let (kind, value) = text.split_once(':').ok_or_else(bad)?;
-        let value: f64 = value.parse().map_err(|_| bad())?;
-        if !(value.is_finite() && value >= 0.0) {
-            return Err(bad());
-        }
-        match kind {
-            "rel" => Ok(Self::Relative(value)),
-            "abs" => Ok(Self::Absolute(value)),
+        match kind_and_amount(text).ok_or_else(bad)? {
+            ("rel", value) => Ok(Self::Relative(value)),
+            ("abs", value) => Ok(Self::Absolute(value)),
             _ => Err(bad()),
         }
     }

@@ -94,7 +94,6 @@ fn mirrors() -> BTreeMap<&'static str, Struct> {
             color_scale,
             background,
             lights,
-            light_count,
             width,
             height,
             zero,
@@ -107,9 +106,6 @@ fn mirrors() -> BTreeMap<&'static str, Struct> {
             epsilon_deepest,
             farthest,
             middle,
-            padding_0,
-            padding_1,
-            padding_2,
         }),
         mirror!(Band { first_row, rows, padding_0, padding_1 }),
         mirror!(Splat { anchor_x, anchor_y, bounds_first, bounds_last, a, b, c, a_low }),
@@ -335,9 +331,9 @@ fn every_binding_has_the_hosts_layout() {
 
 #[test]
 fn a_changed_layout_is_noticed() {
-    // The first needs have no light, so that no kernel uses the lights and the module stays valid.
+    // The first needs do not cull, so that no kernel uses `middle` and the module stays valid.
     let needs = common::all_needs()[0];
-    assert!(!needs.lambert);
+    assert!(!needs.cull);
     let broken = |from: &str, to: &str| {
         let sources = Sources::default().replace("layout.wgsl", from, to).unwrap();
         differences(&first_of(&sources, &needs), needs.accumulator).join("; ")
@@ -345,18 +341,18 @@ fn a_changed_layout_is_noticed() {
     let swapped =
         broken("    a: array<f32, 3>,\n    b: array<f32, 3>,\n", "    b: array<f32, 3>,\n    a: array<f32, 3>,\n");
     assert!(swapped.contains("Splat") && swapped.contains("\"a\""), "{swapped}");
-    let renamed = broken("    light_count: u32,\n", "    light_number: u32,\n");
-    assert!(renamed.contains("View.light_number exists in WGSL only"), "{renamed}");
-    assert!(renamed.contains("View.light_count exists in Rust only"), "{renamed}");
+    let renamed = broken("    middle: f32,\n", "    center: f32,\n");
+    assert!(renamed.contains("View.center exists in WGSL only"), "{renamed}");
+    assert!(renamed.contains("View.middle exists in Rust only"), "{renamed}");
     let exchanged = broken(
-        "    light_count: u32,\n    width: u32,\n    height: u32,\n",
-        "    width: u32,\n    height: u32,\n    light_count: u32,\n",
+        "    farthest: f32,\n    // Depth of the middle of the scene's bounds, device units.\n    middle: f32,\n",
+        "    middle: f32,\n    farthest: f32,\n",
     );
-    assert!(exchanged.contains("\"width\"") && exchanged.contains("\"light_count\""), "{exchanged}");
+    assert!(exchanged.contains("\"farthest\"") && exchanged.contains("\"middle\""), "{exchanged}");
     let longer = broken("    rows: u32,\n    padding_0: u32,\n", "    rows: u32,\n    padding_0: vec2<u32>,\n");
     assert!(longer.contains("Band"), "{longer}");
-    let retyped = broken("    light_count: u32,\n", "    light_count: f32,\n");
-    assert!(retyped.contains("light_count") && retyped.contains("Float"), "{retyped}");
+    let retyped = broken("    middle: f32,\n", "    middle: u32,\n");
+    assert!(retyped.contains("middle") && retyped.contains("Uint"), "{retyped}");
     // Sums of another kind than the accumulator's.
     let wide = SceneNeeds { accumulator: "fixed64", ..needs };
     let other = &first_of(&Sources::default(), &wide);

@@ -22,7 +22,6 @@ struct View {
     background: vec4<f32>,
     // xyz: unit vector toward the light in world space, or 0 for the headlight; w: intensity.
     lights: array<vec4<f32>, 8>,
-    light_count: u32,
     width: u32,
     height: u32,
     // Always 0, which no compiler can know (double.wgsl).
@@ -40,9 +39,6 @@ struct View {
     farthest: f32,
     // Depth of the middle of the scene's bounds, device units.
     middle: f32,
-    padding_0: u32,
-    padding_1: u32,
-    padding_2: u32,
 }
 
 // The rows of the image that the visibility and attribute buffers hold.

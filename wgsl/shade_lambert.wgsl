@@ -1,9 +1,13 @@
 // color * sum of intensity * cosine over the lights. The headlight lights both sides of a surface, n . toward_eye in
 // absolute value; a directional light the side its normal is on. Twin: src/passes/resolve.rs.
+
+// A constant, as some drivers compile a kernel whose loops end by a uniform again for every frame (Mesa's lavapipe).
+override LIGHTS: u32;
+
 fn shade(color: vec3<f32>, normal: vec3<f32>, x: u32, y: u32) -> vec3<f32> {
     let toward_eye = -ray(x, y);
     var irradiance = 0.0;
-    for (var i = 0u; i < view.light_count; i++) {
+    for (var i = 0u; i < LIGHTS; i++) {
         let light = view.lights[i];
         if (all(light.xyz == vec3<f32>(0.0))) {
             irradiance += light.w * abs(dot(normal, toward_eye));

@@ -74,7 +74,6 @@ pub struct View {
     pub color_scale: [f32; 4],
     pub background: [f32; 4],
     pub lights: [[f32; 4]; MAX_LIGHTS],
-    pub light_count: u32,
     pub width: u32,
     pub height: u32,
     pub zero: u32,
@@ -87,9 +86,6 @@ pub struct View {
     pub epsilon_deepest: f32,
     pub farthest: f32,
     pub middle: f32,
-    pub padding_0: u32,
-    pub padding_1: u32,
-    pub padding_2: u32,
 }
 
 /// The rows of the image that the per-pixel buffers hold at a time.
@@ -221,7 +217,6 @@ impl View {
             color_scale: span.map(|s| if s > 0.0 { 1.0 / s } else { 0.0 }),
             background: options.background,
             lights,
-            light_count: options.lights.len().min(MAX_LIGHTS) as u32,
             width: camera.width,
             height: camera.height,
             zero: 0,
@@ -235,9 +230,6 @@ impl View {
             epsilon_deepest: (of_radius * f64::from(scene.largest_radius()) * unit) as f32,
             farthest: (farthest * unit) as f32,
             middle: (camera.rotation.row(2).dot(bounds.center() - eye_relative) * unit) as f32,
-            padding_0: 0,
-            padding_1: 0,
-            padding_2: 0,
         }
     }
 }

@@ -225,6 +225,7 @@ pub fn overrides(needs: &SceneNeeds, options: &RenderOptions, fraction_bits: u32
         ("FRACTION_BITS", fraction_bits.into()),
         ("COLOR_CHANNELS", color_channels(needs).into()),
         ("NORMAL_CHANNEL", layout.normal_channel.into()),
+        ("LIGHTS", options.lights.len() as f64),
         ("TURN_NORMALS", u32::from(needs.turn_normals).into()),
         ("DEPTH_CHANNEL", layout.depth_channel.into()),
         ("COUNT_CHANNEL", layout.count_channel.into()),

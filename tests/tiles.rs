@@ -9,7 +9,9 @@ use common::scenes::{cases, crowded, front, sphere, stack};
 use epsplat::frame::Frame;
 use epsplat::gpu::{Gpu, Sources};
 use epsplat::render::{Backend, Renderer, Report, render};
-use epsplat::scene::{Camera, Colors, Epsilon, Kernel, LowPass, Maps, Projection, RenderOptions, Scene, Shading};
+use epsplat::scene::{
+    Camera, Colors, Epsilon, Kernel, LowPass, Maps, Organisation, Projection, RenderOptions, Scene, Shading,
+};
 
 const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
 
@@ -61,14 +63,19 @@ fn compare(names: &[&str], thresholds: &[u32], adapt: impl Fn(&mut Gpu)) {
         adapt(&mut gpu);
         Some(on(gpu, large_from(pixels)))
     };
-    // Scatter alone, to compare with.
     let Some(scatter) = backend(u32::MAX) else { return };
     let others: Vec<_> = thresholds.iter().filter_map(|&pixels| Some((pixels, backend(pixels)?))).collect();
     for (name, scene, camera, options) in drawn().into_iter().filter(|(name, ..)| names.contains(name)) {
-        let (expected, _) = frame(&scene, &camera, &options, &scatter);
+        let by_scatter = RenderOptions { organisation: Organisation::Scatter, ..options.clone() };
+        let (expected, report) = render(&scene, &camera, &by_scatter, &scatter, &()).unwrap();
+        assert!(!report.needs.contains(&"tiles"));
         for (pixels, backend) in &others {
             let (tiled, _) = frame(&scene, &camera, &options, backend);
             assert!(bits(&tiled) == bits(&expected), "{name}: tiles from {pixels} pixels on show");
+            let all = RenderOptions { organisation: Organisation::Tile, ..options.clone() };
+            let (gathered, report) = frame(&scene, &camera, &all, backend);
+            assert!(report.needs.contains(&"gather"));
+            assert!(bits(&gathered) == bits(&expected), "{name}: all tiles, some lists from {pixels} pixels on, show");
         }
     }
 }

@@ -17,12 +17,20 @@ fn attributes_of(index: u32, splat: Splat) -> Attributes {
     return Attributes(color_of(index), normal_of(index, splat), radius_of(index));
 }
 
-fn blend(pixel: u32, fragment: Fragment, front: f32, attributes: Attributes) {
+fn weight_of(fragment: Fragment) -> Term {
     let unfiltered = clamp(kernel_weight(fragment.rho2), LEAST_WEIGHT, 1.0);
-    let weight = quantise(max(fragment.gain * unfiltered, LEAST_FILTERED_WEIGHT));
+    return quantise(max(fragment.gain * unfiltered, LEAST_FILTERED_WEIGHT));
+}
+
+fn blend(pixel: u32, fragment: Fragment, front: f32, attributes: Attributes) {
+    blend_weighted(pixel, weight_of(fragment), fragment.depth, front, attributes);
+}
+
+// A weight of 0 adds nothing to any sum.
+fn blend_weighted(pixel: u32, weight: Term, depth: f32, front: f32, attributes: Attributes) {
     accumulate_color(pixel, weight, attributes.color);
     accumulate_normal(pixel, weight, attributes.normal);
-    accumulate_depth(pixel, weight, fragment.depth, front);
-    accumulate_count(pixel);
+    accumulate_depth(pixel, weight, depth, front);
+    accumulate_count(pixel, weight);
     settle(pixel);
 }

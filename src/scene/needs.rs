@@ -32,6 +32,8 @@ pub struct SceneNeeds {
     pub cull: bool,
     /// Large splats are drawn by tiles: the accumulator is `fixed`, and the options do not say scatter.
     pub tiles: bool,
+    /// Tiles sum all splats, large and small, and resolve their pixels at once: no sum is stored.
+    pub gather: bool,
     /// A splat's record is read by a subgroup together, as the adapter's processor would else read it for each of its
     /// invocations.
     pub subgroups: bool,
@@ -99,6 +101,7 @@ impl SceneNeeds {
             tiles: options.accumulator == "fixed"
                 && options.raster.is_none()
                 && options.organisation != Organisation::Scatter,
+            gather: false,
             subgroups: false,
             raster: options.raster,
             triangles: options.raster.is_some() && 10 * scene.surfels.len() > camera.pixels(),
@@ -134,6 +137,11 @@ impl SceneNeeds {
         Self { subgroups: self.tiles && subgroups, ..self }
     }
 
+    /// The same where tiles should sum all splats, if there are tiles, or only the large ones.
+    pub fn with_gather(self, gather: bool) -> Self {
+        Self { gather: self.tiles && gather, ..self }
+    }
+
     /// The needs by name, for people and JSON.
     pub fn names(&self) -> Vec<&'static str> {
         let projection = match self.projection {
@@ -163,6 +171,7 @@ impl SceneNeeds {
             (self.atomics_u64, "atomics-u64"),
             (self.cull, "cull"),
             (self.tiles, "tiles"),
+            (self.gather, "gather"),
             (self.epsilon_radius, "epsilon-radius"),
             (self.alpha, "alpha"),
             (self.normal, "normal"),

@@ -2,10 +2,12 @@
 // place. A small splat's cells are the tiles; a large one's are blocks of them, as it touches many. The order within a list
 // depends on the schedule, but no minimum or sum does. Host side: src/passes/tiles.rs.
 
-// For cell t, word t + 1 is at first its count, then where its list starts, and at last where it ends; word 0 is 0. The last
-// two words say how long all lists together, and the longest, were at most.
-@group(0) @binding(26) var<storage, read_write> ends: array<atomic<u32>>;
-@group(0) @binding(27) var<storage, read_write> lists: array<u32>;
+// Words 0 and 1 say how long all lists together, and the longest, were at most. For cell t, word LIST_ENDS + t + 1 is at first
+// its count, then where its list starts, and at last where it ends, and word LIST_ENDS is 0; the lists follow from
+// lists_start on.
+@group(0) @binding(26) var<storage, read_write> lists: array<atomic<u32>>;
+
+const LIST_ENDS: u32 = 2u;
 
 // Pixels of a tile, across and down.
 const TILE_SIDE: u32 = 8u;
@@ -15,6 +17,16 @@ const BLOCK_SIDE: u32 = 16u;
 // Cells of `side` pixels in a row of the image.
 fn cells_across(side: u32) -> u32 {
     return (view.width + side - 1u) / side;
+}
+
+// Cells of `side` pixels in the band.
+fn cells_in_band(side: u32) -> u32 {
+    return cells_across(side) * ((band.rows + side - 1u) / side);
+}
+
+// The word at which the lists of cells of `side` pixels start.
+fn lists_start(side: u32) -> u32 {
+    return LIST_ENDS + 1u + cells_in_band(side);
 }
 
 // The cells that hold `pixels`, which are some, x and y.
@@ -32,7 +44,7 @@ fn count_cells(splat: Splat, side: u32, offset: vec2<u32>, step: u32) {
     let cells = cells_of(pixels, side);
     for (var y = cells.first.y + offset.y; y <= cells.last.y; y += step) {
         for (var x = cells.first.x + offset.x; x <= cells.last.x; x += step) {
-            atomicAdd(&ends[y * cells_across(side) + x + 1u], 1u);
+            atomicAdd(&lists[LIST_ENDS + 1u + y * cells_across(side) + x], 1u);
         }
     }
 }
@@ -46,9 +58,9 @@ fn enter_cells(index: u32, splat: Splat, side: u32, offset: vec2<u32>, step: u32
     let cells = cells_of(pixels, side);
     for (var y = cells.first.y + offset.y; y <= cells.last.y; y += step) {
         for (var x = cells.first.x + offset.x; x <= cells.last.x; x += step) {
-            let at = atomicAdd(&ends[y * cells_across(side) + x + 1u], 1u);
+            let at = lists_start(side) + atomicAdd(&lists[LIST_ENDS + 1u + y * cells_across(side) + x], 1u);
             if (at < arrayLength(&lists)) {
-                lists[at] = index;
+                atomicStore(&lists[at], index);
             }
         }
     }
@@ -121,21 +133,29 @@ fn bin_place_large(
 const SCANNERS: u32 = 256u;
 var<workgroup> partial: array<u32, SCANNERS>;
 
-// Counts become starts. One workgroup; each invocation has a run of cells.
+// Counts of small splats become starts. One workgroup; each invocation has a run of cells.
 @compute @workgroup_size(SCANNERS)
 fn bin_scan(@builtin(local_invocation_index) local: u32) {
-    let cells = arrayLength(&ends) - 3u;
+    scan(local, cells_in_band(TILE_SIDE));
+}
+
+@compute @workgroup_size(SCANNERS)
+fn bin_scan_large(@builtin(local_invocation_index) local: u32) {
+    scan(local, cells_in_band(BLOCK_SIDE));
+}
+
+fn scan(local: u32, cells: u32) {
     let run = (cells + SCANNERS - 1u) / SCANNERS;
-    let first = min(local * run, cells);
-    let last = min(first + run, cells);
+    let first = LIST_ENDS + 1u + min(local * run, cells);
+    let last = LIST_ENDS + 1u + min(local * run + run, cells);
     var total = 0u;
     var longest = 0u;
     for (var t = first; t < last; t++) {
-        let count = atomicLoad(&ends[t + 1u]);
+        let count = atomicLoad(&lists[t]);
         longest = max(longest, count);
         total += count;
     }
-    atomicMax(&ends[arrayLength(&ends) - 1u], longest);
+    atomicMax(&lists[1], longest);
     partial[local] = total;
     workgroupBarrier();
     if (local == 0u) {
@@ -145,13 +165,13 @@ fn bin_scan(@builtin(local_invocation_index) local: u32) {
             partial[k] = before;
             before += own;
         }
-        atomicMax(&ends[arrayLength(&ends) - 2u], before);
+        atomicMax(&lists[0], before);
     }
     workgroupBarrier();
     var start = partial[local];
     for (var t = first; t < last; t++) {
-        let own = atomicLoad(&ends[t + 1u]);
-        atomicStore(&ends[t + 1u], start);
+        let own = atomicLoad(&lists[t]);
+        atomicStore(&lists[t], start);
         start += own;
     }
 }

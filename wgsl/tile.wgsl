@@ -3,8 +3,7 @@
 // Host side: src/passes/tiles.rs.
 
 // The lists of the large splats.
-@group(0) @binding(28) var<storage, read> large_ends: array<u32>;
-@group(0) @binding(29) var<storage, read> large_lists: array<u32>;
+@group(0) @binding(27) var<storage, read> large_lists: array<u32>;
 
 // The pixels of this invocation, from (x, y) down; `pixel` is the first one's place in the band. Those past the image's edge
 // have nothing. `large` and `small`: where its tile's lists start and end.
@@ -23,8 +22,9 @@ fn column_of(workgroup: vec3<u32>, local: u32) -> Column {
     let row = workgroup.y * TILE_SIDE;
     var column = Column(x, row + band.first_row, row * view.width + x, 0u, vec2<u32>(0u), vec2<u32>(0u));
     if (x / TILE_SIDE < cells_across(TILE_SIDE)) {
-        let block = row / BLOCK_SIDE * cells_across(BLOCK_SIDE) + x / BLOCK_SIDE;
-        column.large = min(vec2<u32>(large_ends[block], large_ends[block + 1u]), vec2<u32>(arrayLength(&large_lists)));
+        let end = LIST_ENDS + 1u + row / BLOCK_SIDE * cells_across(BLOCK_SIDE) + x / BLOCK_SIDE;
+        let list = vec2<u32>(large_lists[end - 1u], large_lists[end]) + lists_start(BLOCK_SIDE);
+        column.large = min(list, vec2<u32>(arrayLength(&large_lists)));
         column.small = small_list(x / TILE_SIDE, workgroup.y);
         column.pixels = select(0u, min(TILE_SIDE, band.rows - row), x < view.width);
     }

@@ -138,7 +138,7 @@ pub fn reflect(text: &str) -> std::result::Result<(naga::Module, Bindings, Vec<S
 #[derive(Default)]
 pub(crate) struct Programs(Mutex<HashMap<ProgramKey, Arc<Program>>>);
 
-/// A module's text, its constants by name as bits, and its draws in words.
+/// A module's text, its constants by name as bits, and its entry points and draws in words.
 type ProgramKey = (String, Vec<(&'static str, u64)>, String);
 
 impl Programs {
@@ -152,7 +152,7 @@ impl Programs {
         constants: &[(&'static str, f64)],
     ) -> Result<Arc<Program>> {
         let bits = constants.iter().map(|&(name, value)| (name, value.to_bits())).collect();
-        let key = (text, bits, format!("{draws:?}"));
+        let key = (text, bits, format!("{stages:?} {draws:?}"));
         // A poisoned lock means that another thread panicked while it compiled; the map itself is whole.
         let mut programs = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(program) = programs.get(&key) {

@@ -27,6 +27,9 @@ pub const QUEUE_GRID: u32 = 2;
 /// Side of the tiles that draw large splats, pixels (`wgsl/bin.wgsl`).
 pub const TILE_SIDE: u32 = 8;
 
+/// Words at the start of the lists of tiles: what they needed.
+pub const LIST_ENDS: u32 = 2;
+
 /// Side of the blocks of tiles that share a list of large splats, pixels.
 pub const BLOCK_SIDE: u32 = 16;
 

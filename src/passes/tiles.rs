@@ -25,7 +25,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::kernel::{Bound, Grid, Program};
-use crate::gpu::layout::{BLOCK_SIDE, QUEUE_GRID, TILE_SIDE, WORKGROUP};
+use crate::gpu::layout::{BLOCK_SIDE, LIST_ENDS, QUEUE_GRID, TILE_SIDE, WORKGROUP};
 use crate::scene::{Camera, RenderOptions, Scene};
 
 /// The fewest tiles that a splat touches on average for all to be summed by tiles. On a software adapter at 1024x1024 frames
@@ -59,9 +59,10 @@ pub struct Tiles {
 
 /// Lists of the splats that may touch each cell of the image.
 struct Lists {
-    /// Where each list ends, and what the frame needed.
-    ends: Buffer<u32>,
-    entries: Buffer<u32>,
+    /// What the frame needed, where each list ends, and the lists (`wgsl/bin.wgsl`).
+    words: Buffer<u32>,
+    /// Entries that there is room for.
+    entries: u64,
 }
 
 /// Which splats are listed.
@@ -102,18 +103,13 @@ impl Lists {
         };
         let cells = |rows: &Rows| u64::from(width.div_ceil(side)) * u64::from(rows.count.div_ceil(side));
         let most = bands.iter().map(cells).max().unwrap_or(0);
-        let ends = Buffer::storage(gpu, "ends of lists", most + 3)?;
-        Ok(Self { ends, entries: Buffer::storage(gpu, "lists of splats", entries)? })
-    }
-
-    fn bytes(&self) -> u64 {
-        self.ends.bytes() + self.entries.bytes()
+        let words = Buffer::storage(gpu, "lists of splats", u64::from(LIST_ENDS) + 1 + most + entries)?;
+        Ok(Self { words, entries })
     }
 
     /// What a page and band needed at most in this frame.
     fn needed(&self, gpu: &Gpu) -> Result<Room> {
-        let words = self.ends.read(gpu, self.ends.len)?;
-        let [.., entries, longest] = words[..] else { return Ok(Room { entries: 0, longest: 0 }) };
+        let [entries, longest] = self.words.read(gpu, 2)?[..] else { return Ok(Room { entries: 0, longest: 0 }) };
         Ok(Room { entries: entries.into(), longest: longest.into() })
     }
 }
@@ -164,13 +160,13 @@ impl Tiles {
 
     /// Device memory that they take, bytes.
     pub fn bytes(&self) -> u64 {
-        self.large.bytes() + self.small.bytes()
+        self.large.words.bytes() + self.small.words.bytes()
     }
 
     /// Whether there was room for the frame; if not, the image is wrong.
     pub fn held(&self, gpu: &Gpu) -> Result<bool> {
         let held = |lists: &Lists| -> Result<bool> {
-            Ok(Room { entries: lists.entries.len, longest: LONGEST }.holds(lists.needed(gpu)?))
+            Ok(Room { entries: lists.entries, longest: LONGEST }.holds(lists.needed(gpu)?))
         };
         Ok(held(&self.large)? && (self.parts.is_empty() || held(&self.small)?))
     }
@@ -206,33 +202,38 @@ impl Tiles {
         places: bool,
     ) -> Result<()> {
         let (gpu, lists) = (recorder.gpu, self.lists(of));
-        // The last two words are what it needs.
-        let words = if fresh { lists.ends.len } else { lists.ends.len - 2 };
-        let clear = |encoder: &mut wgpu::CommandEncoder| encoder.clear_buffer(&lists.ends.raw, 0, Some(words * 4));
+        // The first two words are what it needs.
+        let first = if fresh { 0 } else { u64::from(LIST_ENDS) };
+        let words = lists.words.len - lists.entries - first;
+        let clear =
+            |encoder: &mut wgpu::CommandEncoder| encoder.clear_buffer(&lists.words.raw, first * 4, Some(words * 4));
         let own = [
-            ("ends", lists.ends.bound()),
-            ("lists", lists.entries.bound()),
+            ("lists", lists.words.bound()),
             ("splats", splats.pages[page].splats.bound()),
             ("visible", visible.nearest.bound()),
         ];
         let bound = self.bindings(recorder, (splats, page), rows, &own);
         let page = &splats.pages[page];
-        let list = |pass: &mut wgpu::ComputePass<'_>, of_large, of_small| {
+        let [count, scan, place] = match of {
+            Listed::Large => ["bin_count_large", "bin_scan_large", "bin_place_large"],
+            Listed::Small => ["bin_count", "bin_scan", "bin_place"],
+        };
+        let list = |pass: &mut wgpu::ComputePass<'_>, kernel| {
             if of == Listed::Large {
                 let grid = Grid::In(&page.queue.raw, u64::from(QUEUE_GRID) * 4);
-                return self.program.dispatch(gpu, pass, of_large, &bound, grid);
+                return self.program.dispatch(gpu, pass, kernel, &bound, grid);
             }
             for &part in self.parts {
                 let (grid, drawn) = page.of(gpu, part)?;
                 let bound: Bound<'_> = bound.iter().cloned().chain(drawn).collect();
-                self.program.dispatch(gpu, pass, of_small, &bound, grid)?;
+                self.program.dispatch(gpu, pass, kernel, &bound, grid)?;
             }
             Ok(())
         };
         recorder.timing.pass(gpu, "bin", clear, |pass| {
-            list(pass, "bin_count_large", "bin_count")?;
-            self.program.dispatch(gpu, pass, "bin_scan", &bound, Grid::Of((1, 1)))?;
-            if places { list(pass, "bin_place_large", "bin_place") } else { Ok(()) }
+            list(pass, count)?;
+            self.program.dispatch(gpu, pass, scan, &bound, Grid::Of((1, 1)))?;
+            if places { list(pass, place) } else { Ok(()) }
         })
     }
 
@@ -247,12 +248,7 @@ impl Tiles {
     ) -> Result<()> {
         let gpu = recorder.gpu;
         let groups = (self.width.div_ceil(WORKGROUP), rows.count.div_ceil(TILE_SIDE));
-        let mut own = vec![
-            ("large_ends", self.large.ends.bound()),
-            ("large_lists", self.large.entries.bound()),
-            ("small_ends", self.small.ends.bound()),
-            ("small_lists", self.small.entries.bound()),
-        ];
+        let mut own = vec![("large_lists", self.large.words.bound()), ("small_lists", self.small.words.bound())];
         own.extend_from_slice(buffers);
         let bound = self.bindings(recorder, page, rows, &own);
         let kernel =
@@ -308,4 +304,31 @@ pub fn resolve(
     let buffers = [("visible", visible.nearest.bound()), ("image", buffer.image.bound())];
     tiles.bin(recorder, Listed::Small, (splats, 0), (rows, visible), true, true)?;
     tiles.draw(recorder, ("accumulate", "tile_resolve"), (splats, 0), rows, &buffers)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::scene::{Colors, Lens, Surfel, Up};
+    use glam::{DMat3, DVec3, Vec3};
+
+    /// A grid of disks of `radius` that faces a camera which sees its unit square in 100 pixels squared.
+    fn gathered(radius: f32) -> bool {
+        let at = |i: u32| (i as f32 + 0.5) / 40.0 - 0.5;
+        let surfels =
+            (0..1600).map(|i| Surfel::disk(Vec3::new(at(i % 40), at(i / 40), 0.0), Vec3::Z, radius)).collect();
+        let colors = Colors::Constant([1.0; 4]);
+        let scene = Scene { origin: DVec3::ZERO, surfels, colors, oriented: true, up: Up::Y };
+        let lens = Lens::OrthographicHeight(1.0);
+        let camera = Camera::posed((100, 100), lens, DVec3::new(0.0, 0.0, -5.0), DMat3::IDENTITY, 0.1).unwrap();
+        gathers(&scene, &camera, &RenderOptions::default())
+    }
+
+    #[test]
+    fn splats_that_touch_two_tiles_each_are_gathered() {
+        // A square of n pixels touches (1 + (n - 1) / 8)^2 tiles on average, 2 where n is 4.3.
+        assert!(gathered(0.03));
+        assert!(!gathered(0.015));
+    }
 }

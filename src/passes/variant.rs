@@ -34,9 +34,9 @@ fn stages(needs: &SceneNeeds) -> Vec<&'static str> {
 
 /// The entry points of the tiles.
 fn tile_stages(needs: &SceneNeeds) -> Vec<&'static str> {
-    let mut stages = vec!["bin_count_large", "bin_scan", "bin_place_large", "tile_visibility"];
+    let mut stages = vec!["bin_count_large", "bin_scan_large", "bin_place_large", "tile_visibility"];
     if needs.gather {
-        stages.extend(["bin_count", "bin_place", "tile_resolve"]);
+        stages.extend(["bin_count", "bin_scan", "bin_place", "tile_resolve"]);
     } else {
         stages.push("tile_accumulate");
     }

@@ -60,7 +60,8 @@ pub fn all_needs() -> Vec<SceneNeeds> {
                     let low_pass = [LowPass::None, LowPass::Max, LowPass::Ewa][next % 3];
                     let accumulator = row.name;
                     let tiles = accumulator == ACCUMULATORS[0].name;
-                    all.push(SceneNeeds { accumulator, tiles, kernel, epsilon_radius, low_pass, ..base[next] });
+                    let gather = tiles && next % 2 == 0;
+                    all.push(SceneNeeds { accumulator, tiles, gather, kernel, epsilon_radius, low_pass, ..base[next] });
                     if accumulator == ACCUMULATORS[0].name {
                         for (wide_sums, atomics_u64) in [(true, false), (false, true), (true, true)] {
                             let next = base[next];
@@ -85,6 +86,7 @@ pub fn all_needs() -> Vec<SceneNeeds> {
             epsilon_radius: step % 5 == 0,
             cull: false,
             tiles: false,
+            gather: false,
             ..base
         });
     }
@@ -111,6 +113,7 @@ fn base_needs() -> Vec<SceneNeeds> {
                 wide_sums: false,
                 atomics_u64: false,
                 tiles: bits * 37 / 8 % 4 == 0,
+                gather: bits * 37 / 8 % 8 == 0,
                 // Both, of each of the others.
                 subgroups: bits.count_ones() % 3 == 0,
                 cull: bits.count_ones() % 2 == 0,

@@ -84,7 +84,7 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME", value_parser = parse_accumulator)]
     accumulator: Option<&'static str>,
     /// How the device draws splats, to the same image: scatter (one by one), tile (by tiles of the image) or auto (large
-    /// ones by tiles) [default: auto]
+    /// ones by tiles, and on software adapters all but tiny ones) [default: auto]
     #[arg(long, value_name = "HOW")]
     organisation: Option<Organisation>,
     /// What --backend raster blends into: rgba8unorm, rgba16float or rgba32float [default: rgba16float]

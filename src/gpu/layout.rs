@@ -24,7 +24,7 @@ pub const QUEUE_START: u32 = 8;
 /// Word of the queue at which that grid starts.
 pub const QUEUE_GRID: u32 = 2;
 
-/// Side of the tiles that draw large splats, pixels (`wgsl/bin.wgsl`).
+/// Side of a tile, pixels (`wgsl/bin.wgsl`).
 pub const TILE_SIDE: u32 = 8;
 
 /// Words at the start of the lists of tiles: what they needed.

@@ -30,7 +30,7 @@ pub struct SceneNeeds {
     pub atomics_u64: bool,
     /// Batches of surfels that are out of view or hidden are left out.
     pub cull: bool,
-    /// Large splats are drawn by tiles: the accumulator is `fixed`, and the options do not say scatter.
+    /// Large splats, at least, are drawn by tiles: the accumulator is `fixed`, and the options do not say scatter.
     pub tiles: bool,
     /// Tiles sum all splats, large and small, and resolve their pixels at once: no sum is stored.
     pub gather: bool,

@@ -121,7 +121,8 @@ fn files(needs: &SceneNeeds) -> Vec<&'static str> {
     ];
     let depth = match needs.raster {
         None => {
-            files.extend(["visibility.wgsl", "occlusion.wgsl", "accumulate.wgsl", accumulate::file(needs)]);
+            files.extend(["visibility.wgsl", "occlusion.wgsl", "accumulate.wgsl"]);
+            files.extend(accumulate::files(needs));
             "depth.wgsl"
         }
         Some(raster) => {
@@ -154,8 +155,8 @@ fn files(needs: &SceneNeeds) -> Vec<&'static str> {
 
 /// The files of the tiles' module.
 fn tile_files(needs: &SceneNeeds) -> Vec<&'static str> {
-    let stored = accumulate::file(needs);
-    let mut files: Vec<_> = files(needs).into_iter().filter(|file| *file != stored).collect();
+    let stored = accumulate::files(needs);
+    let mut files: Vec<_> = files(needs).into_iter().filter(|file| !stored.contains(file)).collect();
     files.extend(accumulate::tile_files(needs));
     let pick = |needed, file, absent| if needed { file } else { absent };
     files.extend(["bin.wgsl", "tile.wgsl"]);

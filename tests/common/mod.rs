@@ -31,9 +31,11 @@ pub fn gpu() -> Option<Gpu> {
     }
 }
 
-/// The adapter with which `fixed` is kept by the kernel in `file`: without 64-bit atomics if they would replace it.
+/// The adapter with which `fixed` is kept by the kernel in `file`: without 64-bit atomics, or subgroups for tiles to gather
+/// with, if they would replace it.
 pub fn gpu_for(file: &str) -> Option<Gpu> {
     let mut gpu = gpu()?;
+    gpu.adapter.subgroups &= !file.starts_with("accum");
     gpu.adapter.atomics_u64 &= !["accumulator_fixed.wgsl", "accumulator_fixed_wide.wgsl"].contains(&file);
     Some(gpu)
 }

@@ -20,8 +20,9 @@ use super::{Arguments, backend, options, scene};
 /// Frames that wait for a writer or are in its hands take no more host memory than this, bytes, unless one frame does.
 const MOST_WAITING: u64 = 1 << 30;
 
-/// What a writer holds of each pixel, bytes: a frame's colour and maps, and as much again encoded.
+/// What a frame takes of host memory on its way to a file, bytes a pixel; each map takes [`MAP`] more.
 const PIXEL: u64 = 48;
+const MAP: u64 = 24;
 
 /// A view's picture, and what rendering it did.
 #[derive(Serialize)]
@@ -142,7 +143,7 @@ fn check_output(arguments: &Arguments, cameras: &Path) -> Result<()> {
 fn writers(pixels: u64, maps: &Maps) -> NonZeroUsize {
     let threads = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
     let planes = [maps.depth, maps.normal, maps.weight, maps.count, maps.decision];
-    let frame = pixels * (PIXEL + 24 * planes.into_iter().filter(|map| *map).count() as u64);
+    let frame = pixels * (PIXEL + MAP * planes.into_iter().filter(|map| *map).count() as u64);
     let most = usize::try_from(MOST_WAITING / frame.max(1)).unwrap_or(usize::MAX);
     NonZeroUsize::new(threads.min(most)).unwrap_or(NonZeroUsize::MIN)
 }

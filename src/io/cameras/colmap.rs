@@ -109,9 +109,12 @@ fn images(lines: &mut Lines<impl BufRead>, lenses: &HashMap<u64, Camera>) -> Res
 fn image(line: &str, lenses: &HashMap<u64, Camera>) -> Result<NamedCamera, String> {
     let mut rest = line;
     let mut next = || {
-        let (word, after) = rest.trim_start().split_once(|c: char| c.is_ascii_whitespace())?;
+        let (word, after) = match rest.trim_start().split_once(|c: char| c.is_ascii_whitespace()) {
+            Some(split) => split,
+            None => (rest.trim_start(), ""),
+        };
         rest = after;
-        Some(word)
+        (!word.is_empty()).then_some(word)
     };
     whole::<u64>(next(), "IMAGE_ID")?;
     let mut pose = [0.0; 7];
@@ -261,7 +264,7 @@ mod tests {
             ("1 1 0 0 0 x 0 0 1 a.png", "line 1: its TX, 'x', is not a number"),
             ("1 1 0 0 0 0 0", "line 1: it ends before its TZ"),
             ("1 1 0 0 0 0 0 0 1 ..", "line 1: its NAME is no name"),
-            ("1 1 0 0 0 0 0 0 1", "line 1: it ends before its CAMERA_ID"),
+            ("1 1 0 0 0 0 0 0 1", "line 1: its NAME is no name"),
         ] {
             let message = read(LENSES, poses).unwrap_err();
             assert!(message.starts_with(said), "{poses}: {message}");

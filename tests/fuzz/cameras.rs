@@ -90,5 +90,6 @@ fn execute(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
             return Err(format!("a picture would be called {:?}", camera.name));
         }
     }
-    set.into_iter().map(|camera| seen(camera.camera, valid)).last().unwrap_or(Err("there is no camera".into()))
+    let outcomes = set.into_iter().map(|camera| seen(camera.camera, valid)).collect::<Result<Vec<_>, _>>()?;
+    outcomes.first().copied().ok_or("a set holds no camera".into())
 }

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::command::{DATA, Folder, fails, ply, succeeds, text};
+use common::command::{DATA, Folder, epsplat, fails, ply, succeeds, text};
 use std::path::Path;
 use std::process::Command;
 

@@ -4,6 +4,8 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use rayon::prelude::*;
+
 use super::device::Gpu;
 use super::layout::WORKGROUP;
 use crate::error::{Error, Result};
@@ -197,8 +199,11 @@ impl Program {
             label: Some("epsplat"),
             source: wgpu::ShaderSource::Wgsl(text.into()),
         });
-        let mut pipelines = BTreeMap::new();
-        for &stage in stages {
+        let refused = |error| gpu.error(format!("the driver refused a kernel: {error}"));
+        // Each on a thread of its own: half of a first frame's time would else go by here.
+        let pipelines = stages.par_iter().map(|&stage| {
+            // Errors are told to the thread that made them.
+            let guard = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
             let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                 label: Some(stage),
                 layout: None,
@@ -211,8 +216,9 @@ impl Program {
                 },
                 cache: None,
             });
-            pipelines.insert(stage.to_owned(), pipeline);
-        }
+            pollster::block_on(guard.pop()).map_or(Ok((stage.to_owned(), pipeline)), |error| Err(refused(error)))
+        });
+        let pipelines = pipelines.collect::<Result<BTreeMap<_, _>>>()?;
         let mut drawn = BTreeMap::new();
         for draw in draws {
             let extra = draw.constant.filter(|(name, _)| declared.iter().any(|d| d == name));
@@ -249,7 +255,7 @@ impl Program {
             drawn.insert(draw.name.to_owned(), pipeline);
         }
         if let Some(error) = pollster::block_on(guard.pop()) {
-            return Err(gpu.error(format!("the driver refused a kernel: {error}")));
+            return Err(refused(error));
         }
         Ok(Self { pipelines, draws: drawn, bindings })
     }

@@ -37,7 +37,8 @@ pub fn gpu() -> Option<Gpu> {
 pub fn gpu_for(file: &str) -> Option<Gpu> {
     let mut gpu = gpu()?;
     gpu.adapter.subgroups &= !file.starts_with("accum");
-    gpu.adapter.atomics_u64 &= !["accumulator_fixed.wgsl", "accumulator_fixed_wide.wgsl"].contains(&file);
+    gpu.adapter.atomics_u64 &=
+        !["accumulator_fixed.wgsl", "accumulator_fixed_wide.wgsl", "terms_wide.wgsl"].contains(&file);
     Some(gpu)
 }
 

@@ -224,6 +224,7 @@ fn absent_parts_have_their_partners_signatures() {
     pairs.push(("color_constant.wgsl", vec!["color_srgb8.wgsl".into(), "color_sums.wgsl".into()]));
     pairs.push(("color_constant.wgsl", vec!["color_linear.wgsl".into(), "color_sums.wgsl".into()]));
     pairs.push(("shade_unlit.wgsl", vec!["shade_lambert.wgsl".into()]));
+    pairs.push(("shade_unlit.wgsl", vec!["shade_phong.wgsl".into()]));
     for (name, partners) in pairs {
         let partner: BTreeMap<_, _> = partners.iter().flat_map(|partner| signatures(text_of(partner))).collect();
         let own = signatures(text_of(name));

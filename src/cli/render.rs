@@ -9,6 +9,7 @@ use epsplat::io::camera::{self, Pose};
 use epsplat::render::{Backend, Report, render};
 use epsplat::scene::camera::DEFAULT_FOV;
 use epsplat::scene::light::MAX_LIGHTS;
+use epsplat::scene::options::SHININESS_RANGE;
 use epsplat::scene::{
     BlendFormat, Camera, Epsilon, Kernel, Lens, Light, LowPass, Maps, Organisation, Raster, RasterDepth, RenderOptions,
     Scene, Shading, Up,
@@ -29,6 +30,7 @@ use super::{note, write_json};
     after_help = "Examples:\n  \
     epsplat render scan.laz -o scan.png\n  \
     epsplat render a.ply b.ply -o maps.exr --aov depth,normal --size 1920x1080\n  \
+    epsplat render bunny.obj -o bunny.png --shading phong --light 1,1,1 --light headlight:0.3\n  \
     epsplat render scan.laz -o top.png --eye 0,0,500 --target 0,0,0 --ortho 300"
 )]
 pub struct Arguments {
@@ -97,6 +99,9 @@ pub struct Arguments {
     /// Shading of the blended colour
     #[arg(long, value_enum, default_value_t = ShadingName::Lambert)]
     shading: ShadingName,
+    /// Exponent of the highlights of --shading phong, 1 to 1000: the higher, the smaller they are [default: 32]
+    #[arg(long, value_name = "EXPONENT")]
+    shininess: Option<f32>,
     /// A light, instead of the headlight: headlight[:INTENSITY] or the direction toward it, x,y,z[:INTENSITY]
     #[arg(long = "light", value_name = "LIGHT", allow_hyphen_values = true)]
     lights: Vec<Light>,
@@ -133,12 +138,14 @@ enum LowPassName {
     Ewa,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
 enum ShadingName {
     /// The colour as it is
     Unlit,
     /// Colour times the lights' cosines
     Lambert,
+    /// The same, and white highlights
+    Phong,
 }
 
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
@@ -237,11 +244,27 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
         shading: match arguments.shading {
             ShadingName::Unlit => Shading::Unlit,
             ShadingName::Lambert => Shading::Lambert,
+            ShadingName::Phong => Shading::Phong,
         },
+        shininess: shininess(arguments)?.unwrap_or(default.shininess),
         lights: if arguments.lights.is_empty() { default.lights } else { arguments.lights.clone() },
         background: arguments.background.unwrap_or(default.background),
         maps,
     })
+}
+
+/// The exponent of highlights, if there are any.
+fn shininess(arguments: &Arguments) -> Result<Option<f32>> {
+    let (least, most) = SHININESS_RANGE;
+    match arguments.shininess {
+        Some(_) if arguments.shading != ShadingName::Phong => {
+            Err(Error::Usage("--shininess is of highlights: give it with --shading phong".into()))
+        }
+        Some(exponent) if !(least..=most).contains(&exponent) => {
+            Err(Error::Usage(format!("--shininess is {least} to {most}, not {exponent}")))
+        }
+        chosen => Ok(chosen),
+    }
 }
 
 /// How the compute kernels draw splats, of which only `fixed` has a choice.

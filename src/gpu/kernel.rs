@@ -68,6 +68,7 @@ pub const FILES: &[(&str, &str)] = wgsl![
     "resolve.wgsl",
     "rows.wgsl",
     "shade_lambert.wgsl",
+    "shade_phong.wgsl",
     "shade_unlit.wgsl",
     "splat_plain.wgsl",
     "splat_shared.wgsl",

@@ -11,7 +11,7 @@ use crate::gpu::kernel::Program;
 use crate::gpu::layout::{LARGE_BY_TILES, LARGE_BY_WORKGROUPS};
 use crate::gpu::{Gpu, Sources};
 use crate::scene::{
-    ColorNeed, Kernel, KernelShape, LowPass, Organisation, Projection, RasterDepth, RenderOptions, SceneNeeds,
+    ColorNeed, Kernel, KernelShape, LowPass, Organisation, Projection, RasterDepth, RenderOptions, SceneNeeds, Shading,
 };
 
 /// The entry points that a render with `needs` dispatches.
@@ -103,7 +103,11 @@ fn files(needs: &SceneNeeds) -> Vec<&'static str> {
         pick(needs.normal_map, "normal_map.wgsl", "normal_map_absent.wgsl"),
         pick(needs.weight_map, "weight_map.wgsl", "weight_map_absent.wgsl"),
         pick(needs.count, "count.wgsl", "count_absent.wgsl"),
-        pick(needs.lambert, "shade_lambert.wgsl", "shade_unlit.wgsl"),
+        match needs.shading {
+            Shading::Unlit => "shade_unlit.wgsl",
+            Shading::Lambert => "shade_lambert.wgsl",
+            Shading::Phong => "shade_phong.wgsl",
+        },
     ];
     let depth = match needs.raster {
         None => {
@@ -249,6 +253,9 @@ pub fn overrides(needs: &SceneNeeds, options: &RenderOptions, fraction_bits: u32
         // The visibility pass's pipeline says otherwise.
         constants.push(("MOVED", 0.0));
         constants.push(("ALONG_RAY", u32::from(raster.depth == RasterDepth::Ray).into()));
+    }
+    if needs.shading == Shading::Phong {
+        constants.push(("SHININESS", options.shininess.into()));
     }
     if needs.cull {
         constants.push(("FILTER_REACH", cull::filter_reach(&Design::of(options))));

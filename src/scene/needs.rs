@@ -51,7 +51,7 @@ pub struct SceneNeeds {
     pub color: ColorNeed,
     /// Surfels differ in alpha.
     pub alpha: bool,
-    /// Normals are accumulated: Lambert shading or a normal map.
+    /// Normals are accumulated: pixels are lit, or a normal map is written.
     pub normal: bool,
     /// Normals have no consistent side and are turned toward the viewer before they are blended.
     pub turn_normals: bool,
@@ -59,8 +59,8 @@ pub struct SceneNeeds {
     pub depth: bool,
     /// Fragments are counted.
     pub count: bool,
-    /// Pixels are lit.
-    pub lambert: bool,
+    /// How pixels are lit.
+    pub shading: Shading,
     /// A normal map is written.
     pub normal_map: bool,
     /// A weight map is written.
@@ -87,7 +87,7 @@ impl SceneNeeds {
             Colors::Srgb8(_) => ColorNeed::Srgb8,
             Colors::Linear(_) => ColorNeed::Linear,
         };
-        let lambert = options.shading == Shading::Lambert;
+        let lit = options.shading != Shading::Unlit;
         Self {
             projection: camera.projection,
             accumulator: options.accumulator,
@@ -107,11 +107,11 @@ impl SceneNeeds {
             epsilon_radius: matches!(options.epsilon, Epsilon::Radius(_)),
             color,
             alpha: low[3] != high[3],
-            normal: lambert || options.maps.normal,
-            turn_normals: !scene.oriented && (lambert || options.maps.normal),
+            normal: lit || options.maps.normal,
+            turn_normals: !scene.oriented && (lit || options.maps.normal),
             depth: options.maps.depth,
             count: options.maps.count,
-            lambert,
+            shading: options.shading,
             normal_map: options.maps.normal,
             weight_map: options.maps.weight,
             decision: options.maps.decision,
@@ -169,7 +169,8 @@ impl SceneNeeds {
             (self.turn_normals, "turn-normals"),
             (self.depth, "depth"),
             (self.count, "count"),
-            (self.lambert, "lambert"),
+            (self.shading == Shading::Lambert, "lambert"),
+            (self.shading == Shading::Phong, "phong"),
             (self.normal_map, "normal-map"),
             (self.weight_map, "weight-map"),
             (self.decision, "decision"),

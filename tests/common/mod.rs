@@ -11,7 +11,7 @@ use epsplat::gpu::Gpu;
 use epsplat::gpu::layout::{ONE, View};
 use epsplat::passes::accumulate::{ACCUMULATORS, Accumulator};
 use epsplat::scene::{
-    BlendFormat, ColorNeed, KernelShape, LowPass, Projection, Raster, RasterDepth, RenderOptions, SceneNeeds,
+    BlendFormat, ColorNeed, KernelShape, LowPass, Projection, Raster, RasterDepth, RenderOptions, SceneNeeds, Shading,
 };
 
 /// What one unit in a sum of the accumulator `fixed` is of a full weight.
@@ -97,8 +97,13 @@ fn base_needs() -> Vec<SceneNeeds> {
     let mut all = Vec::new();
     for bits in 0..1u32 << 8 {
         let bit = |k: u32| bits >> k & 1 == 1;
-        let (lambert, normal_map, turn_normals, alpha) = (bit(0), bit(1), bit(2), bit(3));
-        let normal = lambert || normal_map;
+        let (lit, normal_map, turn_normals, alpha) = (bit(0), bit(1), bit(2), bit(3));
+        let normal = lit || normal_map;
+        let shading = match (lit, bits.count_ones() % 2 == 0) {
+            (false, _) => Shading::Unlit,
+            (true, true) => Shading::Lambert,
+            (true, false) => Shading::Phong,
+        };
         for color in [ColorNeed::Constant, ColorNeed::Srgb8, ColorNeed::Linear] {
             if (turn_normals && !normal) || (alpha && color == ColorNeed::Constant) {
                 continue;
@@ -124,7 +129,7 @@ fn base_needs() -> Vec<SceneNeeds> {
                 turn_normals,
                 depth,
                 count,
-                lambert,
+                shading,
                 normal_map,
                 weight_map,
                 ..plain

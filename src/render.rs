@@ -231,7 +231,7 @@ impl<'a> Renderer<'a> {
             raster::record(&mut recorder, *options, &splats, first, targets)?;
         }
         for rows in &pixels.bands {
-            let sums = match &pixels.sums {
+            let mut sums = match &pixels.sums {
                 Sums::Storage(nearest, sums) => {
                     for &part in parts {
                         // Bands share their splats.
@@ -261,6 +261,7 @@ impl<'a> Renderer<'a> {
                 }
                 Sums::Targets(_, targets) => targets.bindings(),
             };
+            sums.extend(splats.surfels.texture());
             resolve::record(&mut recorder, rows, sums, &pixels.image)?;
             resolve::read_back(&recorder, rows, &pixels.image, &mut frame)?;
             progress.advance(rows.count.into());

@@ -94,11 +94,12 @@ struct Fragment {
     depth: f32,
     rho2: f32,
     gain: f32,
+    disk: vec2<f32>,
 }
 
 fn intersect(abc: vec3<f32>) -> Fragment {
     let rho2 = dot(abc.xy, abc.xy);
-    return Fragment(rho2 <= 1.0 && abc.z >= held.near, abc.z, rho2, 1.0);
+    return Fragment(rho2 <= 1.0 && abc.z >= held.near, abc.z, rho2, 1.0, abc.xy);
 }
 
 fn nearest_between(low: f32, high: f32) -> f32 {

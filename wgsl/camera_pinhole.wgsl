@@ -225,6 +225,8 @@ struct Fragment {
     rho2: f32,
     // Factor on the kernel's weight.
     gain: f32,
+    // On the unit disk; 0 where a filter shows the splat.
+    disk: vec2<f32>,
 }
 
 // The intersection of the ray through d (relative to the anchor's centre) with the splat's disk, and its weight's rho.
@@ -234,7 +236,7 @@ fn intersect(abc: vec3<f32>) -> Fragment {
     let uv = abc.xy * depth;
     // Behind the camera rho is infinite.
     let rho2 = select(3e38, dot(uv, uv), abc.z > 0.0);
-    return Fragment(reached && depth >= held.near, depth, select(rho2, min(rho2, 1.0), reached), 1.0);
+    return Fragment(reached && depth >= held.near, depth, select(rho2, min(rho2, 1.0), reached), 1.0, uv);
 }
 
 // The least depth of a fragment where row c has values between `low` and `high`.

@@ -47,7 +47,7 @@ fn resolve(
         write_count(out, pixel);
         return;
     }
-    let premultiplied = resolve_color(pixel, weight);
+    let premultiplied = textured(pixel, weight, resolve_color(pixel, weight));
     let alpha = premultiplied.a;
     let color = select(vec3<f32>(0.0), premultiplied.rgb / alpha, alpha > 0.0);
     let normal = resolve_normal(pixel, weight);

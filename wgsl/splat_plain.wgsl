@@ -11,7 +11,7 @@ fn shared_attributes(place: u32, local: u32) -> Attributes {
     let own = large_attributes[place];
     let c = own.color;
     let n = own.normal;
-    return Attributes(vec4<f32>(c[0], c[1], c[2], c[3]), vec3<f32>(n[0], n[1], n[2]), own.radius);
+    return attributes_without_place(vec4<f32>(c[0], c[1], c[2], c[3]), vec3<f32>(n[0], n[1], n[2]), own.radius);
 }
 
 fn shared_any(wanted: bool) -> bool {

@@ -41,7 +41,7 @@ fn shared_attributes(place: u32, local: u32) -> Attributes {
     normal.x = subgroupBroadcast(words, 4u);
     normal.y = subgroupBroadcast(words, 5u);
     normal.z = subgroupBroadcast(words, 6u);
-    return Attributes(color, normal, subgroupBroadcast(words, 7u));
+    return attributes_without_place(color, normal, subgroupBroadcast(words, 7u));
 }
 
 // Whether an invocation wants the splat: then all take it.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use epsplat::frame::Frame;
 use epsplat::gpu::Gpu;
+use epsplat::io::Texture;
 use epsplat::io::camera::{self, Pose};
 use epsplat::render::{Backend, Report, render};
 use epsplat::scene::camera::DEFAULT_FOV;
@@ -31,6 +32,7 @@ use super::{note, write_json};
     epsplat render scan.laz -o scan.png\n  \
     epsplat render a.ply b.ply -o maps.exr --aov depth,normal --size 1920x1080\n  \
     epsplat render bunny.obj -o bunny.png --shading phong --light 1,1,1 --light headlight:0.3\n  \
+    epsplat render surfels.ply -o painted.png --texture image.png\n  \
     epsplat render scan.laz -o top.png --eye 0,0,500 --target 0,0,0 --ortho 300"
 )]
 pub struct Arguments {
@@ -102,6 +104,10 @@ pub struct Arguments {
     /// Exponent of the highlights of --shading phong, 1 to 1000: the higher, the smaller they are [default: 32]
     #[arg(long, value_name = "EXPONENT")]
     shininess: Option<f32>,
+    /// An image to paint the surfels with, by their texture coordinates (`epsplat sample` writes them), in place of their own
+    /// colours: .png
+    #[arg(long, value_name = "IMAGE")]
+    texture: Option<PathBuf>,
     /// A light, instead of the headlight: headlight[:INTENSITY] or the direction toward it, x,y,z[:INTENSITY]
     #[arg(long = "light", value_name = "LIGHT", allow_hyphen_values = true)]
     lights: Vec<Light>,
@@ -168,8 +174,20 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let backend = backend(arguments)?;
 
     let bars = Bars::new();
+    let texture = arguments.texture.as_deref().map(Texture::read).transpose()?;
     let inputs = arguments.inputs.iter().map(|path| io::read(path, &bars)).collect::<Result<Vec<_>>>()?;
-    let (scene, preparation) = surfels::build(inputs, &bars)?;
+    let (scene, preparation) = match texture {
+        None => surfels::build(inputs, &bars)?,
+        Some(texture) => {
+            let mut read = arguments.inputs.iter().zip(&inputs);
+            if let Some((path, _)) = read.find(|(_, points)| points.texture.is_none()) {
+                let what = "its points have no texture coordinates, so they cannot be textured; `epsplat sample` gives surfels of \
+                            a mesh some";
+                return Err(Error::malformed(path, what));
+            }
+            surfels::build_textured(inputs, texture, &bars)?
+        }
+    };
     for line in preparation.notes() {
         note(&line);
     }
@@ -276,6 +294,9 @@ fn organisation(arguments: &Arguments) -> Result<Organisation> {
         Some(Organisation::Tile) if !fixed => {
             Err(Error::Usage("--organisation tile needs the accumulator fixed: leave one of them out".into()))
         }
+        Some(Organisation::Tile) if arguments.texture.is_some() => {
+            Err(Error::Usage("--organisation tile draws no textures: leave it or --texture out".into()))
+        }
         chosen => Ok(chosen.unwrap_or_default()),
     }
 }
@@ -288,6 +309,9 @@ fn raster(arguments: &Arguments) -> Result<Option<Raster>> {
             true => Err(Error::Usage("--blend-format and --raster-depth need --backend raster".into())),
             false => Ok(None),
         };
+    }
+    if arguments.texture.is_some() {
+        return Err(Error::Usage("--backend raster blends no texture coordinates: leave --texture out".into()));
     }
     if arguments.accumulator.is_some() {
         return Err(Error::Usage("--backend raster adds in --blend-format: leave --accumulator out".into()));

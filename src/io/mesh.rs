@@ -54,6 +54,7 @@ impl Mesh {
         let colored = match &self.colors {
             Some(Colors::Srgb8(colors)) => colors.len() == vertices,
             Some(Colors::Linear(colors)) => colors.len() == vertices,
+            Some(Colors::Textured(textured)) => textured.colors().len() == vertices,
             Some(Colors::Constant(_)) | None => true,
         };
         let lengths = [

@@ -40,7 +40,7 @@ use crate::gpu::buffers::Buffer;
 use crate::gpu::kernel::Bound;
 use crate::gpu::layout::ONE;
 use crate::scene::options::LEAST_FILTERED_WEIGHT;
-use crate::scene::{Camera, RenderOptions, Scene, SceneNeeds};
+use crate::scene::{Camera, Colors, RenderOptions, Scene, SceneNeeds};
 
 /// An accumulator: one row of the table below, one file `wgsl/accumulator_*.wgsl`.
 #[derive(Debug)]
@@ -196,6 +196,8 @@ pub struct PixelSums {
     pub normal: [f64; 3],
     /// Of the depth.
     pub depth: f64,
+    /// Of [`Textured::terms`](crate::scene::Textured::terms), places in a texture.
+    pub place: [f64; 4],
     /// Accepted fragments.
     pub count: u32,
     /// The smallest relative distance of a fragment to a decision; see [`crate::scene::Maps::decision`].
@@ -204,8 +206,15 @@ pub struct PixelSums {
 
 impl PixelSums {
     /// Nothing yet.
-    pub const ZERO: Self =
-        Self { weight: 0.0, color: [0.0; 4], normal: [0.0; 3], depth: 0.0, count: 0, decision: f64::INFINITY };
+    pub const ZERO: Self = Self {
+        weight: 0.0,
+        color: [0.0; 4],
+        normal: [0.0; 3],
+        depth: 0.0,
+        place: [0.0; 4],
+        count: 0,
+        decision: f64::INFINITY,
+    };
 }
 
 /// How far outside a decision a fragment is still looked at to record its distance, relative.
@@ -247,6 +256,12 @@ pub fn reference<'a>(
                 sum.weight += weight;
                 for (total, value) in sum.color.iter_mut().zip(color) {
                     *total += weight * value;
+                }
+                if let Colors::Textured(textured) = &scene.colors {
+                    let terms = textured.terms(splat.surfel as usize, at.disk);
+                    for (total, value) in sum.place.iter_mut().zip(terms) {
+                        *total += weight * value;
+                    }
                 }
                 for (total, value) in sum.normal.iter_mut().zip(normal.to_array()) {
                     *total += weight * value;

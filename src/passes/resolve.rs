@@ -12,16 +12,27 @@ use crate::gpu::Gpu;
 use crate::gpu::buffers::{Buffer, Readback};
 use crate::gpu::kernel::{Bound, Grid, grid};
 use crate::scene::options::HIGHLIGHT;
-use crate::scene::{Camera, Light, RenderOptions, Shading};
+use crate::scene::{Camera, Colors, Light, RenderOptions, Scene, Shading};
 
 /// The twin: resolves `sums`, which start at row `first_row` of the image, into `frame`, which holds just their rows.
-pub fn reference(sums: &[PixelSums], camera: &Camera, options: &RenderOptions, first_row: u32, frame: &mut Frame) {
+pub fn reference(
+    sums: &[PixelSums],
+    scene: &Scene,
+    camera: &Camera,
+    options: &RenderOptions,
+    first_row: u32,
+    frame: &mut Frame,
+) {
     for (pixel, sum) in sums.iter().enumerate() {
         let (x, y) = (pixel as u32 % camera.width, pixel as u32 / camera.width + first_row);
         let background = options.background.map(f64::from);
         let (mut color, mut depth, mut normal) = (background, f64::INFINITY, DVec3::ZERO);
         if sum.weight > 0.0 {
-            let mean = sum.color.map(|c| c / sum.weight);
+            let blended = sum.color.map(|c| c / sum.weight);
+            let mean = match &scene.colors {
+                Colors::Textured(textured) => textured.resolve(sum.place.map(|total| total / sum.weight), blended),
+                _ => blended,
+            };
             let alpha = mean[3];
             let straight = DVec3::new(mean[0], mean[1], mean[2]) / if alpha > 0.0 { alpha } else { f64::INFINITY };
             normal = unit_or_zero(DVec3::from_array(sum.normal) / sum.weight);

@@ -2,6 +2,8 @@
 
 use std::sync::LazyLock;
 
+use super::texture::Textured;
+
 /// The sRGB transfer function from a code in [0, 1] to linear light (IEC 61966-2-1).
 pub fn srgb_to_linear(code: f64) -> f64 {
     if code <= 0.04045 { code / 12.92 } else { ((code + 0.055) / 1.055).powf(2.4) }
@@ -26,13 +28,15 @@ pub enum Colors {
     Srgb8(Vec<[u8; 4]>),
     /// One linear colour each; any finite value.
     Linear(Vec<[f32; 4]>),
+    /// A place in a texture each.
+    Textured(Textured),
 }
 
 /// The colour of surfels that come without one: a light grey that shading can darken and highlights cannot clip.
 pub const DEFAULT_COLOR: [f32; 4] = [0.7, 0.7, 0.7, 1.0];
 
 impl Colors {
-    /// The linear colour of surfel `index`, straight alpha.
+    /// The linear colour of surfel `index`, straight alpha; of a texture the mean over its disk.
     pub fn linear(&self, index: usize) -> [f32; 4] {
         match self {
             Self::Constant(color) => *color,
@@ -42,6 +46,7 @@ impl Colors {
                 [table[r as usize], table[g as usize], table[b as usize], f32::from(a) / 255.0]
             }
             Self::Linear(colors) => colors[index],
+            Self::Textured(textured) => textured.colors()[index],
         }
     }
 }

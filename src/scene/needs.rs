@@ -14,6 +14,8 @@ pub enum ColorNeed {
     Srgb8,
     /// Four f32 each.
     Linear,
+    /// The same of the texture's mean over the disk, and a place in the texture, which is looked up once a pixel.
+    Textured,
 }
 
 /// What exists in this render: it chooses the WGSL files that are joined, and so the bindings, buffers and sums.
@@ -30,7 +32,8 @@ pub struct SceneNeeds {
     pub atomics_u64: bool,
     /// Batches of surfels that are out of view or hidden are left out.
     pub cull: bool,
-    /// Large splats are drawn by tiles: the accumulator is `fixed`, and the options do not say scatter.
+    /// Large splats are drawn by tiles: the accumulator is `fixed`, the options do not say scatter, and there is no texture, whose
+    /// sums are more than a tile's registers hold.
     pub tiles: bool,
     /// A splat's record is read by a subgroup together, as the adapter's processor would else read it for each of its
     /// invocations.
@@ -82,6 +85,7 @@ impl SceneNeeds {
     pub fn of(scene: &Scene, color_range: &([f32; 4], [f32; 4]), camera: &Camera, options: &RenderOptions) -> Self {
         let (low, high) = color_range;
         let color = match scene.colors {
+            Colors::Textured(_) => ColorNeed::Textured,
             _ if low == high => ColorNeed::Constant,
             Colors::Constant(_) => ColorNeed::Constant,
             Colors::Srgb8(_) => ColorNeed::Srgb8,
@@ -98,6 +102,7 @@ impl SceneNeeds {
             cull: false,
             tiles: options.accumulator == "fixed"
                 && options.raster.is_none()
+                && color != ColorNeed::Textured
                 && options.organisation != Organisation::Scatter,
             subgroups: false,
             raster: options.raster,
@@ -144,6 +149,7 @@ impl SceneNeeds {
             ColorNeed::Constant => "color-constant",
             ColorNeed::Srgb8 => "color-srgb8",
             ColorNeed::Linear => "color-linear",
+            ColorNeed::Textured => "color-textured",
         };
         let kernel = match self.kernel {
             KernelShape::Gaussian => "kernel-gaussian",

@@ -59,7 +59,7 @@ pub fn all_needs() -> Vec<SceneNeeds> {
                     next = (next + 101) % base.len();
                     let low_pass = [LowPass::None, LowPass::Max, LowPass::Ewa][next % 3];
                     let accumulator = row.name;
-                    let tiles = accumulator == ACCUMULATORS[0].name;
+                    let tiles = accumulator == ACCUMULATORS[0].name && base[next].color != ColorNeed::Textured;
                     all.push(SceneNeeds { accumulator, tiles, kernel, epsilon_radius, low_pass, ..base[next] });
                     if accumulator == ACCUMULATORS[0].name {
                         for (wide_sums, atomics_u64) in [(true, false), (false, true), (true, true)] {
@@ -71,9 +71,10 @@ pub fn all_needs() -> Vec<SceneNeeds> {
             }
         }
     }
+    let rastered: Vec<_> = base.iter().filter(|needs| needs.color != ColorNeed::Textured).collect();
     // The rasteriser's, with as many targets as the sums take.
     for (step, (depth, _)) in (0..240).zip(RasterDepth::ALL.iter().cycle()) {
-        let (kernel, base) = (shapes[step % 4], base[(step * 101) % base.len()]);
+        let (kernel, base) = (shapes[step % 4], rastered[(step * 101) % rastered.len()]);
         let low_pass = [LowPass::None, LowPass::Max, LowPass::Ewa][step / 3 % 3];
         let raster = Some(Raster { format: BlendFormat::ALL[step / 7 % 3].0, depth: *depth });
         let triangles = step / 2 % 2 == 0;
@@ -85,7 +86,7 @@ pub fn all_needs() -> Vec<SceneNeeds> {
             epsilon_radius: step % 5 == 0,
             cull: false,
             tiles: false,
-            ..base
+            ..*base
         });
     }
     all
@@ -104,7 +105,7 @@ fn base_needs() -> Vec<SceneNeeds> {
             (true, true) => Shading::Lambert,
             (true, false) => Shading::Phong,
         };
-        for color in [ColorNeed::Constant, ColorNeed::Srgb8, ColorNeed::Linear] {
+        for color in [ColorNeed::Constant, ColorNeed::Srgb8, ColorNeed::Linear, ColorNeed::Textured] {
             if (turn_normals && !normal) || (alpha && color == ColorNeed::Constant) {
                 continue;
             }
@@ -115,7 +116,7 @@ fn base_needs() -> Vec<SceneNeeds> {
                 accumulator: ACCUMULATORS[0].name,
                 wide_sums: false,
                 atomics_u64: false,
-                tiles: bits * 37 / 8 % 4 == 0,
+                tiles: bits * 37 / 8 % 4 == 0 && color != ColorNeed::Textured,
                 // Both, of each of the others.
                 subgroups: bits.count_ones() % 3 == 0,
                 cull: bits.count_ones() % 2 == 0,

@@ -253,7 +253,7 @@ fn absent_parts_have_their_partners_signatures() {
     alike("splat_", &["shared_splat", "shared_attributes", "shared_any"]);
     alike("kernel_", &["kernel_weight"]);
     alike("epsilon", &["radius_of", "deepest_accepted", "farthest_accepted"]);
-    let shared = ["homography", "intersect", "ray"];
+    let shared = ["homography", "intersect", "ray", "point_at"];
     let (pinhole, orthographic) =
         (signatures(text_of("camera_pinhole.wgsl")), signatures(text_of("camera_orthographic.wgsl")));
     for function in shared {

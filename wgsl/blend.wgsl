@@ -32,6 +32,6 @@ fn blend(pixel: u32, fragment: Fragment, front: f32, attributes: Attributes) {
     accumulate_normal(pixel, weight, attributes.normal);
     accumulate_depth(pixel, weight, fragment.depth, front);
     accumulate_count(pixel);
-    accumulate_place(pixel, weight, attributes.place, fragment.disk);
+    accumulate_place(pixel, weight, attributes.place, fragment.depth);
     settle(pixel);
 }

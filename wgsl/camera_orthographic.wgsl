@@ -94,12 +94,11 @@ struct Fragment {
     depth: f32,
     rho2: f32,
     gain: f32,
-    disk: vec2<f32>,
 }
 
 fn intersect(abc: vec3<f32>) -> Fragment {
     let rho2 = dot(abc.xy, abc.xy);
-    return Fragment(rho2 <= 1.0 && abc.z >= held.near, abc.z, rho2, 1.0, abc.xy);
+    return Fragment(rho2 <= 1.0 && abc.z >= held.near, abc.z, rho2, 1.0);
 }
 
 fn nearest_between(low: f32, high: f32) -> f32 {
@@ -112,6 +111,11 @@ fn plane_depth(abc: vec3<f32>, low: f32, high: f32) -> f32 {
 
 fn ray(x: u32, y: u32) -> vec3<f32> {
     return view.rotation[2].xyz;
+}
+
+fn point_at(x: u32, y: u32, depth: f32) -> vec3<f32> {
+    let image = (vec2<f32>(f32(x), f32(y)) + 0.5 - view.intrinsics.zw) / view.intrinsics.xy;
+    return view.eye.xyz + image.x * view.rotation[0].xyz + image.y * view.rotation[1].xyz + depth * view.rotation[2].xyz;
 }
 
 fn homogeneous_row(splat: Splat) -> vec3<f32> {

@@ -225,8 +225,6 @@ struct Fragment {
     rho2: f32,
     // Factor on the kernel's weight.
     gain: f32,
-    // On the unit disk; 0 where a filter shows the splat.
-    disk: vec2<f32>,
 }
 
 // The intersection of the ray through d (relative to the anchor's centre) with the splat's disk, and its weight's rho.
@@ -236,7 +234,7 @@ fn intersect(abc: vec3<f32>) -> Fragment {
     let uv = abc.xy * depth;
     // Behind the camera rho is infinite.
     let rho2 = select(3e38, dot(uv, uv), abc.z > 0.0);
-    return Fragment(reached && depth >= held.near, depth, select(rho2, min(rho2, 1.0), reached), 1.0, uv);
+    return Fragment(reached && depth >= held.near, depth, select(rho2, min(rho2, 1.0), reached), 1.0);
 }
 
 // The least depth of a fragment where row c has values between `low` and `high`.
@@ -253,6 +251,12 @@ fn plane_depth(abc: vec3<f32>, low: f32, high: f32) -> f32 {
 fn ray(x: u32, y: u32) -> vec3<f32> {
     let image = (vec2<f32>(f32(x), f32(y)) + 0.5 - view.intrinsics.zw) / view.intrinsics.xy;
     return normalize(image.x * view.rotation[0].xyz + image.y * view.rotation[1].xyz + view.rotation[2].xyz);
+}
+
+// The point at a depth on that ray, relative to the scene's origin, device units.
+fn point_at(x: u32, y: u32, depth: f32) -> vec3<f32> {
+    let image = (vec2<f32>(f32(x), f32(y)) + 0.5 - view.intrinsics.zw) / view.intrinsics.xy * depth;
+    return view.eye.xyz + image.x * view.rotation[0].xyz + image.y * view.rotation[1].xyz + depth * view.rotation[2].xyz;
 }
 
 // The third row of the matrix that takes an image point to (u, v, 1), up to a factor.

@@ -6,25 +6,35 @@ override PLACE_CHANNEL: u32;
 // Rows from the top, four bytes of sRGB and straight alpha each.
 @group(0) @binding(36) var<storage, read> texels: array<u32>;
 
-// In units of the range of texture coordinates.
+// Texture coordinates are in units of their range.
 struct Place {
     // Of the surfel's centre, mapped to [0, 1].
     center: vec2<f32>,
     // Mapped to [0, 1] from its own range.
     reach_2: f32,
-    // What the coordinates gain along the half-axes.
-    along_s: vec2<f32>,
-    along_t: vec2<f32>,
+    // The centre itself, device units.
+    position: vec3<f32>,
+    // What the coordinates gain for a world unit along each axis.
+    u_slope: vec3<f32>,
+    v_slope: vec3<f32>,
 }
 
 fn place_of(index: u32) -> Place {
-    let center = colors[3u * index + 1u];
-    let slopes = colors[3u * index + 2u];
-    return Place(center.xy, center.z, slopes.xy, slopes.zw);
+    let center = surfels[index].center;
+    let at = colors[4u * index + 1u];
+    return Place(
+        at.xy,
+        at.z,
+        vec3<f32>(center[0], center[1], center[2]) * view.unit,
+        colors[4u * index + 2u].xyz,
+        colors[4u * index + 3u].xyz,
+    );
 }
 
-fn accumulate_place(pixel: u32, weight: Term, place: Place, disk: vec2<f32>) {
-    let at = place.center + (disk.x * place.along_s + disk.y * place.along_t);
+fn accumulate_place(pixel: u32, weight: Term, place: Place, depth: f32) {
+    let point = point_at(pixel % held.width, pixel / held.width + held.first_row, depth);
+    let step = (point - place.position) * view.world;
+    let at = place.center + vec2<f32>(dot(step, place.u_slope), dot(step, place.v_slope));
     let offset = at - 0.5;
     add_pair(pixel, PLACE_CHANNEL, term(weight, at.x), term(weight, at.y));
     // Of coordinates in [0, 1] the squared distance from the middle is at most 1/2.

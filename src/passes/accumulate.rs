@@ -28,6 +28,8 @@
 //! - **float**, **cas**: f32 sums, by atomic add or by compare and exchange. A sum of n terms in any order errs by at most
 //!   `(n - 1) u` of itself, and so does the weight's: `2 n u + 4 u`. The order shows.
 
+use glam::Vec3;
+
 use super::cull::Part;
 use super::footprint::footprint;
 use super::project::{Splat, SplatBuffer};
@@ -236,7 +238,9 @@ pub fn reference<'a>(
     for splat in splats {
         let [r, g, b, alpha] = scene.colors.linear(splat.surfel as usize).map(f64::from);
         let color = [r * alpha, g * alpha, b * alpha, alpha];
-        let radius = f64::from(scene.surfels[splat.surfel as usize].radius());
+        let surfel = &scene.surfels[splat.surfel as usize];
+        let center = scene.origin + Vec3::from_array(surfel.center).as_dvec3();
+        let radius = f64::from(surfel.radius());
         let epsilon = absolute + of_radius * radius;
         let normal = if splat.away && !scene.oriented { -splat.normal } else { splat.normal };
         for y in splat.first[1].max(first_row)..=splat.last[1].min(first_row + rows - 1) {
@@ -258,7 +262,9 @@ pub fn reference<'a>(
                     *total += weight * value;
                 }
                 if let Colors::Textured(textured) = &scene.colors {
-                    let terms = textured.terms(splat.surfel as usize, at.disk);
+                    let (x, y) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
+                    let point = camera.ray_start(x, y) + at.depth * camera.ray(x, y);
+                    let terms = textured.terms(splat.surfel as usize, point - center);
                     for (total, value) in sum.place.iter_mut().zip(terms) {
                         *total += weight * value;
                     }

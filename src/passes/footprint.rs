@@ -1,7 +1,5 @@
 //! A splat at a pixel: coverage, depth and rho. The twin of `wgsl/footprint.wgsl`.
 
-use glam::DVec2;
-
 use super::lowpass::filtered;
 use super::project::Splat;
 use crate::scene::{Camera, LowPass, Projection};
@@ -13,8 +11,6 @@ pub struct Intersection {
     pub depth: f64,
     /// Squared radius on the unit disk; the disk ends at 1.
     pub rho2: f64,
-    /// On the unit disk; 0 where a filter shows the splat.
-    pub disk: DVec2,
 }
 
 impl Intersection {
@@ -31,12 +27,8 @@ pub fn footprint(splat: &Splat, camera: &Camera, low_pass: LowPass, x: u32, y: u
     let at = |row: glam::DVec3| row.x * dx + (row.y * dy + row.z);
     let (a, b, c) = (at(splat.a), at(splat.b), at(splat.c));
     let disk = match camera.projection {
-        Projection::Pinhole => (c > 0.0).then(|| Intersection {
-            depth: 1.0 / c,
-            rho2: (a * a + b * b) / (c * c),
-            disk: DVec2::new(a, b) / c,
-        }),
-        Projection::Orthographic => Some(Intersection { depth: c, rho2: a * a + b * b, disk: DVec2::new(a, b) }),
+        Projection::Pinhole => (c > 0.0).then(|| Intersection { depth: 1.0 / c, rho2: (a * a + b * b) / (c * c) }),
+        Projection::Orthographic => Some(Intersection { depth: c, rho2: a * a + b * b }),
     };
     filtered(splat, camera, low_pass, disk, c, (dx, dy))
 }

@@ -56,8 +56,8 @@ impl SurfelBuffer {
                 (ColorNeed::Textured, Colors::Textured(textured)) => {
                     let buffer = Buffer::storage(gpu, "colours", indices.len() as u64)?;
                     let all = |&index: &u32| {
-                        let [center, slopes] = textured.mapped(index as usize);
-                        [textured.colors()[index as usize], center, slopes]
+                        let [center, u_slope, v_slope] = textured.mapped(index as usize);
+                        [textured.colors()[index as usize], center, u_slope, v_slope]
                     };
                     let values = |range: Range<usize>| indices[range].par_iter().map(all).collect::<Vec<_>>().into();
                     buffer.write(gpu, indices.len(), values, &())?;

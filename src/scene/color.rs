@@ -51,6 +51,19 @@ impl Colors {
     }
 }
 
+/// The weighted mean of straight colours, premultiplied as splats are blended.
+pub(crate) fn mean_color(colors: impl Iterator<Item = ([f32; 4], f64)>) -> [f32; 4] {
+    let (mut sum, mut weights) = ([0.0; 4], 0.0);
+    for (color, weight) in colors {
+        let [r, g, b, alpha] = color.map(f64::from);
+        let covers = weight * alpha;
+        sum = [sum[0] + covers * r, sum[1] + covers * g, sum[2] + covers * b, sum[3] + covers];
+        weights += weight;
+    }
+    let [r, g, b, alpha] = sum;
+    if alpha > 0.0 { [r / alpha, g / alpha, b / alpha, alpha / weights].map(|c| c as f32) } else { [0.0; 4] }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::DVec2;
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::color::SRGB8_TO_LINEAR;
@@ -88,9 +88,10 @@ const LEAST_REACH: f64 = 1.0 / 128.0;
 pub struct Place {
     /// Texture coordinates (u, v) of its centre, origin bottom left.
     pub center: [f32; 2],
-    /// What they gain along the half-axes s and t: at `p + a s + b t` the surface has the coordinates
-    /// `center + a slopes[0] + b slopes[1]`.
-    pub slopes: [[f32; 2]; 2],
+    /// What u and v gain for a world unit along x, y and z: the surface has the coordinates `center + slopes d` at `p + d`.
+    pub slopes: [[f32; 3]; 2],
+    /// How far they change from the centre to the rim of the disk, at most.
+    pub extent: [f32; 2],
     /// How far those of surfels that overlap may be apart where they meet.
     pub reach: f32,
 }
@@ -98,7 +99,7 @@ pub struct Place {
 /// Surfels that are painted by a texture: it is looked up once a pixel, at the mean coordinates of the fragments that are blended
 /// there (the TexZ map of paper 002, section 5), so it shows what is finer than surfels.
 ///
-/// A fragment has the coordinates of its point of the disk. With those of the disk's centre, as the paper has them, the mean
+/// A fragment has the coordinates of its point of the disk. With those of the centre, as the paper has them, the mean
 /// stays near them around each centre and changes fast in between.
 ///
 /// Coordinates of surfels that meet at a pixel may come from different parts of the image: at its seams, where it is
@@ -106,6 +107,11 @@ pub struct Place {
 /// either. So each surfel also has the texture's mean over its disk, and its *reach*. Where the coordinates of a pixel's
 /// fragments vary by no more than `mean of reach^2`, the pixel has the texture's colour; where by more than twice that, the
 /// blended means; in between there is a linear passage.
+///
+/// **Error.** Let e be the bound of [`crate::passes::accumulate`] on a mean, as a fraction of its range. Coordinates err by e times
+/// their span, so a colour by that times the steepest slope of the interpolated texture (the largest difference of
+/// neighbouring texels times their number for each unit); the variance errs by less than `3 e span^2`, so within the
+/// passage the share of the texture errs by `3 e span^2 / mean of reach^2`, which the least reach keeps below `5e4 e`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Textured {
     texture: Arc<Texture>,
@@ -127,11 +133,9 @@ pub struct PlaceRange {
 
 impl PlaceRange {
     fn of(places: &[Place]) -> Self {
-        // What a disk adds to either side of its centre's coordinate k.
-        let beside = |place: &Place, k: usize| place.slopes[0][k].hypot(place.slopes[1][k]);
         let interval = |k: usize| {
             let ends = places.par_iter().map(|place| {
-                let (at, beside) = (place.center[k], beside(place, k));
+                let (at, beside) = (place.center[k], place.extent[k]);
                 (at - beside, at + beside)
             });
             let (low, high) = ends.reduce(|| (f32::INFINITY, f32::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)));
@@ -189,27 +193,27 @@ impl Textured {
         Self { texture: Arc::clone(&self.texture), places, colors, range }
     }
 
-    /// What is summed of surfel `index` at the point `disk` of its unit disk: the coordinates relative to the middle of their range,
-    /// the squared length of these, and the squared reach; in units of the range's span.
-    pub fn terms(&self, index: usize, disk: DVec2) -> [f64; 4] {
+    /// What is summed of surfel `index` at the world offset `step` from its centre: the coordinates relative to the middle of their
+    /// range, the squared length of these, and the squared reach; in units of the range's span.
+    pub fn terms(&self, index: usize, step: DVec3) -> [f64; 4] {
         let PlaceRange { middle, span, .. } = self.range;
-        let Place { center, slopes, reach } = self.places[index];
+        let Place { center, slopes, reach, .. } = self.places[index];
         let [u, v] = [0, 1].map(|k| {
-            let [s, t] = slopes.map(|slope| f64::from(slope[k]));
-            (f64::from(center[k]) - f64::from(middle[k]) + disk.x * s + disk.y * t) / f64::from(span)
+            let gain = DVec3::from_array(slopes[k].map(f64::from)).dot(step);
+            (f64::from(center[k]) - f64::from(middle[k]) + gain) / f64::from(span)
         });
         let reach = (f64::from(reach) / f64::from(span)).max(LEAST_REACH);
         [u, v, u * u + v * v, reach * reach]
     }
 
-    /// What the device has of surfel `index`: the coordinates of its centre and its squared reach, each mapped to [0, 1], and 0; and the
-    /// slopes in units of the span.
-    pub(crate) fn mapped(&self, index: usize) -> [[f32; 4]; 2] {
-        let [u, v, _, reach_2] = self.terms(index, DVec2::ZERO);
-        let [s, t] =
-            self.places[index].slopes.map(|slope| slope.map(|gain| f64::from(gain) / f64::from(self.range.span)));
-        let mapped = [u + 0.5, v + 0.5, reach_2 / f64::from(self.range.most_reach_2), 0.0];
-        [mapped, [s[0], s[1], t[0], t[1]]].map(|values| values.map(|value| value as f32))
+    /// What the device has of surfel `index`: the coordinates of its centre and its squared reach, each mapped to [0, 1]; and the
+    /// slopes of u and of v in units of the span.
+    pub(crate) fn mapped(&self, index: usize) -> [[f32; 4]; 3] {
+        let [u, v, _, reach_2] = self.terms(index, DVec3::ZERO);
+        let slope = |k: usize| self.places[index].slopes[k].map(|gain| f64::from(gain) / f64::from(self.range.span));
+        let [[ux, uy, uz], [vx, vy, vz]] = [0, 1].map(slope);
+        let center = [u + 0.5, v + 0.5, reach_2 / f64::from(self.range.most_reach_2), 0.0];
+        [center, [ux, uy, uz, 0.0], [vx, vy, vz, 0.0]].map(|values| values.map(|value| value as f32))
     }
 
     /// The premultiplied colour of a pixel from the means of [`Self::terms`] and the blended premultiplied colour: by the texture

@@ -86,9 +86,13 @@ fn place(surfel: &Surfel, center: [f32; 2], steps: &[(DVec3, DVec2)]) -> Place {
     let trace = squares.x_axis.x + squares.y_axis.y;
     let solvable = squares.determinant() > LEAST_SPREAD * trace * trace;
     let slopes = if solvable { products * squares.inverse() } else { DMat2::ZERO };
+    // From the unit disk to world units.
+    let (along_s, along_t) = (s / s.length_squared(), t / t.length_squared());
+    let in_world = |k: usize| (slopes.x_axis[k] * along_s + slopes.y_axis[k] * along_t).as_vec3().to_array();
     Place {
         center,
-        slopes: [slopes.x_axis, slopes.y_axis].map(|slope| slope.as_vec2().to_array()),
+        slopes: [0, 1].map(in_world),
+        extent: [0, 1].map(|k| slopes.x_axis[k].hypot(slopes.y_axis[k]) as f32),
         reach: (typical * f64::from(surfel.radius())) as f32,
     }
 }

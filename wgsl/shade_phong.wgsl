@@ -6,7 +6,7 @@ override SHININESS: f32;
 override LIGHTS: u32;
 
 // HIGHLIGHT of src/scene/options.rs.
-const HIGHLIGHT: f32 = 0.5;
+const HIGHLIGHT: f32 = 0.3;
 
 fn shade(color: vec3<f32>, normal: vec3<f32>, x: u32, y: u32) -> vec3<f32> {
     let toward_eye = -ray(x, y);

@@ -216,7 +216,8 @@ pub enum Shading {
 }
 
 /// What a highlight of [`Shading::Phong`] adds, of a light's irradiance, where the light is mirrored into the eye.
-pub const HIGHLIGHT: f64 = 0.5;
+/// With one light of 1 it does not clip the colour of surfels that have none (`DEFAULT_COLOR`).
+pub const HIGHLIGHT: f64 = 0.3;
 
 /// Exponents that [`RenderOptions::shininess`] may have: with more, the cosine's rounding in f32 would show.
 pub const SHININESS_RANGE: (f32, f32) = (1.0, 1000.0);

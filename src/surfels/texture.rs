@@ -96,3 +96,33 @@ fn place(surfel: &Surfel, center: [f32; 2], steps: &[(DVec3, DVec2)]) -> Place {
         reach: (typical * f64::from(surfel.radius())) as f32,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use glam::Vec3;
+
+    use super::*;
+
+    #[test]
+    fn slopes_and_reach_know_no_jump() {
+        let at = |k: usize| Vec3::new((k % 12) as f32, (k / 12) as f32, 0.0);
+        let surfels: Vec<Surfel> = (0..144).map(|k| Surfel::disk(at(k), Vec3::Z, 1.5)).collect();
+        let bounds = surfels
+            .iter()
+            .fold(Bounds::EMPTY, |bounds, surfel| bounds.with_point(Vec3::from_array(surfel.center).as_dvec3()));
+        let of = |jump: f32| {
+            let centers: Vec<_> =
+                (0..144).map(|k| [0.01 * at(k).x + if at(k).x > 5.5 { jump } else { 0.0 }, 0.02 * at(k).y]).collect();
+            places(&surfels, &bounds, &centers, &()).unwrap()
+        };
+        for (k, place) in of(0.4).iter().enumerate() {
+            let [u, v] = place.slopes.map(Vec3::from_array);
+            assert!(u.distance(0.01 * Vec3::X) < 1e-6 && v.distance(0.02 * Vec3::Y) < 1e-6, "{k}: {u} {v}");
+            assert!(place.reach <= 0.02 * 1.5 * 1.001 && place.reach >= 0.01 * 1.5 * 0.999, "{k}: {}", place.reach);
+        }
+        // What is no jump but steep is followed.
+        let steep = of(0.01);
+        assert!(steep.iter().any(|place| place.slopes[0][0] > 0.011));
+    }
+}

@@ -37,7 +37,7 @@ pub struct TriangleTree {
     /// Half the diagonal of its bounds, world units.
     radius: f64,
     /// The mesh without its positions and normals.
-    paint: Mesh,
+    paint: Box<Mesh>,
 }
 
 /// One that has an area.
@@ -90,7 +90,7 @@ impl TriangleTree {
             material: mesh.material.clone(),
             ..Mesh::default()
         };
-        Ok(Self { tree, triangles, center, radius, paint })
+        Ok(Self { tree, triangles, center, radius, paint: Box::new(paint) })
     }
 
     /// The middle of the mesh's bounds, world coordinates.

@@ -63,6 +63,14 @@ pub enum Error {
         /// What it reported.
         what: String,
     },
+    /// One picture of many failed.
+    #[error("the view {path}: {source}", path = path.display())]
+    View {
+        /// Where the picture would have been written.
+        path: PathBuf,
+        /// Why there is none.
+        source: Box<Error>,
+    },
     /// A benchmark study ran to its end, but its configurations did not do what it says they do.
     #[error("the study {name} failed: {what}")]
     Study {
@@ -89,10 +97,16 @@ impl Error {
         Self::Write { path: path.to_owned(), source }
     }
 
+    /// This failure, of the picture at `path` of many.
+    pub fn of_view(self, path: &Path) -> Self {
+        Self::View { path: path.to_owned(), source: Box::new(self) }
+    }
+
     /// The exit code the command line gives this failure: 2 for unusable arguments, 1 for a failed run.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) => 2,
+            Self::View { source, .. } => source.exit_code(),
             _ => 1,
         }
     }

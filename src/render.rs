@@ -9,22 +9,22 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::frame::Frame;
-use crate::gpu::buffers::Buffer;
-use crate::gpu::layout::{Band, MOST_ROUNDS, OCCLUSION_TILE, TILE, View};
+use crate::gpu::buffers::{Buffer, page_len};
+use crate::gpu::layout::{Band, MOST_ROUNDS, OCCLUSION_TILE, Splat, TILE, View};
 use crate::gpu::timing::Timing;
 use crate::gpu::{Gpu, Sources};
 use crate::passes::accumulate::{ACCUMULATORS, AttributeBuffer};
 use crate::passes::cull::Part;
 use crate::passes::project::SplatBuffer;
 use crate::passes::resolve::ImageBuffer;
-use crate::passes::tiles::Tiles;
+use crate::passes::tiles::{Listed, Tiles};
 use crate::passes::upload::SurfelBuffer;
 use crate::passes::variant::{PixelLayout, Variant};
 use crate::passes::visibility::VisibilityBuffer;
 use crate::passes::{Recorder, Rows, accumulate, project, raster, resolve, tiles, visibility};
 use crate::progress::Progress;
 use crate::scene::light::MAX_LIGHTS;
-use crate::scene::{Bounds, Camera, Raster, RenderOptions, Scene, SceneNeeds};
+use crate::scene::{Bounds, Camera, Organisation, Raster, RenderOptions, Scene, SceneNeeds};
 
 /// Who renders.
 pub enum Backend {
@@ -110,24 +110,30 @@ pub struct Renderer<'a> {
     splats: Option<SplatBuffer>,
     pixels: Option<PixelBuffers>,
     tiles: Option<Tiles>,
+    /// There were too many splats for tiles to gather.
+    crowded: bool,
     held: DeviceBytes,
 }
 
 /// The buffers of a frame's pixels.
 struct PixelBuffers {
     /// What they were made for.
-    size: (u32, u32),
-    pixel: PixelLayout,
+    made_for: PixelKey,
     bands: Vec<Rows>,
     sums: Sums,
     image: ImageBuffer,
     view: Buffer<View>,
 }
 
+/// An image's width and height, the room that its pixels take, and whether their sums are gathered.
+type PixelKey = ((u32, u32), PixelLayout, bool);
+
 /// Where the nearest depths and the weighted sums are kept.
 enum Sums {
     /// In storage buffers, by the compute kernels, a band at a time.
     Storage(VisibilityBuffer, AttributeBuffer),
+    /// Nearest depths in storage; tiles gather the sums, and do not store them.
+    Gathered(VisibilityBuffer),
     /// In textures, by the rasteriser, the whole image at once.
     Targets(Raster, raster::Targets),
 }
@@ -160,6 +166,7 @@ impl<'a> Renderer<'a> {
             splats: None,
             pixels: None,
             tiles: None,
+            crowded: false,
             held: DeviceBytes::default(),
         })
     }
@@ -192,7 +199,16 @@ impl<'a> Renderer<'a> {
         let surfels = self.scene.surfels.len() as u64;
         let rows = rows_per_band(gpu, camera, &Variant::of(&needs, self.options, surfels)?)?;
         let shared = gpu.adapter.subgroups && gpu.adapter.kind == "software";
-        let needs = needs.with_bands(camera.height.div_ceil(rows)).with_subgroups(shared);
+        let bands = camera.height.div_ceil(rows);
+        let gather = bands == 1
+            && surfels <= page_len(gpu, size_of::<Splat>())
+            && !self.crowded
+            && match self.options.organisation {
+                Organisation::Auto => shared && tiles::gathers(self.scene, camera, self.options),
+                Organisation::Tile => true,
+                Organisation::Scatter => false,
+            };
+        let needs = needs.with_bands(bands).with_subgroups(shared).with_gather(gather);
         let variant = Variant::of(&needs, self.options, surfels)?;
         match needs.raster {
             Some(raster) => raster::check(gpu, raster, &needs, camera)?,
@@ -207,7 +223,7 @@ impl<'a> Renderer<'a> {
             }
         };
         let pixels = match self.pixels.take() {
-            Some(pixels) if pixels.size == (camera.width, camera.height) && pixels.pixel == variant.pixel => pixels,
+            Some(pixels) if pixels.made_for == PixelBuffers::key(camera, &variant) => pixels,
             other => {
                 // The old ones make room first.
                 drop((other, self.tiles.take()));
@@ -218,51 +234,72 @@ impl<'a> Renderer<'a> {
             Some(tiles) => Some(tiles.of_variant(variant.compile_tiles(gpu, sources)?)),
             None => None,
         };
+        let fresh = tiles.is_none();
         progress.begin("rendering rows", camera.height.into());
         let start = Instant::now();
         pixels.view.set(gpu, &self.view(camera));
-        let passes_of_pages = if needs.tiles { 5 * splats.pages.len() as u32 } else { 0 };
+        let passes_of_pages = if needs.tiles { 6 * splats.pages.len() as u32 } else { 0 };
         let timing = Timing::new(gpu, 3 + (6 + passes_of_pages) * pixels.bands.len() as u32)?;
         let mut recorder = Recorder { gpu, program: &program, view: &pixels.view, variant: &variant, timing };
         let mut frame = Frame::new(camera, &self.options.maps);
-        let parts: &[Part] = if needs.cull { &[Part::Near, Part::Far] } else { &[Part::All] };
+        let parts: &'static [Part] = if needs.cull { &[Part::Near, Part::Far] } else { &[Part::All] };
         if let ([first, ..], Sums::Targets(options, targets)) = (&pixels.bands[..], &pixels.sums) {
             project::record(&mut recorder, &splats, Part::All, (first, None))?;
             raster::record(&mut recorder, *options, &splats, first, targets)?;
         }
         for rows in &pixels.bands {
-            let mut sums = match &pixels.sums {
+            if let Some(nearest) = pixels.sums.nearest() {
+                for &part in parts {
+                    // Bands share their splats.
+                    if rows.first == 0 {
+                        project::record(&mut recorder, &splats, part, (rows, Some(nearest)))?;
+                    }
+                    visibility::record(&mut recorder, (&splats, part), rows, nearest)?;
+                    if part == Part::Near {
+                        visibility::occlude(&mut recorder, part, rows, nearest)?;
+                    }
+                }
+                if fresh && rows.first == 0 && (needs.gather || needs.tiles && splats.most_large(gpu)? > 0) {
+                    let kernels = variant.compile_tiles(gpu, sources)?;
+                    let small = if needs.gather { parts } else { &[] };
+                    let mut new = Tiles::new(gpu, kernels, (camera.width, &pixels.bands), small)?;
+                    let room = new.make_room(&mut recorder, Listed::Large, &splats, &pixels.bands, nearest)?;
+                    tiles = room.then_some(new);
+                }
+                match &tiles {
+                    Some(tiles) => tiles::visibility(&mut recorder, &splats, rows, tiles, nearest)?,
+                    None => visibility::record_large(&mut recorder, &splats, rows, nearest)?,
+                }
+                visibility::occlude(&mut recorder, Part::All, rows, nearest)?;
+            }
+            match &pixels.sums {
+                Sums::Gathered(nearest) => {
+                    let room = match &mut tiles {
+                        Some(tiles) if fresh => {
+                            tiles.make_room(&mut recorder, Listed::Small, &splats, &pixels.bands, nearest)?
+                        }
+                        Some(_) => true,
+                        None => false,
+                    };
+                    let Some(tiles) = tiles.as_ref().filter(|_| room) else {
+                        // Their sums are stored from here on.
+                        (self.crowded, self.splats) = (true, Some(splats));
+                        return self.on_gpu(gpu, sources, camera, progress);
+                    };
+                    tiles::resolve(&mut recorder, &splats, rows, tiles, (nearest, &pixels.image))?;
+                }
                 Sums::Storage(nearest, sums) => {
-                    for &part in parts {
-                        // Bands share their splats.
-                        if rows.first == 0 {
-                            project::record(&mut recorder, &splats, part, (rows, Some(nearest)))?;
-                        }
-                        visibility::record(&mut recorder, (&splats, part), rows, nearest)?;
-                        if part == Part::Near {
-                            visibility::occlude(&mut recorder, part, rows, nearest)?;
-                        }
-                    }
-                    if needs.tiles && tiles.is_none() && rows.first == 0 {
-                        let kernels = || variant.compile_tiles(gpu, sources);
-                        tiles = Tiles::measured(&mut recorder, &splats, &pixels.bands, camera.width, kernels)?;
-                    }
-                    match &tiles {
-                        Some(tiles) => tiles::visibility(&mut recorder, &splats, rows, tiles, nearest)?,
-                        None => visibility::record_large(&mut recorder, &splats, rows, nearest)?,
-                    }
-                    visibility::occlude(&mut recorder, Part::All, rows, nearest)?;
                     accumulate::record(&mut recorder, (&splats, parts), rows, nearest, sums)?;
                     match &tiles {
                         Some(tiles) => tiles::accumulate(&mut recorder, &splats, rows, tiles, (nearest, sums))?,
                         None => accumulate::record_large(&mut recorder, &splats, rows, nearest, sums)?,
                     }
-                    vec![("visible", nearest.nearest.bound()), ("sums", sums.sums.bound())]
+                    let mut sums = vec![("visible", nearest.nearest.bound()), ("sums", sums.sums.bound())];
+                    sums.extend(splats.surfels.texture());
+                    resolve::record(&mut recorder, rows, sums, &pixels.image)?;
                 }
-                Sums::Targets(_, targets) => targets.bindings(),
-            };
-            sums.extend(splats.surfels.texture());
-            resolve::record(&mut recorder, rows, sums, &pixels.image)?;
+                Sums::Targets(_, targets) => resolve::record(&mut recorder, rows, targets.bindings(), &pixels.image)?,
+            }
             resolve::read_back(&recorder, rows, &pixels.image, &mut frame)?;
             progress.advance(rows.count.into());
         }
@@ -270,10 +307,10 @@ impl<'a> Renderer<'a> {
         let total_ms = start.elapsed().as_secs_f64() * 1e3;
         let overflows = match &pixels.sums {
             Sums::Storage(_, sums) => sums.overflows(gpu)?,
-            Sums::Targets(..) => 0,
+            Sums::Gathered(_) | Sums::Targets(..) => 0,
         };
         if let Some(tiles) = &tiles
-            && !tiles.held(gpu, &splats)?
+            && !tiles.held(gpu)?
         {
             // The next try measures the room that it needs.
             (self.splats, self.pixels) = (Some(splats), Some(pixels));
@@ -316,17 +353,31 @@ impl<'a> Renderer<'a> {
     }
 }
 
+impl Sums {
+    /// The compute kernels' nearest depths.
+    fn nearest(&self) -> Option<&VisibilityBuffer> {
+        match self {
+            Self::Storage(nearest, _) | Self::Gathered(nearest) => Some(nearest),
+            Self::Targets(..) => None,
+        }
+    }
+}
+
 impl PixelBuffers {
+    fn key(camera: &Camera, variant: &Variant) -> PixelKey {
+        ((camera.width, camera.height), variant.pixel, variant.needs.gather)
+    }
+
     fn new(gpu: &Gpu, renderer: &Renderer<'_>, camera: &Camera, variant: &Variant) -> Result<Self> {
         let bands = bands(gpu, camera, variant)?;
         let most = bands.iter().map(|rows| rows.pixels).max().unwrap_or(0);
         let sums = match variant.needs.raster {
+            None if variant.needs.gather => Sums::Gathered(VisibilityBuffer::new(gpu, &bands)?),
             None => Sums::Storage(VisibilityBuffer::new(gpu, &bands)?, AttributeBuffer::new(gpu, variant, most)?),
             Some(raster) => Sums::Targets(raster, raster::Targets::new(gpu, raster, variant.pixel, camera)?),
         };
         Ok(Self {
-            size: (camera.width, camera.height),
-            pixel: variant.pixel,
+            made_for: Self::key(camera, variant),
             bands,
             sums,
             image: ImageBuffer::new(gpu, variant, most)?,
@@ -337,6 +388,7 @@ impl PixelBuffers {
     fn bytes(&self) -> u64 {
         let sums = match &self.sums {
             Sums::Storage(nearest, sums) => nearest.nearest.bytes() + sums.bytes(),
+            Sums::Gathered(nearest) => nearest.nearest.bytes(),
             Sums::Targets(_, targets) => targets.bytes,
         };
         let uniforms = self.view.bytes() + self.bands.iter().map(|rows| rows.uniform.bytes()).sum::<u64>();

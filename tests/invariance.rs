@@ -121,15 +121,15 @@ fn sums_past_32_bits_are_exact() {
     };
     let one = u64::from(ONE);
     assert_eq!(sums(&Sources::default()), vec![(1001 * one, 1001 * 5034, 1001); camera.pixels()]);
-    let broken = |from: &str, to: &str| sums(&Sources::default().replace("accumulator_fixed.wgsl", from, to).unwrap());
-    let no_carry = broken("before + value < before)", "before + value < 0u)");
+    let broken = |file: &str, from: &str, to: &str| sums(&Sources::default().replace(file, from, to).unwrap());
+    let no_carry = broken("accumulator_fixed.wgsl", "before + value < before)", "before + value < 0u)");
     assert!(
         no_carry.iter().all(|sums| sums.0 == (1001 * one) % (1 << 32)),
         "the carry is not needed: {:?}",
         no_carry[0]
     );
-    let truncated =
-        broken("u32(round(f32(weight) * clamp(value, 0.0, 1.0)))", "u32(f32(weight) * clamp(value, 0.0, 1.0))");
+    let rounded = "u32(round(f32(weight) * clamp(value, 0.0, 1.0)))";
+    let truncated = broken("terms.wgsl", rounded, "u32(f32(weight) * clamp(value, 0.0, 1.0))");
     assert!(truncated.iter().all(|sums| sums.1 == 1001 * 5033), "the rounding is not needed: {:?}", truncated[0]);
 }
 

@@ -11,8 +11,8 @@ use std::mem::{offset_of, size_of};
 use epsplat::gpu::Sources;
 use epsplat::gpu::kernel::{FILES, reflect};
 use epsplat::gpu::layout::{
-    AWAY, BATCH, Band, Filter, LIST_START, LargeAttributes, MOST_GROUPS, OCCLUSION_TILE, ONE, ONE_WIDE, QUEUE_GRID,
-    QUEUE_START, QUEUE_TILE_GRID, Splat, TILE, TILE_SIZE, View, WORKGROUP,
+    AWAY, BATCH, BLOCK_SIDE, Band, Filter, LIST_ENDS, LIST_START, MOST_GROUPS, OCCLUSION_TILE, ONE, ONE_WIDE,
+    QUEUE_GRID, QUEUE_START, Splat, TILE, TILE_SIDE, View, WORKGROUP,
 };
 use epsplat::passes::accumulate::accumulator;
 use epsplat::passes::variant::{COLOR_CHANNEL, PixelLayout, color_channels, modules};
@@ -114,7 +114,6 @@ fn mirrors() -> BTreeMap<&'static str, Struct> {
         }),
         mirror!(Band { first_row, rows, padding_0, padding_1 }),
         mirror!(Splat { anchor_x, anchor_y, bounds_first, bounds_last, a, b, c, a_low }),
-        mirror!(LargeAttributes { color, normal, radius }),
         mirror!(Surfel { center, s, t }),
         mirror!(Filter { center_x, center_y, depth_low, depth_high, r_xx, r_xy, r_yy, gain }),
     ])
@@ -155,16 +154,9 @@ fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         ("balls", Element::Plain(&[<[f32; 4]>::SHAPE])),
         ("surviving", Element::Plain(WORD)),
         ("drawn", Element::Plain(WORD)),
-        ("ends", Element::Plain(WORD)),
-        ("listed_ends", Element::Plain(WORD)),
         ("lists", Element::Plain(WORD)),
-        ("tile_lists", Element::Plain(WORD)),
-        ("larges", Element::Struct("Splat")),
-        ("attributes_of_larges", Element::Struct("LargeAttributes")),
-        ("large_splats", Element::Struct("Splat")),
-        ("large_attributes", Element::Struct("LargeAttributes")),
-        ("large_splat_words", Element::Plain(WORD)),
-        ("large_attribute_words", Element::Plain(WORD)),
+        ("large_lists", Element::Plain(WORD)),
+        ("small_lists", Element::Plain(WORD)),
         ("nearest", Element::Plain(WORD)),
         ("visible", Element::Plain(WORD)),
         ("sums", Element::Plain(sums_of(accumulator).0)),
@@ -337,7 +329,7 @@ fn every_binding_has_the_hosts_layout() {
 
 #[test]
 fn a_changed_layout_is_noticed() {
-    // Without culling no kernel uses `middle`, and the module stays valid.
+    // So that no kernel uses `middle`, and the module stays valid.
     let needs = common::all_needs().into_iter().find(|needs| !needs.cull).unwrap();
     let broken = |from: &str, to: &str| {
         let sources = Sources::default().replace("layout.wgsl", from, to).unwrap();
@@ -404,7 +396,6 @@ fn constants_agree() {
             ("TILE", TILE),
             ("QUEUE_START", QUEUE_START),
             ("QUEUE_GRID", QUEUE_GRID),
-            ("QUEUE_TILE_GRID", QUEUE_TILE_GRID),
             ("MOST_GROUPS", MOST_GROUPS),
             ("AWAY", AWAY),
             ("NOTHING", f32::INFINITY.to_bits()),
@@ -414,10 +405,10 @@ fn constants_agree() {
         }
         let tile = needs.raster.is_none().then_some(f64::from(OCCLUSION_TILE));
         assert_eq!(constant("OCCLUSION_TILE"), tile);
-        let of_tiles = [("TILE_WIDTH", TILE_SIZE[0]), ("TILE_HEIGHT", TILE_SIZE[1])];
+        let of_tiles = [("TILE_SIDE", TILE_SIDE), ("BLOCK_SIDE", BLOCK_SIDE), ("LIST_ENDS", LIST_ENDS)];
         let of_batches = [("BATCH", BATCH), ("LIST_START", LIST_START)];
-        for (exists, constants) in [(tiles, of_tiles), (needs.cull, of_batches)] {
-            for (name, value) in constants {
+        for (exists, constants) in [(tiles, &of_tiles[..]), (needs.cull, &of_batches)] {
+            for &(name, value) in constants {
                 assert_eq!(constant(name), exists.then_some(f64::from(value)), "{name}");
             }
         }
@@ -435,8 +426,9 @@ fn constants_agree() {
         for entry in module.entry_points.iter().filter(|entry| entry.stage == naga::ShaderStage::Compute) {
             let size = match entry.name.as_str() {
                 "arrange" | "arrange_rare" => [1, 1, 1],
+                "bin_count_large" | "bin_place_large" => [8, 8, 1],
+                "bin_scan" | "bin_scan_large" => [256, 1, 1],
                 name if name.ends_with("_large") => [TILE, TILE, 1],
-                "tile_scan" => [256, 1, 1],
                 _ => [WORKGROUP, 1, 1],
             };
             assert_eq!(entry.workgroup_size, size, "{}", entry.name);

@@ -118,10 +118,18 @@ fn coarse_models_with_thin_parts_face_outward() {
     let mut points = io::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("data/bunny.obj"), &()).unwrap();
     let truth = points.normals.take().unwrap();
     let found = angles(&surfels(points.clone(), &FromPoints::default()), &truth);
-    let wrong: Vec<f64> = found.iter().copied().filter(|angle| *angle > 90f64.to_radians()).collect();
-    println!("bunny: mean {:.2} degrees, {} of {} past 90", mean(&found).to_degrees(), wrong.len(), found.len());
-    // The ears are three samples thick at their tips: there the planes themselves are across, and no side is right.
-    assert!(wrong.len() <= 3 && wrong.iter().all(|angle| angle.to_degrees() < 105.0), "{wrong:?}");
+    let mut sorted = found.clone();
+    sorted.sort_by(f64::total_cmp);
+    let percentile_99 = sorted[sorted.len() * 99 / 100].to_degrees();
+    let mean = mean(&found).to_degrees();
+    println!(
+        "bunny: mean {mean:.2} degrees, 99th percentile {percentile_99:.1}, worst {:.1}",
+        sorted[1838].to_degrees()
+    );
+    // The ears are thinner at their tips than points are apart: planes through all neighbours there stand across, 3 of them past
+    // 90 degrees, with a mean of 7.1 and a 99th percentile of 47 degrees.
+    assert_eq!(flipped(&found), 0);
+    assert!(mean < 6.5 && percentile_99 < 35.0, "{mean} {percentile_99}");
     assert!(flipped(&angles(&surfels(points, &up()), &truth)) > 500);
 }
 

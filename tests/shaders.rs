@@ -71,9 +71,10 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
             &[]
         };
         let own: BTreeSet<&str> = stages.iter().chain(drawn).copied().collect();
-        // The module of the tiles has what it shares with the first, and so entry points that nobody compiles.
+        // Of a render by tiles each module has entry points that only the other needs.
         let shared = entries.difference(&own).count();
-        assert!(own.is_subset(&entries) && (shared == 0) != files.contains(&"tile.wgsl"), "{entries:?}");
+        let leaves = files.contains(&"tile.wgsl") || needs.gather;
+        assert!(own.is_subset(&entries) && (shared == 0) != leaves, "{entries:?}");
         for (_, variable) in module.global_variables.iter().filter(|(_, v)| v.binding.is_some()) {
             let buffer = matches!(variable.space, AddressSpace::Uniform | AddressSpace::Storage { .. });
             // Only what the rasteriser wrote is a texture.
@@ -236,8 +237,8 @@ fn absent_parts_have_their_partners_signatures() {
         }
     }
     // What stands for one another has one interface: functions of one file only are its own affair.
-    let alike = |prefix: &str, functions: &[&str]| {
-        let all: Vec<&str> = FILES.iter().map(|(name, _)| *name).filter(|name| name.starts_with(prefix)).collect();
+    let starting = |prefix: &str| FILES.iter().map(|(name, _)| *name).filter(|name| name.starts_with(prefix)).collect();
+    let alike_in = |prefix: &str, all: Vec<&str>, functions: &[&str]| {
         assert!(all.len() >= 2, "{prefix}");
         for function in functions {
             let first = signatures(text_of(all[0])).remove(*function);
@@ -247,10 +248,17 @@ fn absent_parts_have_their_partners_signatures() {
             }
         }
     };
-    alike("accumulator_", &["quantise", "term", "add", "add_pair", "settle", "sum_at", "weight_at"]);
-    alike("tile_terms", &["quantise", "term", "add"]);
+    let alike = |prefix: &str, functions: &[&str]| alike_in(prefix, starting(prefix), functions);
+    alike("accumulator_", &["add", "add_pair", "settle", "sum_at", "weight_at"]);
+    let apart = ["accumulator_fixed.wgsl", "accumulator_fixed_pairs.wgsl", "accumulator_fixed_wide.wgsl"];
+    let with_terms =
+        [starting("accumulator_"), starting("terms")].concat().into_iter().filter(|name| !apart.contains(name));
+    alike_in("terms", with_terms.collect(), &["quantise", "term"]);
+    alike("tile_add", &["add"]);
     alike("tile_deposit", &["deposit_sums"]);
-    alike("splat_", &["shared_splat", "shared_attributes", "shared_any"]);
+    alike("splat_", &["hold_lane", "fetcher", "offered", "farthest_in_tile", "handed"]);
+    alike("tile_filter", &["handed_filter"]);
+    alike("tile_small", &["small_list", "small_entry"]);
     alike("kernel_", &["kernel_weight"]);
     alike("epsilon", &["radius_of", "deepest_accepted", "farthest_accepted"]);
     let shared = ["homography", "intersect", "ray", "point_at"];

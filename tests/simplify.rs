@@ -10,11 +10,16 @@ use std::f64::consts::PI;
 use common::Random;
 use common::scenes::generated;
 use epsplat::Error;
-use epsplat::io::Points;
+use epsplat::io::{Mesh, Points};
+use epsplat::metrics::SurfaceDistances;
+use epsplat::metrics::coverage::coverage;
 use epsplat::scene::{Colors, Scene, Surfel};
 use epsplat::surfels::analytic::{Shape, generate};
 use epsplat::surfels::build;
-use epsplat::surfels::simplify::{OVERLAP, Options, Report, SplatShape, Tolerance, simplify};
+use epsplat::surfels::sampling::voxels::Voxel;
+use epsplat::surfels::sampling::{MeshSurface, Method, Priority, sample};
+use epsplat::surfels::simplify::{Options, Report, SplatShape, Tolerance, grown, simplify, written};
+use epsplat::truth::TriangleTree;
 use glam::{DVec3, Vec3};
 
 const DISKS: Options = Options { tolerance: Tolerance::Absolute(0.0), shape: SplatShape::Disk, relaxations: 0 };
@@ -36,7 +41,17 @@ fn run(scene: &Scene, options: Options) -> (Vec<Surfel>, Report) {
     assert_eq!(report.selected, simplified.surfels.len() as u64);
     assert_eq!(report.surfels, scene.surfels.len() as u64);
     assert!(report.mean_deviation <= report.max_deviation && report.selected <= report.before_relaxation);
+    assert!(report.max_deviation <= report.tolerance * (1.0 + 1e-9), "{report:?}");
     (simplified.surfels, report)
+}
+
+/// The surfel as large as it grew.
+fn as_grown(surfel: &Surfel, tolerance: f64) -> Surfel {
+    let shrunk = |axis: [f32; 3]| {
+        let length = Vec3::from_array(axis).as_dvec3().length();
+        axis.map(|c| c * (grown(length, tolerance) / length) as f32)
+    };
+    Surfel { s: shrunk(surfel.s), t: shrunk(surfel.t), ..*surfel }
 }
 
 fn center(surfel: &Surfel) -> DVec3 {
@@ -78,7 +93,7 @@ fn a_sphere_needs_as_many_disks_as_its_sagitta_says() {
     // cannot hold is at most a spacing farther out.
     let sagitta = (1.0 - (1.0 - 2.0 * tolerance).powi(2)).sqrt();
     let spacing = (Shape::Sphere.area() / count as f64).sqrt();
-    let grown = |surfel: &Surfel| f64::from(surfel.radius()) / OVERLAP;
+    let grown = |surfel: &Surfel| f64::from(as_grown(surfel, tolerance).radius());
     let largest = surfels.iter().map(grown).fold(0.0, f64::max);
     let smallest = surfels.iter().map(grown).fold(f64::INFINITY, f64::min);
     assert!(
@@ -109,11 +124,12 @@ fn no_hole_is_left_between_the_points_either() {
         for (splats, relaxations) in [(SplatShape::Disk, 0), (SplatShape::Disk, 3), (SplatShape::Ellipse, 3)] {
             let options = Options { shape: splats, relaxations, ..within(tolerance) };
             let (surfels, _) = run(&sampled, options);
+            let surfels: Vec<Surfel> = surfels.iter().map(|surfel| as_grown(surfel, tolerance)).collect();
             // Cells of neighbours are cut in different planes, which is off by the square of their size over that of the surface.
-            let grown = 1.005 / OVERLAP;
+            let grown = 1.005;
             assert_eq!(uncovered(surface, &surfels, grown, 3.0 * tolerance), 0, "{surface:?} {splats:?} {relaxations}");
             // Controls: with smaller disks there are holes, and with three in four of them.
-            assert!(uncovered(surface, &surfels, 0.85 / OVERLAP, 3.0 * tolerance) > 0);
+            assert!(uncovered(surface, &surfels, 0.85, 3.0 * tolerance) > 0);
             let fewer: Vec<Surfel> = surfels.chunks(4).flat_map(|four| &four[1..]).copied().collect();
             assert!(uncovered(surface, &fewer, grown, 3.0 * tolerance) > 0);
         }
@@ -162,9 +178,10 @@ fn splats_do_not_bridge_to_another_sheet() {
     assert_eq!(off_sheet(&surfels), 0);
     assert!(report.max_deviation < 1e-6);
     for (z, up) in [(0.0, -1.0), (gap, 1.0)] {
-        let sheet: Vec<Surfel> = surfels.iter().filter(|s| s.normal().z * up > 0.0).copied().collect();
+        let sheet = surfels.iter().filter(|s| s.normal().z * up > 0.0);
+        let sheet: Vec<Surfel> = sheet.map(|s| as_grown(s, 0.05)).collect();
         assert!(!sheet.is_empty() && sheet.iter().all(|s| (f64::from(s.center[2]) - z).abs() < 1e-6));
-        assert_eq!(uncovered(Shape::Plane, &sheet, 1.0 / OVERLAP, 0.02), 0);
+        assert_eq!(uncovered(Shape::Plane, &sheet, 1.0 + 1e-6, 0.02), 0);
     }
     // Control: it is the normals that keep them apart.
     assert!(off_sheet(&run(&slab(gap, false), options).0) > 0);
@@ -175,12 +192,13 @@ fn a_surface_with_edges_is_neither_shortened_nor_drawn_out() {
     let plane = shape(Shape::Plane, 10_000);
     let (surfels, report) = run(&plane, within(0.0));
     assert!(report.max_deviation == 0.0 && surfels.len() < 1_000, "{}", surfels.len());
-    assert_eq!(uncovered(Shape::Plane, &surfels, 1.0 / OVERLAP, 1e-9), 0);
+    let surfels: Vec<Surfel> = surfels.iter().map(|s| as_grown(s, 0.0)).collect();
+    assert_eq!(uncovered(Shape::Plane, &surfels, 1.0 + 1e-6, 1e-9), 0);
     // The surface goes on for the 1.5 spacings of an input disk past the last point, and from any place on the edge it is at most
     // a spacing to one of the last points.
     let spacing = (Shape::Plane.area() / 10_000.0).sqrt();
     for surfel in &surfels {
-        let grown = f64::from(surfel.radius()) / OVERLAP;
+        let grown = f64::from(surfel.radius());
         let past = center(surfel).truncate().abs().max_element() + grown - 1.0;
         assert!(past <= 2.5 * spacing, "{past} of {spacing}");
     }
@@ -195,8 +213,80 @@ fn a_surface_with_edges_is_neither_shortened_nor_drawn_out() {
     assert!(report.max_deviation < 1e-6 && surfels.len() < 1_000, "{} {}", surfels.len(), report.max_deviation);
     let top: Vec<Surfel> = surfels.iter().filter(|s| s.normal().z > s.normal().x).copied().collect();
     assert!(top.iter().all(|s| (s.center[2] - 1.0).abs() < 1e-6));
-    let top: Vec<Surfel> = top.into_iter().map(|s| Surfel { center: [s.center[0], s.center[1], 0.0], ..s }).collect();
-    assert_eq!(uncovered(Shape::Plane, &top, 1.0 / OVERLAP, 1e-5), 0);
+    let flat = |s: Surfel| Surfel { center: [s.center[0], s.center[1], 0.0], ..as_grown(&s, 0.001) };
+    let top: Vec<Surfel> = top.into_iter().map(flat).collect();
+    assert_eq!(uncovered(Shape::Plane, &top, 1.0 + 1e-6, 1e-5), 0);
+}
+
+/// A bar along z from -1 to 1 whose profile is a regular polygon of `sides` sides and radius 0.6.
+fn bar(sides: u32) -> Mesh {
+    let at = |k: u32, z: f64| {
+        let (sin, cos) = (2.0 * PI * f64::from(k) / f64::from(sides)).sin_cos();
+        [0.6 * cos, 0.6 * sin, z]
+    };
+    let positions = (0..sides).flat_map(|k| [at(k, -1.0), at(k, 1.0)]).collect();
+    let side = |k: u32| {
+        let [a, b] = [2 * k, 2 * ((k + 1) % sides)];
+        [[a, b, b + 1], [a, b + 1, a + 1]]
+    };
+    let ends = (1..sides - 1).flat_map(|k| [[0, 2 * k + 2, 2 * k], [1, 2 * k + 1, 2 * k + 3]]);
+    Mesh { positions, triangles: (0..sides).flat_map(side).chain(ends).collect(), ..Mesh::default() }
+}
+
+#[test]
+fn at_sharp_edges_each_point_has_a_disk_within_the_tolerance_and_none_is_left_open() {
+    let evenly = |surface: &MeshSurface<'_>, voxels: &[Voxel]| Priority::Area.of(surface, voxels);
+    let method = Method::Stratified { priority: &evenly, depth: None };
+    let tolerance = 0.001;
+    let ellipses = Options { shape: SplatShape::Ellipse, relaxations: 2, ..within(tolerance) };
+    // Edges of 60 degrees, which no disk reaches around; and of 120, which disks must end at though the normals agree.
+    for (sides, options) in [(3, within(tolerance)), (6, within(tolerance)), (6, ellipses)] {
+        let mesh = bar(sides);
+        let (points, _) = sample(&mesh, 6_000, &method, 0, &()).unwrap();
+        let positions = points.positions.clone();
+        let (sampled, _) = build(vec![points], &()).unwrap();
+        let tree = TriangleTree::new(&mesh).unwrap();
+        let (simplified, report) = simplify(&sampled, &options, &()).unwrap();
+        assert!(report.max_deviation <= tolerance && report.selected < 1500, "{report:?}");
+        assert!(report.beyond_tolerance > 0 || sides == 3, "{report:?}");
+        let surfels: Vec<Surfel> = simplified.surfels.iter().map(|s| as_grown(s, tolerance)).collect();
+        let bare = |surfels: &[Surfel]| {
+            let holds = |s: &Surfel, p: &[f64; 3]| {
+                let at = place(s, DVec3::from_array(*p));
+                at.truncate().length() <= 1.0 + 1e-5 && at.z.abs() <= tolerance + 1e-6
+            };
+            positions.iter().filter(|p| !surfels.iter().any(|s| holds(s, p))).count()
+        };
+        assert_eq!(bare(&surfels), 0, "{options:?}");
+        let seen = |scene: &Scene| coverage(&tree, scene, 64, 128, &()).unwrap();
+        let whole = seen(&simplified);
+        assert!(whole.is_hole_free(), "{options:?}: {whole:?}");
+        // Control: with one in ten left out.
+        let all_but_some = |all: &[Surfel]| all.chunks(10).flat_map(|ten| &ten[1..]).copied().collect::<Vec<_>>();
+        assert!(bare(&all_but_some(&surfels)) > 0);
+        let fewer = Scene { surfels: all_but_some(&simplified.surfels), ..simplified.clone() };
+        assert!(!seen(&fewer).is_hole_free());
+        // Disks are as large as the faces where those are flat, and show past their edges by no more than cells do.
+        let rims = SurfaceDistances::of(&simplified, &mesh, &tree).unwrap().rims_to_mesh.unwrap();
+        let spacing = sampled.surfels.iter().map(|s| f64::from(s.radius())).sum::<f64>() / 6_000.0;
+        let largest = simplified.surfels.iter().map(|s| f64::from(s.radius())).fold(0.0, f64::max);
+        assert!(rims.mean < 0.5 * spacing && largest > 6.0 * spacing, "{rims:?} {spacing}");
+        // Ellipses along an edge reach past its end by up to four times as much.
+        let farthest = if options.shape == SplatShape::Disk { 4.0 } else { 16.0 };
+        assert!(rims.max < farthest * spacing, "{rims:?} {spacing}");
+    }
+}
+
+#[test]
+fn what_is_written_tells_what_grew() {
+    for tolerance in [0.0, 1e-3, 0.1, f64::INFINITY] {
+        for length in [1e-6, 0.01, 0.02, 0.1, 0.4, 2.0, 50.0] {
+            let larger = written(length, tolerance);
+            assert!((1.02..=1.4).contains(&(larger / length)) || larger / length - 1.02 > -1e-12);
+            assert!((grown(larger, tolerance) / length - 1.0).abs() < 1e-12, "{length} {tolerance}");
+        }
+    }
+    assert_eq!(written(1.0, 0.025), 1.2);
 }
 
 #[test]
@@ -278,7 +368,7 @@ fn colours_are_means_over_what_is_covered() {
         // Shares of red and blue.
         let (red, blue) = (r / 4.0, b / 2.0);
         assert!((red + blue - 1.0).abs() < 1e-5 && g == 0.0 && (a - 1.0).abs() < 1e-6);
-        let (x, radius) = (f64::from(surfel.center[0]), f64::from(surfel.radius()) / OVERLAP);
+        let (x, radius) = (f64::from(surfel.center[0]), f64::from(as_grown(surfel, 0.01).radius()));
         if x.abs() > radius {
             assert_eq!(red.round(), f64::from(u8::from(x < 0.0)));
             assert!(red.min(blue) < 1e-6);

@@ -9,7 +9,9 @@ use common::scenes::{cases, crowded, front, sphere, stack};
 use epsplat::frame::Frame;
 use epsplat::gpu::{Gpu, Sources};
 use epsplat::render::{Backend, Renderer, Report, render};
-use epsplat::scene::{Camera, Colors, Epsilon, Kernel, LowPass, Maps, Projection, RenderOptions, Scene, Shading};
+use epsplat::scene::{
+    Camera, Colors, Epsilon, Kernel, LowPass, Maps, Organisation, Projection, RenderOptions, Scene, Shading,
+};
 
 const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
 
@@ -61,14 +63,19 @@ fn compare(names: &[&str], thresholds: &[u32], adapt: impl Fn(&mut Gpu)) {
         adapt(&mut gpu);
         Some(on(gpu, large_from(pixels)))
     };
-    // Scatter alone, to compare with.
     let Some(scatter) = backend(u32::MAX) else { return };
     let others: Vec<_> = thresholds.iter().filter_map(|&pixels| Some((pixels, backend(pixels)?))).collect();
     for (name, scene, camera, options) in drawn().into_iter().filter(|(name, ..)| names.contains(name)) {
-        let (expected, _) = frame(&scene, &camera, &options, &scatter);
+        let by_scatter = RenderOptions { organisation: Organisation::Scatter, ..options.clone() };
+        let (expected, report) = render(&scene, &camera, &by_scatter, &scatter, &()).unwrap();
+        assert!(!report.needs.contains(&"tiles"));
         for (pixels, backend) in &others {
             let (tiled, _) = frame(&scene, &camera, &options, backend);
             assert!(bits(&tiled) == bits(&expected), "{name}: tiles from {pixels} pixels on show");
+            let all = RenderOptions { organisation: Organisation::Tile, ..options.clone() };
+            let (gathered, report) = frame(&scene, &camera, &all, backend);
+            assert!(report.needs.contains(&"gather"));
+            assert!(bits(&gathered) == bits(&expected), "{name}: all tiles, some lists from {pixels} pixels on, show");
         }
     }
 }
@@ -106,23 +113,46 @@ fn bands_and_pages_of_tiles_do_not_show() {
 /// A kernel that draws a tile wrongly is noticed, whatever it does wrong.
 #[test]
 fn a_wrong_tile_is_noticed() {
-    let (name, scene, camera, options) = drawn().swap_remove(1);
-    let wrong = [
-        ("tile.wgsl", "select(0u, across << 4u, high.y == 1u)", "0u"),
-        ("tile.wgsl", "b.w = nearer(b.w, next.splat, next.filter_, row.x + 7u, row.y);", ""),
-        ("tile.wgsl", "if (row.pixels > 5u) { deposit(5u, row.pixel + 5u); }", ""),
-        ("tile.wgsl", "deepest_accepted(farthest)", "farthest"),
+    let (name, scene, camera, mut options) = drawn().swap_remove(1);
+    options.organisation = Organisation::Tile;
+    // Of tiles that gather all splats, large and small; and of those that add the large ones to what is stored, of several pages.
+    let gathered = [
+        ("bin.wgsl", "atomicStore(&lists[at], index)", "atomicStore(&lists[at], 0u)"),
+        (
+            "bin.wgsl",
+            "enter_cells(index, splat, TILE_SIDE, vec2<u32>(0u), 1u)",
+            "enter_cells(index, splat, TILE_SIDE, vec2<u32>(0u), 2u)",
+        ),
+        ("tile.wgsl", "b.w = nearer(b.w, splat, filter_, column.x, column.y + 7u);", ""),
+        ("tile.wgsl", "deepest_accepted(farthest_of(a, b))", "farthest_of(a, b)"),
+        ("tile.wgsl", "select(Term(0), weight_of(fragment), accepted)", "weight_of(fragment)"),
+        ("tile_small.wgsl", "small_lists[end]) +", "small_lists[end - 1u]) +"),
         ("tile_sums.wgsl", "high + select(0u, 1u, sum < low)", "high"),
-        // A unit of 2^-32 would not show, 2^-4 does.
+        ("tile_sums.wgsl", "if (slot == 5u)", "if (slot == 55u)"),
+        ("splat_shared.wgsl", "(lane & 24u) | from_", "(lane & 24u) | (from_ ^ 1u)"),
+    ];
+    // A unit of 2^-32 would not show, 2^-4 does.
+    let stored = [
+        ("tile.wgsl", "deposit(column.pixel + k * view.width)", "deposit(column.pixel)"),
         ("tile_deposit_pairs.wgsl", "vec2<u32>(carried, 0u)", "vec2<u32>(carried << 28u, 0u)"),
     ];
-    let Some(gpu) = common::gpu_for("accumulator_fixed_pairs.wgsl") else { return };
-    let (expected, _) = frame(&scene, &camera, &options, &on(gpu, large_from(0)));
-    for (file, from, to) in wrong {
-        let Some(gpu) = common::gpu_for("accumulator_fixed_pairs.wgsl") else { return };
-        let sources = large_from(0).replace(file, from, to).unwrap();
-        let (frame, _) = frame(&scene, &camera, &options, &on(gpu, sources));
-        assert!(bits(&frame) != bits(&expected), "{name}: {from} in {file} may be {to:?}");
+    for (wrong, gathers) in [(&gathered[..], true), (&stored[..], false)] {
+        let image = |sources: Sources| {
+            let gpu = common::gpu()?;
+            if !(gpu.adapter.atomics_u64 && gpu.adapter.subgroups) {
+                eprintln!("skipped: no 64-bit atomics or no subgroups");
+                return None;
+            }
+            let gpu = if gathers { gpu } else { gpu.with_buffer_limit(70_000) };
+            let (frame, report) = frame(&scene, &camera, &options, &on(gpu, sources));
+            assert_eq!(report.needs.contains(&"gather"), gathers);
+            Some(bits(&frame))
+        };
+        let Some(expected) = image(large_from(40)) else { return };
+        for &(file, from, to) in wrong {
+            let sources = large_from(40).replace(file, from, to).unwrap();
+            assert!(image(sources) != Some(expected.clone()), "{name}: {from} in {file} may be {to:?}");
+        }
     }
 }
 
@@ -132,24 +162,28 @@ fn a_view_that_needs_more_room_gets_it() {
     let Some(gpu) = common::gpu() else { return };
     let backend = on(gpu, large_from(30));
     let scene = sphere(900, 2.5);
-    let options = RenderOptions::default();
-    let view = |size| common::scenes::sphere_camera(size, Projection::Pinhole);
+    let near = common::scenes::sphere_camera(160, Projection::Pinhole);
     // Another lens keeps the image's size, and with it the buffers.
     let far = common::scenes::sphere_camera_with(160, epsplat::scene::Lens::Fov(170.0));
-    let mut renderer = Renderer::new(&scene, &options, &backend).unwrap();
-    renderer.frame(&far, &()).unwrap();
-    let small = renderer.device_bytes().pixels;
-    let (kept, _) = renderer.frame(&view(160), &()).unwrap();
-    assert!(renderer.device_bytes().pixels > small, "there was room enough: the test tests nothing");
-    let (fresh, _) = render(&scene, &view(160), &options, &backend, &()).unwrap();
-    assert!(bits(&kept) == bits(&fresh));
-    // And back: what is kept does not show either.
-    let (kept, _) = renderer.frame(&far, &()).unwrap();
-    let (fresh, _) = render(&scene, &far, &options, &backend, &()).unwrap();
-    assert!(bits(&kept) == bits(&fresh));
+    // Left to itself the far view, whose splats are tiny, is scattered; both ways of the sums then follow each other.
+    for organisation in [Organisation::Tile, Organisation::Auto] {
+        let options = RenderOptions { organisation, ..RenderOptions::default() };
+        let mut renderer = Renderer::new(&scene, &options, &backend).unwrap();
+        renderer.frame(&far, &()).unwrap();
+        let small = renderer.device_bytes().pixels;
+        // And back: what is kept does not show either.
+        for view in [&near, &far] {
+            let (kept, _) = renderer.frame(view, &()).unwrap();
+            let grew = renderer.device_bytes().pixels > small;
+            let must = organisation == Organisation::Tile && view == &near;
+            assert!(grew || !must, "there was room enough: the test tests nothing");
+            let (fresh, _) = render(&scene, view, &options, &backend, &()).unwrap();
+            assert!(bits(&kept) == bits(&fresh), "{organisation:?}");
+        }
+    }
 }
 
-/// A list longer than what one loop of any driver runs through is left to the workgroups.
+/// Lists longer than what one loop of any driver runs through are left to scatter and the workgroups.
 #[test]
 fn long_lists_are_drawn_to_their_end() {
     let Some(gpu) = common::gpu() else { return };
@@ -163,7 +197,11 @@ fn long_lists_are_drawn_to_their_end() {
         epsilon: Epsilon::Absolute(1.0),
         ..Default::default()
     };
-    let (frame, _) = frame(&scene, &camera, &options, &backend);
-    let counts = frame.count.unwrap();
-    assert!(counts.iter().all(|&count| count == 30_000.0), "{counts:?}");
+    for organisation in [Organisation::Auto, Organisation::Tile] {
+        let options = RenderOptions { organisation, ..options.clone() };
+        let (frame, report) = frame(&scene, &camera, &options, &backend);
+        assert!(!report.needs.contains(&"gather"));
+        let counts = frame.count.unwrap();
+        assert!(counts.iter().all(|&count| count == 30_000.0), "{counts:?}");
+    }
 }

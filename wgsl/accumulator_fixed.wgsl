@@ -1,25 +1,9 @@
-// Sums in fixed point: a term fills a word, a sum has two (low, high) with an exact carry.
+// Sums of terms.wgsl in fixed point: a term fills a word, a sum has two (low, high) with an exact carry.
 // Error bound: src/passes/accumulate.rs.
 
 override CHANNELS: u32;
 
 @group(0) @binding(8) var<storage, read_write> sums: array<atomic<u32>>;
-
-alias Term = u32;
-const COUNT_ONE: Term = 1u;
-
-// The units of a weight of 1.
-const ONE: f32 = FIXED_ONE;
-
-fn quantise(weight: f32) -> Term {
-    return u32(round(weight * ONE));
-}
-
-// weight * value for a value in [0, 1]. The weight came from an f32, so it has at most 24 significant bits and is exact
-// as f32.
-fn term(weight: Term, value: f32) -> Term {
-    return u32(round(f32(weight) * clamp(value, 0.0, 1.0)));
-}
 
 // The channels whose low words wrapped under the fragment in work.
 var<private> carries: u32;

@@ -8,20 +8,6 @@ override CHANNELS: u32;
 // For each pair of each pixel's channels a u64 of sums; after those of the whole band, as many of carries.
 @group(0) @binding(8) var<storage, read_write> sums: array<atomic<u64>>;
 
-alias Term = u32;
-const COUNT_ONE: Term = 1u;
-
-// The units of a weight of 1.
-const ONE: f32 = FIXED_ONE;
-
-fn quantise(weight: f32) -> Term {
-    return u32(round(weight * ONE));
-}
-
-fn term(weight: Term, value: f32) -> Term {
-    return u32(round(f32(weight) * clamp(value, 0.0, 1.0)));
-}
-
 // What wrapped under the fragment in work, three bits a pair: whether its low half did, and how often its high half, which
 // carries reach twice where the halves are added one by one.
 var<private> carries: u32;

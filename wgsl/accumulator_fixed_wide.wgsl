@@ -1,27 +1,9 @@
-// Sums in fixed point for scenes whose terms may be small (SceneNeeds::wide_sums): 40 fractional bits a term, two words a
-// sum (low, high). Most terms reach into the high word, so most additions are two; accumulator_fixed.wgsl has one.
+// Sums of terms_wide.wgsl in fixed point, two words a sum (low, high). Most terms reach into the high word, so most additions are two; accumulator_fixed.wgsl has one.
 // Error bound: src/passes/accumulate.rs.
 
 override CHANNELS: u32;
 
 @group(0) @binding(8) var<storage, read_write> sums: array<atomic<u32>>;
-
-// Units of 2^-40 as f32: a product is rounded once, as f32 sums would, and no more.
-alias Term = f32;
-const COUNT_ONE: Term = 1.0;
-
-// The units of a weight of 1: 2^40.
-const ONE: f32 = 1099511627776.0;
-
-const WORD: f32 = 4294967296.0;
-
-fn quantise(weight: f32) -> Term {
-    return weight * ONE;
-}
-
-fn term(weight: Term, value: f32) -> Term {
-    return weight * clamp(value, 0.0, 1.0);
-}
 
 fn add(pixel: u32, channel: u32, value: Term) {
     let word = 2u * (pixel * CHANNELS + channel);

@@ -25,13 +25,21 @@ fn attributes_without_place(color: vec4<f32>, normal: vec3<f32>, radius: f32) ->
     return Attributes(color, normal, radius, nowhere);
 }
 
-fn blend(pixel: u32, fragment: Fragment, front: f32, attributes: Attributes) {
+fn weight_of(fragment: Fragment) -> Term {
     let unfiltered = clamp(kernel_weight(fragment.rho2), LEAST_WEIGHT, 1.0);
-    let weight = quantise(max(fragment.gain * unfiltered, LEAST_FILTERED_WEIGHT));
+    return quantise(max(fragment.gain * unfiltered, LEAST_FILTERED_WEIGHT));
+}
+
+fn blend(pixel: u32, fragment: Fragment, front: f32, attributes: Attributes) {
+    blend_weighted(pixel, weight_of(fragment), fragment.depth, front, attributes);
+}
+
+// A weight of 0 adds nothing to any sum.
+fn blend_weighted(pixel: u32, weight: Term, depth: f32, front: f32, attributes: Attributes) {
     accumulate_color(pixel, weight, attributes.color);
     accumulate_normal(pixel, weight, attributes.normal);
-    accumulate_depth(pixel, weight, fragment.depth, front);
-    accumulate_count(pixel);
-    accumulate_place(pixel, weight, attributes.place, fragment.depth);
+    accumulate_depth(pixel, weight, depth, front);
+    accumulate_count(pixel, weight);
+    accumulate_place(pixel, weight, attributes.place, depth);
     settle(pixel);
 }

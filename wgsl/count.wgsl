@@ -3,8 +3,8 @@
 override COUNT_CHANNEL: u32;
 override COUNT_IMAGE: u32;
 
-fn accumulate_count(pixel: u32) {
-    add(pixel, COUNT_CHANNEL, COUNT_ONE);
+fn accumulate_count(pixel: u32, weight: Term) {
+    add(pixel, COUNT_CHANNEL, select(Term(0), COUNT_ONE, weight != Term(0)));
 }
 
 fn write_count(out: u32, pixel: u32) {

@@ -1,3 +1,3 @@
-fn accumulate_count(pixel: u32) {}
+fn accumulate_count(pixel: u32, weight: Term) {}
 
 fn write_count(out: u32, pixel: u32) {}

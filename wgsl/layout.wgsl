@@ -79,14 +79,6 @@ struct Splat {
     a_low: array<f32, 3>,
 }
 
-// The attributes of a large splat, for tiles, as blend.wgsl takes them: its colour, its normal, and where epsilon depends on
-// it its radius.
-struct LargeAttributes {
-    color: array<f32, 4>,
-    normal: array<f32, 3>,
-    radius: f32,
-}
-
 const AWAY: u32 = 0x80000000u;
 
 // The nearest depth where nothing is: +inf.

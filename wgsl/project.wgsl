@@ -5,7 +5,7 @@
 @group(0) @binding(2) var<storage, read> surfels: array<Surfel>;
 @group(0) @binding(3) var<storage, read_write> splats: array<Splat>;
 // Word 0 counts the large splats, word 1 all that are out of view; three words from QUEUE_GRID on are the grid of workgroups
-// that draws the large ones, three from QUEUE_TILE_GRID on that of invocations, and from QUEUE_START on come their indices.
+// that draws the large ones, and from QUEUE_START on come their indices.
 @group(0) @binding(4) var<storage, read_write> queue: array<atomic<u32>>;
 
 // The rare ones, in the same form; the grid is project_rare's.
@@ -13,7 +13,6 @@
 @group(0) @binding(22) var<storage, read> listed: array<u32>;
 
 const QUEUE_GRID: u32 = 2u;
-const QUEUE_TILE_GRID: u32 = 5u;
 const MOST_GROUPS: u32 = 65535u;
 
 var<workgroup> group_unseen: atomic<u32>;
@@ -154,14 +153,12 @@ fn rows_of(groups: u32) -> vec3<u32> {
     return vec3<u32>((groups + max(rows, 1u) - 1u) / max(rows, 1u), rows, 1u);
 }
 
-// After all surfels: a workgroup for each large splat, and an invocation for each.
+// After all surfels: a workgroup for each large splat.
 @compute @workgroup_size(1)
 fn arrange() {
     let large = atomicLoad(&queue[0]);
     let grid = rows_of(large);
-    let tile_grid = rows_of(groups_of(large));
     for (var k = 0u; k < 3u; k++) {
         atomicStore(&queue[QUEUE_GRID + k], grid[k]);
-        atomicStore(&queue[QUEUE_TILE_GRID + k], tile_grid[k]);
     }
 }

@@ -30,30 +30,33 @@ fn resolve(
     if (pixel >= band_pixels()) {
         return;
     }
-    let x = pixel % view.width;
-    let y = pixel / view.width + band.first_row;
+    resolve_pixel(pixel, pixel, pixel % view.width, pixel / view.width + band.first_row);
+}
+
+// The pixel (x, y), the band's `pixel`th, from what `sums_of` names its sums.
+fn resolve_pixel(sums_of: u32, pixel: u32, x: u32, y: u32) {
     let out = pixel * IMAGE_WORDS;
     let front = front_at(pixel);
     // Where nothing is, no sum need be read.
     var weight = 0.0;
     if (bitcast<u32>(front) != NOTHING) {
-        weight = sum_at(pixel, WEIGHT_CHANNEL);
+        weight = sum_at(sums_of, WEIGHT_CHANNEL);
     }
     if (weight == 0.0) {
         write_color(out, view.background);
         write_normal(out, vec3<f32>(0.0));
         write_no_depth(out);
         write_weight(out, 0.0);
-        write_count(out, pixel);
+        write_count(out, sums_of);
         return;
     }
-    let premultiplied = textured(pixel, weight, resolve_color(pixel, weight));
+    let premultiplied = textured(sums_of, weight, resolve_color(sums_of, weight));
     let alpha = premultiplied.a;
     let color = select(vec3<f32>(0.0), premultiplied.rgb / alpha, alpha > 0.0);
-    let normal = resolve_normal(pixel, weight);
+    let normal = resolve_normal(sums_of, weight);
     write_color(out, over(vec4<f32>(shade(color, normal, x, y), alpha), view.background));
     write_normal(out, normal);
-    write_depth(out, pixel, weight, front);
-    write_weight(out, weight_at(pixel));
-    write_count(out, pixel);
+    write_depth(out, sums_of, weight, front);
+    write_weight(out, weight_at(sums_of));
+    write_count(out, sums_of);
 }

@@ -1,19 +1,24 @@
-// A large splat that a whole subgroup works on. Same interface as splat_shared.wgsl.
+// The splats of a tile's list, one after the other. Same interface as splat_shared.wgsl.
 
-@group(0) @binding(30) var<storage, read> large_splats: array<Splat>;
-@group(0) @binding(33) var<storage, read> large_attributes: array<LargeAttributes>;
+const FETCHED: u32 = 1u;
 
-fn shared_splat(place: u32, local: u32) -> Splat {
-    return large_splats[place];
+fn hold_lane() {}
+
+// Which of those that are fetched this invocation fetches.
+fn fetcher() -> u32 {
+    return 0u;
 }
 
-fn shared_attributes(place: u32, local: u32) -> Attributes {
-    let own = large_attributes[place];
-    let c = own.color;
-    let n = own.normal;
-    return attributes_without_place(vec4<f32>(c[0], c[1], c[2], c[3]), vec3<f32>(n[0], n[1], n[2]), own.radius);
+// Of those that are fetched, a bit for each that is wanted.
+fn offered(wanted: bool) -> u32 {
+    return select(0u, 1u, wanted);
 }
 
-fn shared_any(wanted: bool) -> bool {
-    return wanted;
+fn farthest_in_tile(farthest: f32) -> f32 {
+    return farthest;
+}
+
+// The word that the invocation which fetched `from_` has.
+fn handed(word: u32, from_: u32) -> u32 {
+    return word;
 }

@@ -1,204 +1,101 @@
-// Stages 2 and 3 for large splats: they are binned into tiles of the image, and each tile is drawn by one workgroup, whose
-// invocations keep a row of eight pixels each in registers. The footprint, and so every bit, is that of visibility.wgsl and
-// accumulate.wgsl. Host side: src/passes/tiles.rs.
-//
-// Binning is count, scan and place. The order within a tile's list depends on the schedule, but no minimum or sum does.
+// Stages 2 to 4 by tiles of the image, whose lists bin.wgsl made. An invocation keeps a column of a tile's pixels in registers,
+// eight of them a tile. The footprint, and so every bit, is that of visibility.wgsl and accumulate.wgsl.
+// Host side: src/passes/tiles.rs.
 
-// For tile t, word t + 1 is at first its count, then where its list starts, and at last where it ends; word 0 is 0. The last
-// two words say how long all lists together, and the longest, were at most.
-@group(0) @binding(26) var<storage, read_write> ends: array<atomic<u32>>;
-@group(0) @binding(27) var<storage, read_write> lists: array<u32>;
-@group(0) @binding(28) var<storage, read> listed_ends: array<u32>;
-@group(0) @binding(29) var<storage, read> tile_lists: array<u32>;
-// The large splats of the page, in the order of the queue.
-@group(0) @binding(31) var<storage, read_write> larges: array<Splat>;
-@group(0) @binding(32) var<storage, read_write> attributes_of_larges: array<LargeAttributes>;
+// The lists of the large splats.
+@group(0) @binding(27) var<storage, read> large_lists: array<u32>;
 
-const TILE_WIDTH: u32 = 32u;
-const TILE_HEIGHT: u32 = 16u;
-// A tile is four by two blocks of eight by eight pixels, a block eight invocations.
-const BLOCK: u32 = 8u;
-// An entry of a list is a splat's place in the queue of large ones, and a bit for each block that it may touch.
-const ENTRY_BITS: u32 = 24u;
-const ENTRY_PLACE: u32 = 0xffffffu;
-
-fn tiles_across() -> u32 {
-    return (view.width + TILE_WIDTH - 1u) / TILE_WIDTH;
-}
-
-fn tile_count_of_band() -> u32 {
-    return tiles_across() * ((band.rows + TILE_HEIGHT - 1u) / TILE_HEIGHT);
-}
-
-// The tiles that the large splat of this invocation may touch, x and y; empty if there is no such splat.
-fn touched(index: u32) -> Rectangle {
-    if (index >= arrayLength(&projected)) {
-        return Rectangle(vec2<u32>(1u), vec2<u32>(0u));
-    }
-    let pixels = reach(projected[index]);
-    if (any(pixels.first > pixels.last)) {
-        return Rectangle(vec2<u32>(1u), vec2<u32>(0u));
-    }
-    let size = vec2<u32>(TILE_WIDTH, TILE_HEIGHT);
-    let top = vec2<u32>(0u, band.first_row);
-    return Rectangle((pixels.first - top) / size, (pixels.last - top) / size);
-}
-
-// The splat at a place of the queue, or none (a number that is no index).
-fn queued_splat(place: u32) -> u32 {
-    if (place >= queued[0]) {
-        return 0xffffffffu;
-    }
-    return queued[QUEUE_START + place];
-}
-
-@compute @workgroup_size(WORKGROUP)
-fn tile_count(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let tiles = touched(queued_splat(linear_index(workgroup, workgroups, local)));
-    for (var y = tiles.first.y; y <= tiles.last.y; y++) {
-        for (var x = tiles.first.x; x <= tiles.last.x; x++) {
-            atomicAdd(&ends[y * tiles_across() + x + 1u], 1u);
-        }
-    }
-}
-
-const SCANNERS: u32 = 256u;
-var<workgroup> partial: array<u32, SCANNERS>;
-
-// Counts become starts. One workgroup; each invocation has a run of tiles.
-@compute @workgroup_size(SCANNERS)
-fn tile_scan(@builtin(local_invocation_index) local: u32) {
-    let tiles = tile_count_of_band();
-    let run = (tiles + SCANNERS - 1u) / SCANNERS;
-    let first = min(local * run, tiles);
-    let last = min(first + run, tiles);
-    var total = 0u;
-    var longest = 0u;
-    for (var t = first; t < last; t++) {
-        let count = atomicLoad(&ends[t + 1u]);
-        longest = max(longest, count);
-        total += count;
-    }
-    atomicMax(&ends[arrayLength(&ends) - 1u], longest);
-    partial[local] = total;
-    workgroupBarrier();
-    if (local == 0u) {
-        var before = 0u;
-        for (var k = 0u; k < SCANNERS; k++) {
-            let own = partial[k];
-            partial[k] = before;
-            before += own;
-        }
-        atomicMax(&ends[arrayLength(&ends) - 2u], before);
-    }
-    workgroupBarrier();
-    var start = partial[local];
-    for (var t = first; t < last; t++) {
-        let own = atomicLoad(&ends[t + 1u]);
-        atomicStore(&ends[t + 1u], start);
-        start += own;
-    }
-}
-
-// The blocks of the tile that lie in `pixels`, relative to the tile's first pixel.
-fn blocks_in(first: vec2<i32>, last: vec2<i32>) -> u32 {
-    let low = vec2<u32>(max(first, vec2<i32>(0))) / BLOCK;
-    let high = vec2<u32>(min(last, vec2<i32>(31, 15))) / BLOCK;
-    let across = (0xfu << low.x) & (0xfu >> (3u - high.x));
-    return select(0u, across, low.y == 0u) | select(0u, across << 4u, high.y == 1u);
-}
-
-@compute @workgroup_size(WORKGROUP)
-fn tile_place(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let place = linear_index(workgroup, workgroups, local);
-    let index = queued_splat(place);
-    let tiles = touched(index);
-    if (any(tiles.first > tiles.last) || place >= arrayLength(&larges)) {
-        return;
-    }
-    let splat = projected[index];
-    let attributes = attributes_of(index, splat);
-    let n = attributes.normal;
-    let c = attributes.color;
-    larges[place] = splat;
-    attributes_of_larges[place] =
-        LargeAttributes(array<f32, 4>(c.x, c.y, c.z, c.w), array<f32, 3>(n.x, n.y, n.z), attributes.radius);
-    let pixels = reach(splat);
-    let top = vec2<i32>(0, i32(band.first_row));
-    for (var y = tiles.first.y; y <= tiles.last.y; y++) {
-        for (var x = tiles.first.x; x <= tiles.last.x; x++) {
-            let corner = vec2<i32>(i32(x * TILE_WIDTH), i32(y * TILE_HEIGHT)) + top;
-            let blocks = blocks_in(vec2<i32>(pixels.first) - corner, vec2<i32>(pixels.last) - corner);
-            let slot = atomicAdd(&ends[y * tiles_across() + x + 1u], 1u);
-            if (slot < arrayLength(&lists)) {
-                lists[slot] = (blocks << ENTRY_BITS) | place;
-            }
-        }
-    }
-}
-
-// The row of an invocation: its first pixel, how many of its eight lie in the band, and its block's bit in an entry.
-struct Row {
+// The pixels of this invocation, from (x, y) down; `pixel` is the first one's place in the band. Those past the image's edge
+// have nothing. `large` and `small`: where its tile's lists start and end.
+struct Column {
     x: u32,
     y: u32,
     pixel: u32,
     pixels: u32,
-    block: u32,
+    large: vec2<u32>,
+    small: vec2<u32>,
 }
 
-fn row_of(workgroup: vec3<u32>, local: u32) -> Row {
-    let block = local / BLOCK;
-    let x = workgroup.x * TILE_WIDTH + (block % 4u) * BLOCK;
-    let y = workgroup.y * TILE_HEIGHT + (block / 4u) * BLOCK + local % BLOCK;
-    let inside = y < band.rows && x < view.width;
-    let pixels = select(0u, min(BLOCK, view.width - x), inside);
-    return Row(x, y + band.first_row, y * view.width + x, pixels, 1u << (ENTRY_BITS + block));
+// A workgroup has tiles next to each other.
+fn column_of(workgroup: vec3<u32>, local: u32) -> Column {
+    let x = workgroup.x * WORKGROUP + local;
+    let row = workgroup.y * TILE_SIDE;
+    var column = Column(x, row + band.first_row, row * view.width + x, 0u, vec2<u32>(0u), vec2<u32>(0u));
+    if (x / TILE_SIDE < cells_across(TILE_SIDE)) {
+        let end = LIST_ENDS + 1u + row / BLOCK_SIDE * cells_across(BLOCK_SIDE) + x / BLOCK_SIDE;
+        let list = vec2<u32>(large_lists[end - 1u], large_lists[end]) + lists_start(BLOCK_SIDE);
+        column.large = min(list, vec2<u32>(arrayLength(&large_lists)));
+        column.small = small_list(x / TILE_SIDE, workgroup.y);
+        column.pixels = select(0u, min(TILE_SIDE, band.rows - row), x < view.width);
+    }
+    return column;
 }
 
-fn list_of(workgroup: vec3<u32>) -> vec2<u32> {
-    let tile = workgroup.y * tiles_across() + workgroup.x;
-    return min(vec2<u32>(listed_ends[tile], listed_ends[tile + 1u]), vec2<u32>(arrayLength(&tile_lists)));
-}
+// What this invocation fetched.
+var<private> own_index: u32;
+var<private> own_splat: Splat;
+var<private> own_filter: Filter;
 
-struct Entry {
-    found: bool,
-    place: u32,
-    splat: Splat,
-    filter_: Filter,
-}
-
-// The next entry from `place` on, of those before `end`, that could have a fragment in the row no deeper than `deepest`; and
-// the place after it. Some drivers skip what no invocation wants by the rounds of a loop only, so this is one.
-fn next_entry(place: ptr<function, u32>, end: u32, row: Row, local: u32, deepest: f32) -> Entry {
-    let pixels = Rectangle(vec2<u32>(row.x, row.y), vec2<u32>(row.x + row.pixels - 1u, row.y));
-    var entry: Entry;
-    while (*place < end && !entry.found) {
-        let listed = tile_lists[*place];
-        *place += 1u;
-        if ((listed & row.block) != 0u) {
-            entry.place = listed & ENTRY_PLACE;
-            entry.splat = shared_splat(entry.place, local);
-            entry.filter_ = filter_at(entry.place);
-            let reached = nearest_reached(entry.splat, entry.filter_, pixels);
-            entry.found = shared_any(row.pixels > 0u && reached <= deepest);
+// Fetches of the first `listed` splats, of which the large come first, those from `place` on; a bit for each that could have a
+// fragment in the tile no deeper than `deepest`.
+fn fetch(place: u32, listed: u32, column: Column, deepest: f32) -> u32 {
+    let at = place + fetcher();
+    let large = column.large.y - column.large.x;
+    var wanted = false;
+    if (at < listed) {
+        if (at < large) {
+            own_index = large_lists[column.large.x + at];
+        } else {
+            own_index = small_entry(column.small.x + (at - large));
         }
+        own_splat = projected[own_index];
+        own_filter = filter_of(own_index);
+        let extent = reach(own_splat);
+        let first = vec2<u32>(column.x / TILE_SIDE * TILE_SIDE, column.y);
+        let last = first + TILE_SIDE - 1u;
+        let pixels = Rectangle(max(extent.first, first), min(extent.last, last));
+        wanted = all(pixels.first <= pixels.last) && nearest_reached(own_splat, own_filter, pixels) <= deepest;
     }
-    return entry;
+    return offered(wanted);
 }
 
-fn filter_at(place: u32) -> Filter {
-    if (FILTERED) {
-        return filter_of(queued[QUEUE_START + place]);
-    }
-    return filter_of(0u);
+fn handed_number(number: f32, from_: u32) -> f32 {
+    return bitcast<f32>(handed(bitcast<u32>(number), from_));
+}
+
+fn handed_row(row: array<f32, 3>, from_: u32) -> array<f32, 3> {
+    return array<f32, 3>(
+        handed_number(row[0], from_),
+        handed_number(row[1], from_),
+        handed_number(row[2], from_),
+    );
+}
+
+// What the footprint is made of.
+fn handed_splat(from_: u32) -> Splat {
+    var splat: Splat;
+    splat.anchor_x = bitcast<i32>(handed(bitcast<u32>(own_splat.anchor_x), from_));
+    splat.anchor_y = bitcast<i32>(handed(bitcast<u32>(own_splat.anchor_y), from_));
+    splat.a = handed_row(own_splat.a, from_);
+    splat.b = handed_row(own_splat.b, from_);
+    splat.c = handed_row(own_splat.c, from_);
+    splat.a_low = handed_row(own_splat.a_low, from_);
+    return splat;
+}
+
+fn handed_attributes(own: Attributes, from_: u32) -> Attributes {
+    let c = own.color;
+    let n = own.normal;
+    return attributes_without_place(
+        vec4<f32>(
+            handed_number(c.x, from_),
+            handed_number(c.y, from_),
+            handed_number(c.z, from_),
+            handed_number(c.w, from_),
+        ),
+        vec3<f32>(handed_number(n.x, from_), handed_number(n.y, from_), handed_number(n.z, from_)),
+        handed_number(own.radius, from_),
+    );
 }
 
 fn nearer(front: f32, splat: Splat, filter_: Filter, x: u32, y: u32) -> f32 {
@@ -208,7 +105,7 @@ fn nearer(front: f32, splat: Splat, filter_: Filter, x: u32, y: u32) -> f32 {
 
 fn farthest_of(a: vec4<f32>, b: vec4<f32>) -> f32 {
     let m = max(a, b);
-    return max(max(m.x, m.y), max(m.z, m.w));
+    return farthest_in_tile(max(max(m.x, m.y), max(m.z, m.w)));
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -217,108 +114,125 @@ fn tile_visibility(
     @builtin(local_invocation_index) local: u32,
 ) {
     hold();
-    let list = list_of(workgroup);
-    if (list.x == list.y) {
+    hold_lane();
+    let column = column_of(workgroup, local);
+    let listed = column.large.y - column.large.x;
+    if (listed == 0u) {
         return;
     }
-    let row = row_of(workgroup, local);
+    // Pixels past the edge are as near as can be.
     var a = vec4<f32>(0.0);
     var b = vec4<f32>(0.0);
     for (var k = 0u; k < 4u; k++) {
-        if (k < row.pixels) {
-            a[k] = bitcast<f32>(atomicLoad(&nearest[row.pixel + k]));
+        if (k < column.pixels) {
+            a[k] = bitcast<f32>(atomicLoad(&nearest[column.pixel + k * view.width]));
         }
-        if (k + 4u < row.pixels) {
-            b[k] = bitcast<f32>(atomicLoad(&nearest[row.pixel + k + 4u]));
+        if (k + 4u < column.pixels) {
+            b[k] = bitcast<f32>(atomicLoad(&nearest[column.pixel + (k + 4u) * view.width]));
         }
     }
-    var place = list.x;
-    var found = false;
-    loop {
-        let next = next_entry(&place, list.y, row, local, farthest_of(a, b));
-        if (!next.found) {
-            break;
+    for (var place = 0u; place < listed; place += FETCHED) {
+        var wanted = fetch(place, listed, column, farthest_of(a, b));
+        while (wanted != 0u) {
+            let next = firstTrailingBit(wanted);
+            wanted &= wanted - 1u;
+            let splat = handed_splat(next);
+            let filter_ = handed_filter(own_filter, next);
+            a.x = nearer(a.x, splat, filter_, column.x, column.y);
+            a.y = nearer(a.y, splat, filter_, column.x, column.y + 1u);
+            a.z = nearer(a.z, splat, filter_, column.x, column.y + 2u);
+            a.w = nearer(a.w, splat, filter_, column.x, column.y + 3u);
+            b.x = nearer(b.x, splat, filter_, column.x, column.y + 4u);
+            b.y = nearer(b.y, splat, filter_, column.x, column.y + 5u);
+            b.z = nearer(b.z, splat, filter_, column.x, column.y + 6u);
+            b.w = nearer(b.w, splat, filter_, column.x, column.y + 7u);
         }
-        found = true;
-        a.x = nearer(a.x, next.splat, next.filter_, row.x, row.y);
-        a.y = nearer(a.y, next.splat, next.filter_, row.x + 1u, row.y);
-        a.z = nearer(a.z, next.splat, next.filter_, row.x + 2u, row.y);
-        a.w = nearer(a.w, next.splat, next.filter_, row.x + 3u, row.y);
-        b.x = nearer(b.x, next.splat, next.filter_, row.x + 4u, row.y);
-        b.y = nearer(b.y, next.splat, next.filter_, row.x + 5u, row.y);
-        b.z = nearer(b.z, next.splat, next.filter_, row.x + 6u, row.y);
-        b.w = nearer(b.w, next.splat, next.filter_, row.x + 7u, row.y);
-    }
-    if (!found) {
-        return;
     }
     for (var k = 0u; k < 4u; k++) {
-        if (k < row.pixels) {
-            atomicStore(&nearest[row.pixel + k], bitcast<u32>(a[k]));
+        if (k < column.pixels) {
+            atomicStore(&nearest[column.pixel + k * view.width], bitcast<u32>(a[k]));
         }
-        if (k + 4u < row.pixels) {
-            atomicStore(&nearest[row.pixel + k + 4u], bitcast<u32>(b[k]));
+        if (k + 4u < column.pixels) {
+            atomicStore(&nearest[column.pixel + (k + 4u) * view.width], bitcast<u32>(b[k]));
         }
     }
 }
 
 // A pixel without anything is 0, which no fragment is within epsilon of.
-fn front_of(row: Row, k: u32) -> f32 {
-    if (k >= row.pixels) {
+fn front_of(column: Column, k: u32) -> f32 {
+    if (k >= column.pixels) {
         return 0.0;
     }
-    let front = front_at(row.pixel + k);
+    let front = front_at(column.pixel + k * view.width);
     return select(front, 0.0, bitcast<u32>(front) == NOTHING);
 }
 
-fn gather(slot: u32, entry: Entry, attributes: Attributes, front: f32, x: u32, y: u32) {
-    let fragment = footprint(entry.splat, entry.filter_, x, y);
-    if (fragment.hit && fragment.depth <= farthest_accepted(front, attributes.radius)) {
-        blend(slot, fragment, front, attributes);
+fn gather(slot: u32, splat: Splat, filter_: Filter, attributes: Attributes, front: f32, column: Column) {
+    let fragment = footprint(splat, filter_, column.x, column.y + slot);
+    // Selected, as a branch would select what is stored of each sum.
+    let accepted = fragment.hit && fragment.depth <= farthest_accepted(front, attributes.radius);
+    let weight = select(Term(0), weight_of(fragment), accepted);
+    blend_weighted(slot, weight, select(front, fragment.depth, accepted), front, attributes);
+}
+
+// Sums the fragments of the tile's splats in registers.
+fn sum_tile(column: Column) {
+    let a = vec4<f32>(front_of(column, 0u), front_of(column, 1u), front_of(column, 2u), front_of(column, 3u));
+    let b = vec4<f32>(front_of(column, 4u), front_of(column, 5u), front_of(column, 6u), front_of(column, 7u));
+    let deepest = deepest_accepted(farthest_of(a, b));
+    let listed = (column.large.y - column.large.x) + (column.small.y - column.small.x);
+    for (var place = 0u; place < listed; place += FETCHED) {
+        var wanted = fetch(place, listed, column, deepest);
+        let own_attributes = attributes_of(own_index, own_splat);
+        while (wanted != 0u) {
+            let next = firstTrailingBit(wanted);
+            wanted &= wanted - 1u;
+            let splat = handed_splat(next);
+            let filter_ = handed_filter(own_filter, next);
+            let attributes = handed_attributes(own_attributes, next);
+            gather(0u, splat, filter_, attributes, a.x, column);
+            gather(1u, splat, filter_, attributes, a.y, column);
+            gather(2u, splat, filter_, attributes, a.z, column);
+            gather(3u, splat, filter_, attributes, a.w, column);
+            gather(4u, splat, filter_, attributes, b.x, column);
+            gather(5u, splat, filter_, attributes, b.y, column);
+            gather(6u, splat, filter_, attributes, b.z, column);
+            gather(7u, splat, filter_, attributes, b.w, column);
+        }
     }
 }
 
+// Adds what the splats of this page and of some sizes sum to.
 @compute @workgroup_size(WORKGROUP)
 fn tile_accumulate(
     @builtin(workgroup_id) workgroup: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
     hold();
-    let list = list_of(workgroup);
-    if (list.x == list.y) {
+    hold_lane();
+    let column = column_of(workgroup, local);
+    if (column.large.x == column.large.y) {
         return;
     }
-    let row = row_of(workgroup, local);
-    let a = vec4<f32>(front_of(row, 0u), front_of(row, 1u), front_of(row, 2u), front_of(row, 3u));
-    let b = vec4<f32>(front_of(row, 4u), front_of(row, 5u), front_of(row, 6u), front_of(row, 7u));
-    let farthest = farthest_of(a, b);
-    var place = list.x;
-    var found = false;
-    loop {
-        let next = next_entry(&place, list.y, row, local, deepest_accepted(farthest));
-        if (!next.found) {
-            break;
-        }
-        found = true;
-        let attributes = shared_attributes(next.place, local);
-        gather(0u, next, attributes, a.x, row.x, row.y);
-        gather(1u, next, attributes, a.y, row.x + 1u, row.y);
-        gather(2u, next, attributes, a.z, row.x + 2u, row.y);
-        gather(3u, next, attributes, a.w, row.x + 3u, row.y);
-        gather(4u, next, attributes, b.x, row.x + 4u, row.y);
-        gather(5u, next, attributes, b.y, row.x + 5u, row.y);
-        gather(6u, next, attributes, b.z, row.x + 6u, row.y);
-        gather(7u, next, attributes, b.w, row.x + 7u, row.y);
+    sum_tile(column);
+    for (var k = 0u; k < column.pixels; k++) {
+        show(k);
+        deposit(column.pixel + k * view.width);
     }
-    if (!found) {
-        return;
+}
+
+// Where the tiles have all splats there are, their sums need not be stored.
+@compute @workgroup_size(WORKGROUP)
+fn tile_resolve(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    hold();
+    hold_lane();
+    let column = column_of(workgroup, local);
+    sum_tile(column);
+    for (var k = 0u; k < column.pixels; k++) {
+        show(k);
+        resolve_pixel(k, column.pixel + k * view.width, column.x, column.y + k);
     }
-    if (row.pixels > 0u) { deposit(0u, row.pixel); }
-    if (row.pixels > 1u) { deposit(1u, row.pixel + 1u); }
-    if (row.pixels > 2u) { deposit(2u, row.pixel + 2u); }
-    if (row.pixels > 3u) { deposit(3u, row.pixel + 3u); }
-    if (row.pixels > 4u) { deposit(4u, row.pixel + 4u); }
-    if (row.pixels > 5u) { deposit(5u, row.pixel + 5u); }
-    if (row.pixels > 6u) { deposit(6u, row.pixel + 6u); }
-    if (row.pixels > 7u) { deposit(7u, row.pixel + 7u); }
 }

@@ -20,32 +20,56 @@ fn add_pair(pixel: u32, channel: u32, first: Term, second: Term) {
 
 fn settle(pixel: u32) {}
 
-// What the registers hold, in the units of the terms.
-fn sum_at(pixel: u32, channel: u32) -> f32 {
-    let at = pixel * MOST_CHANNELS + channel;
-    return f32(kept_high[at]) * 4294967296.0 + f32(kept_low[at]);
+// The sums of the pixel that is shown.
+var<private> shown_low: array<u32, 12>;
+var<private> shown_high: array<u32, 12>;
+
+fn show_channel(slot: u32, channel: u32) {
+    var low = kept_low[channel];
+    var high = kept_high[channel];
+    if (slot == 1u) { low = kept_low[12u + channel]; high = kept_high[12u + channel]; }
+    if (slot == 2u) { low = kept_low[24u + channel]; high = kept_high[24u + channel]; }
+    if (slot == 3u) { low = kept_low[36u + channel]; high = kept_high[36u + channel]; }
+    if (slot == 4u) { low = kept_low[48u + channel]; high = kept_high[48u + channel]; }
+    if (slot == 5u) { low = kept_low[60u + channel]; high = kept_high[60u + channel]; }
+    if (slot == 6u) { low = kept_low[72u + channel]; high = kept_high[72u + channel]; }
+    if (slot == 7u) { low = kept_low[84u + channel]; high = kept_high[84u + channel]; }
+    shown_low[channel] = low;
+    shown_high[channel] = high;
 }
 
-fn weight_at(pixel: u32) -> f32 {
-    return sum_at(pixel, WEIGHT_CHANNEL) / ONE;
+fn show_pair(slot: u32, channel: u32) {
+    show_channel(slot, channel);
+    show_channel(slot, channel + 1u);
 }
 
-// Adds the registers of pixel `slot` to the stored sums of `pixel`. Written out, so that no register is indexed by a number
-// that only the device knows.
-fn deposit(slot: u32, pixel: u32) {
-    deposit_pair(slot, pixel, 0u);
-    if (CHANNELS > 2u) { deposit_pair(slot, pixel, 2u); }
-    if (CHANNELS > 4u) { deposit_pair(slot, pixel, 4u); }
-    if (CHANNELS > 6u) { deposit_pair(slot, pixel, 6u); }
-    if (CHANNELS > 8u) { deposit_pair(slot, pixel, 8u); }
-    if (CHANNELS > 10u) { deposit_pair(slot, pixel, 10u); }
+// Takes the sums of a pixel out of the registers. Written out, so that no register is indexed by a number that only the
+// device knows.
+fn show(slot: u32) {
+    show_pair(slot, 0u);
+    if (CHANNELS > 2u) { show_pair(slot, 2u); }
+    if (CHANNELS > 4u) { show_pair(slot, 4u); }
+    if (CHANNELS > 6u) { show_pair(slot, 6u); }
+    if (CHANNELS > 8u) { show_pair(slot, 8u); }
+    if (CHANNELS > 10u) { show_pair(slot, 10u); }
 }
 
-fn deposit_pair(slot: u32, pixel: u32, channel: u32) {
-    let at = slot * MOST_CHANNELS + channel;
-    let first = vec2<u32>(kept_low[at], kept_high[at]);
-    let second = vec2<u32>(kept_low[at + 1u], kept_high[at + 1u]);
-    deposit_sums(pixel, channel, first, second);
+// A sum of the shown pixel, in the units of the terms.
+fn sum_at(slot: u32, channel: u32) -> f32 {
+    return f32(shown_high[channel]) * 4294967296.0 + f32(shown_low[channel]);
+}
+
+fn weight_at(slot: u32) -> f32 {
+    return sum_at(slot, WEIGHT_CHANNEL) / ONE;
+}
+
+// Adds the sums of the shown pixel to those that are stored of `pixel`.
+fn deposit(pixel: u32) {
+    for (var channel = 0u; channel < CHANNELS; channel += 2u) {
+        let first = vec2<u32>(shown_low[channel], shown_high[channel]);
+        let second = vec2<u32>(shown_low[channel + 1u], shown_high[channel + 1u]);
+        deposit_sums(pixel, channel, first, second);
+    }
 }
 
 // The sum of two 64-bit numbers, each low and high word.

@@ -61,7 +61,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         note(&format!("{} surfels had no radius: theirs are estimated from neighbours", preparation.estimated_radii));
     }
     let mesh = io::read_mesh(&arguments.mesh, &bars)?;
+    mesh.notes.iter().for_each(|line| note(line));
     let triangles = TriangleTree::new(&mesh)?;
+    let dropped = mesh.triangles.len() - triangles.len();
+    if dropped > 0 {
+        note(&format!(
+            "{dropped} triangles were dropped: they have no area, or a coordinate is not finite or too large"
+        ));
+    }
     if triangles.is_empty() {
         return Err(Error::malformed(&arguments.mesh, "it has no triangle with an area, so there is nothing to cover"));
     }

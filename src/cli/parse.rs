@@ -18,6 +18,14 @@ pub(super) fn parse_size(text: &str) -> Result<(u32, u32), String> {
     Ok((width, height))
 }
 
+/// A factor that makes pictures larger or smaller.
+pub(super) fn parse_scale(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(factor) if factor > 0.0 && factor.is_finite() => Ok(factor),
+        _ => Err("a factor is a positive number".into()),
+    }
+}
+
 /// Finite numbers between commas.
 fn parse_numbers(text: &str) -> Result<Vec<f64>, String> {
     let number = |part: &str| match part.trim().parse::<f64>() {

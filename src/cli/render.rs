@@ -1,30 +1,34 @@
-//! `epsplat render`: files in, a picture and its maps out.
+//! `epsplat render`: files in, a picture and its maps out, or one for each of many cameras.
 
-use std::path::{Path, PathBuf};
+mod output;
+mod view;
+mod views;
+
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use epsplat::frame::Frame;
 use epsplat::gpu::Gpu;
 use epsplat::io::Texture;
-use epsplat::io::camera::{self, Pose};
-use epsplat::render::{Backend, Report, render};
-use epsplat::scene::camera::DEFAULT_FOV;
+use epsplat::render::{Backend, render};
 use epsplat::scene::light::MAX_LIGHTS;
 use epsplat::scene::options::SHININESS_RANGE;
 use epsplat::scene::{
-    BlendFormat, Camera, Epsilon, Kernel, Lens, Light, LowPass, Maps, Organisation, Raster, RasterDepth, RenderOptions,
-    Scene, Shading, Up,
+    BlendFormat, Camera, Epsilon, Kernel, Light, LowPass, Maps, Organisation, Raster, RasterDepth, RenderOptions,
+    Scene, Shading,
 };
 use epsplat::{Error, Result, io, surfels};
 use glam::DVec3;
 
-use super::parse::{parse_accumulator, parse_color, parse_intrinsics, parse_size, parse_vector};
+use self::output::{Format, check_folder, check_json, note_overflows, summary};
+use self::view::View;
+use super::parse::{parse_accumulator, parse_color, parse_intrinsics, parse_scale, parse_size, parse_vector};
 use super::progress::Bars;
 use super::{note, write_json};
 
 /// Render PLY, LAS, LAZ and OBJ files to a PNG or EXR image.
 ///
-/// Without a camera the scene is framed from its bounds. Several inputs make one scene.
+/// Without a camera the scene is framed from its bounds. Several inputs make one scene. With --cameras there is a picture for each
+/// camera of a file, in a folder; those that are written stay if a later one fails.
 #[derive(Args)]
 #[command(
     allow_negative_numbers = true,
@@ -33,13 +37,14 @@ use super::{note, write_json};
     epsplat render a.ply b.ply -o maps.exr --aov depth,normal --size 1920x1080\n  \
     epsplat render bunny.obj -o bunny.png --shading phong --light 1,1,1 --light headlight:0.3\n  \
     epsplat render surfels.ply -o painted.png --texture image.png\n  \
-    epsplat render scan.laz -o top.png --eye 0,0,500 --target 0,0,0 --ortho 300"
+    epsplat render scan.laz -o top.png --eye 0,0,500 --target 0,0,0 --ortho 300\n  \
+    epsplat render scan.laz -o views --cameras transforms.json"
 )]
 pub struct Arguments {
     /// Point clouds or meshes: .ply, .las, .laz, .obj
     #[arg(required = true)]
     inputs: Vec<PathBuf>,
-    /// The image: .png (8-bit sRGB) or .exr (linear f32, every map a layer)
+    /// The image: .png (8-bit sRGB) or .exr (linear f32, every map a layer); with --cameras the folder of the images
     #[arg(short, long)]
     output: PathBuf,
     /// Image size in pixels [default: 1024x1024, or the camera file's]
@@ -72,6 +77,19 @@ pub struct Arguments {
     /// A camera file (see the README); takes the place of all other camera arguments but --size
     #[arg(long, value_name = "CAMERA.json", conflicts_with_all = ["eye", "target", "up", "fov", "ortho", "intrinsics"])]
     camera: Option<PathBuf>,
+    /// Many cameras: a transforms.json (NeRF, instant-ngp, nerfstudio), or a folder with COLMAP's cameras.txt and images.txt.
+    /// Each names its image, folders included
+    #[arg(long, value_name = "PATH", conflicts_with_all = ["camera", "eye", "target", "up", "fov", "ortho", "intrinsics"])]
+    cameras: Option<PathBuf>,
+    /// What --cameras writes [default: png; exr with --aov]
+    #[arg(long, value_enum, requires = "cameras")]
+    format: Option<Format>,
+    /// So many times the pixels of --cameras, a side; intrinsics are scaled too
+    #[arg(long, value_name = "FACTOR", value_parser = parse_scale, requires = "cameras")]
+    scale: Option<f64>,
+    /// Leave the lens distortion of --cameras out; else a distorted camera is refused
+    #[arg(long, requires = "cameras")]
+    ignore_distortion: bool,
     /// Smallest depth drawn, world units [default: a millionth of the scene]
     #[arg(long)]
     near: Option<f64>,
@@ -88,7 +106,7 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME", value_parser = parse_accumulator)]
     accumulator: Option<&'static str>,
     /// How the device draws splats, to the same image: scatter (one by one), tile (by tiles of the image) or auto (large
-    /// ones by tiles) [default: auto]
+    /// ones by tiles, and on software adapters all but tiny ones) [default: auto]
     #[arg(long, value_name = "HOW")]
     organisation: Option<Organisation>,
     /// What --backend raster blends into: rgba8unorm, rgba16float or rgba32float [default: rgba16float]
@@ -105,7 +123,7 @@ pub struct Arguments {
     #[arg(long, value_name = "EXPONENT")]
     shininess: Option<f32>,
     /// An image to paint the surfels with, by their texture coordinates (`epsplat sample` writes them), in place of their own
-    /// colours: .png
+    /// colours: .png or .jpg
     #[arg(long, value_name = "IMAGE")]
     texture: Option<PathBuf>,
     /// A light, instead of the headlight: headlight[:INTENSITY] or the direction toward it, x,y,z[:INTENSITY]
@@ -164,41 +182,26 @@ enum MapName {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
+    match &arguments.cameras {
+        Some(path) => views::run(arguments, path),
+        None => one(arguments),
+    }
+}
+
+/// A single picture.
+fn one(arguments: &Arguments) -> Result<()> {
     let format = Format::of(&arguments.output)?;
     let options = options(arguments, format)?;
     check_folder(&arguments.output)?;
-    if let Some(json) = &arguments.json {
-        check_json(json, arguments)?;
-    }
+    check_json(arguments, [arguments.output.as_path()])?;
     let view = View::of(arguments)?;
     let backend = backend(arguments)?;
 
     let bars = Bars::new();
-    let texture = arguments.texture.as_deref().map(Texture::read).transpose()?;
-    let inputs = arguments.inputs.iter().map(|path| io::read(path, &bars)).collect::<Result<Vec<_>>>()?;
-    let (scene, preparation) = match texture {
-        None => surfels::build(inputs, &bars)?,
-        Some(texture) => {
-            let mut read = arguments.inputs.iter().zip(&inputs);
-            if let Some((path, _)) = read.find(|(_, points)| points.texture.is_none()) {
-                let what = "its points have no texture coordinates, so they cannot be textured; `epsplat sample` gives surfels of \
-                            a mesh some";
-                return Err(Error::malformed(path, what));
-            }
-            surfels::build_textured(inputs, texture, &bars)?
-        }
-    };
-    for line in preparation.notes() {
-        note(&line);
-    }
-    let camera = view.camera(&scene)?;
+    let scene = scene(arguments, &bars)?;
+    let camera = view.camera(&scene, Camera::default_near(&scene))?;
     let (frame, report) = render(&scene, &camera, &options, &backend, &bars)?;
-    if report.overflows > 0 {
-        note(&format!(
-            "{} sums overflowed: rendered again with the accumulator {}",
-            report.overflows, report.accumulator
-        ));
-    }
+    note_overflows(&report);
     format.write(&arguments.output, &frame)?;
     match &arguments.json {
         Some(path) => write_json(path, &report),
@@ -209,24 +212,26 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
 }
 
-/// One line: what was drawn, and how long each pass took.
-fn summary(report: &Report, output: &Path) -> String {
-    let order = ["project_ms", "visibility_ms", "accumulate_ms", "resolve_ms"];
-    let passes = order
-        .iter()
-        .filter_map(|name| report.passes.get(*name).map(|ms| format!("{} {ms:.1}", name.trim_end_matches("_ms"))));
-    let clock = match (report.backend, report.clock) {
-        ("gpu", "wall") => ", wall time",
-        _ => "",
+/// What all inputs hold, as one scene.
+fn scene(arguments: &Arguments, bars: &Bars) -> Result<Scene> {
+    let texture = arguments.texture.as_deref().map(Texture::read).transpose()?;
+    let inputs = arguments.inputs.iter().map(|path| io::read(path, bars)).collect::<Result<Vec<_>>>()?;
+    let (scene, preparation) = match texture {
+        None => surfels::build(inputs, bars)?,
+        Some(texture) => {
+            let mut read = arguments.inputs.iter().zip(&inputs);
+            if let Some((path, _)) = read.find(|(_, points)| points.texture.is_none()) {
+                let what = "its points have no texture coordinates, so they cannot be textured; `epsplat sample` gives surfels of \
+                            a mesh some";
+                return Err(Error::malformed(path, what));
+            }
+            surfels::build_textured(inputs, texture, bars)?
+        }
     };
-    format!(
-        "{}: {} of {} surfels drawn, {:.1} ms ({}{clock})",
-        output.display(),
-        report.splats_drawn,
-        report.surfels,
-        report.total_ms,
-        passes.collect::<Vec<_>>().join(", "),
-    )
+    for line in preparation.notes() {
+        note(&line);
+    }
+    Ok(scene)
 }
 
 fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
@@ -344,133 +349,4 @@ fn backend(arguments: &Arguments) -> Result<Backend> {
         }
         Err(error) => Err(error),
     }
-}
-
-/// The camera as far as the arguments decide it.
-struct View {
-    size: (u32, u32),
-    lens: Lens,
-    place: Place,
-    near: Option<f64>,
-}
-
-enum Place {
-    /// Chosen to show the scene.
-    Framed,
-    /// At the eye; looks at the scene's centre.
-    Eye(DVec3, Option<DVec3>),
-    /// As given.
-    Pose(Pose),
-}
-
-impl View {
-    fn of(arguments: &Arguments) -> Result<Self> {
-        let view = match &arguments.camera {
-            Some(path) => {
-                let file = camera::read(path)?;
-                if let (Some(size), Some(own)) = (arguments.size, file.size)
-                    && size != own
-                {
-                    return Err(Error::Usage(format!(
-                        "--size {}x{} contradicts {}, which says {}x{}",
-                        size.0,
-                        size.1,
-                        path.display(),
-                        own.0,
-                        own.1
-                    )));
-                }
-                let size = arguments.size.or(file.size).unwrap_or(DEFAULT_SIZE);
-                Self { size, lens: file.lens, place: Place::Pose(file.pose), near: arguments.near.or(file.near) }
-            }
-            None => {
-                let lens = match (arguments.intrinsics, arguments.ortho) {
-                    (Some(values), _) => Lens::Intrinsics(values),
-                    (None, Some(height)) => Lens::OrthographicHeight(height),
-                    (None, None) => Lens::Fov(arguments.fov.unwrap_or(DEFAULT_FOV)),
-                };
-                let place = match (arguments.eye, arguments.target) {
-                    (None, _) => Place::Framed,
-                    (Some(eye), None) => Place::Eye(eye, arguments.up),
-                    (Some(eye), Some(target)) => Place::Pose(Pose::LookAt(eye, target, arguments.up)),
-                };
-                Self { size: arguments.size.unwrap_or(DEFAULT_SIZE), lens, place, near: arguments.near }
-            }
-        };
-        // What the arguments decide is refused before minutes of reading: only the scene's centre is not known yet.
-        let stand_in = match &view.place {
-            Place::Pose(pose) => pose.clone(),
-            Place::Framed | Place::Eye(..) => Pose::LookAt(DVec3::ZERO, DVec3::X, None),
-        };
-        view.posed(&stand_in, Up::Z, view.near.unwrap_or(1.0))?;
-        Ok(view)
-    }
-
-    fn posed(&self, pose: &Pose, up: Up, near: f64) -> Result<Camera> {
-        match *pose {
-            Pose::Rigid(rotation, eye) => Camera::posed(self.size, self.lens, eye, rotation, near),
-            Pose::LookAt(eye, target, own_up) => Camera::look_at(self.size, self.lens, eye, target, own_up, up, near),
-        }
-    }
-
-    fn camera(&self, scene: &Scene) -> Result<Camera> {
-        let near = self.near.unwrap_or_else(|| Camera::default_near(scene));
-        match &self.place {
-            Place::Framed => Camera::framing(self.size, self.lens, scene, near),
-            Place::Eye(eye, up) => {
-                let center = scene.origin + scene.bounds().center();
-                self.posed(&Pose::LookAt(*eye, center, *up), scene.up, near)
-            }
-            Place::Pose(pose) => self.posed(pose, scene.up, near),
-        }
-    }
-}
-
-const DEFAULT_SIZE: (u32, u32) = (1024, 1024);
-
-/// What the output's name asks for.
-#[derive(Clone, Copy, PartialEq)]
-enum Format {
-    Png,
-    Exr,
-}
-
-impl Format {
-    fn of(path: &Path) -> Result<Self> {
-        match path.extension().and_then(|e| e.to_str()).map(str::to_lowercase).as_deref() {
-            Some("png") => Ok(Self::Png),
-            Some("exr") => Ok(Self::Exr),
-            _ => Err(Error::Usage(format!("the output must end in .png or .exr, {} does not", path.display()))),
-        }
-    }
-
-    fn write(self, path: &Path, frame: &Frame) -> Result<()> {
-        match self {
-            Self::Png => io::png::write(path, frame),
-            Self::Exr => io::exr::write(path, frame),
-        }
-    }
-}
-
-/// An output in a folder that is not there fails now rather than after the render.
-fn check_folder(output: &Path) -> Result<()> {
-    match output.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => {
-            std::fs::metadata(folder).map(|_| ()).map_err(|e| Error::write(output, e))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// A report must not take the place of the image or of an input.
-fn check_json(json: &Path, arguments: &Arguments) -> Result<()> {
-    if json == Path::new("-") {
-        return Ok(());
-    }
-    // Files that are not there yet have no canonical path; then their names must do.
-    let name = |path: &Path| std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    if arguments.inputs.iter().chain([&arguments.output]).any(|path| name(path) == name(json)) {
-        return Err(Error::Usage(format!("--json {} would overwrite an input or the image", json.display())));
-    }
-    check_folder(json)
 }

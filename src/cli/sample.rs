@@ -34,7 +34,7 @@ pub struct Arguments {
     /// How often the mesh's box is halved; else until there is a voxel for every four samples
     #[arg(long, value_name = "HALVINGS", value_parser = clap::value_parser!(u32).range(0..=60))]
     depth: Option<u32>,
-    /// An image for the whole mesh, in place of its own materials: .png
+    /// An image for the whole mesh, in place of its own materials: .png or .jpg
     #[arg(long, value_name = "FILE")]
     texture: Option<PathBuf>,
     /// Another seed gives other samples

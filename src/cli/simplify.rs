@@ -108,7 +108,8 @@ fn summary(report: &Report) -> String {
     );
     if report.beyond_tolerance > 0 {
         text += &format!(
-            "{} surfels hold a point beyond the tolerance: there the surface bends more than that from a point to the next\n",
+            "{} surfels at creases, where the surface bends by more than the tolerance from a point to the next, are as large as \
+             the cell of their own point\n",
             report.beyond_tolerance
         );
     }

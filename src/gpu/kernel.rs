@@ -26,6 +26,7 @@ pub const FILES: &[(&str, &str)] = wgsl![
     "accumulator_float.wgsl",
     "accumulator_packed64.wgsl",
     "accumulator_raster.wgsl",
+    "bin.wgsl",
     "blend.wgsl",
     "camera_orthographic.wgsl",
     "camera_pinhole.wgsl",
@@ -74,14 +75,20 @@ pub const FILES: &[(&str, &str)] = wgsl![
     "splat_plain.wgsl",
     "splat_shared.wgsl",
     "srgb.wgsl",
+    "terms.wgsl",
+    "terms_wide.wgsl",
     "texture.wgsl",
     "texture_absent.wgsl",
     "tile.wgsl",
+    "tile_add.wgsl",
+    "tile_add_wide.wgsl",
     "tile_deposit.wgsl",
     "tile_deposit_pairs.wgsl",
+    "tile_filter.wgsl",
+    "tile_filter_absent.wgsl",
+    "tile_small.wgsl",
+    "tile_small_absent.wgsl",
     "tile_sums.wgsl",
-    "tile_terms.wgsl",
-    "tile_terms_wide.wgsl",
     "visibility.wgsl",
     "weight_map.wgsl",
     "weight_map_absent.wgsl",
@@ -138,7 +145,7 @@ pub fn reflect(text: &str) -> std::result::Result<(naga::Module, Bindings, Vec<S
 #[derive(Default)]
 pub(crate) struct Programs(Mutex<HashMap<ProgramKey, Arc<Program>>>);
 
-/// A module's text, its constants by name as bits, and its draws in words.
+/// A module's text, its constants by name as bits, and its entry points and draws in words.
 type ProgramKey = (String, Vec<(&'static str, u64)>, String);
 
 impl Programs {
@@ -152,7 +159,7 @@ impl Programs {
         constants: &[(&'static str, f64)],
     ) -> Result<Arc<Program>> {
         let bits = constants.iter().map(|&(name, value)| (name, value.to_bits())).collect();
-        let key = (text, bits, format!("{draws:?}"));
+        let key = (text, bits, format!("{stages:?} {draws:?}"));
         // A poisoned lock means that another thread panicked while it compiled; the map itself is whole.
         let mut programs = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(program) = programs.get(&key) {

@@ -18,18 +18,21 @@ pub const LARGE_BY_TILES: u32 = 256;
 /// Where there are no tiles, splats whose bounds hold more pixels than this get a workgroup each instead of an invocation.
 pub const LARGE_BY_WORKGROUPS: u32 = 1024;
 
-/// Words at the start of a page's queue of large splats: how many there are, how many splats are out of view, and
-/// the grids that have a workgroup or an invocation for each of the large ones.
+/// Words at the start of a page's queue of large splats: how many there are, how many splats are out of view, and the grid
+/// that has a workgroup for each of the large ones.
 pub const QUEUE_START: u32 = 8;
 
 /// Word of the queue at which that grid starts.
 pub const QUEUE_GRID: u32 = 2;
 
-/// Word of the queue at which the grid of invocations starts.
-pub const QUEUE_TILE_GRID: u32 = 5;
+/// Side of a tile, pixels (`wgsl/bin.wgsl`).
+pub const TILE_SIDE: u32 = 8;
 
-/// Pixels of a tile, across and down (`wgsl/tile.wgsl`).
-pub const TILE_SIZE: [u32; 2] = [32, 16];
+/// Words at the start of the lists of tiles: what they needed.
+pub const LIST_ENDS: u32 = 2;
+
+/// Side of the blocks of tiles that share a list of large splats, pixels.
+pub const BLOCK_SIDE: u32 = 16;
 
 /// The most workgroups per dimension that every adapter grants.
 pub const MOST_GROUPS: u32 = 65_535;
@@ -121,16 +124,6 @@ pub struct Splat {
     pub b: [f32; 3],
     pub c: [f32; 3],
     pub a_low: [f32; 3],
-}
-
-/// The attributes of a large splat; see the WGSL.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-#[allow(missing_docs)]
-pub struct LargeAttributes {
-    pub color: [f32; 4],
-    pub normal: [f32; 3],
-    pub radius: f32,
 }
 
 /// What a low-pass needs of a splat; see `wgsl/filter.wgsl`.

@@ -76,6 +76,25 @@ pub fn read(path: &Path) -> Result<CameraFile> {
     parse(&text).map_err(|what| Error::malformed(path, what))
 }
 
+impl CameraFile {
+    /// The same view with `scale` times as many pixels a side, rounded; the lens keeps what it sees. A camera that gives no size
+    /// keeps all.
+    pub fn scaled(self, scale: f64) -> Self {
+        let Some((width, height)) = self.size else { return self };
+        // At least one pixel; what is too many saturates and is refused where sizes are.
+        let scaled = |side: u32| (f64::from(side) * scale).round().max(1.0) as u32;
+        let size = (scaled(width), scaled(height));
+        let (x, y) = (f64::from(size.0) / f64::from(width), f64::from(size.1) / f64::from(height));
+        let pixels = |[fx, fy, cx, cy]: [f64; 4]| [fx * x, fy * y, cx * x, cy * y];
+        let lens = match self.lens {
+            Lens::Intrinsics(values) => Lens::Intrinsics(pixels(values)),
+            Lens::OrthographicScale(values) => Lens::OrthographicScale(pixels(values)),
+            lens @ (Lens::Fov(_) | Lens::OrthographicHeight(_)) => lens,
+        };
+        Self { size: Some(size), lens, ..self }
+    }
+}
+
 fn parse(text: &str) -> std::result::Result<CameraFile, String> {
     let raw: Raw = serde_json::from_str(text).map_err(|e| format!("not a camera: {}", one_line(&e.to_string())))?;
     let size = match (raw.width, raw.height) {
@@ -120,7 +139,8 @@ fn parse(text: &str) -> std::result::Result<CameraFile, String> {
     Ok(CameraFile { size, lens, pose, near: raw.near })
 }
 
-fn rigid(rows: [[f64; 4]; 4]) -> std::result::Result<(DMat3, DVec3), String> {
+/// The rotation and the translation of a 4x4 matrix, rows, whose last is 0 0 0 1.
+pub(super) fn rigid(rows: [[f64; 4]; 4]) -> std::result::Result<(DMat3, DVec3), String> {
     if rows[3] != [0.0, 0.0, 0.0, 1.0] {
         return Err("the last row of a pose is 0 0 0 1".into());
     }

@@ -2,6 +2,7 @@
 
 use crate::Error;
 use std::io;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 /// A reader's failure without the path.
@@ -38,4 +39,10 @@ pub(super) fn reserve<T>(items: &mut Vec<T>, more: u64) -> Result<(), Fault> {
 /// The name of a file for a progress line.
 pub(super) fn name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
+/// Runs what calls a decoder of another crate: corrupt data can make it panic.
+pub(super) fn surviving<T>(run: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fault> {
+    catch_unwind(AssertUnwindSafe(run))
+        .unwrap_or_else(|_| Err(Fault::Malformed("its points cannot be decoded; the file is damaged".into())))
 }

@@ -2,17 +2,24 @@
 
 pub mod atomic;
 pub mod camera;
+pub mod cameras;
+#[cfg(feature = "e57")]
+pub mod e57;
 pub mod exr;
 mod fault;
+mod intensity;
 pub mod las;
 pub mod mesh;
 pub mod obj;
+#[cfg(feature = "pcd")]
+pub mod pcd;
 pub mod ply;
 pub mod png;
 pub mod points;
 pub mod texture;
 mod triangles;
 mod values;
+pub mod write_behind;
 
 pub use mesh::{Material, Mesh};
 pub use points::{Points, Up};
@@ -23,7 +30,8 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// Reads any supported file: PLY, LAS, LAZ (COPC too) or OBJ, by its extension in either case, or else by its first bytes.
+/// Reads any supported file: PLY, LAS, LAZ (COPC too), OBJ, and with the features of those names E57 and PCD, by its extension in
+/// either case, or else by its first bytes.
 ///
 /// Points come in the file's own order and coordinates. A file with no points is no error here.
 ///
@@ -37,12 +45,31 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
         Some("ply") => ply::read(path, progress),
         Some("las" | "laz") => las::read(path, progress),
         Some("obj") => obj::read(path, progress),
+        #[cfg(feature = "e57")]
+        Some("e57") => e57::read(path, progress),
+        #[cfg(not(feature = "e57"))]
+        Some("e57") => Err(without(path, "e57")),
+        #[cfg(feature = "pcd")]
+        Some("pcd") => pcd::read(path, progress),
+        #[cfg(not(feature = "pcd"))]
+        Some("pcd") => Err(without(path, "pcd")),
         _ => match &magic(path).map_err(|error| Error::read(path, error))? {
             b"ply\n" | b"ply\r" => ply::read(path, progress),
             b"LASF" => las::read(path, progress),
+            #[cfg(feature = "e57")]
+            b"ASTM" => e57::read(path, progress),
+            #[cfg(feature = "pcd")]
+            b"# .P" => pcd::read(path, progress),
             _ => Err(Error::malformed(path, "its format is not known; PLY, LAS, LAZ and OBJ files are read")),
         },
     }
+}
+
+/// A file of a format whose reader was left out.
+#[cfg(not(all(feature = "e57", feature = "pcd")))]
+fn without(path: &Path, feature: &str) -> Error {
+    let format = feature.to_ascii_uppercase();
+    Error::malformed(path, format!("this build does not read {format} files: build with '--features {feature}'"))
 }
 
 /// Reads the triangles of a mesh: OBJ or PLY, by its extension in either case.

@@ -11,14 +11,14 @@ pub use crate::scene::Texture;
 const LARGEST: u64 = 1 << 28;
 
 impl Texture {
-    /// Reads a PNG file; of 16-bit values the upper byte counts.
+    /// Reads a PNG or JPEG file, whatever its name ends in; of 16-bit values the upper byte counts.
     ///
     /// # Errors
     ///
-    /// [`Error::Read`] where the system cannot read, [`Error::Malformed`] for what is no PNG file or has more than 2^28 pixels.
+    /// [`Error::Read`] where the system cannot read, [`Error::Malformed`] for what is neither or has more than 2^28 pixels.
     pub fn read(path: &Path) -> Result<Self> {
         let open = || ImageReader::open(path).and_then(ImageReader::with_guessed_format);
-        let unreadable = |e: image::ImageError| Error::malformed(path, format!("not a readable PNG: {e}"));
+        let unreadable = |e: image::ImageError| Error::malformed(path, format!("not a readable PNG or JPEG: {e}"));
         let (width, height) = open().map_err(|e| Error::read(path, e))?.into_dimensions().map_err(unreadable)?;
         if u64::from(width) * u64::from(height) > LARGEST {
             return Err(Error::malformed(

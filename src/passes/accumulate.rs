@@ -75,8 +75,8 @@ pub enum Features {
 /// The rounding of one f32 operation.
 const U: f64 = 1.0 / 16_777_216.0;
 
-/// The files of `fixed`, by whether terms may be small ([`SceneNeeds::wide_sums`]) and whether the adapter adds 64 bits at
-/// once ([`SceneNeeds::atomics_u64`]): the sums are the same with it, in half the additions.
+/// The file that keeps the sums of `fixed`, by whether terms may be small ([`SceneNeeds::wide_sums`]) and whether the adapter
+/// adds 64 bits at once ([`SceneNeeds::atomics_u64`]): the sums are the same with it, in half the additions.
 fn fixed_file(needs: &SceneNeeds) -> &'static str {
     match (needs.wide_sums, needs.atomics_u64) {
         (false, false) => "accumulator_fixed.wgsl",
@@ -86,20 +86,29 @@ fn fixed_file(needs: &SceneNeeds) -> &'static str {
     }
 }
 
-/// The file that keeps the sums of a render with `needs`.
-pub fn file(needs: &SceneNeeds) -> &'static str {
+/// The file of its terms, where [`fixed_file`] does not have them.
+fn terms_file(needs: &SceneNeeds) -> &'static str {
+    if needs.wide_sums { "terms_wide.wgsl" } else { "terms.wgsl" }
+}
+
+/// The files that keep the sums of a render with `needs` in storage.
+pub fn files(needs: &SceneNeeds) -> Vec<&'static str> {
     match accumulator(needs.accumulator) {
-        Ok(row) if row.name == ACCUMULATORS[0].name => fixed_file(needs),
-        Ok(row) => row.file,
-        Err(_) => "",
+        Ok(row) if row.name == ACCUMULATORS[0].name => match fixed_file(needs) {
+            whole @ "accumulator_fixed64.wgsl" => vec![whole],
+            sums => vec![terms_file(needs), sums],
+        },
+        Ok(row) => vec![row.file],
+        Err(_) => Vec::new(),
     }
 }
 
-/// The files that keep the sums of a tile's pixels, where [`file`] keeps them in storage.
-pub fn tile_files(needs: &SceneNeeds) -> [&'static str; 3] {
+/// The files that keep the sums of a tile's pixels, where [`files`] keeps them in storage.
+pub fn tile_files(needs: &SceneNeeds) -> [&'static str; 4] {
     let pairs = fixed_file(needs) == "accumulator_fixed_pairs.wgsl";
     [
-        if needs.wide_sums { "tile_terms_wide.wgsl" } else { "tile_terms.wgsl" },
+        terms_file(needs),
+        if needs.wide_sums { "tile_add_wide.wgsl" } else { "tile_add.wgsl" },
         "tile_sums.wgsl",
         if pairs { "tile_deposit_pairs.wgsl" } else { "tile_deposit.wgsl" },
     ]

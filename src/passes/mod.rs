@@ -9,7 +9,7 @@
 //! | [`project`] | surfels | [`project::SplatBuffer`] |
 //! | [`visibility`] | splats | [`visibility::VisibilityBuffer`] |
 //! | [`accumulate`] | splats, nearest depths | [`accumulate::AttributeBuffer`] |
-//! | [`tiles`] | large splats | the same two |
+//! | [`tiles`] | large splats, or all | the same two, or the next |
 //! | [`resolve`] | sums | [`Frame`](crate::frame::Frame) |
 //!
 //! [`footprint`] is evaluated inside visibility and accumulate, with the [`lowpass`] that [`project`] prepared; [`variant`] says which kernels a render is made of.

@@ -295,7 +295,7 @@ pub fn record(
                 buffers.extend(page.filters.as_ref().map(|filters| ("filters", filters.bound())));
                 cull::record(gpu, program, pass, &buffers, (buffer, index, part), (rows, visible))?;
                 buffers.extend(page.batches.of(part).map(|list| ("drawn", list.bound())));
-                program.dispatch(gpu, pass, "project", &buffers, page.grid(gpu, part)?)?;
+                program.dispatch(gpu, pass, "project", &buffers, page.of(gpu, part)?.0)?;
                 program.dispatch(gpu, pass, "arrange_rare", &buffers, Grid::Of((1, 1)))?;
                 let at = u64::from(layout::QUEUE_GRID) * 4;
                 program.dispatch(gpu, pass, "project_rare", &buffers, Grid::In(&page.rare.raw, at))?;
@@ -307,11 +307,11 @@ pub fn record(
 }
 
 impl SplatPage {
-    /// A workgroup for every [`layout::WORKGROUP`] surfels of `part`.
-    fn grid(&self, gpu: &Gpu, part: Part) -> Result<Grid<'_>> {
+    /// A workgroup for every [`layout::WORKGROUP`] surfels of `part`, and what says which they are.
+    pub(super) fn of(&self, gpu: &Gpu, part: Part) -> Result<(Grid<'_>, Option<(&str, wgpu::BindingResource<'_>)>)> {
         Ok(match self.batches.of(part) {
-            Some(list) => Grid::In(&list.raw, 0),
-            None => Grid::Of(grid(gpu, self.splats.len)?),
+            Some(list) => (Grid::In(&list.raw, 0), Some(("drawn", list.bound()))),
+            None => (Grid::Of(grid(gpu, self.splats.len)?), None),
         })
     }
 }
@@ -395,8 +395,9 @@ impl SplatBuffer {
             for (index, page) in self.pages.iter().enumerate() {
                 for &part in parts {
                     let mut bound = self.bindings(index, &own);
-                    bound.extend(page.batches.of(part).map(|list| ("drawn", list.bound())));
-                    program.dispatch(gpu, pass, stage, &bound, page.grid(gpu, part)?)?;
+                    let (grid, drawn) = page.of(gpu, part)?;
+                    bound.extend(drawn);
+                    program.dispatch(gpu, pass, stage, &bound, grid)?;
                 }
             }
             Ok(())

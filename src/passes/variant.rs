@@ -16,9 +16,15 @@ use crate::scene::{
 
 /// The entry points that a render with `needs` dispatches.
 fn stages(needs: &SceneNeeds) -> Vec<&'static str> {
-    let mut stages = vec!["project", "arrange_rare", "project_rare", "arrange", "resolve"];
+    let mut stages = vec!["project", "arrange_rare", "project_rare", "arrange"];
     if needs.raster.is_none() {
-        stages.extend(["clear", "visibility", "visibility_large", "occlude", "accumulate", "accumulate_large"]);
+        stages.extend(["clear", "visibility", "visibility_large", "occlude"]);
+    }
+    if needs.raster.is_none() && !needs.gather {
+        stages.extend(["accumulate", "accumulate_large"]);
+    }
+    if !needs.gather {
+        stages.push("resolve");
     }
     if needs.cull {
         stages.extend(["cull_near", "cull_far", "occlude_open"]);
@@ -27,7 +33,15 @@ fn stages(needs: &SceneNeeds) -> Vec<&'static str> {
 }
 
 /// The entry points of the tiles.
-const TILE_STAGES: [&str; 5] = ["tile_count", "tile_scan", "tile_place", "tile_visibility", "tile_accumulate"];
+fn tile_stages(needs: &SceneNeeds) -> Vec<&'static str> {
+    let mut stages = vec!["bin_count_large", "bin_scan_large", "bin_place_large", "tile_visibility"];
+    if needs.gather {
+        stages.extend(["bin_count", "bin_scan", "bin_place", "tile_resolve"]);
+    } else {
+        stages.push("tile_accumulate");
+    }
+    stages
+}
 
 /// A render's kernels, before they are compiled.
 #[derive(Clone, Debug)]
@@ -58,12 +72,12 @@ impl Variant {
 
     /// The compiled kernels of the tiles; `gpu` keeps them.
     pub fn compile_tiles(&self, gpu: &Gpu, sources: &Sources) -> Result<Arc<Program>> {
-        gpu.programs.get(gpu, sources.join(&tile_files(&self.needs)), &TILE_STAGES, &[], &self.constants)
+        gpu.programs.get(gpu, sources.join(&tile_files(&self.needs)), &tile_stages(&self.needs), &[], &self.constants)
     }
 
-    /// u32 words of a pixel's sums in storage; the rasteriser's are in textures.
+    /// u32 words of a pixel's sums in storage; the rasteriser's are in textures, those of tiles that gather in registers.
     pub fn sum_words(&self) -> u32 {
-        if self.needs.raster.is_some() { 0 } else { self.pixel.channels * self.accumulator.words }
+        if self.needs.raster.is_some() || self.needs.gather { 0 } else { self.pixel.channels * self.accumulator.words }
     }
 }
 
@@ -71,7 +85,7 @@ impl Variant {
 pub fn modules(needs: &SceneNeeds) -> Vec<(Vec<&'static str>, Vec<&'static str>)> {
     let mut modules = vec![(files(needs), stages(needs))];
     if needs.tiles {
-        modules.push((tile_files(needs), TILE_STAGES.to_vec()));
+        modules.push((tile_files(needs), tile_stages(needs)));
     }
     modules
 }
@@ -111,7 +125,8 @@ fn files(needs: &SceneNeeds) -> Vec<&'static str> {
     ];
     let depth = match needs.raster {
         None => {
-            files.extend(["visibility.wgsl", "occlusion.wgsl", "accumulate.wgsl", accumulate::file(needs)]);
+            files.extend(["visibility.wgsl", "occlusion.wgsl", "accumulate.wgsl"]);
+            files.extend(accumulate::files(needs));
             "depth.wgsl"
         }
         Some(raster) => {
@@ -146,10 +161,14 @@ fn files(needs: &SceneNeeds) -> Vec<&'static str> {
 
 /// The files of the tiles' module.
 fn tile_files(needs: &SceneNeeds) -> Vec<&'static str> {
-    let stored = accumulate::file(needs);
-    let mut files: Vec<_> = files(needs).into_iter().filter(|file| *file != stored).collect();
+    let stored = accumulate::files(needs);
+    let mut files: Vec<_> = files(needs).into_iter().filter(|file| !stored.contains(file)).collect();
     files.extend(accumulate::tile_files(needs));
-    files.extend(["tile.wgsl", if needs.subgroups { "splat_shared.wgsl" } else { "splat_plain.wgsl" }]);
+    let pick = |needed, file, absent| if needed { file } else { absent };
+    files.extend(["bin.wgsl", "tile.wgsl"]);
+    files.push(pick(needs.low_pass == LowPass::None, "tile_filter_absent.wgsl", "tile_filter.wgsl"));
+    files.push(pick(needs.gather, "tile_small.wgsl", "tile_small_absent.wgsl"));
+    files.push(pick(needs.subgroups, "splat_shared.wgsl", "splat_plain.wgsl"));
     files
 }
 

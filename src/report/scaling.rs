@@ -109,6 +109,27 @@ fn curves<'a>(measurements: &'a [Measurement], quantity: &Quantity) -> (Curves<'
     (Curves::new(), "")
 }
 
+/// Time as a start and a cost for each: `base + slope * value`, ms.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Line {
+    base: f64,
+    slope: f64,
+    /// The farthest that a point lies from the line, as a fraction of its own time.
+    departure: f64,
+}
+
+/// The line with the least squares of departures, each as a fraction of its own time.
+fn line(points: &[(f64, f64)]) -> Line {
+    let sum = |term: &dyn Fn(f64, f64) -> f64| points.iter().map(|&(value, time)| term(value, time)).sum::<f64>();
+    // Weights 1 / t^2.
+    let (w, wx, wxx) = (sum(&|_, t| t.powi(-2)), sum(&|x, t| x * t.powi(-2)), sum(&|x, t| x * x * t.powi(-2)));
+    let (wt, wxt) = (sum(&|_, t| t.recip()), sum(&|x, t| x / t));
+    let slope = (w * wxt - wx * wt) / (w * wxx - wx * wx);
+    let base = (wt - slope * wx) / w;
+    let departure = points.iter().map(|&(value, time)| ((base + slope * value) / time - 1.0).abs()).fold(0.0, f64::max);
+    Line { base, slope, departure }
+}
+
 /// The section of the page; nothing if nothing was varied.
 pub(super) fn section(measurements: &[Measurement], families: &Families) -> String {
     let figures: String = QUANTITIES.iter().map(|quantity| figure(measurements, quantity, families)).collect();
@@ -170,7 +191,21 @@ fn figure(measurements: &[Measurement], quantity: &Quantity, families: &Families
         })
         .collect();
     let svg = plot.finish("scaling", &format!("scaling-{}", quantity.class), title, &format!("{}.", ends.join("; ")));
-    format!("<figure>{svg}<figcaption>{}; {alike} along a curve.</figcaption></figure>", escape(title))
+    let lines: String = if quantity.class == "surfels" { curves.iter().map(straight).collect() } else { String::new() };
+    format!("<figure>{svg}<figcaption>{}; {alike} along a curve.{lines}</figcaption></figure>", escape(title))
+}
+
+/// How nearly a curve over surfels is a straight line, as a sentence.
+fn straight(((config, _), curve): (&(&str, String), &Vec<(f64, &Measurement)>)) -> String {
+    let points: Vec<_> = curve.iter().map(|(value, m)| (*value, m.total_ms.median)).collect();
+    let Line { base, slope, departure } = line(&points);
+    format!(
+        " {}: {} ms and {} ns a surfel, to {} %.",
+        escape(config),
+        significant(base, 2),
+        significant(slope * 1e6, 3),
+        significant(departure * 100.0, 2)
+    )
 }
 
 #[cfg(test)]
@@ -198,6 +233,17 @@ mod tests {
         // Nor does a value that comes twice make a third.
         let twice = [10, 100, 100].map(|surfels| measurement("a", "s", surfels, 1.0, 100));
         assert!(lengths(&twice, 0).is_empty());
+    }
+
+    #[test]
+    fn a_line_is_found_and_what_departs_from_it_is_told() {
+        let straight = [1e5, 1e6, 1e7].map(|n| (n, 40.0 + 1e-4 * n));
+        let found = line(&straight);
+        assert!((found.base - 40.0).abs() < 1e-6 && (found.slope - 1e-4).abs() < 1e-12, "{found:?}");
+        assert!(found.departure < 1e-9, "{found:?}");
+        // Twice the slope from the middle on.
+        let bent = [(1e5, 50.0), (1e6, 140.0), (1e7, 1940.0)];
+        assert!(line(&bent).departure > 0.1);
     }
 
     #[test]

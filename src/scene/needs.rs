@@ -32,9 +32,11 @@ pub struct SceneNeeds {
     pub atomics_u64: bool,
     /// Batches of surfels that are out of view or hidden are left out.
     pub cull: bool,
-    /// Large splats are drawn by tiles: the accumulator is `fixed`, the options do not say scatter, and there is no texture, whose
-    /// sums are more than a tile's registers hold.
+    /// Large splats, at least, are drawn by tiles: the accumulator is `fixed`, the options do not say scatter, and there is no
+    /// texture, whose sums are more than a tile's registers hold.
     pub tiles: bool,
+    /// Tiles sum all splats, large and small, and resolve their pixels at once: no sum is stored.
+    pub gather: bool,
     /// A splat's record is read by a subgroup together, as the adapter's processor would else read it for each of its
     /// invocations.
     pub subgroups: bool,
@@ -104,6 +106,7 @@ impl SceneNeeds {
                 && options.raster.is_none()
                 && color != ColorNeed::Textured
                 && options.organisation != Organisation::Scatter,
+            gather: false,
             subgroups: false,
             raster: options.raster,
             triangles: options.raster.is_some() && 10 * scene.surfels.len() > camera.pixels(),
@@ -139,6 +142,11 @@ impl SceneNeeds {
         Self { subgroups: self.tiles && subgroups, ..self }
     }
 
+    /// The same where tiles should sum all splats, if there are tiles, or only the large ones.
+    pub fn with_gather(self, gather: bool) -> Self {
+        Self { gather: self.tiles && gather, ..self }
+    }
+
     /// The needs by name, for people and JSON.
     pub fn names(&self) -> Vec<&'static str> {
         let projection = match self.projection {
@@ -169,6 +177,7 @@ impl SceneNeeds {
             (self.atomics_u64, "atomics-u64"),
             (self.cull, "cull"),
             (self.tiles, "tiles"),
+            (self.gather, "gather"),
             (self.epsilon_radius, "epsilon-radius"),
             (self.alpha, "alpha"),
             (self.normal, "normal"),

@@ -179,7 +179,7 @@ pub enum LowPass {
 /// How the compute kernels draw splats. The image is the same to the bit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Organisation {
-    /// Small ones one by one, large ones by tiles of the image.
+    /// Small ones one by one, large ones by tiles of the image; on a software adapter tiles sum all, unless they are tiny.
     #[default]
     Auto,
     /// One by one, large ones by a workgroup each.

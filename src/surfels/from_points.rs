@@ -9,6 +9,7 @@ use super::graph::NeighbourGraph;
 use super::orient::{self, Orientation};
 use super::outliers::inliers;
 use super::positions::DistinctPositions;
+use super::sheets;
 use super::sizes::{
     ELLIPSE_NEIGHBOURS, Size, bounding_ellipse, bsp_radii, ellipse_radii, knn_radii, local_limits, offsets,
 };
@@ -136,6 +137,7 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
             let given = given.iter().flatten().zip(distinct.of_point());
             let given: Vec<_> = given.filter_map(|(normal, &position)| Some((position, (*normal)?))).collect();
             parts = Some(orient::propagate(&distinct, &graph, &mut normals, &given, up, progress));
+            sheets::refit(&distinct, &graph, &mut normals);
         }
     }
 

@@ -14,6 +14,7 @@ mod orient;
 mod outliers;
 mod positions;
 pub mod sampling;
+mod sheets;
 pub mod simplify;
 mod sizes;
 #[cfg(test)]

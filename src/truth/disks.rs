@@ -43,7 +43,7 @@ struct Disk {
 }
 
 impl DiskTree {
-    /// Builds the tree. Surfels that are not finite or have no size are left out.
+    /// Builds the tree. Surfels that are not finite or have no size are left out, and those that are the same are one.
     pub fn new(scene: &Scene) -> Self {
         let world = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
         let extent = |surfel: &Surfel| (world(surfel.s).powf(2.0) + world(surfel.t).powf(2.0)).map(f64::sqrt);
@@ -51,7 +51,11 @@ impl DiskTree {
             let numbers = [surfel.center, surfel.s, surfel.t];
             numbers.as_flattened().iter().all(|c| c.is_finite()) && surfel.radius() > 0.0
         };
-        let surfels: Vec<&Surfel> = scene.surfels.iter().filter(sized).collect();
+        let mut surfels: Vec<&Surfel> = scene.surfels.iter().filter(sized).collect();
+        // Boxes tell nothing apart that is in one place: of thousands that are, each would be looked at for each point.
+        let bits = |surfel: &&Surfel| [surfel.center, surfel.s, surfel.t].map(|v| v.map(f32::to_bits));
+        surfels.par_sort_unstable_by_key(bits);
+        surfels.dedup_by_key(|surfel| bits(surfel));
         let bounds = surfels.par_iter().fold(
             || Bounds::EMPTY,
             |bounds, surfel| {
@@ -208,6 +212,7 @@ mod tests {
             Surfel { center: center.to_array(), s: s.to_array(), t: t.to_array() }
         });
         let mut surfels: Vec<Surfel> = surfels.collect();
+        surfels.extend_from_within(20..60);
         surfels[7].center[0] = f32::NAN;
         (surfels[8].s, surfels[8].t) = ([0.0; 3], [0.0; 3]);
         let origin = DVec3::new(6e5, 5e6, 0.0);

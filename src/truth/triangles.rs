@@ -19,6 +19,7 @@ use super::nearest::{nearest, triangle_squared_distance};
 use crate::error::Result;
 use crate::io::Mesh;
 use crate::scene::Bounds;
+use crate::surfels::LARGEST_COORDINATE;
 
 /// How much a box is larger than its triangle on each side, in radii of the mesh. A ray starts within 2 radii of the
 /// centre and is followed for 3: its f32 origin, direction and box distances err by less than 2e-6 of a radius.
@@ -54,7 +55,8 @@ struct Triangle {
 }
 
 impl TriangleTree {
-    /// Builds the tree. Triangles without an area or with a coordinate that is not finite are left out: no ray meets them.
+    /// Builds the tree. Triangles without an area, or with a coordinate that is not finite or exceeds [`LARGEST_COORDINATE`], are
+    /// left out: no ray meets them.
     ///
     /// # Errors
     ///
@@ -62,7 +64,9 @@ impl TriangleTree {
     pub fn new(mesh: &Mesh) -> Result<Self> {
         mesh.check()?;
         let corner = |vertex: u32| DVec3::from(mesh.positions[vertex as usize]);
-        let finite = |triangle: &[u32; 3]| triangle.iter().all(|&vertex| corner(vertex).is_finite());
+        let finite = |triangle: &[u32; 3]| {
+            triangle.iter().all(|&vertex| corner(vertex).abs().cmple(DVec3::splat(LARGEST_COORDINATE)).all())
+        };
         let used = mesh.triangles.iter().filter(|triangle| finite(triangle)).flatten();
         let bounds = used.fold(Bounds::EMPTY, |bounds, &vertex| bounds.with_point(corner(vertex)));
         let (center, radius) = (bounds.center(), 0.5 * bounds.extent().length());

@@ -2,6 +2,7 @@
 
 #![allow(dead_code, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+pub mod command;
 pub mod enclosure;
 pub mod meshes;
 pub mod scenes;
@@ -31,9 +32,11 @@ pub fn gpu() -> Option<Gpu> {
     }
 }
 
-/// The adapter with which `fixed` is kept by the kernel in `file`: without 64-bit atomics if they would replace it.
+/// The adapter with which `fixed` is kept by the kernel in `file`: without 64-bit atomics, or subgroups for tiles to gather
+/// with, if they would replace it.
 pub fn gpu_for(file: &str) -> Option<Gpu> {
     let mut gpu = gpu()?;
+    gpu.adapter.subgroups &= !file.starts_with("accum");
     gpu.adapter.atomics_u64 &= !["accumulator_fixed.wgsl", "accumulator_fixed_wide.wgsl"].contains(&file);
     Some(gpu)
 }
@@ -60,7 +63,8 @@ pub fn all_needs() -> Vec<SceneNeeds> {
                     let low_pass = [LowPass::None, LowPass::Max, LowPass::Ewa][next % 3];
                     let accumulator = row.name;
                     let tiles = accumulator == ACCUMULATORS[0].name && base[next].color != ColorNeed::Textured;
-                    all.push(SceneNeeds { accumulator, tiles, kernel, epsilon_radius, low_pass, ..base[next] });
+                    let gather = tiles && next % 2 == 0;
+                    all.push(SceneNeeds { accumulator, tiles, gather, kernel, epsilon_radius, low_pass, ..base[next] });
                     if accumulator == ACCUMULATORS[0].name {
                         for (wide_sums, atomics_u64) in [(true, false), (false, true), (true, true)] {
                             let next = base[next];
@@ -86,6 +90,7 @@ pub fn all_needs() -> Vec<SceneNeeds> {
             epsilon_radius: step % 5 == 0,
             cull: false,
             tiles: false,
+            gather: false,
             ..*base
         });
     }
@@ -117,6 +122,7 @@ fn base_needs() -> Vec<SceneNeeds> {
                 wide_sums: false,
                 atomics_u64: false,
                 tiles: bits * 37 / 8 % 4 == 0 && color != ColorNeed::Textured,
+                gather: bits * 37 / 8 % 8 == 0 && color != ColorNeed::Textured,
                 // Both, of each of the others.
                 subgroups: bits.count_ones() % 3 == 0,
                 cull: bits.count_ones() % 2 == 0,

@@ -6,7 +6,7 @@ use super::render::{SIZE, draw};
 use super::session::sentence;
 use super::{Outcome, Target};
 use epsplat::io::Points;
-use epsplat::io::camera::{self, Pose};
+use epsplat::io::camera::{self, CameraFile, Pose};
 use epsplat::scene::camera::check_size;
 use epsplat::scene::{Camera, Scene, Shading};
 use epsplat::surfels::analytic::{Shape, generate as sample};
@@ -57,7 +57,7 @@ pub const TARGET: Target = Target {
     execute,
 };
 
-fn array(values: impl IntoIterator<Item = f64>) -> String {
+pub fn array(values: impl IntoIterator<Item = f64>) -> String {
     format!("[{}]", values.into_iter().map(|value| value.to_string()).collect::<Vec<_>>().join(", "))
 }
 
@@ -129,6 +129,11 @@ fn execute(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
         Err(error) if valid.is_some() => return Err(format!("a valid file is refused: {error}")),
         Err(error) => return sentence(&error, Some(path)).map(|()| Outcome::Refused),
     };
+    seen(file, valid)
+}
+
+/// Draws what the camera of a file sees.
+pub fn seen(file: CameraFile, valid: Option<usize>) -> Result<Outcome, String> {
     let scene = &*SCENE;
     let near = file.near.unwrap_or_else(|| Camera::default_near(scene));
     let posed = file.size.map_or(Ok(()), |(width, height)| check_size(width, height)).and_then(|()| match file.pose {

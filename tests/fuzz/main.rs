@@ -9,6 +9,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod camera;
+mod cameras;
 mod las;
 mod memory;
 mod mutate;
@@ -65,4 +66,9 @@ fn obj() {
 #[test]
 fn camera() {
     session::run(&camera::TARGET);
+}
+
+#[test]
+fn cameras() {
+    session::run(&cameras::TARGET);
 }

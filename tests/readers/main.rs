@@ -1,10 +1,14 @@
 //! The readers on files of every kind they promise to read, and on damaged ones.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+#[cfg(feature = "e57")]
+mod e57;
 mod las;
 mod las_damage;
 mod mesh;
 mod obj;
+#[cfg(feature = "pcd")]
+mod pcd;
 mod ply;
 mod ply_damage;
 
@@ -135,5 +139,16 @@ fn missing_files_and_directories_cannot_be_read() {
         std::fs::create_dir(folder.path(name)).unwrap();
         let error = io::read(&folder.path(name), &()).unwrap_err();
         assert!(matches!(error, Error::Read { .. }), "{error}");
+    }
+}
+
+/// The formats whose readers are left out of a build say which feature holds them.
+#[cfg(not(all(feature = "e57", feature = "pcd")))]
+#[test]
+fn readers_that_were_left_out_are_named() {
+    let folder = Folder::new();
+    for (format, left_out) in [("e57", cfg!(not(feature = "e57"))), ("pcd", cfg!(not(feature = "pcd")))] {
+        let said = folder.refusal(&format!("a.{format}"), b"");
+        assert_eq!(said.contains(&format!("'--features {format}'")), left_out, "{said}");
     }
 }

@@ -141,3 +141,78 @@ fn materials_textures_and_what_of_them_is_missing() {
     assert_eq!(colored.colors, Some(Colors::Linear(vec![[1.0, 0.0, 0.0, 1.0]; 3])));
     assert!(colored.material.is_none() && colored.notes.is_empty());
 }
+
+/// A picture of two columns, red and blue.
+fn picture(format: image::ImageFormat) -> Vec<u8> {
+    let column = |x: u32| if x < 8 { image::Rgb([250u8, 0, 0]) } else { image::Rgb([0, 0, 250]) };
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    image::RgbImage::from_fn(16, 16, |x, _| column(x)).write_to(&mut bytes, format).unwrap();
+    bytes.into_inner()
+}
+
+#[test]
+fn textures_are_png_or_jpeg_whatever_they_are_called() {
+    let folder = Folder::new();
+    let path = folder.path("texture.png");
+    for (format, close) in [(image::ImageFormat::Png, 0.0), (image::ImageFormat::Jpeg, 0.05)] {
+        std::fs::write(&path, picture(format)).unwrap();
+        let texture = io::Texture::read(&path).unwrap();
+        for (u, expected) in [(0.1, [0.956, 0.0, 0.0]), (0.9, [0.0, 0.0, 0.956])] {
+            let color = texture.at(u, 0.5);
+            assert!((0..3).all(|k| (color[k] - expected[k]).abs() <= close + 1e-3), "{format:?} {u}: {color:?}");
+        }
+    }
+    // A picture cut short, and what is none.
+    let jpeg = picture(image::ImageFormat::Jpeg);
+    for bytes in [&jpeg[..jpeg.len() / 3], &jpeg[..10], b"GIF89a", b""] {
+        std::fs::write(&path, bytes).unwrap();
+        let message = sentence(&io::Texture::read(&path).unwrap_err(), &path);
+        assert!(message.starts_with("not a readable PNG or JPEG: "), "{message}");
+    }
+}
+
+#[test]
+fn faces_have_texture_coordinates_of_their_own_and_a_texture_each() {
+    let folder = Folder::new();
+    std::fs::write(folder.path("a b.jpg"), picture(image::ImageFormat::Jpeg)).unwrap();
+    let (indices, texcoord) = (("list uchar int", "vertex_indices"), ("list uchar float", "texcoord"));
+    let corners = |of: &[f64]| -> Vec<f64> { [&[of.len() as f64], of].concat() };
+    let uv: Vec<f64> = (0..8).map(f64::from).collect();
+    let (square, square_uv) = (corners(&[0.0, 1.0, 2.0, 3.0]), corners(&uv));
+    let (triangle, triangle_uv) = (corners(&[0.0, 1.0, 4.0]), corners(&uv[2..]));
+    for encoding in ENCODINGS {
+        // In either order, with the number of the texture between.
+        for turned in [false, true] {
+            let row = |first: &[f64], second: &[f64], number: f64| match turned {
+                false => [first, &[number], second].concat(),
+                true => [second, &[number], first].concat(),
+            };
+            let faces = [row(&square, &square_uv, 1.0), row(&triangle, &triangle_uv, 0.0)];
+            let faces: Vec<&[f64]> = faces.iter().map(Vec::as_slice).collect();
+            let names = if turned {
+                [texcoord, ("uchar", "texnumber"), indices]
+            } else {
+                [indices, ("uchar", "texnumber"), texcoord]
+            };
+            let elements = [("vertex", &XYZ[..], &CORNERS[..]), ("face", &names[..], &faces)];
+            let bytes = file(encoding, &elements);
+            let comments = b"ply\ncomment TextureFile a b.jpg\ncomment TextureFile none.png\n";
+            let mesh = read(&folder, "a.ply", &[&comments[..], &bytes[4..]].concat());
+            assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [0, 1, 4]]);
+            let [a, b, c, d] = [[0.0, 1.0], [2.0, 3.0], [4.0, 5.0], [6.0, 7.0]];
+            assert_eq!(mesh.texture.as_deref(), Some(&[[a, b, c], [a, c, d], [b, c, d]][..]), "{encoding} {turned}");
+            assert_eq!(mesh.material.as_deref(), Some(&[1, 1, 0][..]));
+            mesh.check().unwrap();
+            assert!(mesh.materials[0].texture.is_some() && mesh.materials[1].texture.is_none());
+            assert!(mesh.notes.len() == 1 && mesh.notes[0].contains("none.png"), "{:?}", mesh.notes);
+            // As points, coordinates of faces are nobody's.
+            assert_eq!(io::read(&folder.path("a.ply"), &()).unwrap().texture, None);
+
+            // One face without coordinates leaves the mesh without.
+            let bare = row(&triangle, &[0.0], 0.0);
+            let elements = [("vertex", &XYZ[..], &CORNERS[..]), ("face", &names[..], &[faces[0], &bare])];
+            let mesh = read(&folder, "a.ply", &[&comments[..], &file(encoding, &elements)[4..]].concat());
+            assert_eq!((mesh.triangles.len(), mesh.texture, mesh.material), (3, None, None));
+        }
+    }
+}

@@ -30,28 +30,6 @@ pub(super) fn from_rgb(codes: Vec<[u16; 3]>) -> Option<Colors> {
     }
 }
 
-/// Grey from intensities: the 99.9th percentile is white, so that a few glints do not blacken the rest. `None` where all
-/// intensities are the same.
-pub(super) fn from_intensity(intensities: Vec<u16>) -> Option<Colors> {
-    let mut counts = vec![0u64; 1 << 16];
-    for &intensity in &intensities {
-        counts[usize::from(intensity)] += 1;
-    }
-    if counts.iter().filter(|&&count| count > 0).count() < 2 {
-        return None;
-    }
-    let rank = (0.999 * intensities.len() as f64).ceil() as u64;
-    let mut below = 0;
-    let percentile = counts.iter().position(|count| {
-        below += count;
-        below >= rank
-    });
-    // Where nearly all are zero, the percentile is too: then any other intensity is white.
-    let white = percentile.unwrap_or(0).max(1) as f64;
-    let grey = |intensity| (f64::from(intensity) / white * 255.0).round() as u8;
-    Some(Colors::Srgb8(intensities.into_iter().map(|intensity| opaque([grey(intensity); 3])).collect()))
-}
-
 fn opaque([r, g, b]: [u8; 3]) -> [u8; 4] {
     [r, g, b, 255]
 }
@@ -76,18 +54,5 @@ mod tests {
         let light = |code: u16| srgb_to_linear(f64::from(code) / 65535.0) as f32;
         let expected = vec![[light(300), light(65535), light(12345), 1.0]];
         assert_eq!(from_rgb(vec![[300, 65535, 12345]]), Some(Colors::Linear(expected)));
-    }
-
-    #[test]
-    fn glints_do_not_set_white() {
-        let mut intensities: Vec<u16> = (0..2000).map(|i| i % 101).collect();
-        intensities.push(60000);
-        let Some(Colors::Srgb8(grey)) = from_intensity(intensities) else { return assert_eq!(1, 0) };
-        assert_eq!(
-            (grey[0], grey[50], grey[100], grey[2000]),
-            ([0, 0, 0, 255], [128, 128, 128, 255], [255; 4], [255; 4])
-        );
-        assert_eq!(from_intensity(vec![7; 9]), None);
-        assert_eq!(from_intensity(vec![]), None);
     }
 }

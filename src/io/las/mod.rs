@@ -4,7 +4,8 @@ mod arithmetic;
 mod chunks;
 mod color;
 
-use crate::io::fault::{self, Fault, reserve};
+use crate::io::fault::{self, Fault, reserve, surviving};
+use crate::io::intensity;
 use crate::io::values::one_line;
 use crate::io::{Points, Up};
 use crate::{Progress, Result};
@@ -12,7 +13,6 @@ use las::reader::{LazParallelism, ReaderOptions};
 use las::{PointData, PointDataBuilder, Reader, raw};
 use std::fs::File;
 use std::io::{self, BufReader, Seek};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 /// Bytes of records that are decoded together.
@@ -55,12 +55,6 @@ const DECODER_STACK: usize = 1 << 28;
 fn deep<T: Send>(decode: impl FnOnce() -> Result<T, Fault> + Send) -> Result<T, Fault> {
     let pool = rayon::ThreadPoolBuilder::new().stack_size(DECODER_STACK).build();
     pool.map_err(|error| Fault::Io(io::Error::other(error)))?.install(decode)
-}
-
-/// Runs what calls the decoder: corrupt data can make it panic.
-fn surviving<T>(run: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fault> {
-    catch_unwind(AssertUnwindSafe(run))
-        .unwrap_or_else(|_| Err(Fault::Malformed("its points cannot be decoded; the file is damaged".into())))
 }
 
 fn open(path: &Path) -> Result<(BufReader<File>, raw::Header, u64), Fault> {
@@ -138,7 +132,7 @@ fn decode(
         }
         progress.advance(count);
     }
-    let colors = if format.has_color { color::from_rgb(codes) } else { color::from_intensity(intensities) };
+    let colors = if format.has_color { color::from_rgb(codes) } else { intensity::grey(&intensities) };
     Ok(Points { positions, colors, up: Some(Up::Z), ..Points::default() })
 }
 

@@ -40,7 +40,7 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
 /// file without faces is a mesh without triangles, and no error here.
 ///
 /// Of the materials in the MTL files beside it the diffuse colour `Kd` (linear light), the opacity `d` and the image
-/// `map_Kd` (PNG, sRGB) are read. Files that cannot be read are left out and named in [`Mesh::notes`].
+/// `map_Kd` (PNG or JPEG, sRGB) are read. Files that cannot be read are left out and named in [`Mesh::notes`].
 ///
 /// # Errors
 ///

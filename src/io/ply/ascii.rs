@@ -1,6 +1,6 @@
 //! PLY in text: words between white space, wherever lines end.
 
-use super::faces::Faces;
+use super::faces::{Faces, Role};
 use super::header::{Element, Header, Kind};
 use super::read::{Contents, ends_early, negative_list};
 use super::vertex::{Layout, Vertices};
@@ -18,10 +18,11 @@ pub(super) fn read(
     reader: impl BufRead,
     header: &Header,
     length: u64,
+    faces: Faces,
     progress: &dyn Progress,
 ) -> Result<Contents, Fault> {
     let mut tokens = Tokens { reader, line: header.lines + 1, token: Vec::new() };
-    let mut contents = Contents::default();
+    let mut contents = Contents { faces, points: Points::default() };
     for element in header.needed() {
         if element.name == "vertex" {
             contents.points = vertices(&mut tokens, element, length, progress)?;
@@ -34,19 +35,23 @@ pub(super) fn read(
 
 /// Reads faces, and passes over what is none.
 fn others(tokens: &mut Tokens<impl BufRead>, element: &Element, faces: &mut Faces) -> Result<(), Fault> {
-    let list = Faces::list(element).map(|(list, ..)| list);
+    let roles = faces.roles(element);
     for row in 0..if element.properties.is_empty() { 0 } else { element.count } {
-        for (index, property) in element.properties.iter().enumerate() {
-            let whole = if list == Some(index) {
-                faces.begin(element);
-                tokens.list(element, row, |number| faces.take(element, row, number))?
-            } else {
-                tokens.skip(element, row, property.kind)?
+        faces.begin(element);
+        for (property, &role) in element.properties.iter().zip(&roles) {
+            let whole = match (role, property.kind) {
+                (Role::Unused, kind) => tokens.skip(element, row, kind)?,
+                (_, Kind::List { .. }) => tokens.list(element, row, |number| faces.take(element, row, role, number))?,
+                (_, Kind::Scalar(_)) => match tokens.number()? {
+                    Some(number) => faces.take(element, row, role, number).map(|()| true)?,
+                    None => false,
+                },
             };
             if !whole {
                 return Err(ends_early(element, row));
             }
         }
+        faces.end();
     }
     Ok(())
 }

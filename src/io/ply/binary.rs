@@ -1,6 +1,6 @@
 //! Binary PLY: blocks of rows, decoded column by column.
 
-use super::faces::Faces;
+use super::faces::{Faces, Role};
 use super::header::{Element, Header, Kind, Scalar};
 use super::read::{Contents, ends_early, negative_list};
 use super::vertex::{Layout, Vertices};
@@ -17,14 +17,15 @@ pub(super) fn read<const BIG: bool>(
     mut reader: impl BufRead,
     header: &Header,
     length: u64,
+    faces: Faces,
     progress: &dyn Progress,
 ) -> Result<Contents, Fault> {
-    let mut contents = Contents::default();
+    let mut contents = Contents { faces, points: Points::default() };
     for element in header.needed() {
         if element.name == "vertex" {
             contents.points = vertices::<BIG>(&mut reader, element, length, progress)?;
-        } else if let Some(list) = Faces::list(element) {
-            faces::<BIG>(&mut reader, element, list, &mut contents.faces)?;
+        } else if Faces::are(element) {
+            self::faces::<BIG>(&mut reader, element, &mut contents.faces)?;
         } else {
             skip::<BIG>(&mut reader, element)?;
         }
@@ -149,16 +150,15 @@ fn skip_list<const BIG: bool>(
     Ok(skip_bytes(reader, size)? == size)
 }
 
-/// Reads one list of vertices; `false` where the file ends in it.
-fn face<const BIG: bool>(
+/// Gives each number of one list to `take`; `false` where the file ends in it.
+fn list<const BIG: bool>(
     reader: &mut impl BufRead,
     element: &Element,
     row: u64,
     (count, item): (Scalar, Scalar),
-    faces: &mut Faces,
+    mut take: impl FnMut(f64) -> Result<(), Fault>,
 ) -> Result<bool, Fault> {
     let Some(mut items) = list_length::<BIG>(reader, element, row, count)? else { return Ok(false) };
-    faces.begin(element);
     let (mut block, mut numbers) = (Vec::new(), Vec::new());
     while items > 0 {
         let wanted = items.min((BLOCK / item.size()) as u64);
@@ -167,29 +167,37 @@ fn face<const BIG: bool>(
             return Ok(false);
         }
         decode::<BIG>(&block, item.size(), 0, item, &mut numbers);
-        numbers.iter().try_for_each(|number| faces.take(element, row, *number))?;
+        numbers.iter().try_for_each(|number| take(*number))?;
         items -= wanted;
     }
     Ok(true)
 }
 
-fn faces<const BIG: bool>(
-    reader: &mut impl BufRead,
-    element: &Element,
-    (list, count, item): (usize, Scalar, Scalar),
-    faces: &mut Faces,
-) -> Result<(), Fault> {
+fn faces<const BIG: bool>(reader: &mut impl BufRead, element: &Element, faces: &mut Faces) -> Result<(), Fault> {
+    let roles = faces.roles(element);
     for row in 0..element.count {
-        for (index, property) in element.properties.iter().enumerate() {
-            let whole = match property.kind {
-                _ if index == list => face::<BIG>(reader, element, row, (count, item), faces)?,
-                Kind::Scalar(scalar) => skip_bytes(reader, scalar.size() as u64)? == scalar.size() as u64,
-                Kind::List { count, item } => skip_list::<BIG>(reader, element, row, count, item)?,
+        faces.begin(element);
+        for (property, &role) in element.properties.iter().zip(&roles) {
+            let mut take = |number| faces.take(element, row, role, number);
+            let whole = match (role, property.kind) {
+                (Role::Unused, Kind::Scalar(scalar)) => {
+                    skip_bytes(reader, scalar.size() as u64)? == scalar.size() as u64
+                }
+                (Role::Unused, Kind::List { count, item }) => skip_list::<BIG>(reader, element, row, count, item)?,
+                (_, Kind::List { count, item }) => list::<BIG>(reader, element, row, (count, item), take)?,
+                (_, Kind::Scalar(scalar)) => {
+                    let (mut bytes, mut numbers) = (vec![0; scalar.size()], Vec::with_capacity(1));
+                    let whole = read_until_end(reader, &mut bytes)? == bytes.len();
+                    decode::<BIG>(&bytes, bytes.len(), 0, scalar, &mut numbers);
+                    numbers.into_iter().try_for_each(&mut take)?;
+                    whole
+                }
             };
             if !whole {
                 return Err(ends_early(element, row));
             }
         }
+        faces.end();
     }
     Ok(())
 }

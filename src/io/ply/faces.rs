@@ -1,6 +1,6 @@
 //! The triangles of a PLY file: polygons of the element `face`, strips of the element `tristrips`.
 
-use super::header::{Element, Kind, Property, Scalar};
+use super::header::{Element, Kind, Property};
 use crate::io::fault::Fault;
 
 /// How a list of vertices becomes triangles.
@@ -12,46 +12,99 @@ enum Shape {
     Strip,
 }
 
-/// Triangles while they are read, and the list that they are read from.
+/// What a property of a face is read for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Role {
+    /// The list of its vertices.
+    Corners,
+    /// The list of its texture coordinates: u and v of each corner, as MeshLab writes them.
+    Texture,
+    /// The number of its texture.
+    TextureNumber,
+    /// Nothing.
+    Unused,
+}
+
+/// Triangles while they are read, and the row that they are read from.
 #[derive(Debug, Default)]
 pub(super) struct Faces {
     pub(super) triangles: Vec<[u32; 3]>,
+    /// Whether texture coordinates are read; they may be absent.
+    surface: bool,
+    /// Texture coordinates of the triangles, one each, or as many as there were before the first face without.
+    texture: Vec<[[f32; 2]; 3]>,
+    /// Which of the file's textures each triangle has.
+    texture_numbers: Vec<u32>,
     shape: Option<Shape>,
-    /// The last two vertices of a strip, or the first and the last one of a polygon.
-    kept: [Option<u32>; 2],
+    /// Which corner of the row is next, and where its triangles begin.
+    corner: usize,
+    first: usize,
+    /// The corners of each of the row's triangles, by their number in the row.
+    corners: Vec<[usize; 3]>,
+    /// The row's texture coordinates, and its texture.
+    row_texture: Vec<f32>,
+    row_number: u32,
+    /// The last two vertices of a strip, or the first and the last one of a polygon, with their numbers in the row.
+    kept: [Option<(u32, usize)>; 2],
     /// Whether the next triangle of the strip is turned round.
     odd: bool,
 }
 
+/// What the faces of a file are.
+#[derive(Debug, Default)]
+pub(super) struct Triangles {
+    pub(super) triangles: Vec<[u32; 3]>,
+    /// Texture coordinates of each corner, if every face has some.
+    pub(super) texture: Option<Vec<[[f32; 2]; 3]>>,
+    /// Which of the file's textures each triangle has.
+    pub(super) texture_numbers: Vec<u32>,
+}
+
 impl Faces {
-    /// Which property of an element lists the vertices of faces, if one does.
-    pub(super) fn list(element: &Element) -> Option<(usize, Scalar, Scalar)> {
-        Self::shape_of(element)?;
-        let list = |(index, property): (usize, &Property)| match property.kind {
-            Kind::List { count, item } if ["vertex_indices", "vertex_index"].contains(&property.name.as_str()) => {
-                Some((index, count, item))
-            }
-            _ => None,
+    /// None yet; with `surface`, texture coordinates are read too.
+    pub(super) fn new(surface: bool) -> Self {
+        Self { surface, ..Self::default() }
+    }
+
+    /// Whether an element lists the vertices of faces.
+    pub(super) fn are(element: &Element) -> bool {
+        element.properties.iter().any(|property| role(element, property) == Role::Corners)
+    }
+
+    /// What each property of an element is read for.
+    pub(super) fn roles(&self, element: &Element) -> Vec<Role> {
+        let mut found = false;
+        let mut role = |property: &Property| match role(element, property) {
+            // The first list of vertices is theirs.
+            Role::Corners if std::mem::replace(&mut found, true) => Role::Unused,
+            Role::Texture | Role::TextureNumber if !self.surface => Role::Unused,
+            role => role,
         };
-        element.properties.iter().enumerate().find_map(list)
+        element.properties.iter().map(&mut role).collect()
     }
 
-    fn shape_of(element: &Element) -> Option<Shape> {
-        match element.name.as_str() {
-            "face" => Some(Shape::Polygon),
-            "tristrips" => Some(Shape::Strip),
-            _ => None,
-        }
-    }
-
-    /// Begins the list of a row.
+    /// Begins a row.
     pub(super) fn begin(&mut self, element: &Element) {
-        self.shape = Self::shape_of(element);
+        self.shape = shape_of(element);
         (self.kept, self.odd) = ([None, None], false);
+        (self.corner, self.first, self.row_number) = (0, self.triangles.len(), 0);
+        self.corners.clear();
+        self.row_texture.clear();
     }
 
-    /// Takes the next number of the list.
-    pub(super) fn take(&mut self, element: &Element, row: u64, number: f64) -> Result<(), Fault> {
+    /// Takes the next number of a property that is read.
+    pub(super) fn take(&mut self, element: &Element, row: u64, role: Role, number: f64) -> Result<(), Fault> {
+        match role {
+            Role::Corners => self.vertex(element, row, number)?,
+            Role::Texture => self.row_texture.push(number as f32),
+            // A cast takes what is no number of a texture for that of none.
+            Role::TextureNumber => self.row_number = if number < 0.0 { u32::MAX } else { number as u32 },
+            Role::Unused => {}
+        }
+        Ok(())
+    }
+
+    fn vertex(&mut self, element: &Element, row: u64, number: f64) -> Result<(), Fault> {
         if number == -1.0 && self.shape == Some(Shape::Strip) {
             (self.kept, self.odd) = ([None, None], false);
             return Ok(());
@@ -63,32 +116,70 @@ impl Faces {
                 "row {row} of element '{name}' names the vertex {number}, which cannot be"
             )));
         }
+        let third = (vertex, self.corner);
+        self.corner += 1;
         let [first, second] = self.kept;
         match (first, second) {
-            (None, _) => self.kept[0] = Some(vertex),
-            (_, None) => self.kept[1] = Some(vertex),
+            (None, _) => self.kept[0] = Some(third),
+            (_, None) => self.kept[1] = Some(third),
             (Some(first), Some(second)) => {
                 let turned = self.shape == Some(Shape::Strip) && self.odd;
-                let triangle = if turned { [second, first, vertex] } else { [first, second, vertex] };
+                let triangle = if turned { [second, first, third] } else { [first, second, third] };
                 // Strips turn corners by triangles without area.
-                if first != second && second != vertex && vertex != first {
-                    self.triangles.push(triangle);
+                if first.0 != second.0 && second.0 != vertex && vertex != first.0 {
+                    self.triangles.push(triangle.map(|(vertex, _)| vertex));
+                    if self.surface {
+                        self.corners.push(triangle.map(|(_, corner)| corner));
+                    }
                 }
                 let keep = if self.shape == Some(Shape::Strip) { second } else { first };
-                self.kept = [Some(keep), Some(vertex)];
+                self.kept = [Some(keep), Some(third)];
                 self.odd = !self.odd;
             }
         }
         Ok(())
     }
 
+    /// Ends a row: its triangles get their texture coordinates, in whichever order the row gave the two.
+    pub(super) fn end(&mut self) {
+        if !self.surface {
+            return;
+        }
+        self.texture_numbers.resize(self.triangles.len(), self.row_number);
+        let (pairs, _) = self.row_texture.as_chunks::<2>();
+        if pairs.len() >= self.corner && self.texture.len() == self.first {
+            self.texture.extend(self.corners.iter().map(|corners| corners.map(|corner| pairs[corner])));
+        }
+    }
+
     /// The triangles of a file with so many vertices.
-    pub(super) fn finish(self, vertices: usize) -> Result<Vec<[u32; 3]>, Fault> {
-        match self.triangles.as_flattened().iter().find(|vertex| **vertex as usize >= vertices) {
+    pub(super) fn finish(self, vertices: usize) -> Result<Triangles, Fault> {
+        let Self { triangles, texture, texture_numbers, .. } = self;
+        match triangles.as_flattened().iter().find(|vertex| **vertex as usize >= vertices) {
             Some(vertex) => {
                 Err(Fault::Malformed(format!("a face names the vertex {vertex}, but there are {vertices}")))
             }
-            None => Ok(self.triangles),
+            None => {
+                let texture = Some(texture).filter(|texture| !texture.is_empty() && texture.len() == triangles.len());
+                Ok(Triangles { triangles, texture, texture_numbers })
+            }
         }
+    }
+}
+
+fn shape_of(element: &Element) -> Option<Shape> {
+    match element.name.as_str() {
+        "face" => Some(Shape::Polygon),
+        "tristrips" => Some(Shape::Strip),
+        _ => None,
+    }
+}
+
+fn role(element: &Element, property: &Property) -> Role {
+    match (shape_of(element), property.kind, property.name.as_str()) {
+        (Some(_), Kind::List { .. }, "vertex_indices" | "vertex_index") => Role::Corners,
+        (Some(Shape::Polygon), Kind::List { .. }, "texcoord") => Role::Texture,
+        (Some(Shape::Polygon), Kind::Scalar(_), "texnumber") => Role::TextureNumber,
+        _ => Role::Unused,
     }
 }

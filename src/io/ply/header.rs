@@ -87,6 +87,8 @@ pub(super) struct Element {
 pub(super) struct Header {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element>,
+    /// Images that MeshLab names in comments.
+    pub(super) textures: Vec<String>,
     /// Lines, `end_header` included: the first value of an ASCII file is on the next.
     pub(super) lines: u64,
 }
@@ -94,7 +96,7 @@ pub(super) struct Header {
 impl Header {
     /// The elements up to the last one that is read.
     pub(super) fn needed(&self) -> &[Element] {
-        let read = |element: &Element| element.name == "vertex" || Faces::list(element).is_some();
+        let read = |element: &Element| element.name == "vertex" || Faces::are(element);
         &self.elements[..self.elements.iter().rposition(read).map_or(0, |last| last + 1)]
     }
 }
@@ -104,6 +106,7 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
     let mut line = Vec::new();
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
+    let mut textures = Vec::new();
     for number in 1.. {
         line.clear();
         reader.take(LINE_LIMIT).read_until(b'\n', &mut line)?;
@@ -128,7 +131,12 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
         let malformed =
             |what: &str| Fault::Malformed(format!("line {number}: {what}: '{}'", shown(text.trim().as_bytes())));
         match keyword {
-            None | Some("comment" | "obj_info") => {}
+            None | Some("obj_info") => {}
+            Some("comment") => {
+                let name =
+                    text.trim().strip_prefix("comment").and_then(|rest| rest.trim().strip_prefix("TextureFile "));
+                textures.extend(name.map(|name| name.trim().to_owned()));
+            }
             Some("format") => {
                 let parsed = match words.next() {
                     Some("ascii") => Some(Encoding::Ascii),
@@ -158,7 +166,7 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
             }
             Some("end_header") => {
                 let encoding = encoding.ok_or_else(|| malformed("the PLY header has no format line"))?;
-                return Ok(Header { encoding, elements, lines: number });
+                return Ok(Header { encoding, elements, textures, lines: number });
             }
             Some(_) => return Err(malformed("not a PLY header line")),
         }

@@ -1,16 +1,17 @@
 //! From a PLY file to points or a mesh, in one pass and with one small buffer.
 
-use super::faces::Faces;
+use super::faces::{Faces, Triangles};
 use super::header::{self, Element, Encoding};
 use super::{ascii, binary};
 use crate::io::fault::{self, Fault};
-use crate::io::triangles::Triangles;
+use crate::io::triangles;
 use crate::io::values::shown;
-use crate::io::{Mesh, Points};
+use crate::io::{Material, Mesh, Points, Texture};
 use crate::{Progress, Result};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Reads the vertices of a PLY file: ASCII, or binary of either byte order.
 ///
@@ -35,12 +36,12 @@ use std::path::Path;
 /// the header is not PLY's, `x`, `y` or `z` is missing, the file ends before the vertices or faces that its header
 /// promises, a number in text is none, a list has a negative length, or a face names a vertex that does not exist.
 pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
-    let (mut points, faces) = contents(path, progress)?;
-    if faces.is_empty() {
+    let (mut points, faces, _) = contents(path, false, progress)?;
+    if faces.triangles.is_empty() {
         return Ok(points);
     }
-    let mut triangles = Triangles::new(&points.positions);
-    faces.iter().for_each(|corners| triangles.add(corners.map(|corner| corner as usize), None));
+    let mut triangles = triangles::Triangles::new(&points.positions);
+    faces.triangles.iter().for_each(|corners| triangles.add(corners.map(|corner| corner as usize), None));
     let (normals, radii) = triangles.finish();
     points.normals.get_or_insert(normals);
     points.radii.get_or_insert(radii);
@@ -49,36 +50,52 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
 
 /// Reads the triangles of a PLY file: the polygons of the element `face`, fanned, and the strips of the element `tristrips`.
 ///
-/// Corners have what their vertices have: normals, colours, texture coordinates. A file without faces is a mesh without
-/// triangles, and no error here.
+/// Corners have what their vertices have: normals, colours, texture coordinates; the last from the list `texcoord` of the faces
+/// instead, as MeshLab writes it, where every face has one. What comments `TextureFile` name, PNG or JPEG beside the file, are the
+/// materials, of which a face's `texnumber` is one, or else the first; those that cannot be read are left out and named in
+/// [`Mesh::notes`]. A file without faces is a mesh without triangles, and no error here.
 ///
 /// # Errors
 ///
 /// As [`read`].
 pub fn read_mesh(path: &Path, progress: &dyn Progress) -> Result<Mesh> {
-    let (points, triangles) = contents(path, progress)?;
+    let (points, faces, textures) = contents(path, true, progress)?;
+    let Triangles { triangles, texture, texture_numbers } = faces;
     fn corners<T: Copy>(triangles: &[[u32; 3]], of_vertices: &[T]) -> Vec<[T; 3]> {
         triangles.iter().map(|corners| corners.map(|vertex| of_vertices[vertex as usize])).collect()
     }
+    let texture = texture.or_else(|| points.texture.map(|texture| corners(&triangles, &texture)));
+    let mut notes = Vec::new();
+    let mut material = |name: String| {
+        let read = Texture::read(&path.parent().unwrap_or(Path::new("")).join(name.replace('\\', "/")));
+        let image = read.map(Arc::new).map_err(|error| notes.push(format!("a texture is left out: {error}"))).ok();
+        Material { name, diffuse: [1.0; 4], texture: image }
+    };
+    let materials: Vec<_> = textures.into_iter().map(&mut material).collect();
+    // Where an image is missing the colours of the vertices are what is left.
+    let painted = texture.is_some() && materials.iter().any(|material| material.texture.is_some());
     Ok(Mesh {
         normals: points.normals.map(|normals| corners(&triangles, &normals)),
-        texture: points.texture.map(|texture| corners(&triangles, &texture)),
+        texture,
         positions: points.positions,
         colors: points.colors,
         triangles,
+        material: painted.then_some(texture_numbers),
+        materials,
+        notes,
         ..Mesh::default()
     })
 }
 
 /// What is read of a file.
-#[derive(Default)]
 pub(super) struct Contents {
     pub(super) points: Points,
     pub(super) faces: Faces,
 }
 
-/// The vertices and the triangles, which name vertices that exist.
-fn contents(path: &Path, progress: &dyn Progress) -> Result<(Points, Vec<[u32; 3]>)> {
+/// The vertices, the triangles, which name vertices that exist, and the names of textures. With `surface`, faces may have texture
+/// coordinates.
+fn contents(path: &Path, surface: bool, progress: &dyn Progress) -> Result<(Points, Triangles, Vec<String>)> {
     let in_file = |fault: Fault| fault.of(path);
     let file = File::open(path).map_err(Fault::Io).map_err(in_file)?;
     let length = file.metadata().map_err(Fault::Io).map_err(in_file)?.len();
@@ -89,14 +106,14 @@ fn contents(path: &Path, progress: &dyn Progress) -> Result<(Points, Vec<[u32; 3
     };
     progress.begin(&format!("reading {}", fault::name(path)), vertex.count);
     let contents = match header.encoding {
-        Encoding::Ascii => ascii::read(reader, &header, length, progress),
-        Encoding::LittleEndian => binary::read::<false>(reader, &header, length, progress),
-        Encoding::BigEndian => binary::read::<true>(reader, &header, length, progress),
+        Encoding::Ascii => ascii::read(reader, &header, length, Faces::new(surface), progress),
+        Encoding::LittleEndian => binary::read::<false>(reader, &header, length, Faces::new(surface), progress),
+        Encoding::BigEndian => binary::read::<true>(reader, &header, length, Faces::new(surface), progress),
     };
     progress.end();
     let Contents { points, faces } = contents.map_err(in_file)?;
     let triangles = faces.finish(points.positions.len()).map_err(in_file)?;
-    Ok((points, triangles))
+    Ok((points, triangles, header.textures))
 }
 
 /// The file ended inside an element.

@@ -6,7 +6,7 @@
 //! 4. [`candidates`]: each voxel's samples begin evenly spread over the triangles in it.
 //! 5. [`relax`]: they move apart, also from those of other voxels, and stay on the triangles.
 //!
-//! Then each sample gets what the surface says there, and a disk that covers the part of the surface nearest to it.
+//! Then each sample gets what the surface says there, and a disk that covers the part of the surface nearest to it ([`voronoi`]).
 //!
 //! The thesis projects one point a voxel, or several, onto its triangles and does not say which. Where these lie decides
 //! how well a surface is sampled: independent random points leave gaps three times as wide as needed.
@@ -19,6 +19,7 @@ mod random;
 mod relax;
 pub mod surface;
 mod uniform;
+mod voronoi;
 pub mod voxels;
 
 use rayon::prelude::*;
@@ -128,7 +129,7 @@ pub fn sample(
             let fair: Vec<f64> = priorities.iter().map(|priority| count as f64 * (usable(priority) / sum)).collect();
             let (candidates, mut places) = candidates::candidates(&voxels, &quotas, &fair, seed);
             let cells = relax::relax(&surface, &candidates, &mut places, progress)?;
-            let radii = relax::radii(&surface, &candidates, &places, &cells);
+            let radii = voronoi::radii(&surface, &places, progress)?;
             let colors = surface.is_colored().then(|| relax::colors(&surface, &candidates, &places, &cells));
             points(&surface, &places, Some(radii), colors)
         }

@@ -27,9 +27,8 @@ pub(super) struct Candidates {
 }
 
 impl Candidates {
-    /// Grows splats until each cell is covered by [`ENOUGH`] of them or has its own.
+    /// Grows splats until each cell is covered by [`ENOUGH`] of them or has its own, and each piece is covered.
     pub fn grow(samples: &Samples, cells: &Cells, tolerance: f64, shape: SplatShape, progress: &dyn Progress) -> Self {
-        const CHUNK: usize = 256;
         progress.begin("growing splats", samples.len() as u64);
         let mut candidates = Self { splats: Vec::new(), first_cover: vec![0], covers: Vec::new() };
         let mut covered = vec![0u32; samples.len()];
@@ -40,28 +39,10 @@ impl Candidates {
             let round: Vec<u32> = (first..count).step_by(stride as usize).collect();
             progress.advance(round.len() as u64);
             let wanted: Vec<u32> = round.into_iter().filter(|&point| covered[point as usize] < ENOUGH).collect();
-            let grown: Vec<(Vec<Splat>, Vec<u64>, Vec<Cover>)> = wanted
-                .par_chunks(CHUNK)
-                .map_init(
-                    || Grower::new(samples, cells, tolerance, shape),
-                    |grower, points| {
-                        let (mut splats, mut ends, mut covers) = (Vec::new(), Vec::new(), Vec::new());
-                        for &point in points {
-                            splats.push(grower.grow(point, &mut covers));
-                            ends.push(covers.len() as u64);
-                        }
-                        (splats, ends, covers)
-                    },
-                )
-                .collect();
-            for (splats, ends, covers) in grown {
-                let before = candidates.covers.len() as u64;
-                for cover in &covers {
-                    covered[cover.cell as usize] += u32::from(cover.pieces == cells.pieces(cover.cell));
-                }
-                candidates.splats.extend(splats);
-                candidates.first_cover.extend(ends.into_iter().map(|end| before + end));
-                candidates.covers.extend(covers);
+            let before = candidates.covers.len();
+            candidates.append(&wanted, || Grower::new(samples, cells, tolerance, shape), Grower::grow);
+            for cover in &candidates.covers[before..] {
+                covered[cover.cell as usize] += u32::from(cover.pieces == cells.pieces(cover.cell));
             }
             if first == 0 && stride == FIRST_STRIDE {
                 first = stride / 2;
@@ -72,8 +53,42 @@ impl Candidates {
                 first = stride / 2;
             }
         }
+        // Pieces that no splat covers within the tolerance, because the surface bends more than that on the way.
+        let mut missing: Vec<u16> = (0..count).map(|cell| cells.pieces(cell)).collect();
+        for cover in &candidates.covers {
+            missing[cover.cell as usize] &= !cover.pieces;
+        }
+        let bare: Vec<u32> = (0..count).filter(|&cell| missing[cell as usize] != 0).collect();
+        candidates.append(&bare, || Grower::new(samples, cells, tolerance, shape), Grower::grow_over_cell);
         progress.end();
         candidates
+    }
+
+    /// Grows a splat by `grow` from each of `points`.
+    fn append<'a>(
+        &mut self,
+        points: &[u32],
+        grower: impl Fn() -> Grower<'a> + Send + Sync,
+        grow: impl Fn(&mut Grower<'a>, u32, &mut Vec<Cover>) -> Splat + Sync,
+    ) {
+        const CHUNK: usize = 256;
+        let grown: Vec<(Vec<Splat>, Vec<u64>, Vec<Cover>)> = points
+            .par_chunks(CHUNK)
+            .map_init(grower, |grower, points| {
+                let (mut splats, mut ends, mut covers) = (Vec::new(), Vec::new(), Vec::new());
+                for &point in points {
+                    splats.push(grow(grower, point, &mut covers));
+                    ends.push(covers.len() as u64);
+                }
+                (splats, ends, covers)
+            })
+            .collect();
+        for (splats, ends, covers) in grown {
+            let before = self.covers.len() as u64;
+            self.splats.extend(splats);
+            self.first_cover.extend(ends.into_iter().map(|end| before + end));
+            self.covers.extend(covers);
+        }
     }
 
     /// What a splat covers, in the order of cells.

@@ -30,6 +30,9 @@ const REACH: f64 = 2.5;
 /// The cosine of the elevation over the tangent plane up to which a point is beside another: 60 degrees.
 const STEEPEST: f64 = 0.5;
 
+/// A crease is at least this part of the distance of two points from either: a cell has an area.
+const NARROWEST: f64 = 0.01;
+
 /// Corners of a cell that has no neighbours.
 const OUTLINE: usize = 8;
 
@@ -44,14 +47,16 @@ pub(super) struct Cells {
     corners: Vec<DVec2>,
     /// The distance of the farthest corner from the point.
     pub radii: Vec<f64>,
-    /// For a cell at the end of the surface how far it goes on there, else infinity.
+    /// For a cell at the end of the surface, or at a crease that the graph has no edge across, how far it goes on there, else
+    /// infinity.
     pub overhangs: Vec<f64>,
     first_neighbour: Vec<usize>,
     neighbours: Vec<u32>,
 }
 
 impl Cells {
-    pub fn new(samples: &Samples, progress: &dyn Progress) -> Self {
+    /// Creases are told from bends that `tolerance`, scaled units, allows.
+    pub fn new(samples: &Samples, tolerance: f64, progress: &dyn Progress) -> Self {
         const CHUNK: usize = 2048;
         progress.begin("finding neighbours", samples.len() as u64);
         let few = NeighbourSearch::new(&samples.positions, NEIGHBOURS);
@@ -63,7 +68,7 @@ impl Cells {
                 let first = chunk * CHUNK as u32;
                 let range = first..count.min(first + CHUNK as u32);
                 progress.advance(range.len() as u64);
-                range.map(|index| cell(samples, index, &few, &many, found)).collect()
+                range.map(|index| cell(samples, index, tolerance, &few, &many, found)).collect()
             })
             .collect();
         let mut cells = Self {
@@ -167,72 +172,109 @@ struct Cell {
 fn cell(
     samples: &Samples,
     index: u32,
+    tolerance: f64,
     few: &NeighbourSearch<'_>,
     many: &NeighbourSearch<'_>,
     found: &mut Vec<Neighbour>,
 ) -> Cell {
-    let mut bisectors = Vec::new();
+    let mut borders = Vec::new();
     let (mut neighbours, mut spacing) = (Vec::new(), 0.0);
     for search in [few, many] {
         search.nearest(index, found);
-        bisectors.clear();
-        bisectors.extend(found.iter().filter_map(|neighbour| Bisector::new(samples, index, neighbour)));
-        spacing = local_spacing(&bisectors);
-        let polygon = Polygon::cut(REACH * spacing, &bisectors);
+        borders.clear();
+        borders.extend(found.iter().filter_map(|neighbour| Border::new(samples, index, neighbour, tolerance)));
+        spacing = local_spacing(&borders);
+        let polygon = Polygon::cut(REACH * spacing, &borders);
         neighbours = polygon.neighbours();
         if polygon.is_closed() {
-            return Cell { corners: polygon.corners, neighbours, overhang: f64::INFINITY, spacing };
+            let overhang = polygon.farthest_at_crease().unwrap_or(f64::INFINITY);
+            return Cell { corners: polygon.corners, neighbours, overhang, spacing };
         }
     }
     // Where the surface ends, it goes on as far as the surfel does.
     let overhang = samples.radii[index as usize];
-    Cell { corners: Polygon::cut(overhang, &bisectors).corners, neighbours, overhang, spacing }
+    Cell { corners: Polygon::cut(overhang, &borders).corners, neighbours, overhang, spacing }
 }
 
 /// The local spacing; zero without neighbours.
-fn local_spacing(bisectors: &[Bisector]) -> f64 {
-    let nearest = &bisectors[..bisectors.len().min(SPACING_NEIGHBOURS)];
-    let squares: f64 = nearest.iter().map(|bisector| 4.0 * bisector.distance * bisector.distance).sum();
-    let ranks = (nearest.len() * (nearest.len() + 1) / 2).max(1) as f64;
+fn local_spacing(borders: &[Border]) -> f64 {
+    let nearest = || borders.iter().filter_map(|border| Some(border.neighbour?.1)).take(SPACING_NEIGHBOURS);
+    let squares: f64 = nearest().map(|distance| distance * distance).sum();
+    let count = nearest().count();
+    let ranks = (count * (count + 1) / 2).max(1) as f64;
     (std::f64::consts::PI * squares / ranks).sqrt()
 }
 
-/// The line halfway to a neighbour, in the tangent plane.
-struct Bisector {
+/// The line, in the tangent plane, where a cell borders on that of a neighbour.
+struct Border {
     /// Unit.
     toward: DVec2,
-    /// Half the distance in space: as if the surface were unrolled into the plane.
     distance: f64,
-    neighbour: u32,
+    /// And how far it is. None for one beyond a right angle or a sharper one: the cell ends there, the graph has no edge.
+    neighbour: Option<(u32, f64)>,
 }
 
-impl Bisector {
-    /// None for a neighbour on another side of the surface, or above or below more than beside: it bounds no cell.
-    fn new(samples: &Samples, index: u32, neighbour: &Neighbour) -> Option<Self> {
+impl Border {
+    /// Halfway to the neighbour, at half the distance in space: as if the surface were unrolled into the plane. Across a crease
+    /// it is where the two tangent planes meet, however near to one of the points that is; else the cell of the nearer would
+    /// reach past the crease, and that of the farther fall short of it.
+    ///
+    /// None for a neighbour on another side of the surface, or above or below more than beside, without a crease between:
+    /// it bounds no cell.
+    fn new(samples: &Samples, index: u32, neighbour: &Neighbour, tolerance: f64) -> Option<Self> {
         let offset = samples.positions.position(neighbour.index) - samples.positions.position(index);
         let [s, t] = tangent_basis(samples.normals[index as usize]);
+        let in_plane = |v: DVec3| DVec2::new(v.dot(s), v.dot(t));
         let distance = neighbour.squared_distance.sqrt();
-        let flat = DVec2::new(offset.dot(s), offset.dot(t)) / distance;
-        let toward = flat.try_normalize().filter(|_| flat.length() > STEEPEST)?;
-        samples.same_side(index, neighbour.index).then_some(Self {
-            toward,
-            distance: 0.5 * distance,
-            neighbour: neighbour.index,
-        })
+        let same_side = samples.same_side(index, neighbour.index);
+        let linked = same_side.then_some((neighbour.index, distance));
+        if let Some((toward, distance)) = crease(samples, index, neighbour.index, offset, tolerance) {
+            return Some(Self { toward: in_plane(toward), distance, neighbour: linked });
+        }
+        let flat = in_plane(offset) / distance;
+        let toward = flat.try_normalize().filter(|_| same_side && flat.length() > STEEPEST)?;
+        Some(Self { toward, distance: 0.5 * distance, neighbour: linked })
     }
+}
+
+/// Where a crease runs between a point and another at `offset`: the unit direction from the point to it in the tangent plane, and
+/// how far that is.
+///
+/// Each of the two then lies below the plane of the other, or each above it, together by more than a surface within the
+/// tolerance bends; they face each other across the line where the planes meet, rather than along it; and each is within reach of
+/// the other's surfel, as no outlier is.
+fn crease(samples: &Samples, index: u32, other: u32, offset: DVec3, tolerance: f64) -> Option<(DVec3, f64)> {
+    let radius = samples.radii[index as usize].min(samples.radii[other as usize]);
+    if offset.length() > 2.0 * REACH * radius {
+        return None;
+    }
+    let normal = samples.normals[index as usize];
+    let agrees = samples.oriented || normal.dot(samples.normals[other as usize]) >= 0.0;
+    let other = samples.normals[other as usize] * if agrees { 1.0 } else { -1.0 };
+    // Of the other point over this one's plane, and of this one over the other's.
+    let (height, back) = (offset.dot(normal), -offset.dot(other));
+    if height * back < 0.0 || height.abs() + back.abs() <= 2.0 * tolerance {
+        return None;
+    }
+    let slope = other - normal * other.dot(normal);
+    let sine = slope.length();
+    let toward = slope.try_normalize()? * if height + back < 0.0 { 1.0 } else { -1.0 };
+    let along = offset.dot(normal.cross(toward));
+    (along.abs() * sine <= height.abs() + back.abs())
+        .then_some((toward, (back.abs() / sine).max(NARROWEST * offset.length())))
 }
 
 /// A convex polygon around the origin that remembers what cut each edge.
 #[derive(Default)]
 struct Polygon {
     corners: Vec<DVec2>,
-    /// Of the edge from the corner of the same index to the next: the neighbour, and how far it is. None for the outline.
-    cut_by: Vec<Option<(u32, f64)>>,
+    /// Of the edge from the corner of the same index to the next: the neighbour of the border. None for the outline.
+    cut_by: Vec<Option<Option<(u32, f64)>>>,
 }
 
 impl Polygon {
-    /// The outline, a regular polygon whose edges are `reach` away, cut by bisectors, which come nearest first.
-    fn cut(reach: f64, bisectors: &[Bisector]) -> Self {
+    /// The outline, a regular polygon whose edges are `reach` away, cut by borders.
+    fn cut(reach: f64, borders: &[Border]) -> Self {
         let mut polygon = Self { corners: Vec::with_capacity(12), cut_by: Vec::with_capacity(12) };
         let edge = std::f64::consts::SQRT_2 - 1.0;
         for (x, y) in [(1.0, -edge), (1.0, edge), (edge, 1.0), (-edge, 1.0)] {
@@ -242,19 +284,13 @@ impl Polygon {
             polygon.corners.push(-polygon.corners[k]);
         }
         polygon.cut_by = vec![None; OUTLINE];
-        for bisector in bisectors {
-            let farthest = polygon.corners.iter().map(|corner| corner.length_squared()).fold(0.0, f64::max);
-            if bisector.distance * bisector.distance >= farthest {
-                break;
-            }
-            polygon.clip(bisector);
-        }
+        borders.iter().for_each(|border| polygon.clip(border));
         polygon
     }
 
-    /// Keeps what is nearer than the bisector; the origin always is.
-    fn clip(&mut self, bisector: &Bisector) {
-        let beyond = |corner: DVec2| corner.dot(bisector.toward) - bisector.distance;
+    /// Keeps what is nearer than the border; the origin always is.
+    fn clip(&mut self, border: &Border) {
+        let beyond = |corner: DVec2| corner.dot(border.toward) - border.distance;
         if self.corners.iter().all(|&corner| beyond(corner) <= 0.0) {
             return;
         }
@@ -269,7 +305,7 @@ impl Polygon {
                 cut_by.push(self.cut_by[k]);
                 if b > 0.0 {
                     corners.push(crossing());
-                    cut_by.push(Some((bisector.neighbour, 2.0 * bisector.distance)));
+                    cut_by.push(Some(border.neighbour));
                 }
             } else if b <= 0.0 {
                 corners.push(crossing());
@@ -283,7 +319,14 @@ impl Polygon {
         !self.corners.is_empty() && self.cut_by.iter().all(Option::is_some)
     }
 
+    /// How far the corners are at edges without a neighbour. None without such edges.
+    fn farthest_at_crease(&self) -> Option<f64> {
+        let count = self.corners.len();
+        let ends = (0..count).filter(|&k| self.cut_by[k] == Some(None)).flat_map(|k| [k, (k + 1) % count]);
+        ends.map(|k| self.corners[k].length()).reduce(f64::max)
+    }
+
     fn neighbours(&self) -> Vec<(u32, f64)> {
-        self.cut_by.iter().flatten().copied().collect()
+        self.cut_by.iter().flatten().flatten().copied().collect()
     }
 }

@@ -27,8 +27,8 @@ pub(super) struct Splat {
     pub shift: f64,
     /// Half-axes, perpendicular to each other and to the normal. All in scaled units.
     pub axes: [DVec3; 2],
-    /// The largest distance of a point inside from its plane. It exceeds the tolerance where the point's own cell, which must
-    /// be covered all the same, reaches past a point that bent too far.
+    /// The largest distance of a point inside from its plane. It exceeds the tolerance where the splat is
+    /// [larger](Grower::grow_over_cell) than it grew.
     pub deviation: f64,
 }
 
@@ -96,22 +96,31 @@ impl<'a> Grower<'a> {
     /// Grows a splat from `point` and appends what it covers, in the order of cells.
     pub fn grow(&mut self, point: u32, covers: &mut Vec<Cover>) -> Splat {
         let first = covers.len();
-        let disk = self.grow_shape(point, tangent_basis(self.samples.normals[point as usize]), covers);
+        let disk = self.grow_shape(point, self.circle(point), false, covers);
         let Some(axes) = (self.shape == SplatShape::Ellipse).then(|| self.principal_axes(point)).flatten() else {
             return disk;
         };
         let middle = covers.len();
-        let ellipse = self.grow_shape(point, axes, covers);
+        let ellipse = self.grow_shape(point, axes, false, covers);
         let area = |covers: &[Cover]| -> f64 { covers.iter().map(|c| self.cells.area(c.cell, c.pieces)).sum() };
-        // One that must be larger than it grew, to cover its own cell, reaches far past it along its longer axis.
-        let fits = ellipse.deviation <= self.tolerance.max(disk.deviation);
-        if fits && area(&covers[middle..]) > area(&covers[first..middle]) {
+        if area(&covers[middle..]) > area(&covers[first..middle]) {
             covers.drain(first..middle);
             ellipse
         } else {
             covers.truncate(middle);
             disk
         }
+    }
+
+    /// The same for a disk that is at least so large that it covers the point's own cell, though another point inside may then
+    /// lie beyond the tolerance. It covers nothing of the cells of such points.
+    pub fn grow_over_cell(&mut self, point: u32, covers: &mut Vec<Cover>) -> Splat {
+        self.grow_shape(point, self.circle(point), true, covers)
+    }
+
+    /// Half-axes of unit length.
+    fn circle(&self, point: u32) -> [DVec3; 2] {
+        tangent_basis(self.samples.normals[point as usize])
     }
 
     /// Half-axes with the ratio and the directions in which the surface bends equally far from the tangent plane: along
@@ -156,18 +165,20 @@ impl<'a> Grower<'a> {
     }
 
     /// The same for the shape of an ellipse with half-axes along `shape`: distances and radii are in units of them.
-    fn grow_shape(&mut self, point: u32, shape: [DVec3; 2], covers: &mut Vec<Cover>) -> Splat {
-        let radius = self.conquer(point, shape);
+    fn grow_shape(&mut self, point: u32, shape: [DVec3; 2], over_cell: bool, covers: &mut Vec<Cover>) -> Splat {
+        let mut radius = self.conquer(point, shape);
         let normal = self.samples.normals[point as usize];
         let center = self.samples.positions.position(point);
         let inverse = shape.map(|axis| axis / axis.length_squared());
         let flat = |p: DVec3| DVec2::new(p.dot(inverse[0]), p.dot(inverse[1]));
-        let basis = tangent_basis(normal);
-        let own = self.cells.corners(point).iter().map(|c| flat(basis[0] * c.x + basis[1] * c.y).length());
-        let own = own.fold(0.0, f64::max);
+        if over_cell {
+            // By the same steps as below, so that rounding leaves out no corner.
+            let [s, t] = tangent_basis(normal);
+            let corners = self.cells.corners(point).iter();
+            radius = corners.map(|corner| flat(s * corner.x + t * corner.y).length()).fold(radius, f64::max);
+        }
         let (low, high) = self.heights();
         let shift = 0.5 * (low + high);
-        let radius = radius.max(own);
         let confront = self.confront.iter().map(|Reverse((Distance(distance), point))| (*distance, *point));
         let deviation = confront
             .filter(|(distance, _)| *distance < radius)

@@ -18,7 +18,12 @@
 //! may share a cell. Of 57,000 random samples of the Stanford bunny at a tolerance of 0.00025 diagonals, with disks exactly as
 //! large as they grew, rays from 64 sides that miss all disks, and disks selected: constant share 0.6 0.427 % with
 //! 15,369; convex hull 0.0123 % with 20,933; whole cells 0.0127 % with 15,977; triangles 0.0133 % with 14,826. What
-//! is left is seen aslant, where disks of different heights meet: [`OVERLAP`] closes it.
+//! is left is seen aslant, where disks of different heights meet: [`written`] closes it.
+//!
+//! **Within the tolerance.** A disk covers the cells of those points in it that it grew over, none of which is farther off than
+//! the tolerance. Where the surface bends by more than that within a cell no disk covers all of it so, and at a crease any that
+//! does holds, seen along its normal, points of the other side. There the cell's own point gets a disk as large as the cell
+//! ([`Report::beyond_tolerance`] counts them), which covers nothing of cells beyond the crease.
 
 mod candidates;
 mod cells;
@@ -32,7 +37,7 @@ use std::str::FromStr;
 
 use self::candidates::Candidates;
 use self::cells::Cells;
-pub use self::outcome::{OVERLAP, Report};
+pub use self::outcome::{Report, grown, written};
 use self::samples::Samples;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
@@ -117,15 +122,15 @@ pub fn simplify(scene: &Scene, options: &Options, progress: &dyn Progress) -> Re
     progress.begin("sorting points", 0);
     let samples = Samples::new(scene)?;
     progress.end();
-    let cells = Cells::new(&samples, progress);
     let scaled = tolerance * samples.positions.scale();
+    let cells = Cells::new(&samples, scaled, progress);
     let candidates = Candidates::grow(&samples, &cells, scaled, options.shape, progress);
     let mut selected = selection::select(&cells, &candidates, progress);
     let before_relaxation = selected.len() as u64;
     if options.relaxations > 0 {
         selected = relaxation::relax(&cells, &candidates, &selected, options.relaxations, progress);
     }
-    let (simplified, deviations) = outcome::scene(scene, &samples, &cells, &candidates, &selected);
+    let (simplified, deviations) = outcome::scene(scene, &samples, &cells, &candidates, &selected, scaled);
     // Rounding aside.
     let beyond = |&&index: &&u32| candidates.splats[index as usize].deviation > scaled * (1.0 + 1e-9);
     let beyond_tolerance = selected.iter().filter(beyond).count() as u64;

@@ -10,11 +10,30 @@ use super::samples::Samples;
 use crate::scene::color::linear_to_srgb;
 use crate::scene::{Colors, Scene, Surfel};
 
-/// How much larger surfels are written than they grew. Disks that just cover the surface together leave slits where it is seen
-/// aslant, because they lie at different heights. A kernel has faded there, so the rim shows only where nothing else is: at
-/// the radius that a disk grew to, the default kernel weighs 0.03. Rays that miss all disks of the bunny of [`super`], for 1, 1.1 and
-/// 1.2: 133, 36 and 12 of a million.
-pub const OVERLAP: f64 = 1.2;
+/// A half-axis is written longer than it grew by at most this part of itself,
+const LARGEST_OVERLAP: f64 = 0.4;
+
+/// at least this part,
+const SMALLEST_OVERLAP: f64 = 0.02;
+
+/// and in between by so many tolerances.
+const OVERLAP_IN_TOLERANCES: f64 = 8.0;
+
+/// The half-axis that a surfel has whose half-axis grew to `grown`, in the unit of the tolerance.
+///
+/// Disks that just cover the surface together leave slits where it is seen aslant, because they lie at different heights. Two
+/// within a tolerance E of the surface are at most 2 E apart where they meet; overlapping by 8 E each they close the slit
+/// for views up to atan 8, 83 degrees, from the normal. More would only show past sharp edges.
+pub fn written(grown: f64, tolerance: f64) -> f64 {
+    let overlap = (OVERLAP_IN_TOLERANCES * tolerance).max(SMALLEST_OVERLAP * grown);
+    grown + overlap.min(LARGEST_OVERLAP * grown)
+}
+
+/// The inverse of [`written`]: the half-axis that a surfel grew to.
+pub fn grown(written: f64, tolerance: f64) -> f64 {
+    let between = written - OVERLAP_IN_TOLERANCES * tolerance;
+    between.min(written / (1.0 + SMALLEST_OVERLAP)).max(written / (1.0 + LARGEST_OVERLAP))
+}
 
 /// What simplification did. Lengths are in world units.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -29,13 +48,14 @@ pub struct Report {
     pub before_relaxation: u64,
     /// What was asked for.
     pub tolerance: f64,
-    /// The largest distance of a point from the plane of a selected surfel that it lies in, before [`OVERLAP`].
+    /// The largest distance of a point from the plane of a selected surfel that covers its cell or a part of it: at most the
+    /// tolerance, rounding aside.
     pub max_deviation: f64,
     /// The mean distance of a point from the planes of the selected surfels that cover its cell or a part of it, weighted by the
     /// area that they cover.
     pub mean_deviation: f64,
-    /// Selected surfels with a point in them that is farther off than the tolerance: the surface bends more than that from one
-    /// point to the next.
+    /// Selected surfels at creases: the surface bends by more than the tolerance within the cell of their own point, which they
+    /// cover. Points that lie farther off than that are over or under them, but not in the cells that they cover.
     pub beyond_tolerance: u64,
 }
 
@@ -45,40 +65,49 @@ pub(super) struct Deviations {
     pub mean: f64,
 }
 
-/// The selected splats as a scene like `scene`.
+/// The selected splats as a scene like `scene`; the tolerance in scaled units.
 pub(super) fn scene(
     scene: &Scene,
     samples: &Samples,
     cells: &Cells,
     candidates: &Candidates,
     selected: &[u32],
+    tolerance: f64,
 ) -> (Scene, Deviations) {
     struct Chosen {
         surfel: Surfel,
         color: [f32; 4],
         /// Area times deviation, and area.
         sums: [f64; 2],
+        /// The largest deviation.
+        largest: f64,
     }
     let scale = samples.positions.scale();
     let choose = |&index: &u32| {
         let splat = &candidates.splats[index as usize];
         let normal = samples.normals[splat.point as usize];
         let center = samples.positions.position(splat.point) + normal * splat.shift;
-        let (mut color, mut sums) = ([0.0; 4], [0.0; 2]);
+        let (mut color, mut sums, mut largest) = ([0.0; 4], [0.0; 2], 0f64);
         for cover in candidates.covers(index) {
             let area = cells.area(cover.cell, cover.pieces);
             let deviation = (samples.positions.position(cover.cell) - center).dot(normal).abs() / scale;
+            largest = largest.max(deviation);
             sums = [sums[0] + area * deviation, sums[1] + area];
             for (sum, value) in color.iter_mut().zip(samples.colors[cover.cell as usize]) {
                 *sum += area * value;
             }
         }
         let world = |v: DVec3| (v / scale).as_vec3().to_array();
-        let [s, t] = splat.axes.map(|axis| world(axis * OVERLAP));
+        let [s, t] = splat.axes.map(|axis| {
+            let length = axis.length();
+            // Where the surface bends by more than the tolerance, disks that meet are farther apart.
+            let tolerance = if splat.deviation > tolerance { f64::INFINITY } else { tolerance };
+            world(axis * (written(length, tolerance) / length))
+        });
         let [r, g, b, alpha] = color;
         let opaque = if alpha > 0.0 { alpha } else { f64::INFINITY };
         let color = [r / opaque, g / opaque, b / opaque, alpha / sums[1]].map(|c| c as f32);
-        Chosen { surfel: Surfel { center: world(center), s, t }, color, sums }
+        Chosen { surfel: Surfel { center: world(center), s, t }, color, sums, largest }
     };
     let chosen: Vec<Chosen> = selected.par_iter().map(choose).collect();
     let colors = match scene.colors {
@@ -87,8 +116,8 @@ pub(super) fn scene(
         Colors::Linear(_) | Colors::Textured(_) => Colors::Linear(chosen.iter().map(|chosen| chosen.color).collect()),
     };
     let [moment, area] = chosen.iter().fold([0.0; 2], |sum, chosen| [sum[0] + chosen.sums[0], sum[1] + chosen.sums[1]]);
-    let of_splat = |&index: &u32| candidates.splats[index as usize].deviation / scale;
-    let deviations = Deviations { max: selected.iter().map(of_splat).fold(0.0, f64::max), mean: moment / area };
+    let max = chosen.iter().map(|chosen| chosen.largest).fold(0.0, f64::max);
+    let deviations = Deviations { max, mean: moment / area };
     let surfels = chosen.into_iter().map(|chosen| chosen.surfel).collect();
     (Scene { origin: scene.origin, surfels, colors, oriented: scene.oriented, up: scene.up }, deviations)
 }

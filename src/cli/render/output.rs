@@ -1,0 +1,101 @@
+//! What a render leaves: images, a report, and lines on stderr.
+
+use std::path::Path;
+
+use clap::ValueEnum;
+use epsplat::frame::Frame;
+use epsplat::render::Report;
+use epsplat::{Error, Result, io};
+
+use super::super::note;
+use super::Arguments;
+
+/// How images are written.
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+pub(super) enum Format {
+    /// 8-bit sRGB
+    Png,
+    /// Linear f32, every map a layer
+    Exr,
+}
+
+impl Format {
+    /// What the output's name asks for.
+    pub(super) fn of(path: &Path) -> Result<Self> {
+        match path.extension().and_then(|e| e.to_str()).map(str::to_lowercase).as_deref() {
+            Some("png") => Ok(Self::Png),
+            Some("exr") => Ok(Self::Exr),
+            _ => Err(Error::Usage(format!("the output must end in .png or .exr, {} does not", path.display()))),
+        }
+    }
+
+    /// The extension of its files.
+    pub(super) fn extension(self) -> &'static str {
+        match self {
+            Self::Png => "png",
+            Self::Exr => "exr",
+        }
+    }
+
+    pub(super) fn write(self, path: &Path, frame: &Frame) -> Result<()> {
+        match self {
+            Self::Png => io::png::write(path, frame),
+            Self::Exr => io::exr::write(path, frame),
+        }
+    }
+}
+
+/// An output in a folder that is not there fails now rather than after the render.
+pub(super) fn check_folder(output: &Path) -> Result<()> {
+    match output.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => {
+            std::fs::metadata(folder).map(|_| ()).map_err(|e| Error::write(output, e))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// A report must not take the place of an image or of an input.
+pub(super) fn check_json<'a>(arguments: &'a Arguments, images: impl IntoIterator<Item = &'a Path>) -> Result<()> {
+    let json = match &arguments.json {
+        Some(json) if json != Path::new("-") => json,
+        _ => return Ok(()),
+    };
+    // Files that are not there yet have no canonical path; then their names must do.
+    let name = |path: &Path| std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let inputs = arguments.inputs.iter().chain(&arguments.camera).chain(&arguments.cameras).map(|path| path.as_path());
+    if inputs.chain(images).any(|path| name(path) == name(json)) {
+        return Err(Error::Usage(format!("--json {} would overwrite an input or an image", json.display())));
+    }
+    check_folder(json)
+}
+
+/// Tells of a frame that had to be rendered twice.
+pub(super) fn note_overflows(report: &Report) {
+    if report.overflows > 0 {
+        note(&format!(
+            "{} sums overflowed: rendered again with the accumulator {}",
+            report.overflows, report.accumulator
+        ));
+    }
+}
+
+/// One line: what was drawn, and how long each pass took.
+pub(super) fn summary(report: &Report, output: &Path) -> String {
+    let order = ["project_ms", "visibility_ms", "accumulate_ms", "resolve_ms"];
+    let passes = order
+        .iter()
+        .filter_map(|name| report.passes.get(*name).map(|ms| format!("{} {ms:.1}", name.trim_end_matches("_ms"))));
+    let clock = match (report.backend, report.clock) {
+        ("gpu", "wall") => ", wall time",
+        _ => "",
+    };
+    format!(
+        "{}: {} of {} surfels drawn, {:.1} ms ({}{clock})",
+        output.display(),
+        report.splats_drawn,
+        report.surfels,
+        report.total_ms,
+        passes.collect::<Vec<_>>().join(", "),
+    )
+}

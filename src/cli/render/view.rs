@@ -1,0 +1,111 @@
+//! The camera of a picture, as far as arguments and camera files decide it.
+
+use std::path::Path;
+
+use epsplat::io::camera::{self, CameraFile, Pose};
+use epsplat::scene::camera::DEFAULT_FOV;
+use epsplat::scene::{Camera, Lens, Scene, Up};
+use epsplat::{Error, Result};
+use glam::DVec3;
+
+use super::Arguments;
+
+pub(super) const DEFAULT_SIZE: (u32, u32) = (1024, 1024);
+
+/// A view, which lacks at most what the scene decides.
+pub(super) struct View {
+    size: (u32, u32),
+    lens: Lens,
+    place: Place,
+    near: Option<f64>,
+}
+
+enum Place {
+    /// Chosen to show the scene.
+    Framed,
+    /// At the eye; looks at the scene's centre.
+    Eye(DVec3, Option<DVec3>),
+    /// As given.
+    Pose(Pose),
+}
+
+impl View {
+    /// What the arguments say, `--cameras` apart.
+    pub(super) fn of(arguments: &Arguments) -> Result<Self> {
+        if let Some(path) = &arguments.camera {
+            return Self::of_file(arguments, camera::read(path)?, path);
+        }
+        let lens = match (arguments.intrinsics, arguments.ortho) {
+            (Some(values), _) => Lens::Intrinsics(values),
+            (None, Some(height)) => Lens::OrthographicHeight(height),
+            (None, None) => Lens::Fov(arguments.fov.unwrap_or(DEFAULT_FOV)),
+        };
+        let place = match (arguments.eye, arguments.target) {
+            (None, _) => Place::Framed,
+            (Some(eye), None) => Place::Eye(eye, arguments.up),
+            (Some(eye), Some(target)) => Place::Pose(Pose::LookAt(eye, target, arguments.up)),
+        };
+        Self { size: arguments.size.unwrap_or(DEFAULT_SIZE), lens, place, near: arguments.near }.checked()
+    }
+
+    /// What a camera of the file at `path` says, and the arguments that add to it.
+    pub(super) fn of_file(arguments: &Arguments, file: CameraFile, path: &Path) -> Result<Self> {
+        if let (Some(size), Some(own)) = (arguments.size, file.size)
+            && size != own
+        {
+            return Err(Error::Usage(format!(
+                "--size {}x{} contradicts {}, which says {}x{}",
+                size.0,
+                size.1,
+                path.display(),
+                own.0,
+                own.1
+            )));
+        }
+        if arguments.scale.is_some() && file.size.is_none() {
+            let path = path.display();
+            return Err(Error::Usage(format!(
+                "--scale needs pictures of known size, which {path} does not give: take --size"
+            )));
+        }
+        let file = file.scaled(arguments.scale.unwrap_or(1.0));
+        let size = file.size.or(arguments.size).unwrap_or(DEFAULT_SIZE);
+        let near = arguments.near.or(file.near);
+        Self { size, lens: file.lens, place: Place::Pose(file.pose), near }.checked()
+    }
+
+    /// What the arguments decide is refused before minutes of reading: only the scene's centre is not known yet.
+    fn checked(self) -> Result<Self> {
+        let stand_in = match &self.place {
+            Place::Pose(pose) => pose.clone(),
+            Place::Framed | Place::Eye(..) => Pose::LookAt(DVec3::ZERO, DVec3::X, None),
+        };
+        self.posed(&stand_in, Up::Z, self.near.unwrap_or(1.0))?;
+        Ok(self)
+    }
+
+    fn posed(&self, pose: &Pose, up: Up, near: f64) -> Result<Camera> {
+        match *pose {
+            Pose::Rigid(rotation, eye) => Camera::posed(self.size, self.lens, eye, rotation, near),
+            Pose::LookAt(eye, target, own_up) => Camera::look_at(self.size, self.lens, eye, target, own_up, up, near),
+        }
+    }
+
+    /// The camera of the view; `default_near` is [`Camera::default_near`] of the scene.
+    pub(super) fn camera(&self, scene: &Scene, default_near: f64) -> Result<Camera> {
+        let near = self.near.unwrap_or(default_near);
+        match &self.place {
+            Place::Framed => Camera::framing(self.size, self.lens, scene, near),
+            Place::Eye(eye, up) => {
+                let center = scene.origin + scene.bounds().center();
+                self.posed(&Pose::LookAt(*eye, center, *up), scene.up, near)
+            }
+            Place::Pose(pose) => self.posed(pose, scene.up, near),
+        }
+    }
+
+    /// Pixels of the picture.
+    pub(super) fn pixels(&self) -> u64 {
+        u64::from(self.size.0) * u64::from(self.size.1)
+    }
+}

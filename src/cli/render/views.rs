@@ -1,0 +1,163 @@
+//! Many pictures of one scene, a camera each: while one is rendered, those before it are encoded and written.
+
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use epsplat::io::cameras;
+use epsplat::io::write_behind::write_behind;
+use epsplat::render::{Renderer, Report};
+use epsplat::scene::{Camera, Maps};
+use epsplat::{Error, Progress, Result};
+use serde::Serialize;
+
+use super::super::progress::Bars;
+use super::super::{note, write_json};
+use super::output::{Format, check_folder, check_json, note_overflows};
+use super::view::{DEFAULT_SIZE, View};
+use super::{Arguments, backend, options, scene};
+
+/// Frames that wait for a writer or are in its hands take no more host memory than this, bytes, unless one frame does.
+const MOST_WAITING: u64 = 1 << 30;
+
+/// What a frame takes of host memory on its way to a file, bytes a pixel; each map takes [`MAP`] more.
+const PIXEL: u64 = 48;
+const MAP: u64 = 24;
+
+/// A view's picture, and what rendering it did.
+#[derive(Serialize)]
+struct Picture {
+    file: PathBuf,
+    #[serde(flatten)]
+    report: Report,
+    /// Milliseconds of encoding and writing, while other pictures were rendered.
+    write_ms: f64,
+}
+
+#[derive(Serialize)]
+struct Reports {
+    views: Vec<Picture>,
+    /// Threads that encoded and wrote.
+    writers: usize,
+    /// Milliseconds of rendering, and of encoding and writing, over all views.
+    render_ms: f64,
+    write_ms: f64,
+    /// Milliseconds from the scene in host memory to the last written picture.
+    total_ms: f64,
+}
+
+/// Renders a picture of each camera of the set at `path`.
+pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
+    let maps = !arguments.aov.is_empty();
+    let format = arguments.format.unwrap_or(if maps { Format::Exr } else { Format::Png });
+    let options = options(arguments, format)?;
+    let views = views(arguments, path, format)?;
+    check_output(arguments, path)?;
+    check_json(arguments, views.iter().map(|(file, _)| file.as_path()))?;
+    let backend = backend(arguments)?;
+
+    let bars = Bars::new();
+    let scene = scene(arguments, &bars)?;
+    let near = Camera::default_near(&scene);
+    let largest = views.iter().map(|(_, view)| view.pixels()).max().unwrap_or(1);
+    let writers = writers(largest, &options.maps);
+    let mut renderer = Renderer::new(&scene, &options, &backend)?;
+    let start = Instant::now();
+    bars.begin("rendering views", views.len() as u64);
+    let frames = views.iter().map(|(file, view)| {
+        let frame = view.camera(&scene, near).and_then(|camera| renderer.frame(&camera, &()));
+        frame.map(|(frame, report)| (file, frame, report)).map_err(|error| error.of_view(file))
+    });
+    let pictures = write_behind(writers, frames, |(file, frame, report)| {
+        let start = Instant::now();
+        if let Some(folder) = file.parent() {
+            std::fs::create_dir_all(folder).map_err(|error| Error::write(file, error))?;
+        }
+        format.write(file, &frame)?;
+        bars.advance(1);
+        Ok(Picture { file: file.clone(), report, write_ms: start.elapsed().as_secs_f64() * 1e3 })
+    });
+    bars.end();
+    let views = pictures?;
+    views.iter().for_each(|view| note_overflows(&view.report));
+    let reports = Reports {
+        writers: writers.get(),
+        render_ms: views.iter().map(|view| view.report.total_ms).sum(),
+        write_ms: views.iter().map(|view| view.write_ms).sum(),
+        total_ms: start.elapsed().as_secs_f64() * 1e3,
+        views,
+    };
+    match &arguments.json {
+        Some(path) => write_json(path, &reports),
+        None => {
+            note(&summary(&reports, &arguments.output));
+            Ok(())
+        }
+    }
+}
+
+/// The files and views of all cameras, which the arguments do not contradict.
+fn views(arguments: &Arguments, path: &Path, format: Format) -> Result<Vec<(PathBuf, View)>> {
+    let cameras = cameras::read(path, arguments.size.unwrap_or(DEFAULT_SIZE))?;
+    let distorted = cameras.iter().filter(|camera| camera.distortion.is_some());
+    if let Some((first, (name, value))) = distorted.clone().find_map(|camera| Some((&camera.name, camera.distortion?)))
+    {
+        if !arguments.ignore_distortion {
+            return Err(Error::malformed(
+                path,
+                format!(
+                    "the lens of {first} is distorted ({name} = {value}), which is not rendered: undistort the pictures, or say \
+                     --ignore-distortion"
+                ),
+            ));
+        }
+        note(&format!("the lens distortion of {} cameras is left out", distorted.count()));
+    }
+    let view = |camera: cameras::NamedCamera| {
+        let file = arguments.output.join(format!("{}.{}", camera.name, format.extension()));
+        let view = View::of_file(arguments, camera.camera, path).map_err(|error| error.of_view(&file))?;
+        Ok((file, view))
+    };
+    cameras.into_iter().map(view).collect()
+}
+
+/// The pictures must not take the place of the photographs that the cameras are named after.
+fn check_output(arguments: &Arguments, cameras: &Path) -> Result<()> {
+    let output = &arguments.output;
+    if output.metadata().is_ok_and(|output| !output.is_dir()) {
+        return Err(Error::write(output, std::io::ErrorKind::NotADirectory.into()));
+    }
+    let beside = if cameras.is_dir() { cameras } else { cameras.parent().unwrap_or(Path::new("")) };
+    let beside = if beside.as_os_str().is_empty() { Path::new(".") } else { beside };
+    if let (Ok(output), Ok(beside)) = (output.canonicalize(), beside.canonicalize())
+        && output == beside
+    {
+        return Err(Error::Usage(
+            "the pictures have the names of those that the cameras belong to: choose another folder than theirs".into(),
+        ));
+    }
+    check_folder(output)
+}
+
+/// How many threads write frames of so many pixels.
+fn writers(pixels: u64, maps: &Maps) -> NonZeroUsize {
+    let threads = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let planes = [maps.depth, maps.normal, maps.weight, maps.count, maps.decision];
+    let frame = pixels * (PIXEL + MAP * planes.into_iter().filter(|map| *map).count() as u64);
+    let most = usize::try_from(MOST_WAITING / frame.max(1)).unwrap_or(usize::MAX);
+    NonZeroUsize::new(threads.min(most)).unwrap_or(NonZeroUsize::MIN)
+}
+
+/// One line: how many, and how long a picture took.
+fn summary(reports: &Reports, output: &Path) -> String {
+    let count = reports.views.len();
+    let each = |ms: f64| ms / count.max(1) as f64;
+    format!(
+        "{}: {count} pictures of {} surfels, {:.1} ms each (rendering {:.1}, beside it encoding and writing {:.1})",
+        output.display(),
+        reports.views.first().map_or(0, |view| view.report.surfels),
+        each(reports.total_ms),
+        each(reports.render_ms),
+        each(reports.write_ms),
+    )
+}

@@ -1,0 +1,194 @@
+//! `transforms.json`: one object, with an object for each picture in `frames`.
+
+use std::path::Path;
+
+use glam::{DMat3, DVec3};
+use serde_json::Value;
+
+use super::{NamedCamera, name_of};
+use crate::error::{Error, Result};
+use crate::io::camera::{CameraFile, Pose, rigid};
+use crate::io::fault::Fault;
+use crate::io::values::{one_line, shown};
+use crate::scene::Lens;
+
+/// Lens models that are a pinhole's where nothing is distorted.
+const PINHOLES: [&str; 6] = ["PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV"];
+
+const DISTORTIONS: [&str; 8] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
+
+pub(super) fn read(path: &Path, size: (u32, u32)) -> Result<Vec<NamedCamera>> {
+    let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
+    parse(&text, size).map_err(|what| Fault::Malformed(what).of(path))
+}
+
+fn parse(text: &str, size: (u32, u32)) -> Result<Vec<NamedCamera>, String> {
+    let file: Value = serde_json::from_str(text).map_err(|e| format!("not JSON: {}", one_line(&e.to_string())))?;
+    let Some(Value::Array(frames)) = file.get("frames") else {
+        return Err("it has no list 'frames', as a transforms.json has; a single camera is given with --camera".into());
+    };
+    let of_frame = |(index, own): (usize, &Value)| {
+        let frame = Frame { own, shared: &file };
+        frame.camera(index, size).map_err(|what| format!("frame {}{}: {what}", index + 1, frame.shown()))
+    };
+    frames.iter().enumerate().map(of_frame).collect()
+}
+
+/// A frame, and what the file says for all.
+struct Frame<'a> {
+    own: &'a Value,
+    shared: &'a Value,
+}
+
+impl Frame<'_> {
+    fn camera(&self, index: usize, size: (u32, u32)) -> Result<NamedCamera, String> {
+        let name = match self.own.get("file_path") {
+            None | Some(Value::Null) => format!("{index:04}"),
+            Some(path) => path.as_str().and_then(name_of).ok_or("its file_path is no name of a file")?,
+        };
+        if let Some(model) = self.value("camera_model")
+            && !model.as_str().is_some_and(|model| PINHOLES.contains(&model))
+        {
+            let model = shown(model.as_str().unwrap_or_default().as_bytes());
+            return Err(format!("the camera_model '{model}' is not a pinhole's; undistort the pictures first"));
+        }
+        if self.value("is_fisheye").is_some_and(|is| is != &Value::Bool(false)) {
+            return Err("a fisheye lens is not a pinhole's; undistort the pictures first".into());
+        }
+        let mut distortion = None;
+        for key in DISTORTIONS {
+            distortion = distortion.or(self.number(key)?.filter(|k| *k != 0.0).map(|k| (key, k)));
+        }
+        let given = match (self.pixels("w")?, self.pixels("h")?) {
+            (Some(width), Some(height)) => Some((width, height)),
+            (None, None) => None,
+            _ => return Err("a size is both w and h".into()),
+        };
+        let (width, height) = given.unwrap_or(size);
+        let camera = CameraFile {
+            size: given,
+            lens: self.lens(f64::from(width), f64::from(height), given.is_some())?,
+            pose: self.pose()?,
+            near: None,
+        };
+        Ok(NamedCamera { name, camera, distortion })
+    }
+
+    /// Focal lengths by pixels, or else by angles; square pixels unless both are given.
+    fn lens(&self, width: f64, height: f64, sized: bool) -> Result<Lens, String> {
+        let of_angle =
+            |key: &str, side: f64| Ok::<_, String>(self.number(key)?.map(|angle| 0.5 * side / (0.5 * angle).tan()));
+        let pixels = [self.number("fl_x")?, self.number("fl_y")?, self.number("cx")?, self.number("cy")?];
+        if !sized && pixels.iter().any(Option::is_some) {
+            return Err("intrinsics are in pixels, so the camera needs w and h".into());
+        }
+        let [fl_x, fl_y, cx, cy] = pixels;
+        let fx = if fl_x.is_some() { fl_x } else { of_angle("camera_angle_x", width)? };
+        let fy = if fl_y.is_some() { fl_y } else { of_angle("camera_angle_y", height)? };
+        let fx = fx.or(fy).ok_or("it gives neither fl_x nor camera_angle_x")?;
+        let (cx, cy) = (cx.unwrap_or(0.5 * width), cy.unwrap_or(0.5 * height));
+        Ok(Lens::Intrinsics([fx, fy.unwrap_or(fx), cx, cy]))
+    }
+
+    fn pose(&self) -> Result<Pose, String> {
+        let matrix = self.own.get("transform_matrix").ok_or("it has no transform_matrix")?;
+        let rows: [[f64; 4]; 4] =
+            serde_json::from_value(matrix.clone()).map_err(|_| "its transform_matrix is not 4 rows of 4 numbers")?;
+        let (to_world, eye) = rigid(rows)?;
+        // From y up and z back to y down and z forward.
+        let turned = DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0));
+        Ok(Pose::Rigid((to_world * turned).transpose(), eye))
+    }
+
+    /// The frame's own value, or else that for all.
+    fn value(&self, key: &str) -> Option<&Value> {
+        let given = |object: &'_ Value| object.get(key).is_some_and(|value| !value.is_null());
+        if given(self.own) { self.own.get(key) } else { self.shared.get(key).filter(|value| !value.is_null()) }
+    }
+
+    fn number(&self, key: &str) -> Result<Option<f64>, String> {
+        let number = |value: &Value| value.as_f64().ok_or_else(|| format!("its {key} is not a number"));
+        self.value(key).map(number).transpose()
+    }
+
+    /// A number of pixels, which programs write with a decimal point too.
+    fn pixels(&self, key: &str) -> Result<Option<u32>, String> {
+        let whole = |number: f64| {
+            let pixels = number as u32;
+            (f64::from(pixels) == number).then_some(pixels).ok_or(format!("its {key} is not a number of pixels"))
+        };
+        self.number(key)?.map(whole).transpose()
+    }
+
+    /// What the file calls the frame, for messages.
+    fn shown(&self) -> String {
+        let name = self.own.get("file_path").and_then(Value::as_str);
+        name.map_or(String::new(), |name| format!(" ({})", shown(name.as_bytes())))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, clippy::panic)]
+    use super::*;
+
+    const POSE: &str = r#""transform_matrix": [[1,0,0,3],[0,0,-1,4],[0,1,0,5],[0,0,0,1]]"#;
+
+    fn one(shared: &str, own: &str) -> Result<NamedCamera, String> {
+        let text = format!(r#"{{{shared} "frames": [{{"file_path": "./train/r_7", {own} {POSE}}}]}}"#);
+        parse(&text, (400, 300)).map(|cameras| cameras[0].clone())
+    }
+
+    #[test]
+    fn poses_are_camera_to_world_with_y_up_and_z_back() {
+        let camera = one(r#""camera_angle_x": 1.5707963267948966,"#, "").unwrap();
+        assert_eq!((camera.name.as_str(), camera.camera.size, camera.distortion), ("train/r_7", None, None));
+        let Pose::Rigid(rotation, eye) = camera.camera.pose else { panic!() };
+        assert_eq!(eye, DVec3::new(3.0, 4.0, 5.0));
+        // Its y axis, up in the picture, is the world's z; it looks along -z, which is the world's y.
+        assert_eq!((rotation * DVec3::X, rotation * DVec3::Z, rotation * DVec3::Y), (DVec3::X, -DVec3::Y, DVec3::Z));
+        let Lens::Intrinsics([fx, fy, cx, cy]) = camera.camera.lens else { panic!() };
+        assert!((fx - 200.0).abs() < 1e-12 && fy == fx && (cx, cy) == (200.0, 150.0), "{fx} {fy} {cx} {cy}");
+    }
+
+    #[test]
+    fn a_frames_own_lens_comes_before_that_of_all() {
+        let shared = r#""w": 800.0, "h": 600, "fl_x": 500, "cx": 390.5, "k1": 0, "camera_model": "OPENCV","#;
+        let lens = |own: &str| one(shared, own).unwrap().camera;
+        assert_eq!(lens("").lens, Lens::Intrinsics([500.0, 500.0, 390.5, 300.0]));
+        assert_eq!(lens("").size, Some((800, 600)));
+        let own = lens(r#""fl_x": 700, "fl_y": 710, "cy": 310, "w": 640, "cx": null,"#);
+        assert_eq!((own.lens, own.size), (Lens::Intrinsics([700.0, 710.0, 390.5, 310.0]), Some((640, 600))));
+        assert_eq!(one(shared, r#""p2": -0.5,"#).unwrap().distortion, Some(("p2", -0.5)));
+    }
+
+    #[test]
+    fn what_is_no_set_of_pinholes_is_said() {
+        for (shared, own, said) in [
+            ("", "", "neither fl_x nor camera_angle_x"),
+            (r#""fl_x": 5,"#, "", "needs w and h"),
+            (r#""w": 8, "fl_x": 5,"#, "", "both w and h"),
+            (r#""w": 8, "h": 7.5, "fl_x": 5,"#, "", "h is not a number of pixels"),
+            (r#""w": -8, "h": 7, "fl_x": 5,"#, "", "w is not a number of pixels"),
+            (r#""camera_angle_x": "wide","#, "", "camera_angle_x is not a number"),
+            (r#""camera_angle_x": 1, "camera_model": "OPENCV_FISHEYE","#, "", "'OPENCV_FISHEYE'"),
+            (r#""camera_angle_x": 1, "is_fisheye": true,"#, "", "fisheye"),
+            (r#""camera_angle_x": 1,"#, r#""k2": [],"#, "k2 is not a number"),
+        ] {
+            let message = one(shared, own).unwrap_err();
+            assert!(message.starts_with("frame 1 (./train/r_7): ") && message.contains(said), "{message}");
+        }
+        for (text, said) in [
+            ("", "not JSON"),
+            ("[]", "no list 'frames'"),
+            (r#"{"frames": 5}"#, "no list 'frames'"),
+            (r#"{"frames": [5]}"#, "frame 1: it gives neither"),
+            (r#"{"camera_angle_x": 1, "frames": [{}]}"#, "frame 1: it has no transform_matrix"),
+            (r#"{"camera_angle_x": 1, "frames": [{"file_path": 7}]}"#, "no name of a file"),
+            (r#"{"camera_angle_x": 1, "frames": [{"transform_matrix": [[1]]}]}"#, "not 4 rows"),
+        ] {
+            let message = parse(text, (8, 8)).unwrap_err();
+            assert!(message.contains(said), "{text}: {message}");
+        }
+    }
+}

@@ -1,0 +1,257 @@
+//! E57 (ASTM E2807): the scans of laser scanners on the ground, through the `e57` crate.
+
+use std::fs::File;
+use std::io::{self, BufReader};
+use std::path::Path;
+
+use ::e57::{E57Reader, PointCloud, Record, RecordDataType, RecordName, RecordValue};
+use glam::{DQuat, DVec3};
+
+use crate::io::fault::{self, Fault, reserve, surviving};
+use crate::io::values::one_line;
+use crate::io::{Points, Up, intensity};
+use crate::scene::Colors;
+use crate::scene::color::{DEFAULT_COLOR, linear_to_srgb, srgb_to_linear};
+use crate::{Progress, Result};
+
+/// No scan has more attributes.
+const MOST_ATTRIBUTES: usize = 64;
+
+/// Reads the points of all scans of an E57 file, in the file's own system: each scan's pose is applied, in f64.
+///
+/// Coordinates are Cartesian or, where a scan has none, spherical; points that are marked as invalid are left out. Colours are sRGB
+/// codes, in the range that the scan gives or else its type: of 0 to 255 they stay 8-bit, else they become linear light. Without
+/// colours, intensities become grey as in a LAS file. Up is z.
+///
+/// # Errors
+///
+/// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where the file
+/// is not E57, ends early, fails its checksums or cannot be decoded.
+pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
+    let opened = surviving(|| {
+        let file = File::open(path)?;
+        let length = file.metadata()?.len();
+        let reader = E57Reader::new(BufReader::with_capacity(1 << 18, file)).map_err(of_e57)?;
+        let scans = reader.pointclouds();
+        let mut promised = 0u64;
+        for (number, scan) in (1..).zip(&scans) {
+            check(scan, length).map_err(|what| Fault::Malformed(format!("its scan {number} {what}")))?;
+            promised = promised.saturating_add(scan.records);
+        }
+        Ok((reader, scans, promised))
+    });
+    let (mut reader, scans, promised) = opened.map_err(|fault| fault.of(path))?;
+    progress.begin(&format!("reading {}", fault::name(path)), promised);
+    let points = surviving(|| {
+        let mut reading = Reading::default();
+        scans.iter().try_for_each(|scan| reading.scan(&mut reader, scan, progress))?;
+        Ok(reading.into_points())
+    });
+    progress.end();
+    points.map_err(|fault| fault.of(path))
+}
+
+/// The crate's failures that are the file's fault, told from the system's.
+fn of_e57(error: ::e57::Error) -> Fault {
+    if let ::e57::Error::Read { source: Some(source), .. } = &error
+        && let Some(of_system) = source.downcast_ref::<io::Error>()
+    {
+        match of_system.kind() {
+            io::ErrorKind::UnexpectedEof => return Fault::Malformed("the file ends early".into()),
+            io::ErrorKind::InvalidData | io::ErrorKind::InvalidInput => {}
+            kind => return Fault::Io(kind.into()),
+        }
+    }
+    Fault::Malformed(one_line(&error.to_string()))
+}
+
+/// Holds what a scan promises against the file's `length`, before anything is allocated for it.
+fn check(scan: &PointCloud, length: u64) -> Result<(), String> {
+    if Place::of(scan).is_none() {
+        return Err("has no coordinates".into());
+    }
+    if scan.prototype.len() > MOST_ATTRIBUTES {
+        return Err(format!("has {} attributes, more than {MOST_ATTRIBUTES}", scan.prototype.len()));
+    }
+    // Values that are all the same take no bits; points of which none takes any would have no end.
+    let bits: u64 = scan.prototype.iter().map(|record| bits(&record.data_type)).sum();
+    let held = length.saturating_mul(8).checked_div(bits).unwrap_or(0);
+    if held < scan.records {
+        return Err(format!("promises {} points, the file holds {held} at most", scan.records));
+    }
+    Ok(())
+}
+
+/// Bits of a value in the file.
+fn bits(kind: &RecordDataType) -> u64 {
+    match *kind {
+        RecordDataType::Single { .. } => 32,
+        RecordDataType::Double { .. } => 64,
+        RecordDataType::ScaledInteger { min, max, .. } | RecordDataType::Integer { min, max } => {
+            u64::from(u64::BITS - max.abs_diff(min).leading_zeros())
+        }
+    }
+}
+
+/// Which of a scan's attributes are its coordinates, and which marks the invalid ones.
+#[derive(Clone, Copy)]
+struct Place {
+    spherical: bool,
+    axes: [usize; 3],
+    invalid: Option<usize>,
+}
+
+impl Place {
+    fn of(scan: &PointCloud) -> Option<Self> {
+        let cartesian = [RecordName::CartesianX, RecordName::CartesianY, RecordName::CartesianZ];
+        let spherical = [RecordName::SphericalRange, RecordName::SphericalAzimuth, RecordName::SphericalElevation];
+        if let Some(axes) = triple(scan, &cartesian) {
+            let invalid = index(scan, &RecordName::CartesianInvalidState);
+            return Some(Self { spherical: false, axes, invalid });
+        }
+        let axes = triple(scan, &spherical)?;
+        Some(Self { spherical: true, axes, invalid: index(scan, &RecordName::SphericalInvalidState) })
+    }
+}
+
+fn index(scan: &PointCloud, name: &RecordName) -> Option<usize> {
+    scan.prototype.iter().position(|record| record.name == *name)
+}
+
+fn triple(scan: &PointCloud, names: &[RecordName; 3]) -> Option<[usize; 3]> {
+    let [a, b, c] = names.each_ref().map(|name| index(scan, name));
+    Some([a?, b?, c?])
+}
+
+/// The points of a file while they are being read.
+#[derive(Default)]
+struct Reading {
+    positions: Vec<[f64; 3]>,
+    /// Colours as shares of their range; not numbers where there is none.
+    colors: Vec<[f32; 3]>,
+    /// Whether any point has a colour, and whether all ranges are 0 to 255.
+    colored: bool,
+    wide: bool,
+    /// 0 where there is none.
+    intensities: Vec<f32>,
+}
+
+impl Reading {
+    fn scan(
+        &mut self,
+        reader: &mut E57Reader<BufReader<File>>,
+        scan: &PointCloud,
+        progress: &dyn Progress,
+    ) -> Result<(), Fault> {
+        let Some(place) = Place::of(scan) else { return Ok(()) };
+        let (rotation, translation) = pose(scan)?;
+        let color = triple(scan, &[RecordName::ColorRed, RecordName::ColorGreen, RecordName::ColorBlue]);
+        let ranges = color.map(|color| ranges(scan, color));
+        let color_invalid = index(scan, &RecordName::IsColorInvalid);
+        let intensity = index(scan, &RecordName::Intensity);
+        let intensity_invalid = index(scan, &RecordName::IsIntensityInvalid);
+        self.wide |= ranges.is_some_and(|ranges| ranges != [(0.0, 255.0); 3]);
+        reserve(&mut self.positions, scan.records)?;
+        reserve(&mut self.colors, scan.records)?;
+        reserve(&mut self.intensities, scan.records)?;
+        let mut unreported = 0;
+        for values in reader.pointcloud_raw(scan).map_err(of_e57)? {
+            let values = values.map_err(of_e57)?;
+            let number = |at: usize| number(&values, &scan.prototype, at);
+            unreported += 1;
+            if unreported == 1 << 16 {
+                progress.advance(std::mem::take(&mut unreported));
+            }
+            let marked = |at: Option<usize>| at.map_or(Ok(false), |at| Ok::<_, Fault>(number(at)? != 0.0));
+            if marked(place.invalid)? {
+                continue;
+            }
+            let [a, b, c] = [number(place.axes[0])?, number(place.axes[1])?, number(place.axes[2])?];
+            let local = if place.spherical {
+                let (range, azimuth, elevation) = (a, b, c);
+                range * DVec3::new(elevation.cos() * azimuth.cos(), elevation.cos() * azimuth.sin(), elevation.sin())
+            } else {
+                DVec3::new(a, b, c)
+            };
+            self.positions.push((rotation * local + translation).to_array());
+            let mut share = [f32::NAN; 3];
+            if let (Some(color), Some(ranges), false) = (color, ranges, marked(color_invalid)?) {
+                for (share, (at, (low, high))) in share.iter_mut().zip(color.into_iter().zip(ranges)) {
+                    *share = ((number(at)? - low) / (high - low)).clamp(0.0, 1.0) as f32;
+                }
+                self.colored = true;
+            }
+            self.colors.push(share);
+            let intensity = intensity.filter(|_| !marked(intensity_invalid).unwrap_or(true));
+            self.intensities.push(intensity.map_or(Ok(0.0), number)? as f32);
+        }
+        progress.advance(unreported);
+        Ok(())
+    }
+
+    fn into_points(self) -> Points {
+        let colors = if !self.colored {
+            intensity::grey(&intensity::codes(&self.intensities))
+        } else if self.wide {
+            let light = |share: f32| srgb_to_linear(f64::from(share)) as f32;
+            let color = |[r, g, b]: [f32; 3]| {
+                if r.is_nan() { DEFAULT_COLOR } else { [light(r), light(g), light(b), 1.0] }
+            };
+            Some(Colors::Linear(self.colors.into_iter().map(color).collect()))
+        } else {
+            let code = |share: f64| (share * 255.0).round() as u8;
+            let [r, g, b, _] = DEFAULT_COLOR.map(|light| code(linear_to_srgb(light.into())));
+            let default = [r, g, b, 255];
+            let color = |[r, g, b]: [f32; 3]| {
+                if r.is_nan() { default } else { [code(r.into()), code(g.into()), code(b.into()), 255] }
+            };
+            Some(Colors::Srgb8(self.colors.into_iter().map(color).collect()))
+        };
+        Points { positions: self.positions, colors, up: Some(Up::Z), ..Points::default() }
+    }
+}
+
+/// What takes a scan's coordinates to the file's.
+fn pose(scan: &PointCloud) -> Result<(DQuat, DVec3), Fault> {
+    let Some(pose) = &scan.transform else { return Ok((DQuat::IDENTITY, DVec3::ZERO)) };
+    let (q, t) = (&pose.rotation, &pose.translation);
+    let rotation = DQuat::from_xyzw(q.x, q.y, q.z, q.w);
+    let length = rotation.length();
+    if !(0.99..=1.01).contains(&length) {
+        return Err(Fault::Malformed(format!("the quaternion of a scan's pose has the length {length}, not 1")));
+    }
+    Ok((rotation.normalize(), DVec3::new(t.x, t.y, t.z)))
+}
+
+/// Smallest and largest values of a scan's colours: those it gives, or else those of their types.
+fn ranges(scan: &PointCloud, color: [usize; 3]) -> [(f64, f64); 3] {
+    let limits = scan.color_limits.as_ref();
+    let given = [
+        limits.map(|limits| (&limits.red_min, &limits.red_max)),
+        limits.map(|limits| (&limits.green_min, &limits.green_max)),
+        limits.map(|limits| (&limits.blue_min, &limits.blue_max)),
+    ];
+    std::array::from_fn(|channel| {
+        let Some(Record { data_type, .. }) = scan.prototype.get(color[channel]) else { return (0.0, 1.0) };
+        if let Some((Some(low), Some(high))) = given[channel]
+            && let (Ok(low), Ok(high)) = (low.to_f64(data_type), high.to_f64(data_type))
+            && low < high
+        {
+            return (low, high);
+        }
+        match *data_type {
+            RecordDataType::Integer { min, max } if min < max => (min as f64, max as f64),
+            RecordDataType::ScaledInteger { min, max, scale, offset } if min < max && scale > 0.0 => {
+                (min as f64 * scale + offset, max as f64 * scale + offset)
+            }
+            _ => (0.0, 1.0),
+        }
+    })
+}
+
+fn number(values: &[RecordValue], prototype: &[Record], at: usize) -> Result<f64, Fault> {
+    match (values.get(at), prototype.get(at)) {
+        (Some(value), Some(record)) => value.to_f64(&record.data_type).map_err(of_e57),
+        _ => Err(Fault::Malformed("a point lacks an attribute that its scan has".into())),
+    }
+}

@@ -1,0 +1,183 @@
+//! The points of a PCD file, in each of the three ways they are written.
+
+use std::io::{self, BufRead, Read};
+
+use super::header::{Header, Scalar};
+use super::lzf;
+use super::points::{Columns, Place, Reading};
+use crate::Progress;
+use crate::io::Points;
+use crate::io::fault::{Fault, reserve};
+use crate::io::values::{parse_number, shown};
+
+/// Bytes of points that are decoded together.
+const BLOCK: u64 = 1 << 19;
+
+/// No line of text is longer.
+const LINE_LIMIT: u64 = 1 << 24;
+
+fn ends_early(header: &Header, rows: u64) -> Fault {
+    Fault::Malformed(format!("the header promises {} points, the file ends after {rows}", header.points))
+}
+
+/// A point a line, its numbers between white space; `left` bytes follow the header, here and below.
+pub(super) fn ascii(
+    mut reader: impl BufRead,
+    header: &Header,
+    left: u64,
+    progress: &dyn Progress,
+) -> Result<Points, Fault> {
+    let columns = Columns::of(header)?;
+    let mut wanted: Vec<_> = columns.used().map(|field| (field, columns.is_packed(field))).collect();
+    wanted.sort_unstable();
+    // Each number takes a digit and a separator at least.
+    let mut reading = Reading::with_capacity(columns, header.points.min(left / 2))?;
+    let mut values = vec![0.0; header.fields.len()];
+    let (mut line, mut number, mut unreported) = (Vec::new(), header.lines, 0);
+    while reading.len() < header.points {
+        line.clear();
+        number += 1;
+        let bytes = reader.by_ref().take(LINE_LIMIT).read_until(b'\n', &mut line)?;
+        if bytes == 0 {
+            return Err(ends_early(header, reading.len()));
+        }
+        if bytes as u64 == LINE_LIMIT {
+            return Err(Fault::Malformed(format!("line {number} is longer than {LINE_LIMIT} bytes")));
+        }
+        let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).peekable();
+        if words.peek().is_none() {
+            continue;
+        }
+        let mut wanted = wanted.iter().peekable();
+        for (index, field) in header.fields.iter().enumerate() {
+            let mut skipped = field.count;
+            if let Some((_, packed)) = wanted.next_if(|(wanted, _)| *wanted == index) {
+                let word = words.next().ok_or_else(|| too_few(number))?;
+                let value = if *packed { packed_color(word, field.scalar) } else { parse_number(word) };
+                values[index] = value
+                    .ok_or_else(|| Fault::Malformed(format!("line {number}: '{}' is not a number", shown(word))))?;
+                skipped -= 1;
+            }
+            for _ in 0..skipped {
+                words.next().ok_or_else(|| too_few(number))?;
+            }
+        }
+        reading.extend(1, |field, _| values[field]);
+        unreported += 1;
+        if unreported == 1 << 16 {
+            progress.advance(std::mem::take(&mut unreported));
+        }
+    }
+    progress.advance(unreported);
+    Ok(reading.into_points())
+}
+
+fn too_few(line: u64) -> Fault {
+    Fault::Malformed(format!("line {line}: it has fewer numbers than the header has fields"))
+}
+
+/// The bits of a colour that is written as a number of the given type.
+fn packed_color(word: &[u8], scalar: Scalar) -> Option<f64> {
+    let text = std::str::from_utf8(word).ok()?;
+    let bits = match scalar {
+        Scalar::Float => text.parse::<f32>().ok()?.to_bits(),
+        Scalar::Unsigned => text.parse().ok()?,
+        Scalar::Signed => text.parse::<i32>().ok()?.cast_unsigned(),
+    };
+    Some(bits.into())
+}
+
+/// A point after the other.
+pub(super) fn binary(
+    mut reader: impl Read,
+    header: &Header,
+    left: u64,
+    progress: &dyn Progress,
+) -> Result<Points, Fault> {
+    let columns = Columns::of(header)?;
+    let held = left / header.row;
+    if held < header.points {
+        return Err(ends_early(header, held));
+    }
+    let mut places = Vec::new();
+    let mut start = 0;
+    for field in &header.fields {
+        places.push(Place { start, stride: header.row as usize });
+        start += (field.size * field.count) as usize;
+    }
+    let packed: Vec<_> = (0..header.fields.len()).map(|field| columns.is_packed(field)).collect();
+    let mut reading = Reading::with_capacity(columns, header.points)?;
+    let rows = (BLOCK / header.row).max(1);
+    let mut block = Vec::new();
+    reserve(&mut block, rows.min(header.points) * header.row)?;
+    while reading.len() < header.points {
+        let rows = rows.min(header.points - reading.len());
+        block.clear();
+        let size = rows * header.row;
+        if reader.by_ref().take(size).read_to_end(&mut block)? < size as usize {
+            return Err(ends_early(header, reading.len() + block.len() as u64 / header.row));
+        }
+        extend(&mut reading, header, &block, (&places, &packed), rows as usize);
+        progress.advance(rows);
+    }
+    Ok(reading.into_points())
+}
+
+/// The lengths of what follows, packed and not; then, packed, the first field of all points, the second of all, and so on.
+pub(super) fn compressed(
+    mut reader: impl Read,
+    header: &Header,
+    left: u64,
+    progress: &dyn Progress,
+) -> Result<Points, Fault> {
+    let columns = Columns::of(header)?;
+    if header.points == 0 {
+        return Ok(Reading::with_capacity(columns, 0)?.into_points());
+    }
+    let mut lengths = [[0; 4]; 2];
+    for length in &mut lengths {
+        reader.read_exact(length).map_err(|error| match error.kind() {
+            io::ErrorKind::UnexpectedEof => ends_early(header, 0),
+            _ => Fault::Io(error),
+        })?;
+    }
+    let [packed_length, length] = lengths.map(|bytes| u64::from(u32::from_le_bytes(bytes)));
+    if header.points.checked_mul(header.row) != Some(length) {
+        let points = header.points;
+        return Err(Fault::Malformed(format!(
+            "the header promises {points} points, but the data of {length} bytes is not theirs"
+        )));
+    }
+    if packed_length > left.saturating_sub(8) {
+        return Err(ends_early(header, 0));
+    }
+    let undecodable = || Fault::Malformed("its compressed data cannot be decoded; the file is damaged".into());
+    if length > packed_length.saturating_mul(lzf::MOST_GROWTH) {
+        return Err(undecodable());
+    }
+    let mut packed = Vec::new();
+    reserve(&mut packed, packed_length)?;
+    reader.by_ref().take(packed_length).read_to_end(&mut packed)?;
+    let bytes = lzf::unpack(&packed, length as usize).ok_or_else(undecodable)?;
+    drop(packed);
+    let mut places = Vec::new();
+    let mut start = 0;
+    for field in &header.fields {
+        let stride = (field.size * field.count) as usize;
+        places.push(Place { start, stride });
+        start += stride * header.points as usize;
+    }
+    let packed: Vec<_> = (0..header.fields.len()).map(|field| columns.is_packed(field)).collect();
+    let mut reading = Reading::with_capacity(columns, header.points)?;
+    extend(&mut reading, header, &bytes, (&places, &packed), header.points as usize);
+    progress.advance(header.points);
+    Ok(reading.into_points())
+}
+
+/// Takes `rows` points, whose fields lie at `places` in `bytes`.
+fn extend(reading: &mut Reading, header: &Header, bytes: &[u8], (places, packed): (&[Place], &[bool]), rows: usize) {
+    reading.extend(rows, |field, row| {
+        let Place { start, stride } = places[field];
+        header.fields[field].number(bytes, start + row * stride, packed[field])
+    });
+}

@@ -1,0 +1,48 @@
+//! PCD, the format of the Point Cloud Library: version 0.7, and what older versions have of it.
+
+mod body;
+mod header;
+mod lzf;
+mod points;
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use crate::io::Points;
+use crate::io::fault::{self, Fault};
+use crate::{Progress, Result};
+use header::Data;
+
+/// Reads the points of a PCD file: `ascii`, `binary` or `binary_compressed`.
+///
+/// - `x y z` of any type become f64 positions; organised clouds mark missing points by coordinates that are not finite.
+/// - `normal_x normal_y normal_z` become normals.
+/// - `rgb` or `rgba`, one number of 4 bytes whatever its type, become 8-bit sRGB codes: blue in the lowest byte, then green,
+///   red, and in `rgba` alpha, unless that is 0 in the whole file.
+/// - `intensity`, where there is no colour, becomes grey as in a LAS file.
+///
+/// Other fields are skipped. Coordinates stay relative to the sensor whose pose the line `VIEWPOINT` gives, as most programs
+/// take them.
+///
+/// # Errors
+///
+/// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where the
+/// header is not PCD's, `x`, `y` or `z` is missing, the file ends before the points that its header promises, a number in text
+/// is none, or compressed data cannot be decoded.
+pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
+    let in_file = |fault: Fault| fault.of(path);
+    let file = File::open(path).map_err(Fault::Io).map_err(in_file)?;
+    let length = file.metadata().map_err(Fault::Io).map_err(in_file)?.len();
+    let mut reader = BufReader::with_capacity(1 << 18, file);
+    let header = header::read(&mut reader).map_err(in_file)?;
+    let left = length.saturating_sub(header.bytes);
+    progress.begin(&format!("reading {}", fault::name(path)), header.points);
+    let points = match header.data {
+        Data::Ascii => body::ascii(reader, &header, left, progress),
+        Data::Binary => body::binary(reader, &header, left, progress),
+        Data::Compressed => body::compressed(reader, &header, left, progress),
+    };
+    progress.end();
+    points.map_err(in_file)
+}

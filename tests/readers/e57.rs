@@ -1,0 +1,228 @@
+//! E57 files, written by the `e57` crate.
+
+use super::{Folder, Random, sentence};
+use e57::{
+    ColorLimits, E57Writer, Quaternion, Record, RecordDataType, RecordName, RecordValue, Transform, Translation,
+};
+use epsplat::io::Up;
+use epsplat::scene::Colors;
+use epsplat::scene::color::srgb_to_linear;
+use std::io::Cursor;
+
+/// A scan: its attributes, its pose, its points.
+struct Scan {
+    prototype: Vec<Record>,
+    pose: Option<Transform>,
+    limits: Option<ColorLimits>,
+    points: Vec<Vec<RecordValue>>,
+}
+
+fn file(scans: Vec<Scan>) -> Vec<u8> {
+    let mut bytes = Cursor::new(Vec::new());
+    let mut writer = E57Writer::new(&mut bytes, "file").unwrap();
+    for (number, scan) in scans.into_iter().enumerate() {
+        let mut of_scan = writer.add_pointcloud(&format!("scan {number}"), scan.prototype).unwrap();
+        of_scan.set_transform(scan.pose);
+        if scan.limits.is_some() {
+            of_scan.set_color_limits(scan.limits);
+        }
+        scan.points.into_iter().for_each(|point| of_scan.add_point(point).unwrap());
+        of_scan.finalize().unwrap();
+    }
+    writer.finalize().unwrap();
+    drop(writer);
+    bytes.into_inner()
+}
+
+fn record(name: RecordName, data_type: RecordDataType) -> Record {
+    Record { name, data_type }
+}
+
+const INVALID: RecordDataType = RecordDataType::Integer { min: 0, max: 2 };
+
+/// Points on a line, every third of them invalid, with 8-bit colours.
+fn cartesian(count: i64) -> Scan {
+    let millimetres = RecordDataType::ScaledInteger { min: -1_000_000, max: 1_000_000, scale: 0.001, offset: 5e6 };
+    let points = (0..count).map(|i| {
+        vec![
+            RecordValue::Double(i as f64 + 0.25),
+            RecordValue::Single(i as f32),
+            RecordValue::ScaledInteger(7 * i),
+            RecordValue::Integer(if i % 3 == 2 { 2 } else { 0 }),
+            RecordValue::Integer(i % 256),
+            RecordValue::Integer(20),
+            RecordValue::Integer(255),
+        ]
+    });
+    Scan {
+        prototype: vec![
+            record(RecordName::CartesianX, RecordDataType::F64),
+            record(RecordName::CartesianY, RecordDataType::F32),
+            record(RecordName::CartesianZ, millimetres),
+            record(RecordName::CartesianInvalidState, INVALID),
+            record(RecordName::ColorRed, RecordDataType::U8),
+            record(RecordName::ColorGreen, RecordDataType::U8),
+            record(RecordName::ColorBlue, RecordDataType::U8),
+        ],
+        pose: None,
+        limits: None,
+        points: points.collect(),
+    }
+}
+
+/// One point two metres ahead, on the axis that is azimuth 90 degrees, seen from a pose far away.
+fn spherical() -> Scan {
+    let intensity = RecordDataType::Single { min: None, max: None };
+    Scan {
+        prototype: vec![
+            record(RecordName::SphericalRange, RecordDataType::F64),
+            record(RecordName::SphericalAzimuth, RecordDataType::F64),
+            record(RecordName::SphericalElevation, RecordDataType::F64),
+            record(RecordName::Intensity, intensity),
+        ],
+        // A quarter turn around z.
+        pose: Some(Transform {
+            rotation: Quaternion { w: 0.5f64.sqrt(), x: 0.0, y: 0.0, z: 0.5f64.sqrt() },
+            translation: Translation { x: 4e5, y: 5e6, z: 100.0 },
+        }),
+        limits: None,
+        points: [(0.0, 0.5), (0.25, 1.0)]
+            .map(|(elevation, intensity)| {
+                let angles = [2.0, 90f64.to_radians(), elevation];
+                angles.into_iter().map(RecordValue::Double).chain([RecordValue::Single(intensity)]).collect()
+            })
+            .into(),
+    }
+}
+
+#[test]
+fn every_kind_of_number_and_colours() {
+    let folder = Folder::new();
+    let points = folder.read("a.e57", &file(vec![cartesian(3000)])).unwrap();
+    let kept: Vec<i64> = (0..3000).filter(|i| i % 3 != 2).collect();
+    let expected = kept.iter().map(|&i| [i as f64 + 0.25, i as f64, (7 * i) as f64 * 0.001 + 5e6]);
+    assert!(points.positions.iter().copied().eq(expected));
+    assert_eq!((points.up, points.normals), (Some(Up::Z), None));
+    let codes = kept.iter().map(|&i| [i as u8, 20, 255, 255]).collect();
+    assert_eq!(points.colors, Some(Colors::Srgb8(codes)));
+    // By its first bytes.
+    assert_eq!(folder.read("scan", &file(vec![cartesian(9)])).unwrap().positions.len(), 6);
+}
+
+#[test]
+fn scans_are_put_where_their_poses_say() {
+    let folder = Folder::new();
+    let points = folder.read("a.e57", &file(vec![spherical()])).unwrap();
+    // The scan's y is the file's -x.
+    let (level, up) = (2.0 * 0.25f64.cos(), 2.0 * 0.25f64.sin());
+    for (position, expected) in points.positions.iter().zip([[4e5 - 2.0, 5e6, 100.0], [4e5 - level, 5e6, 100.0 + up]]) {
+        assert!((0..3).all(|axis| (position[axis] - expected[axis]).abs() < 1e-9), "{position:?}");
+    }
+    assert_eq!(points.colors, Some(Colors::Srgb8(vec![[128, 128, 128, 255], [255; 4]])));
+
+    // Without its pose the scan lies elsewhere; with another one the two are one file, and colours are there for both.
+    let control = folder.read("a.e57", &file(vec![Scan { pose: None, ..spherical() }])).unwrap();
+    assert!(control.positions[0][0].abs() < 1e-9 && control.positions[0][1] == 2.0);
+    let both = folder.read("a.e57", &file(vec![spherical(), cartesian(2)])).unwrap();
+    assert_eq!(both.positions.len(), 4);
+    let Some(Colors::Srgb8(codes)) = both.colors else { panic!("{:?}", both.colors) };
+    assert_eq!(codes[1..], [[218, 218, 218, 255], [0, 20, 255, 255], [1, 20, 255, 255]]);
+}
+
+#[test]
+fn colours_of_other_ranges_become_linear() {
+    let folder = Folder::new();
+    let wide = RecordDataType::Integer { min: 0, max: 65535 };
+    let mut scan = cartesian(2);
+    for (record, name) in
+        scan.prototype[4..].iter_mut().zip([RecordName::ColorRed, RecordName::ColorGreen, RecordName::ColorBlue])
+    {
+        *record = Record { name, data_type: wide.clone() };
+    }
+    let light = |share: f64| srgb_to_linear(share) as f32;
+    let colors = |points: epsplat::io::Points| match points.colors {
+        Some(Colors::Linear(colors)) => colors[1],
+        other => panic!("{other:?}"),
+    };
+    let points = folder.read("a.e57", &file(vec![scan])).unwrap();
+    let expected = [1.0, 20.0, 255.0].map(|code| light(f64::from((code / 65535.0) as f32)));
+    assert_eq!(colors(points)[..3], expected);
+    // Limits of the scan come before those of the type.
+    let mut scan = cartesian(2);
+    let limit = |value| Some(RecordValue::Integer(value));
+    scan.limits = Some(ColorLimits {
+        red_min: limit(0),
+        red_max: limit(2),
+        green_min: limit(0),
+        green_max: limit(40),
+        blue_min: limit(0),
+        blue_max: limit(255),
+    });
+    let points = folder.read("a.e57", &file(vec![scan])).unwrap();
+    assert_eq!(colors(points)[..3], [light(0.5), light(0.5), 1.0]);
+}
+
+/// The checksums of all pages, as they should be (CRC-32C, big-endian), so that what is inside is read.
+fn seal(bytes: &mut [u8]) {
+    for page in bytes.chunks_exact_mut(1024) {
+        let mut crc = !0u32;
+        for byte in &page[..1020] {
+            crc ^= u32::from(*byte);
+            for _ in 0..8 {
+                crc = (crc >> 1) ^ (0x82f6_3b78 & (crc & 1).wrapping_neg());
+            }
+        }
+        page[1020..].copy_from_slice(&(!crc).to_be_bytes());
+    }
+}
+
+#[test]
+fn promises_are_held_against_the_file() {
+    let folder = Folder::new();
+    let whole = file(vec![cartesian(1000)]);
+    let mut same = whole.clone();
+    seal(&mut same);
+    assert!(same == whole);
+    let replaced = |from: &str, to: &str| {
+        let mut bytes = whole.clone();
+        let at = bytes.windows(from.len()).position(|window| window == from.as_bytes()).unwrap();
+        assert_eq!(from.len(), to.len());
+        bytes[at..at + to.len()].copy_from_slice(to.as_bytes());
+        seal(&mut bytes);
+        folder.refusal("a.e57", &bytes)
+    };
+    let message = replaced("recordCount=\"1000\"", "recordCount=\"9999\"");
+    assert!(message.contains("9999 points") || message.contains("ends early"), "{message}");
+    let message = replaced("<cartesianX ", "<cartesianW ");
+    assert!(message.contains("cartesianW") || message.contains("no coordinates"), "{message}");
+    // Without the checksums being made right again.
+    let mut torn = whole.clone();
+    torn[2000] ^= 1;
+    assert!(folder.refusal("a.e57", &torn).contains("checksum"));
+    assert!(folder.refusal("a.e57", b"").contains("early"));
+    assert!(folder.refusal("a.e57", &[0; 4096]).contains("signature"));
+}
+
+#[test]
+fn cut_and_flipped_files_are_refused_or_read() {
+    let folder = Folder::new();
+    let mut random = Random(0xe57);
+    let whole = file(vec![cartesian(300), spherical()]);
+    for length in (0..whole.len()).step_by(97) {
+        sentence(&folder.read("a.e57", &whole[..length]).unwrap_err(), &folder.path("a.e57"));
+    }
+    let mut read = 0;
+    for _ in 0..300 {
+        let mut bytes = whole.clone();
+        for _ in 0..=random.below(3) {
+            let at = random.below(bytes.len());
+            bytes[at] = random.below(256) as u8;
+        }
+        seal(&mut bytes);
+        match folder.read("a.e57", &bytes) {
+            Ok(_) => read += 1,
+            Err(error) => assert!(!sentence(&error, &folder.path("a.e57")).is_empty()),
+        }
+    }
+    assert!((1..300).contains(&read), "{read} of 300 were read");
+}

@@ -1,0 +1,177 @@
+// Between stages 2 and 3, for tiles: each cell of the image gets a list of the splats that may touch it, by count, scan and
+// place. A small splat's cells are the tiles; a large one's are blocks of them, as it touches many. The order within a list
+// depends on the schedule, but no minimum or sum does. Host side: src/passes/tiles.rs.
+
+// Words 0 and 1 say how long all lists together, and the longest, were at most. For cell t, word LIST_ENDS + t + 1 is at first
+// its count, then where its list starts, and at last where it ends, and word LIST_ENDS is 0; the lists follow from
+// lists_start on.
+@group(0) @binding(26) var<storage, read_write> lists: array<atomic<u32>>;
+
+const LIST_ENDS: u32 = 2u;
+
+// Pixels of a tile, across and down.
+const TILE_SIDE: u32 = 8u;
+// Of a large splat's cell.
+const BLOCK_SIDE: u32 = 16u;
+
+// Cells of `side` pixels in a row of the image.
+fn cells_across(side: u32) -> u32 {
+    return (view.width + side - 1u) / side;
+}
+
+// Cells of `side` pixels in the band.
+fn cells_in_band(side: u32) -> u32 {
+    return cells_across(side) * ((band.rows + side - 1u) / side);
+}
+
+// The word at which the lists of cells of `side` pixels start.
+fn lists_start(side: u32) -> u32 {
+    return LIST_ENDS + 1u + cells_in_band(side);
+}
+
+// The cells that hold `pixels`, which are some, x and y.
+fn cells_of(pixels: Rectangle, side: u32) -> Rectangle {
+    let top = vec2<u32>(0u, band.first_row);
+    return Rectangle((pixels.first - top) / side, (pixels.last - top) / side);
+}
+
+// Counts the splat in its cells, of these those from `offset` on in steps of `step`.
+fn count_cells(splat: Splat, side: u32, offset: vec2<u32>, step: u32) {
+    let pixels = reach(splat);
+    if (any(pixels.first > pixels.last)) {
+        return;
+    }
+    let cells = cells_of(pixels, side);
+    for (var y = cells.first.y + offset.y; y <= cells.last.y; y += step) {
+        for (var x = cells.first.x + offset.x; x <= cells.last.x; x += step) {
+            atomicAdd(&lists[LIST_ENDS + 1u + y * cells_across(side) + x], 1u);
+        }
+    }
+}
+
+// Enters it in their lists.
+fn enter_cells(index: u32, splat: Splat, side: u32, offset: vec2<u32>, step: u32) {
+    let pixels = reach(splat);
+    if (any(pixels.first > pixels.last)) {
+        return;
+    }
+    let cells = cells_of(pixels, side);
+    for (var y = cells.first.y + offset.y; y <= cells.last.y; y += step) {
+        for (var x = cells.first.x + offset.x; x <= cells.last.x; x += step) {
+            let at = lists_start(side) + atomicAdd(&lists[LIST_ENDS + 1u + y * cells_across(side) + x], 1u);
+            if (at < arrayLength(&lists)) {
+                atomicStore(&lists[at], index);
+            }
+        }
+    }
+}
+
+// One invocation a splat. One that is hidden gets empty bounds, by which no later pass sees it.
+@compute @workgroup_size(WORKGROUP)
+fn bin_count(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    hold();
+    let index = surfel_of(workgroup, workgroups, local);
+    if (index >= arrayLength(&splats)) {
+        return;
+    }
+    let splat = splats[index];
+    if (is_large(splat)) {
+        return;
+    }
+    if (hidden(splat, filter_of(index), reach(splat), radius_of(index))) {
+        splats[index].bounds_first = 0xffffffffu;
+        splats[index].bounds_last = 0u;
+    } else {
+        count_cells(splat, TILE_SIDE, vec2<u32>(0u), 1u);
+    }
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn bin_place(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let index = surfel_of(workgroup, workgroups, local);
+    if (index < arrayLength(&projected)) {
+        let splat = projected[index];
+        if (!is_large(splat)) {
+            enter_cells(index, splat, TILE_SIDE, vec2<u32>(0u), 1u);
+        }
+    }
+}
+
+// One workgroup a large splat, in a square of eight invocations.
+@compute @workgroup_size(8, 8)
+fn bin_count_large(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_id) local: vec3<u32>,
+) {
+    let index = large_splat(workgroup, workgroups);
+    if (index < arrayLength(&projected)) {
+        count_cells(projected[index], BLOCK_SIDE, local.xy, 8u);
+    }
+}
+
+@compute @workgroup_size(8, 8)
+fn bin_place_large(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_id) local: vec3<u32>,
+) {
+    let index = large_splat(workgroup, workgroups);
+    if (index < arrayLength(&projected)) {
+        enter_cells(index, projected[index], BLOCK_SIDE, local.xy, 8u);
+    }
+}
+
+const SCANNERS: u32 = 256u;
+var<workgroup> partial: array<u32, SCANNERS>;
+
+// Counts of small splats become starts. One workgroup; each invocation has a run of cells.
+@compute @workgroup_size(SCANNERS)
+fn bin_scan(@builtin(local_invocation_index) local: u32) {
+    scan(local, cells_in_band(TILE_SIDE));
+}
+
+@compute @workgroup_size(SCANNERS)
+fn bin_scan_large(@builtin(local_invocation_index) local: u32) {
+    scan(local, cells_in_band(BLOCK_SIDE));
+}
+
+fn scan(local: u32, cells: u32) {
+    let run = (cells + SCANNERS - 1u) / SCANNERS;
+    let first = LIST_ENDS + 1u + min(local * run, cells);
+    let last = LIST_ENDS + 1u + min(local * run + run, cells);
+    var total = 0u;
+    var longest = 0u;
+    for (var t = first; t < last; t++) {
+        let count = atomicLoad(&lists[t]);
+        longest = max(longest, count);
+        total += count;
+    }
+    atomicMax(&lists[1], longest);
+    partial[local] = total;
+    workgroupBarrier();
+    if (local == 0u) {
+        var before = 0u;
+        for (var k = 0u; k < SCANNERS; k++) {
+            let own = partial[k];
+            partial[k] = before;
+            before += own;
+        }
+        atomicMax(&lists[0], before);
+    }
+    workgroupBarrier();
+    var start = partial[local];
+    for (var t = first; t < last; t++) {
+        let own = atomicLoad(&lists[t]);
+        atomicStore(&lists[t], start);
+        start += own;
+    }
+}

@@ -1,0 +1,17 @@
+// The terms of the accumulator `fixed`: a term fills a word. Error bound: src/passes/accumulate.rs.
+
+alias Term = u32;
+const COUNT_ONE: Term = 1u;
+
+// The units of a weight of 1.
+const ONE: f32 = FIXED_ONE;
+
+fn quantise(weight: f32) -> Term {
+    return u32(round(weight * ONE));
+}
+
+// weight * value for a value in [0, 1]. The weight came from an f32, so it has at most 24 significant bits and is exact
+// as f32.
+fn term(weight: Term, value: f32) -> Term {
+    return u32(round(f32(weight) * clamp(value, 0.0, 1.0)));
+}

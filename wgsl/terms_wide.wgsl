@@ -1,0 +1,19 @@
+// The terms of the accumulator `fixed` for scenes in which they may be small (SceneNeeds::wide_sums): 40 fractional bits.
+// Error bound: src/passes/accumulate.rs.
+
+// Units of 2^-40 as f32: a product is rounded once, as f32 sums would, and no more.
+alias Term = f32;
+const COUNT_ONE: Term = 1.0;
+
+// The units of a weight of 1: 2^40.
+const ONE: f32 = 1099511627776.0;
+
+const WORD: f32 = 4294967296.0;
+
+fn quantise(weight: f32) -> Term {
+    return weight * ONE;
+}
+
+fn term(weight: Term, value: f32) -> Term {
+    return weight * clamp(value, 0.0, 1.0);
+}

@@ -1,0 +1,3 @@
+fn handed_filter(own: Filter, from_: u32) -> Filter {
+    return own;
+}

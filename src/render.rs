@@ -294,7 +294,8 @@ impl<'a> Renderer<'a> {
                         Some(tiles) => tiles::accumulate(&mut recorder, &splats, rows, tiles, (nearest, sums))?,
                         None => accumulate::record_large(&mut recorder, &splats, rows, nearest, sums)?,
                     }
-                    let sums = vec![("visible", nearest.nearest.bound()), ("sums", sums.sums.bound())];
+                    let mut sums = vec![("visible", nearest.nearest.bound()), ("sums", sums.sums.bound())];
+                    sums.extend(splats.surfels.texture());
                     resolve::record(&mut recorder, rows, sums, &pixels.image)?;
                 }
                 Sums::Targets(_, targets) => resolve::record(&mut recorder, rows, targets.bindings(), &pixels.image)?,

@@ -15,6 +15,7 @@ use epsplat::passes::resolve;
 use epsplat::passes::variant::COLOR_CHANNEL;
 use epsplat::render::{Backend, render};
 use epsplat::scene::camera::Lens;
+use epsplat::scene::options::HIGHLIGHT;
 use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Maps, Projection, RenderOptions, Scene, Shading, Surfel, Up};
 use glam::{DVec3, Vec3};
 
@@ -134,13 +135,12 @@ fn sums_past_32_bits_are_exact() {
 
 #[test]
 fn resolve_matches_its_twin_on_the_devices_own_sums() {
-    let Some(gpu) = common::gpu() else { return };
-    let differences = |sources: Sources, gpu: Gpu| {
+    let differences = |sources: Sources, gpu: Gpu, shading: Shading| {
         let backend = Backend::Gpu { gpu: Box::new(gpu), sources };
         let Backend::Gpu { gpu, .. } = &backend else { unreachable!() };
         let mut worst = [0f64; 4];
         for (index, (scene, camera)) in crowded().into_iter().enumerate() {
-            let mut options = options();
+            let mut options = RenderOptions { shading, ..options() };
             if index != 0 {
                 options.background = [0.3, 0.2, 0.9, 0.5];
                 options.lights.push("1,2,3:0.7".parse().unwrap());
@@ -148,7 +148,7 @@ fn resolve_matches_its_twin_on_the_devices_own_sums() {
             let device = frame(&scene, &camera, &options, &backend);
             let sums = unmapped(&scene, &camera, &options, gpu);
             let mut twin = Frame::new(&camera, &ALL_MAPS);
-            resolve::reference(&sums, &camera, &options, 0, &mut twin);
+            resolve::reference(&sums, &scene, &camera, &options, 0, &mut twin);
             // Of the largest colour; of one; of the depth; of the weight.
             let largest = scene.color_range().1.map(f64::from).into_iter().fold(1.0, f64::max);
             for (pixel, sum) in sums.iter().enumerate() {
@@ -178,10 +178,21 @@ fn resolve_matches_its_twin_on_the_devices_own_sums() {
         worst
     };
     let limits = [40.0 * E, 16.0 * E, 8.0 * E, 4.0 * E];
-    let worst = differences(Sources::default(), gpu);
-    eprintln!("colour, normal, depth, weight: {:.1?} units of 2^-24", worst.map(|w| w / E));
-    assert!(worst.iter().zip(limits).all(|(worst, limit)| *worst <= limit), "{worst:?} over {limits:?}");
+    // The cosine of a mirrored light errs by four times what the normal does and its own rounding, its power by the exponent
+    // times that, and two lights shine.
+    let of_cosine = 4.0 * limits[1] + 8.0 * E;
+    let of_highlights = 2.0 * HIGHLIGHT * f64::from(RenderOptions::default().shininess) * of_cosine;
+    let phong = [limits[0] + of_highlights, limits[1], limits[2], limits[3]];
+    for (shading, limits) in [(Shading::Lambert, limits), (Shading::Phong, phong)] {
+        let Some(gpu) = common::gpu() else { return };
+        let worst = differences(Sources::default(), gpu, shading);
+        eprintln!("{shading:?}: colour, normal, depth, weight: {:.1?} units of 2^-24", worst.map(|w| w / E));
+        assert!(worst.iter().zip(limits).all(|(worst, limit)| *worst <= limit), "{worst:?} over {limits:?}");
+    }
     for (file, from, to, which) in [
+        ("shade_phong.wgsl", "2.0 * facing * facing_eye", "2.001 * facing * facing_eye", 0),
+        ("shade_phong.wgsl", "mirrored), SHININESS)", "mirrored), 1.01 * SHININESS)", 0),
+        ("shade_phong.wgsl", "max(0.0, facing), abs(facing)", "abs(facing), abs(facing)", 0),
         ("normal.wgsl", "* 2.0 - 1.0", "* 2.0 - 0.9999", 1),
         ("shade_lambert.wgsl", "max(0.0, dot(normal, light.xyz))", "abs(dot(normal, light.xyz))", 0),
         ("resolve.wgsl", "back.a * (1.0 - front.a)", "back.a * (1.0001 - front.a)", 0),
@@ -190,7 +201,10 @@ fn resolve_matches_its_twin_on_the_devices_own_sums() {
         ("accumulator_fixed.wgsl", "WEIGHT_CHANNEL) / ONE", "WEIGHT_CHANNEL) / (ONE - 6400.0)", 3),
     ] {
         let Some(gpu) = common::gpu_for(file) else { return };
-        let broken = differences(Sources::default().replace(file, from, to).unwrap(), gpu);
+        let of_phong = file == "shade_phong.wgsl";
+        let shading = if of_phong { Shading::Phong } else { Shading::Lambert };
+        let limits = if of_phong { phong } else { limits };
+        let broken = differences(Sources::default().replace(file, from, to).unwrap(), gpu, shading);
         assert!(broken[which] > 1.5 * limits[which], "a broken {file} was not noticed: {broken:?}");
     }
 }
@@ -217,6 +231,7 @@ fn unmapped(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu) 
             weight,
             color: [0, 1, 2, 3].map(color),
             normal: [0, 1, 2].map(normal),
+            place: [0.0; 4],
             depth: weight * front + common::depth_span(&device.view, front) * sum(device.pixel.depth_channel),
             count: device.count(pixel).unwrap() as u32,
             decision: 0.0,

@@ -106,6 +106,11 @@ fn mirrors() -> BTreeMap<&'static str, Struct> {
             epsilon_deepest,
             farthest,
             middle,
+            texture_width,
+            texture_height,
+            padding_0,
+            padding_1,
+            place,
         }),
         mirror!(Band { first_row, rows, padding_0, padding_1 }),
         mirror!(Splat { anchor_x, anchor_y, bounds_first, bounds_last, a, b, c, a_low }),
@@ -158,6 +163,7 @@ fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         ("overflows", Element::Plain(WORD)),
         ("image", Element::Plain(&[f32::SHAPE])),
         ("colors", Element::Plain(&[u32::SHAPE, <[f32; 4]>::SHAPE])),
+        ("texels", Element::Plain(WORD)),
         ("srgb_to_linear", Element::Plain(&[<[f32; 256]>::SHAPE])),
     ])
 }

@@ -11,6 +11,7 @@ use epsplat::gpu::device::STORAGE_BUFFERS;
 use epsplat::gpu::kernel::{FILES, reflect};
 use epsplat::passes::accumulate::{ACCUMULATORS, Features, accumulator};
 use epsplat::passes::variant::{COLOR_CHANNEL, PixelLayout, color_channels, modules, overrides};
+use epsplat::scene::ColorNeed;
 use epsplat::scene::{Kernel, KernelShape, RenderOptions, SceneNeeds};
 use naga::AddressSpace;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
@@ -169,24 +170,23 @@ fn storage_buffers_stay_within_core_limits() {
 fn the_channels_of_a_pixel_do_not_overlap() {
     for needs in common::all_needs() {
         let pixel = PixelLayout::of(&needs);
-        let ranges = |all: [(u32, u32); 5]| all.into_iter().flat_map(|(first, count)| first..first + count);
+        let ranges = |all: &[(u32, u32)]| all.iter().flat_map(|(first, count)| *first..first + count).collect();
         let of = |needed: bool, count: u32| if needed { count } else { 0 };
-        let sums: Vec<u32> = ranges([
+        let sums: Vec<u32> = ranges(&[
             (0, 1),
             (COLOR_CHANNEL, color_channels(&needs)),
             (pixel.normal_channel, of(needs.normal, 3)),
             (pixel.depth_channel, of(needs.depth, 1)),
             (pixel.count_channel, of(needs.count, 1)),
-        ])
-        .collect();
-        let image: Vec<u32> = ranges([
+            (pixel.place_channel, of(needs.color == ColorNeed::Textured, 4)),
+        ]);
+        let image: Vec<u32> = ranges(&[
             (0, 4),
             (pixel.normal_image, of(needs.normal_map, 3)),
             (pixel.depth_image, of(needs.depth, 1)),
             (pixel.weight_image, of(needs.weight_map, 1)),
             (pixel.count_image, of(needs.count, 1)),
-        ])
-        .collect();
+        ]);
         for (places, room) in [(&sums, pixel.channels), (&image, pixel.image_words)] {
             assert!(places.iter().all(|place| *place < room), "{places:?} of {room}, {:?}", needs.names());
             assert_eq!(places.iter().collect::<BTreeSet<_>>().len(), places.len(), "{:?}", needs.names());
@@ -194,7 +194,8 @@ fn the_channels_of_a_pixel_do_not_overlap() {
         // At most one channel is there to make pairs whole, and one to start one.
         assert!(pixel.channels as usize <= sums.len() + 2 && pixel.image_words as usize == image.len());
         // What is added as a pair starts at an even channel, the colour's second at 2.
-        assert_eq!((pixel.channels % 2, pixel.normal_channel % 2, COLOR_CHANNEL), (0, 0, 1));
+        let pairs = [pixel.channels, pixel.normal_channel, pixel.place_channel].map(|channel| channel % 2);
+        assert_eq!((pairs, COLOR_CHANNEL), ([0; 3], 1));
     }
 }
 
@@ -224,7 +225,9 @@ fn absent_parts_have_their_partners_signatures() {
         absent.into_iter().map(|name| (name, vec![name.replace("_absent", "")])).collect();
     pairs.push(("color_constant.wgsl", vec!["color_srgb8.wgsl".into(), "color_sums.wgsl".into()]));
     pairs.push(("color_constant.wgsl", vec!["color_linear.wgsl".into(), "color_sums.wgsl".into()]));
+    pairs.push(("color_constant.wgsl", vec!["color_textured.wgsl".into(), "color_sums.wgsl".into()]));
     pairs.push(("shade_unlit.wgsl", vec!["shade_lambert.wgsl".into()]));
+    pairs.push(("shade_unlit.wgsl", vec!["shade_phong.wgsl".into()]));
     for (name, partners) in pairs {
         let partner: BTreeMap<_, _> = partners.iter().flat_map(|partner| signatures(text_of(partner))).collect();
         let own = signatures(text_of(name));
@@ -258,7 +261,7 @@ fn absent_parts_have_their_partners_signatures() {
     alike("tile_small", &["small_list", "small_entry"]);
     alike("kernel_", &["kernel_weight"]);
     alike("epsilon", &["radius_of", "deepest_accepted", "farthest_accepted"]);
-    let shared = ["homography", "intersect", "ray"];
+    let shared = ["homography", "intersect", "ray", "point_at"];
     let (pinhole, orthographic) =
         (signatures(text_of("camera_pinhole.wgsl")), signatures(text_of("camera_orthographic.wgsl")));
     for function in shared {

@@ -10,7 +10,8 @@ use common::meshes::sphere;
 use epsplat::io::Mesh;
 use epsplat::metrics::{Reconstruction, reconstruction};
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, Lens, Maps, RenderOptions, Shading, Up};
+use epsplat::scene::options::HIGHLIGHT;
+use epsplat::scene::{Camera, Colors, Lens, Light, Maps, RenderOptions, Shading, Up};
 use epsplat::surfels::analytic::Shape;
 use epsplat::truth::{DEFAULT_GRID, Surface, Truth};
 use glam::DVec3;
@@ -91,6 +92,40 @@ fn a_torus_has_its_hole() {
     let side = cast(&Surface::Analytic(Shape::Torus), &side);
     let center = 50 * 101 + 50;
     assert!((depth(&side, center) - 2.6).abs() < 1e-6 && (side.second_depth[center] - 3.4).abs() < 1e-6);
+}
+
+/// A plane seen head-on, where every cosine has a formula.
+#[test]
+fn highlights_are_phongs() {
+    let (size, distance, exponent) = (65, 5.0, 20.0);
+    let camera = camera(size, Lens::Fov(24.0), DVec3::new(0.0, 0.0, distance));
+    let toward = DVec3::new(0.2, 0.0, 1.0).normalize();
+    let lights =
+        [Light::Headlight { intensity: 0.5 }, Light::Directional { toward: toward.as_vec3(), intensity: 0.25 }];
+    let cast = |shading, lights: &[Light]| {
+        let options =
+            RenderOptions { shading, lights: lights.into(), shininess: exponent as f32, ..Default::default() };
+        Truth::cast(&Surface::Analytic(Shape::Plane), &camera, &options, 1, &()).unwrap().frame
+    };
+    let (diffuse, both) = (cast(Shading::Lambert, &lights), cast(Shading::Phong, &lights));
+    let (mut seen, mut brightest) = (0, (0.0, 0));
+    for pixel in (0..diffuse.color.len()).filter(|pixel| diffuse.depth.as_ref().unwrap()[*pixel].is_finite()) {
+        let [x, y] = [pixel % 65, pixel / 65].map(|k| (k as f64 - 32.0) / camera.fx);
+        let toward_eye = DVec3::new(-x, y, 1.0).normalize();
+        // The headlight's own direction comes back by twice its angle; the other's is mirrored at z.
+        let of_headlight = 0.5 * toward_eye.z * (2.0 * toward_eye.z * toward_eye.z - 1.0).powf(exponent);
+        let mirrored = DVec3::new(-toward.x, -toward.y, toward.z).dot(toward_eye).max(0.0);
+        let of_other = 0.25 * toward.z * mirrored.powf(exponent);
+        let expected = HIGHLIGHT * (of_headlight + of_other);
+        let highlight = f64::from(both.color[pixel][1] - diffuse.color[pixel][1]);
+        assert!((highlight - expected).abs() < 1e-6, "{highlight} is not {expected} at {pixel}");
+        let alone = highlight - HIGHLIGHT * of_headlight;
+        brightest = if alone > brightest.0 { (alone, pixel) } else { brightest };
+        seen += 1;
+    }
+    // The light stands to the right of the eye, so it is mirrored from the right of the middle.
+    let expected = 32.0 + toward.x / toward.z * camera.fx;
+    assert!(seen > 3500 && (brightest.1 as f64 % 65.0 - expected).abs() <= 1.0, "{brightest:?} {expected}");
 }
 
 #[test]

@@ -17,6 +17,7 @@ use epsplat::passes::project::{Splat, reference_all};
 use epsplat::passes::variant::COLOR_CHANNEL;
 use epsplat::passes::{accumulate, visibility};
 use epsplat::render::{Backend, render};
+use epsplat::scene::options::HIGHLIGHT;
 use epsplat::scene::{Epsilon, Kernel, LowPass, Maps, Projection, RenderOptions, Shading};
 
 fn options(kernel: Kernel) -> RenderOptions {
@@ -328,7 +329,7 @@ fn the_frame_of_the_device_is_the_frame_of_the_twins() {
     let Some(gpu) = common::gpu() else { return };
     let backend = Backend::gpu(gpu);
     for projection in [Projection::Pinhole, Projection::Orthographic] {
-        for shading in [Shading::Lambert, Shading::Unlit] {
+        for shading in [Shading::Lambert, Shading::Unlit, Shading::Phong] {
             let (scene, camera) = (sphere(3000, 1.5), sphere_camera(256, projection));
             let mut options = RenderOptions { shading, ..options(DEFAULT_KERNEL) };
             let (device, _) = render(&scene, &camera, &options, &backend, &()).unwrap();
@@ -349,9 +350,12 @@ fn the_frame_of_the_device_is_the_frame_of_the_twins() {
                 let bound = accumulate::ACCUMULATORS[0].error_bound;
                 let sums = bound(count.max(1.0).into(), weight.max(1e-3).into(), 24) as f32;
                 let limit = 3.0 * sums + 1e-5;
+                // A highlight's cosine moves by four times what the normal does, and its power by the exponent times that.
+                let highlight = if shading == Shading::Phong { 1.0 + 4.0 * options.shininess } else { 0.0 };
+                let of_color = limit * (1.0 + HIGHLIGHT as f32 * highlight);
                 assert!(
-                    difference < limit,
-                    "colour {difference:e} over {limit:e} at {pixel}, {shading:?} {projection:?}"
+                    difference < of_color,
+                    "colour {difference:e} over {of_color:e} at {pixel}, {shading:?} {projection:?}"
                 );
                 let (near, far) = (device.depth.as_ref().unwrap()[pixel], twin.depth.as_ref().unwrap()[pixel]);
                 assert!(near == far || (near - far).abs() < 2e-6 * far, "depth {near} {far} at {pixel}");

@@ -11,10 +11,18 @@ struct Attributes {
     normal: vec3<f32>,
     // Device units; 0 where epsilon does not depend on it.
     radius: f32,
+    // In a texture.
+    place: Place,
 }
 
 fn attributes_of(index: u32, splat: Splat) -> Attributes {
-    return Attributes(color_of(index), normal_of(index, splat), radius_of(index));
+    return Attributes(color_of(index), normal_of(index, splat), radius_of(index), place_of(index));
+}
+
+// Those that a tile's list or the rasteriser hands on, neither of which draws textures.
+fn attributes_without_place(color: vec4<f32>, normal: vec3<f32>, radius: f32) -> Attributes {
+    var nowhere: Place;
+    return Attributes(color, normal, radius, nowhere);
 }
 
 fn weight_of(fragment: Fragment) -> Term {
@@ -32,5 +40,6 @@ fn blend_weighted(pixel: u32, weight: Term, depth: f32, front: f32, attributes: 
     accumulate_normal(pixel, weight, attributes.normal);
     accumulate_depth(pixel, weight, depth, front);
     accumulate_count(pixel, weight);
+    accumulate_place(pixel, weight, attributes.place, depth);
     settle(pixel);
 }

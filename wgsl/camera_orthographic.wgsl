@@ -113,6 +113,11 @@ fn ray(x: u32, y: u32) -> vec3<f32> {
     return view.rotation[2].xyz;
 }
 
+fn point_at(x: u32, y: u32, depth: f32) -> vec3<f32> {
+    let image = (vec2<f32>(f32(x), f32(y)) + 0.5 - view.intrinsics.zw) / view.intrinsics.xy;
+    return view.eye.xyz + image.x * view.rotation[0].xyz + image.y * view.rotation[1].xyz + depth * view.rotation[2].xyz;
+}
+
 fn homogeneous_row(splat: Splat) -> vec3<f32> {
     return vec3<f32>(0.0, 0.0, 1.0);
 }

@@ -253,6 +253,12 @@ fn ray(x: u32, y: u32) -> vec3<f32> {
     return normalize(image.x * view.rotation[0].xyz + image.y * view.rotation[1].xyz + view.rotation[2].xyz);
 }
 
+// The point at a depth on that ray, relative to the scene's origin, device units.
+fn point_at(x: u32, y: u32, depth: f32) -> vec3<f32> {
+    let image = (vec2<f32>(f32(x), f32(y)) + 0.5 - view.intrinsics.zw) / view.intrinsics.xy * depth;
+    return view.eye.xyz + image.x * view.rotation[0].xyz + image.y * view.rotation[1].xyz + depth * view.rotation[2].xyz;
+}
+
 // The third row of the matrix that takes an image point to (u, v, 1), up to a factor.
 fn homogeneous_row(splat: Splat) -> vec3<f32> {
     return vec3<f32>(splat.c[0], splat.c[1], splat.c[2]);

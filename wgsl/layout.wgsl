@@ -39,6 +39,13 @@ struct View {
     farthest: f32,
     // Depth of the middle of the scene's bounds, device units.
     middle: f32,
+    // Texels; 0 without a texture.
+    texture_width: u32,
+    texture_height: u32,
+    padding_0: u32,
+    padding_1: u32,
+    // The middle of the range of texture coordinates, its span, and the largest squared reach in units of the span.
+    place: vec4<f32>,
 }
 
 // The rows of the image that the visibility and attribute buffers hold.

@@ -122,5 +122,5 @@ fn fragment_of(corner: Corner) -> Fragment {
 }
 
 fn carried(corner: Corner) -> Attributes {
-    return Attributes(corner.color, corner.normal, corner.radius);
+    return attributes_without_place(corner.color, corner.normal, corner.radius);
 }

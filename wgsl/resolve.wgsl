@@ -50,7 +50,7 @@ fn resolve_pixel(sums_of: u32, pixel: u32, x: u32, y: u32) {
         write_count(out, sums_of);
         return;
     }
-    let premultiplied = resolve_color(sums_of, weight);
+    let premultiplied = textured(sums_of, weight, resolve_color(sums_of, weight));
     let alpha = premultiplied.a;
     let color = select(vec3<f32>(0.0), premultiplied.rgb / alpha, alpha > 0.0);
     let normal = resolve_normal(sums_of, weight);

@@ -86,7 +86,7 @@ fn handed_splat(from_: u32) -> Splat {
 fn handed_attributes(own: Attributes, from_: u32) -> Attributes {
     let c = own.color;
     let n = own.normal;
-    return Attributes(
+    return attributes_without_place(
         vec4<f32>(
             handed_number(c.x, from_),
             handed_number(c.y, from_),

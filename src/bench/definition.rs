@@ -61,10 +61,20 @@ pub struct SceneEntry {
     pub name: String,
     /// A point cloud or mesh, relative to the definition's folder. Either this or a shape.
     pub file: Option<PathBuf>,
+    /// Where to get the file, for who lacks it.
+    pub source: Option<String>,
+    /// How surfels are made of the file; as `epsplat render` reads it by default.
+    #[serde(default)]
+    pub surfels: Making,
+    /// An image for the mesh of the file, relative to the definition's folder.
+    pub texture: Option<PathBuf>,
+    /// The image is looked up once a pixel; else surfels have its colours.
+    #[serde(default)]
+    pub lookup: bool,
     /// A generated surface: sphere, torus, plane or checkerboard.
     #[serde(default, deserialize_with = "parsed")]
     pub shape: Option<Shape>,
-    /// Surfels of the shape.
+    /// Surfels of the shape, or to be made of the mesh.
     pub count: Option<OneOrMany<u64>>,
     /// Disk radius of a shape's surfels in units of their mean spacing; the generator's by default.
     pub radius: Option<f64>,
@@ -103,6 +113,34 @@ pub struct SceneEntry {
     /// Whether a quick run has it.
     #[serde(default = "yes")]
     pub quick: bool,
+}
+
+/// How surfels are made of a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Making {
+    /// By all that it says, as `epsplat render` does.
+    #[default]
+    File,
+    /// By its points alone, as `epsplat render` does: radii from the distances of neighbours, normals turned to the viewer.
+    Points,
+    /// By its points alone, as `epsplat surfels` does: normals that agree, disks.
+    Knn,
+    /// The same with ellipses.
+    Ellipse,
+    /// The same with disks from clusters of three.
+    Bsp,
+    /// As `epsplat sample` does: `count` of a mesh, with radii that cover it.
+    Sample,
+    /// Independent random points of a mesh, `count` of them, with its normals, and radii from the distances of neighbours.
+    Uniform,
+}
+
+impl Making {
+    /// Whether the mesh is sampled at a number of points.
+    pub fn samples(self) -> bool {
+        matches!(self, Self::Sample | Self::Uniform)
+    }
 }
 
 /// One way to render. What it does not say is as for `epsplat render`.

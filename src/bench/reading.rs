@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::definition::{BackendName, Config, Definition, OneOrMany, SceneEntry};
+use super::definition::{BackendName, Config, Definition, Making, OneOrMany, SceneEntry};
 use crate::error::{Error, Result};
 use crate::passes::accumulate::ACCUMULATORS;
 use crate::scene::camera::check_size;
@@ -89,14 +89,29 @@ impl SceneEntry {
             (Some(_), Some(_)) => return Err("shape: a scene has either a file or a shape".into()),
             (None, None) => return Err("shape: a scene needs a file or a shape".into()),
             (Some(file), None) => {
-                not_beside("count", self.count.is_some() || self.quick_count.is_some(), "file")?;
-                not_beside("radius", self.radius.is_some(), "file (footprint_px serves)")?;
-                if self.truth && !file.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) {
-                    return Err("truth: only OBJ files have triangles that rays can meet".into());
+                let counts = self.count.is_some() || self.quick_count.is_some();
+                if self.surfels.samples() && self.count.is_none() {
+                    return Err("count: a mesh is sampled at a number of points".into());
                 }
+                not_beside("count", counts && !self.surfels.samples(), "file, unless surfels are sampled")?;
+                not_beside("radius", self.radius.is_some(), "file (footprint_px serves)")?;
+                let is_mesh =
+                    file.extension().is_some_and(|e| ["obj", "ply"].iter().any(|m| e.eq_ignore_ascii_case(m)));
+                if self.truth && !is_mesh {
+                    return Err("truth: only OBJ and PLY files have triangles that rays can meet".into());
+                }
+            }
+            (None, Some(_)) if self.texture.is_some() || self.source.is_some() || self.surfels != Making::File => {
+                return Err("surfels, texture, source: they are of a file".into());
             }
             (None, Some(_)) if self.count.is_none() => return Err("count: a shape needs its number of surfels".into()),
             (None, Some(_)) => {}
+        }
+        if self.lookup && (self.texture.is_none() || !self.surfels.samples()) {
+            return Err("lookup: it needs a texture, and surfels that are sampled with texture coordinates".into());
+        }
+        if self.texture.is_some() && !self.surfels.samples() && !self.truth {
+            return Err("texture: it is of a mesh that is sampled, or that rays meet".into());
         }
         for (key, counts) in [("count", &self.count), ("quick_count", &self.quick_count)] {
             let counts = counts.as_ref().map(OneOrMany::values);
@@ -224,7 +239,12 @@ mod tests {
             ("[[scene]]\nname = \"t\"\n", &["scene \"t\": shape:"]),
             ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 1\nconfigs = [\"e\"]\n", &["configs:", "\"e\""]),
             ("[[scene]]\nname = \"t\"\nfile = \"a.ply\"\ncount = 1\n", &["count:", "file"]),
-            ("[[scene]]\nname = \"t\"\nfile = \"a.ply\"\ntruth = true\n", &["truth:", "OBJ"]),
+            ("[[scene]]\nname = \"t\"\nfile = \"a.las\"\ntruth = true\n", &["truth:", "OBJ"]),
+            ("[[scene]]\nname = \"t\"\nfile = \"a.ply\"\nsurfels = \"sample\"\n", &["count:", "sampled"]),
+            ("[[scene]]\nname = \"t\"\nfile = \"a.ply\"\nsurfels = \"mesh\"\n", &["surfels:", "mesh", "uniform"]),
+            ("[[scene]]\nname = \"t\"\nfile = \"a.ply\"\nlookup = true\n", &["lookup:", "texture"]),
+            ("[[scene]]\nname = \"t\"\nfile = \"a.ply\"\ntexture = \"a.png\"\n", &["texture:", "sampled"]),
+            ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 1\nsurfels = \"knn\"\n", &["surfels", "file"]),
             ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = [1, \"x\"]\n", &["count:", "list of numbers"]),
             ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 0\n", &["count:"]),
             ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 1\nfill = -1\n", &["fill:", "-1"]),

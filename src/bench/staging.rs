@@ -2,16 +2,20 @@
 
 use std::f64::consts::{PI, TAU};
 
+use std::path::{Path, PathBuf};
+
 use glam::{DMat3, DVec3};
 
-use super::definition::{Definition, OneOrMany, SceneEntry};
-use crate::error::Result;
-use crate::io::{self, Points};
+use super::definition::{Definition, Making, OneOrMany, SceneEntry};
+use crate::error::{Error, Result};
+use crate::io::{self, Points, Texture};
 use crate::progress::Progress;
 use crate::scene::camera::DEFAULT_FOV;
 use crate::scene::{Camera, Colors, Lens, Projection, Scene, Surfel};
 use crate::surfels::analytic::{RADIUS_IN_SPACINGS, Shape, generate};
-use crate::surfels::build;
+use crate::surfels::sampling::voxels::Voxel;
+use crate::surfels::sampling::{MeshSurface, Method, Priority, sample};
+use crate::surfels::{FromPoints, Size, Triangle, build, build_textured, from_points};
 use crate::truth::Surface;
 
 /// One point of a scene's sweep: how many surfels, and their mean radius in pixels.
@@ -57,18 +61,22 @@ pub(super) fn stage(
     point: Point,
     progress: &dyn Progress,
 ) -> Result<Staged> {
-    let file = entry.file.as_ref().map(|file| definition.path_of(file));
-    let points = match (&file, entry.shape) {
-        (Some(file), _) => io::read(file, progress)?,
-        (None, Some(shape)) => of_shape(shape, point.count.unwrap_or(1), entry.radius),
+    let texture = entry.texture.as_ref().map(|file| Texture::read(&present(definition, entry, file)?)).transpose()?;
+    let (points, surface) = match (&entry.file, entry.shape) {
+        (Some(file), _) => {
+            let file = present(definition, entry, file)?;
+            of_file(&file, entry, point.count.unwrap_or(1) as usize, texture.as_ref(), progress)?
+        }
+        (None, Some(shape)) => {
+            let surface = entry.truth.then_some(Surface::Analytic(shape));
+            (of_shape(shape, point.count.unwrap_or(1), entry.radius), surface)
+        }
         // Reading a definition makes sure that there is one of them; no points are told as an empty scene.
-        (None, None) => Points::default(),
+        (None, None) => (Points::default(), None),
     };
-    let (mut scene, _) = build(vec![points], progress)?;
-    let surface = match (entry.truth, &file, entry.shape) {
-        (true, Some(file), _) => Some(Surface::read(file, progress)?),
-        (true, None, Some(shape)) => Some(Surface::Analytic(shape)),
-        _ => None,
+    let (mut scene, _) = match texture.filter(|_| entry.lookup) {
+        Some(texture) => build_textured(vec![points], texture, progress)?,
+        None => build(vec![points], progress)?,
     };
     let cameras = cameras(entry.size.unwrap_or(definition.size), entry, &scene)?;
     let mut footprint_px = footprint(&scene, &cameras);
@@ -81,6 +89,58 @@ pub(super) fn stage(
         footprint_px = wanted;
     }
     Ok(Staged { scene, cameras, surface, footprint_px })
+}
+
+/// The path of one of a scene's files.
+fn present(definition: &Definition, entry: &SceneEntry, file: &Path) -> Result<PathBuf> {
+    let path = definition.path_of(file);
+    match &entry.source {
+        Some(source) if !path.exists() => {
+            let what = format!("the scene {:?} needs it, and it is not there: get it from {source}", entry.name);
+            Err(Error::malformed(&path, what))
+        }
+        _ => Ok(path),
+    }
+}
+
+/// The surfels that a scene makes of its file, and the triangles of the mesh if the scene asks for ground truth.
+fn of_file(
+    file: &Path,
+    entry: &SceneEntry,
+    count: usize,
+    texture: Option<&Texture>,
+    progress: &dyn Progress,
+) -> Result<(Points, Option<Surface>)> {
+    let mesh = match entry.truth || entry.surfels.samples() {
+        true => {
+            let mut mesh = io::read_mesh(file, progress)?;
+            texture.iter().for_each(|texture| mesh.paint((*texture).clone()));
+            Some(mesh)
+        }
+        false => None,
+    };
+    let bare =
+        || io::read(file, progress).map(|Points { positions, up, .. }| Points { positions, up, ..Points::default() });
+    let sized = |size| {
+        let options = FromPoints { size, ..FromPoints::default() };
+        Ok::<_, Error>(from_points(vec![bare()?], &options, progress)?.points)
+    };
+    let priority = |surface: &MeshSurface<'_>, voxels: &[Voxel]| Priority::default().of(surface, voxels);
+    let sampled = |method| match &mesh {
+        Some(mesh) => Ok::<_, Error>(sample(mesh, count, &method, 0, progress)?.0),
+        None => Ok(Points::default()),
+    };
+    let points = match entry.surfels {
+        Making::File => io::read(file, progress)?,
+        Making::Points => bare()?,
+        Making::Knn => sized(Size::Knn)?,
+        Making::Ellipse => sized(Size::Ellipse)?,
+        Making::Bsp => sized(Size::Bsp(Triangle::default()))?,
+        Making::Sample => sampled(Method::Stratified { priority: &priority, depth: None })?,
+        Making::Uniform => sampled(Method::Uniform)?,
+    };
+    let surface = mesh.filter(|_| entry.truth).map(|mesh| Surface::mesh(&mesh)).transpose()?;
+    Ok((points, surface))
 }
 
 /// What `epsplat generate` writes, with disks of `radius` mean spacings.

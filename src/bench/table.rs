@@ -12,7 +12,7 @@ type Column<'a> = (String, Box<dyn Fn(&Measurement) -> String + 'a>);
 const NONE: &str = "-";
 
 /// Every measurement in a line: scene, configuration, milliseconds a frame (median ± median absolute deviation), the time as
-/// a multiple of the baseline's, largest error and RMSE against the f64 reference, PSNR, holes and leaks against ground
+/// a multiple of the baseline's, largest error and RMSE against the f64 reference, PSNR, mean errors of depth and normal, holes and leaks against ground
 /// truth, and how many times as fast as the fastest rasteriser of the same error. Columns that would be empty are left out.
 pub fn text(definition: &Definition, study: &Study) -> String {
     let all = &study.measurements;
@@ -34,6 +34,8 @@ pub fn text(definition: &Definition, study: &Study) -> String {
     if all.iter().any(|m| !m.reconstruction.is_empty()) {
         columns.push(("PSNR, dB".into(), Box::new(move |m| optional(truth(m, "psnr_db"), 2))));
         columns.push(("SSIM".into(), Box::new(move |m| optional(truth(m, "ssim"), 4))));
+        columns.push(("depth, %".into(), Box::new(move |m| percent(m, "depth_relative_mean"))));
+        columns.push(("normal, °".into(), Box::new(move |m| optional(truth(m, "normal_degrees_mean"), 2))));
         columns.push(("holes, %".into(), Box::new(move |m| percent(m, "hole_rate"))));
         columns.push(("leaks, %".into(), Box::new(move |m| percent(m, "leak_rate"))));
     }

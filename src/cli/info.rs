@@ -33,6 +33,8 @@ struct Info {
     normals: bool,
     radii: bool,
     colors: &'static str,
+    /// Texture coordinates, by which `render --texture` paints.
+    texture: bool,
     up: &'static str,
     /// World coordinates of the smallest box.
     min: [f64; 3],
@@ -52,6 +54,7 @@ struct Info {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let bars = Bars::new();
     let points = io::read(&arguments.input, &bars)?;
+    let texture = points.texture.is_some();
     let held = (points.positions.len() as u64, points.normals.is_some(), points.radii.is_some(), colors(&points));
     let (scene, preparation) = surfels::build(vec![points], &bars)
         .map_err(|e| if let Error::EmptyScene(what) = e { Error::malformed(&arguments.input, what) } else { e })?;
@@ -74,6 +77,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         normals: held.1,
         radii: held.2,
         colors: held.3,
+        texture,
         up: match scene.up {
             epsplat::scene::Up::Y => "y",
             epsplat::scene::Up::Z => "z",
@@ -97,7 +101,7 @@ fn colors(points: &Points) -> &'static str {
     match points.colors {
         None => "none",
         Some(Colors::Srgb8(_)) => "8-bit sRGB",
-        Some(Colors::Linear(_) | Colors::Constant(_)) => "float",
+        Some(_) => "float",
     }
 }
 
@@ -111,6 +115,9 @@ fn table(input: &std::path::Path, info: &Info) -> String {
     let _ = writeln!(text, "  normals   {}", given(info.normals));
     let _ = writeln!(text, "  radii     {}", given(info.radii));
     let _ = writeln!(text, "  colours   {}", info.colors);
+    if info.texture {
+        let _ = writeln!(text, "  texture   coordinates given: `epsplat render --texture IMAGE.png` paints by them");
+    }
     let _ = writeln!(text, "  box       {} to {}", vector(info.min), vector(info.max));
     let _ = writeln!(text, "  up        {}", info.up);
     if let Some(Coverage { spacing, covered }) = info.coverage {

@@ -8,8 +8,10 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use epsplat::gpu::Gpu;
+use epsplat::io::Texture;
 use epsplat::render::{Backend, render};
 use epsplat::scene::light::MAX_LIGHTS;
+use epsplat::scene::options::SHININESS_RANGE;
 use epsplat::scene::{
     BlendFormat, Camera, Epsilon, Kernel, Light, LowPass, Maps, Organisation, Raster, RasterDepth, RenderOptions,
     Scene, Shading,
@@ -33,6 +35,8 @@ use super::{note, write_json};
     after_help = "Examples:\n  \
     epsplat render scan.laz -o scan.png\n  \
     epsplat render a.ply b.ply -o maps.exr --aov depth,normal --size 1920x1080\n  \
+    epsplat render bunny.obj -o bunny.png --shading phong --light 1,1,1 --light headlight:0.3\n  \
+    epsplat render surfels.ply -o painted.png --texture image.png\n  \
     epsplat render scan.laz -o top.png --eye 0,0,500 --target 0,0,0 --ortho 300\n  \
     epsplat render scan.laz -o views --cameras transforms.json"
 )]
@@ -115,6 +119,13 @@ pub struct Arguments {
     /// Shading of the blended colour
     #[arg(long, value_enum, default_value_t = ShadingName::Lambert)]
     shading: ShadingName,
+    /// Exponent of the highlights of --shading phong, 1 to 1000: the higher, the smaller they are [default: 32]
+    #[arg(long, value_name = "EXPONENT")]
+    shininess: Option<f32>,
+    /// An image to paint the surfels with, by their texture coordinates (`epsplat sample` writes them), in place of their own
+    /// colours: .png or .jpg
+    #[arg(long, value_name = "IMAGE")]
+    texture: Option<PathBuf>,
     /// A light, instead of the headlight: headlight[:INTENSITY] or the direction toward it, x,y,z[:INTENSITY]
     #[arg(long = "light", value_name = "LIGHT", allow_hyphen_values = true)]
     lights: Vec<Light>,
@@ -151,12 +162,14 @@ enum LowPassName {
     Ewa,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
 enum ShadingName {
     /// The colour as it is
     Unlit,
     /// Colour times the lights' cosines
     Lambert,
+    /// The same, and white highlights
+    Phong,
 }
 
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
@@ -201,8 +214,20 @@ fn one(arguments: &Arguments) -> Result<()> {
 
 /// What all inputs hold, as one scene.
 fn scene(arguments: &Arguments, bars: &Bars) -> Result<Scene> {
+    let texture = arguments.texture.as_deref().map(Texture::read).transpose()?;
     let inputs = arguments.inputs.iter().map(|path| io::read(path, bars)).collect::<Result<Vec<_>>>()?;
-    let (scene, preparation) = surfels::build(inputs, bars)?;
+    let (scene, preparation) = match texture {
+        None => surfels::build(inputs, bars)?,
+        Some(texture) => {
+            let mut read = arguments.inputs.iter().zip(&inputs);
+            if let Some((path, _)) = read.find(|(_, points)| points.texture.is_none()) {
+                let what = "its points have no texture coordinates, so they cannot be textured; `epsplat sample` gives surfels of \
+                            a mesh some";
+                return Err(Error::malformed(path, what));
+            }
+            surfels::build_textured(inputs, texture, bars)?
+        }
+    };
     for line in preparation.notes() {
         note(&line);
     }
@@ -242,11 +267,27 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
         shading: match arguments.shading {
             ShadingName::Unlit => Shading::Unlit,
             ShadingName::Lambert => Shading::Lambert,
+            ShadingName::Phong => Shading::Phong,
         },
+        shininess: shininess(arguments)?.unwrap_or(default.shininess),
         lights: if arguments.lights.is_empty() { default.lights } else { arguments.lights.clone() },
         background: arguments.background.unwrap_or(default.background),
         maps,
     })
+}
+
+/// The exponent of highlights, if there are any.
+fn shininess(arguments: &Arguments) -> Result<Option<f32>> {
+    let (least, most) = SHININESS_RANGE;
+    match arguments.shininess {
+        Some(_) if arguments.shading != ShadingName::Phong => {
+            Err(Error::Usage("--shininess is of highlights: give it with --shading phong".into()))
+        }
+        Some(exponent) if !(least..=most).contains(&exponent) => {
+            Err(Error::Usage(format!("--shininess is {least} to {most}, not {exponent}")))
+        }
+        chosen => Ok(chosen),
+    }
 }
 
 /// How the compute kernels draw splats, of which only `fixed` has a choice.
@@ -257,6 +298,9 @@ fn organisation(arguments: &Arguments) -> Result<Organisation> {
         Some(_) if !kernels => Err(Error::Usage("--organisation is a choice of --backend gpu: leave it out".into())),
         Some(Organisation::Tile) if !fixed => {
             Err(Error::Usage("--organisation tile needs the accumulator fixed: leave one of them out".into()))
+        }
+        Some(Organisation::Tile) if arguments.texture.is_some() => {
+            Err(Error::Usage("--organisation tile draws no textures: leave it or --texture out".into()))
         }
         chosen => Ok(chosen.unwrap_or_default()),
     }
@@ -270,6 +314,9 @@ fn raster(arguments: &Arguments) -> Result<Option<Raster>> {
             true => Err(Error::Usage("--blend-format and --raster-depth need --backend raster".into())),
             false => Ok(None),
         };
+    }
+    if arguments.texture.is_some() {
+        return Err(Error::Usage("--backend raster blends no texture coordinates: leave --texture out".into()));
     }
     if arguments.accumulator.is_some() {
         return Err(Error::Usage("--backend raster adds in --blend-format: leave --accumulator out".into()));

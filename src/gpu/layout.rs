@@ -5,7 +5,8 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use crate::scene::light::MAX_LIGHTS;
-use crate::scene::{Bounds, Camera, Light, RenderOptions, Scene};
+use crate::scene::texture::PlaceRange;
+use crate::scene::{Bounds, Camera, Colors, Light, RenderOptions, Scene};
 
 /// Invocations of a workgroup, in every kernel.
 pub const WORKGROUP: u32 = 64;
@@ -89,6 +90,11 @@ pub struct View {
     pub epsilon_deepest: f32,
     pub farthest: f32,
     pub middle: f32,
+    pub texture_width: u32,
+    pub texture_height: u32,
+    pub padding_0: u32,
+    pub padding_1: u32,
+    pub place: [f32; 4],
 }
 
 /// The rows of the image that the per-pixel buffers hold at a time.
@@ -189,6 +195,13 @@ impl View {
                 Light::Directional { toward, intensity } => toward.extend(intensity).to_array(),
             };
         }
+        let ([texture_width, texture_height], place) = match &scene.colors {
+            Colors::Textured(textured) => {
+                let PlaceRange { middle: [u, v], span, most_reach_2 } = textured.range();
+                (textured.texture().size(), [u, v, span, most_reach_2])
+            }
+            _ => ([0; 2], [0.0; 4]),
+        };
         let (relative, absolute, of_radius) = options.epsilon.parts();
         // Past every surfel, with room for the rounding of depths. An epsilon that accepts everything must not make the
         // interval that depths are measured in infinite, nor coarser than the scene.
@@ -223,6 +236,11 @@ impl View {
             epsilon_deepest: (of_radius * f64::from(scene.largest_radius()) * unit) as f32,
             farthest: (farthest * unit) as f32,
             middle: (camera.rotation.row(2).dot(bounds.center() - eye_relative) * unit) as f32,
+            texture_width,
+            texture_height,
+            padding_0: 0,
+            padding_1: 0,
+            place,
         }
     }
 }

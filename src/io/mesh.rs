@@ -2,8 +2,11 @@
 
 use std::sync::Arc;
 
+use glam::{DVec2, DVec3};
+
 use super::Texture;
 use crate::error::{Error, Result};
+use crate::scene::color::{DEFAULT_COLOR, mean_color};
 use crate::scene::{Colors, Up};
 
 /// A triangle mesh as a file gives it: f64 world coordinates and whatever attributes exist.
@@ -54,6 +57,7 @@ impl Mesh {
         let colored = match &self.colors {
             Some(Colors::Srgb8(colors)) => colors.len() == vertices,
             Some(Colors::Linear(colors)) => colors.len() == vertices,
+            Some(Colors::Textured(textured)) => textured.colors().len() == vertices,
             Some(Colors::Constant(_)) | None => true,
         };
         let lengths = [
@@ -77,6 +81,30 @@ impl Mesh {
         let name = "texture".to_owned();
         self.materials = vec![Material { name, diffuse: [1.0; 4], texture: Some(Arc::new(texture)) }];
         self.material = Some(vec![0; self.triangles.len()]);
+    }
+
+    /// Texture coordinates on a triangle, by its index, at the point with these corner weights, whose sum is 1; if the mesh has any.
+    pub fn texture_at(&self, triangle: usize, weights: DVec3) -> Option<[f32; 2]> {
+        let [a, b, c] = self.texture.as_ref()?.get(triangle)?.map(|[u, v]| DVec2::new(u.into(), v.into()));
+        Some((a * weights.x + b * weights.y + c * weights.z).as_vec2().to_array())
+    }
+
+    /// The colour there: linear RGB, straight alpha. A texture times its material's diffuse colour, if there is one; else the
+    /// interpolated colours of the vertices; else the diffuse colour.
+    pub fn color_at(&self, triangle: usize, weights: DVec3) -> [f32; 4] {
+        let material = self.material_of(triangle);
+        let textured = material.and_then(|material| Some((material, material.texture.as_ref()?)));
+        if let (Some((material, texture)), Some([u, v])) = (textured, self.texture_at(triangle, weights)) {
+            let texel = texture.at(u, v);
+            return std::array::from_fn(|k| texel[k] * material.diffuse[k]);
+        }
+        match &self.colors {
+            Some(colors) => {
+                let corners = self.triangles[triangle].map(|vertex| colors.linear(vertex as usize));
+                mean_color(corners.into_iter().zip(weights.to_array()))
+            }
+            None => material.map_or(DEFAULT_COLOR, |material| material.diffuse),
+        }
     }
 
     /// The material of a triangle, by its index in `triangles`.

@@ -18,7 +18,7 @@ pub struct Points {
     /// Half-axes s and t of one elliptical disk each, world units, with the normal s x t; they stand in for normal and radius
     /// where they span an ellipse. Zero, parallel or non-finite ones mean missing.
     pub axes: Option<Vec<[[f32; 3]; 2]>>,
-    /// Colours, never [`Colors::Constant`].
+    /// Colours, [`Colors::Srgb8`] or [`Colors::Linear`].
     pub colors: Option<Colors>,
     /// Texture coordinates (u, v), origin bottom left as in OBJ.
     pub texture: Option<Vec<[f32; 2]>>,

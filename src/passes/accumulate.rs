@@ -28,6 +28,8 @@
 //! - **float**, **cas**: f32 sums, by atomic add or by compare and exchange. A sum of n terms in any order errs by at most
 //!   `(n - 1) u` of itself, and so does the weight's: `2 n u + 4 u`. The order shows.
 
+use glam::Vec3;
+
 use super::cull::Part;
 use super::footprint::footprint;
 use super::project::{Splat, SplatBuffer};
@@ -40,7 +42,7 @@ use crate::gpu::buffers::Buffer;
 use crate::gpu::kernel::Bound;
 use crate::gpu::layout::ONE;
 use crate::scene::options::LEAST_FILTERED_WEIGHT;
-use crate::scene::{Camera, RenderOptions, Scene, SceneNeeds};
+use crate::scene::{Camera, Colors, RenderOptions, Scene, SceneNeeds};
 
 /// An accumulator: one row of the table below, one file `wgsl/accumulator_*.wgsl`.
 #[derive(Debug)]
@@ -205,6 +207,8 @@ pub struct PixelSums {
     pub normal: [f64; 3],
     /// Of the depth.
     pub depth: f64,
+    /// Of [`Textured::terms`](crate::scene::Textured::terms), places in a texture.
+    pub place: [f64; 4],
     /// Accepted fragments.
     pub count: u32,
     /// The smallest relative distance of a fragment to a decision; see [`crate::scene::Maps::decision`].
@@ -213,8 +217,15 @@ pub struct PixelSums {
 
 impl PixelSums {
     /// Nothing yet.
-    pub const ZERO: Self =
-        Self { weight: 0.0, color: [0.0; 4], normal: [0.0; 3], depth: 0.0, count: 0, decision: f64::INFINITY };
+    pub const ZERO: Self = Self {
+        weight: 0.0,
+        color: [0.0; 4],
+        normal: [0.0; 3],
+        depth: 0.0,
+        place: [0.0; 4],
+        count: 0,
+        decision: f64::INFINITY,
+    };
 }
 
 /// How far outside a decision a fragment is still looked at to record its distance, relative.
@@ -236,7 +247,9 @@ pub fn reference<'a>(
     for splat in splats {
         let [r, g, b, alpha] = scene.colors.linear(splat.surfel as usize).map(f64::from);
         let color = [r * alpha, g * alpha, b * alpha, alpha];
-        let radius = f64::from(scene.surfels[splat.surfel as usize].radius());
+        let surfel = &scene.surfels[splat.surfel as usize];
+        let center = scene.origin + Vec3::from_array(surfel.center).as_dvec3();
+        let radius = f64::from(surfel.radius());
         let epsilon = absolute + of_radius * radius;
         let normal = if splat.away && !scene.oriented { -splat.normal } else { splat.normal };
         for y in splat.first[1].max(first_row)..=splat.last[1].min(first_row + rows - 1) {
@@ -256,6 +269,14 @@ pub fn reference<'a>(
                 sum.weight += weight;
                 for (total, value) in sum.color.iter_mut().zip(color) {
                     *total += weight * value;
+                }
+                if let Colors::Textured(textured) = &scene.colors {
+                    let (x, y) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
+                    let point = camera.ray_start(x, y) + at.depth * camera.ray(x, y);
+                    let terms = textured.terms(splat.surfel as usize, point - center);
+                    for (total, value) in sum.place.iter_mut().zip(terms) {
+                        *total += weight * value;
+                    }
                 }
                 for (total, value) in sum.normal.iter_mut().zip(normal.to_array()) {
                     *total += weight * value;

@@ -22,7 +22,7 @@ use super::{Recorder, Rows};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::kernel::{Bound, Draw};
-use crate::scene::{BlendFormat, Camera, Raster, RasterDepth, SceneNeeds};
+use crate::scene::{BlendFormat, Camera, ColorNeed, Raster, RasterDepth, SceneNeeds};
 
 /// Vertices of a splat; see raster.wgsl.
 pub fn vertices(needs: &SceneNeeds) -> u32 {
@@ -125,6 +125,11 @@ pub fn check(gpu: &Gpu, raster: Raster, needs: &SceneNeeds, camera: &Camera) -> 
             what: what.into(),
         }),
     };
+    if needs.color == ColorNeed::Textured {
+        return Err(Error::Usage(
+            "the rasteriser blends no texture coordinates: leave the texture out, or render by compute".into(),
+        ));
+    }
     if raster.format == BlendFormat::Rgba32Float && !gpu.adapter.blends_f32 {
         return Err(gpu.error("this adapter does not blend into 32-bit floats: take --blend-format rgba16float"));
     }

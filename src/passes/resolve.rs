@@ -11,16 +11,28 @@ use crate::frame::Frame;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::{Buffer, Readback};
 use crate::gpu::kernel::{Bound, Grid, grid};
-use crate::scene::{Camera, Light, RenderOptions, Shading};
+use crate::scene::options::HIGHLIGHT;
+use crate::scene::{Camera, Colors, Light, RenderOptions, Scene, Shading};
 
 /// The twin: resolves `sums`, which start at row `first_row` of the image, into `frame`, which holds just their rows.
-pub fn reference(sums: &[PixelSums], camera: &Camera, options: &RenderOptions, first_row: u32, frame: &mut Frame) {
+pub fn reference(
+    sums: &[PixelSums],
+    scene: &Scene,
+    camera: &Camera,
+    options: &RenderOptions,
+    first_row: u32,
+    frame: &mut Frame,
+) {
     for (pixel, sum) in sums.iter().enumerate() {
         let (x, y) = (pixel as u32 % camera.width, pixel as u32 / camera.width + first_row);
         let background = options.background.map(f64::from);
         let (mut color, mut depth, mut normal) = (background, f64::INFINITY, DVec3::ZERO);
         if sum.weight > 0.0 {
-            let mean = sum.color.map(|c| c / sum.weight);
+            let blended = sum.color.map(|c| c / sum.weight);
+            let mean = match &scene.colors {
+                Colors::Textured(textured) => textured.resolve(sum.place.map(|total| total / sum.weight), blended),
+                _ => blended,
+            };
             let alpha = mean[3];
             let straight = DVec3::new(mean[0], mean[1], mean[2]) / if alpha > 0.0 { alpha } else { f64::INFINITY };
             normal = unit_or_zero(DVec3::from_array(sum.normal) / sum.weight);
@@ -53,19 +65,34 @@ fn unit_or_zero(mean: DVec3) -> DVec3 {
 pub(crate) fn shade(straight: DVec3, normal: DVec3, camera: &Camera, options: &RenderOptions, at: DVec2) -> DVec3 {
     match options.shading {
         Shading::Unlit => straight,
-        Shading::Lambert => straight * irradiance(normal, camera, &options.lights, at),
+        Shading::Lambert => {
+            straight * irradiances(normal, camera, &options.lights, at).map(|(light, _)| light).sum::<f64>()
+        }
+        Shading::Phong => {
+            let exponent = f64::from(options.shininess);
+            let lights = irradiances(normal, camera, &options.lights, at);
+            let (diffuse, highlight) = lights.fold((0.0, 0.0), |(diffuse, highlight), (light, mirrored)| {
+                (diffuse + light, highlight + light * mirrored.max(0.0).powf(exponent))
+            });
+            straight * diffuse + HIGHLIGHT * highlight
+        }
     }
 }
 
-/// Sum of intensity times cosine over the lights at an image point: the headlight lights both sides, a directional light
-/// the side the normal is on.
-fn irradiance(normal: DVec3, camera: &Camera, lights: &[Light], at: DVec2) -> f64 {
+/// For each light at an image point its intensity times its cosine (the headlight lights both sides, a directional light the
+/// side the normal is on), and the cosine between its mirrored direction and the one toward the eye.
+fn irradiances(normal: DVec3, camera: &Camera, lights: &[Light], at: DVec2) -> impl Iterator<Item = (f64, f64)> {
     let toward_eye = -camera.ray(at.x, at.y).normalize();
-    let lights = lights.iter().map(|light| match *light {
-        Light::Headlight { intensity } => f64::from(intensity) * normal.dot(toward_eye).abs(),
-        Light::Directional { toward, intensity } => f64::from(intensity) * normal.dot(toward.as_dvec3()).max(0.0),
-    });
-    lights.sum()
+    lights.iter().map(move |light| {
+        let (toward, intensity) = match *light {
+            Light::Headlight { intensity } => (toward_eye, intensity),
+            Light::Directional { toward, intensity } => (toward.as_dvec3(), intensity),
+        };
+        let facing = normal.dot(toward);
+        let received = if matches!(light, Light::Headlight { .. }) { facing.abs() } else { facing.max(0.0) };
+        let mirrored = 2.0 * facing * normal.dot(toward_eye) - toward.dot(toward_eye);
+        (f64::from(intensity) * received, mirrored)
+    })
 }
 
 /// Straight alpha over straight alpha.

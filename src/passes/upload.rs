@@ -1,6 +1,7 @@
 //! Stage 0: the scene in device memory, in an [`order`] that draws well, in pages that fit a binding.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use bytemuck::Pod;
 use rayon::prelude::*;
@@ -10,6 +11,7 @@ use super::order::order;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::{Buffer, page_len};
+use crate::gpu::kernel::Bound;
 use crate::gpu::layout::{BATCH, MOST_GROUPS, Splat};
 use crate::progress::Progress;
 use crate::scene::color::SRGB8_TO_LINEAR;
@@ -21,6 +23,8 @@ pub struct SurfelBuffer {
     pub pages: Vec<SurfelPage>,
     /// The table that decodes 8-bit sRGB.
     pub(crate) srgb_to_linear: Option<Buffer<[[f32; 4]; 64]>>,
+    /// The texture's.
+    pub(crate) texels: Option<Buffer<[u8; 4]>>,
 }
 
 /// One page of a [`SurfelBuffer`].
@@ -49,6 +53,16 @@ impl SurfelBuffer {
             let colors = match (needs.color, &scene.colors) {
                 (ColorNeed::Srgb8, Colors::Srgb8(codes)) => Some(upload(gpu, codes, indices)?),
                 (ColorNeed::Linear, Colors::Linear(colors)) => Some(upload(gpu, colors, indices)?),
+                (ColorNeed::Textured, Colors::Textured(textured)) => {
+                    let buffer = Buffer::storage(gpu, "colours", indices.len() as u64)?;
+                    let all = |&index: &u32| {
+                        let [center, u_slope, v_slope] = textured.mapped(index as usize);
+                        [textured.colors()[index as usize], center, u_slope, v_slope]
+                    };
+                    let values = |range: Range<usize>| indices[range].par_iter().map(all).collect::<Vec<_>>().into();
+                    buffer.write(gpu, indices.len(), values, &())?;
+                    Some(buffer.raw)
+                }
                 _ => None,
             };
             let batches: Vec<_> = indices
@@ -60,14 +74,29 @@ impl SurfelBuffer {
             pages.push(SurfelPage { surfels, balls, colors });
         }
         let srgb_to_linear = match needs.color {
-            ColorNeed::Srgb8 => {
+            ColorNeed::Srgb8 | ColorNeed::Textured => {
                 let table = std::array::from_fn(|row| std::array::from_fn(|k| SRGB8_TO_LINEAR[4 * row + k]));
                 Some(Buffer::uniform(gpu, "sRGB table", &table)?)
             }
             _ => None,
         };
+        let texels = match &scene.colors {
+            Colors::Textured(textured) => {
+                let texels = textured.texture().texels();
+                let buffer = Buffer::storage(gpu, "the texture", texels.len() as u64)?;
+                buffer.write(gpu, texels.len(), |range| texels[range].into(), &())?;
+                Some(buffer)
+            }
+            _ => None,
+        };
         progress.end();
-        Ok(Self { pages, srgb_to_linear })
+        Ok(Self { pages, srgb_to_linear, texels })
+    }
+
+    /// What looks up the texture.
+    pub(crate) fn texture(&self) -> Bound<'_> {
+        let table = self.srgb_to_linear.as_ref().map(|table| ("srgb_to_linear", table.bound()));
+        table.into_iter().chain(self.texels.as_ref().map(|texels| ("texels", texels.bound()))).collect()
     }
 
     /// Device memory that it takes, bytes.
@@ -75,7 +104,9 @@ impl SurfelBuffer {
         let of_page = |page: &SurfelPage| {
             page.surfels.bytes() + page.balls.bytes() + page.colors.as_ref().map_or(0, wgpu::Buffer::size)
         };
-        self.pages.iter().map(of_page).sum::<u64>() + self.srgb_to_linear.as_ref().map_or(0, Buffer::bytes)
+        let of_colors =
+            self.srgb_to_linear.as_ref().map_or(0, Buffer::bytes) + self.texels.as_ref().map_or(0, Buffer::bytes);
+        self.pages.iter().map(of_page).sum::<u64>() + of_colors
     }
 }
 

@@ -11,7 +11,7 @@ use crate::gpu::kernel::Program;
 use crate::gpu::layout::{LARGE_BY_TILES, LARGE_BY_WORKGROUPS};
 use crate::gpu::{Gpu, Sources};
 use crate::scene::{
-    ColorNeed, Kernel, KernelShape, LowPass, Organisation, Projection, RasterDepth, RenderOptions, SceneNeeds,
+    ColorNeed, Kernel, KernelShape, LowPass, Organisation, Projection, RasterDepth, RenderOptions, SceneNeeds, Shading,
 };
 
 /// The entry points that a render with `needs` dispatches.
@@ -117,7 +117,11 @@ fn files(needs: &SceneNeeds) -> Vec<&'static str> {
         pick(needs.normal_map, "normal_map.wgsl", "normal_map_absent.wgsl"),
         pick(needs.weight_map, "weight_map.wgsl", "weight_map_absent.wgsl"),
         pick(needs.count, "count.wgsl", "count_absent.wgsl"),
-        pick(needs.lambert, "shade_lambert.wgsl", "shade_unlit.wgsl"),
+        match needs.shading {
+            Shading::Unlit => "shade_unlit.wgsl",
+            Shading::Lambert => "shade_lambert.wgsl",
+            Shading::Phong => "shade_phong.wgsl",
+        },
     ];
     let depth = match needs.raster {
         None => {
@@ -147,9 +151,11 @@ fn files(needs: &SceneNeeds) -> Vec<&'static str> {
     }
     match needs.color {
         ColorNeed::Constant => files.push("color_constant.wgsl"),
-        ColorNeed::Srgb8 => files.extend(["color_srgb8.wgsl", "color_sums.wgsl"]),
+        ColorNeed::Srgb8 => files.extend(["color_srgb8.wgsl", "srgb.wgsl", "color_sums.wgsl"]),
         ColorNeed::Linear => files.extend(["color_linear.wgsl", "color_sums.wgsl"]),
+        ColorNeed::Textured => files.extend(["color_textured.wgsl", "srgb.wgsl", "color_sums.wgsl"]),
     }
+    files.push(pick(needs.color == ColorNeed::Textured, "texture.wgsl", "texture_absent.wgsl"));
     files
 }
 
@@ -177,6 +183,8 @@ pub struct PixelLayout {
     pub depth_channel: u32,
     /// The fragment count's channel.
     pub count_channel: u32,
+    /// The first of the four channels of places in a texture.
+    pub place_channel: u32,
     /// Words of a pixel in the image; the colour's four come first.
     pub image_words: u32,
     /// Word of the normal map's x in the image.
@@ -200,15 +208,17 @@ impl PixelLayout {
         let normal_channel = (COLOR_CHANNEL + color_channels(needs)).next_multiple_of(2);
         let depth_channel = normal_channel + channels(needs.normal, 3);
         let count_channel = depth_channel + channels(needs.depth, 1);
+        let place_channel = (count_channel + channels(needs.count, 1)).next_multiple_of(2);
         let normal_image = 4;
         let depth_image = normal_image + channels(needs.normal_map, 3);
         let weight_image = depth_image + channels(needs.depth, 1);
         let count_image = weight_image + channels(needs.weight_map, 1);
         Self {
-            channels: (count_channel + channels(needs.count, 1)).next_multiple_of(2),
+            channels: place_channel + channels(needs.color == ColorNeed::Textured, 4),
             normal_channel,
             depth_channel,
             count_channel,
+            place_channel,
             image_words: count_image + channels(needs.count, 1),
             normal_image,
             depth_image,
@@ -248,6 +258,7 @@ pub fn overrides(needs: &SceneNeeds, options: &RenderOptions, fraction_bits: u32
         ("TURN_NORMALS", u32::from(needs.turn_normals).into()),
         ("DEPTH_CHANNEL", layout.depth_channel.into()),
         ("COUNT_CHANNEL", layout.count_channel.into()),
+        ("PLACE_CHANNEL", layout.place_channel.into()),
         ("IMAGE_WORDS", layout.image_words.into()),
         ("NORMAL_IMAGE", layout.normal_image.into()),
         ("DEPTH_IMAGE", layout.depth_image.into()),
@@ -268,6 +279,9 @@ pub fn overrides(needs: &SceneNeeds, options: &RenderOptions, fraction_bits: u32
         // The visibility pass's pipeline says otherwise.
         constants.push(("MOVED", 0.0));
         constants.push(("ALONG_RAY", u32::from(raster.depth == RasterDepth::Ray).into()));
+    }
+    if needs.shading == Shading::Phong {
+        constants.push(("SHININESS", options.shininess.into()));
     }
     if needs.cull {
         constants.push(("FILTER_REACH", cull::filter_reach(&Design::of(options))));

@@ -48,7 +48,7 @@ pub(super) fn frame(
         let summed = lap(1, seen);
         let strip = Camera { height: rows, ..camera.clone() };
         let mut frame = Frame::new(&strip, &options.maps);
-        resolve::reference(&sums, camera, options, first_row, &mut frame);
+        resolve::reference(&sums, scene, camera, options, first_row, &mut frame);
         lap(2, summed);
         progress.advance(rows.into());
         frame

@@ -2,6 +2,8 @@
 
 use std::sync::LazyLock;
 
+use super::texture::Textured;
+
 /// The sRGB transfer function from a code in [0, 1] to linear light (IEC 61966-2-1).
 pub fn srgb_to_linear(code: f64) -> f64 {
     if code <= 0.04045 { code / 12.92 } else { ((code + 0.055) / 1.055).powf(2.4) }
@@ -26,13 +28,15 @@ pub enum Colors {
     Srgb8(Vec<[u8; 4]>),
     /// One linear colour each; any finite value.
     Linear(Vec<[f32; 4]>),
+    /// A place in a texture each.
+    Textured(Textured),
 }
 
 /// The colour of surfels that come without one: a light grey that shading can darken and highlights cannot clip.
 pub const DEFAULT_COLOR: [f32; 4] = [0.7, 0.7, 0.7, 1.0];
 
 impl Colors {
-    /// The linear colour of surfel `index`, straight alpha.
+    /// The linear colour of surfel `index`, straight alpha; of a texture the mean over its disk.
     pub fn linear(&self, index: usize) -> [f32; 4] {
         match self {
             Self::Constant(color) => *color,
@@ -42,8 +46,22 @@ impl Colors {
                 [table[r as usize], table[g as usize], table[b as usize], f32::from(a) / 255.0]
             }
             Self::Linear(colors) => colors[index],
+            Self::Textured(textured) => textured.colors()[index],
         }
     }
+}
+
+/// The weighted mean of straight colours, premultiplied as splats are blended.
+pub(crate) fn mean_color(colors: impl Iterator<Item = ([f32; 4], f64)>) -> [f32; 4] {
+    let (mut sum, mut weights) = ([0.0; 4], 0.0);
+    for (color, weight) in colors {
+        let [r, g, b, alpha] = color.map(f64::from);
+        let covers = weight * alpha;
+        sum = [sum[0] + covers * r, sum[1] + covers * g, sum[2] + covers * b, sum[3] + covers];
+        weights += weight;
+    }
+    let [r, g, b, alpha] = sum;
+    if alpha > 0.0 { [r / alpha, g / alpha, b / alpha, alpha / weights].map(|c| c as f32) } else { [0.0; 4] }
 }
 
 #[cfg(test)]

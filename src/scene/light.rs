@@ -1,4 +1,4 @@
-//! Lights of the Lambert model.
+//! Lights of the shading models.
 
 use std::str::FromStr;
 

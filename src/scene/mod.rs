@@ -10,6 +10,7 @@ pub mod raster;
 #[expect(clippy::module_inception, reason = "the file is named for the type it holds")]
 pub mod scene;
 pub mod surfel;
+pub mod texture;
 
 pub use camera::{Camera, Lens, Projection};
 pub use color::Colors;
@@ -19,3 +20,4 @@ pub use options::{Epsilon, Kernel, KernelShape, LowPass, Maps, Organisation, Ren
 pub use raster::{BlendFormat, Raster, RasterDepth};
 pub use scene::{Bounds, Scene, Up};
 pub use surfel::Surfel;
+pub use texture::{Place, Texture, Textured};

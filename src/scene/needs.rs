@@ -14,6 +14,8 @@ pub enum ColorNeed {
     Srgb8,
     /// Four f32 each.
     Linear,
+    /// The same of the texture's mean over the disk, and a place in the texture, which is looked up once a pixel.
+    Textured,
 }
 
 /// What exists in this render: it chooses the WGSL files that are joined, and so the bindings, buffers and sums.
@@ -30,7 +32,8 @@ pub struct SceneNeeds {
     pub atomics_u64: bool,
     /// Batches of surfels that are out of view or hidden are left out.
     pub cull: bool,
-    /// Large splats, at least, are drawn by tiles: the accumulator is `fixed`, and the options do not say scatter.
+    /// Large splats, at least, are drawn by tiles: the accumulator is `fixed`, the options do not say scatter, and there is no
+    /// texture, whose sums are more than a tile's registers hold.
     pub tiles: bool,
     /// Tiles sum all splats, large and small, and resolve their pixels at once: no sum is stored.
     pub gather: bool,
@@ -53,7 +56,7 @@ pub struct SceneNeeds {
     pub color: ColorNeed,
     /// Surfels differ in alpha.
     pub alpha: bool,
-    /// Normals are accumulated: Lambert shading or a normal map.
+    /// Normals are accumulated: pixels are lit, or a normal map is written.
     pub normal: bool,
     /// Normals have no consistent side and are turned toward the viewer before they are blended.
     pub turn_normals: bool,
@@ -61,8 +64,8 @@ pub struct SceneNeeds {
     pub depth: bool,
     /// Fragments are counted.
     pub count: bool,
-    /// Pixels are lit.
-    pub lambert: bool,
+    /// How pixels are lit.
+    pub shading: Shading,
     /// A normal map is written.
     pub normal_map: bool,
     /// A weight map is written.
@@ -84,12 +87,13 @@ impl SceneNeeds {
     pub fn of(scene: &Scene, color_range: &([f32; 4], [f32; 4]), camera: &Camera, options: &RenderOptions) -> Self {
         let (low, high) = color_range;
         let color = match scene.colors {
+            Colors::Textured(_) => ColorNeed::Textured,
             _ if low == high => ColorNeed::Constant,
             Colors::Constant(_) => ColorNeed::Constant,
             Colors::Srgb8(_) => ColorNeed::Srgb8,
             Colors::Linear(_) => ColorNeed::Linear,
         };
-        let lambert = options.shading == Shading::Lambert;
+        let lit = options.shading != Shading::Unlit;
         Self {
             projection: camera.projection,
             accumulator: options.accumulator,
@@ -100,6 +104,7 @@ impl SceneNeeds {
             cull: false,
             tiles: options.accumulator == "fixed"
                 && options.raster.is_none()
+                && color != ColorNeed::Textured
                 && options.organisation != Organisation::Scatter,
             gather: false,
             subgroups: false,
@@ -110,11 +115,11 @@ impl SceneNeeds {
             epsilon_radius: matches!(options.epsilon, Epsilon::Radius(_)),
             color,
             alpha: low[3] != high[3],
-            normal: lambert || options.maps.normal,
-            turn_normals: !scene.oriented && (lambert || options.maps.normal),
+            normal: lit || options.maps.normal,
+            turn_normals: !scene.oriented && (lit || options.maps.normal),
             depth: options.maps.depth,
             count: options.maps.count,
-            lambert,
+            shading: options.shading,
             normal_map: options.maps.normal,
             weight_map: options.maps.weight,
             decision: options.maps.decision,
@@ -152,6 +157,7 @@ impl SceneNeeds {
             ColorNeed::Constant => "color-constant",
             ColorNeed::Srgb8 => "color-srgb8",
             ColorNeed::Linear => "color-linear",
+            ColorNeed::Textured => "color-textured",
         };
         let kernel = match self.kernel {
             KernelShape::Gaussian => "kernel-gaussian",
@@ -178,7 +184,8 @@ impl SceneNeeds {
             (self.turn_normals, "turn-normals"),
             (self.depth, "depth"),
             (self.count, "count"),
-            (self.lambert, "lambert"),
+            (self.shading == Shading::Lambert, "lambert"),
+            (self.shading == Shading::Phong, "phong"),
             (self.normal_map, "normal-map"),
             (self.weight_map, "weight-map"),
             (self.decision, "decision"),

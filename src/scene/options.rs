@@ -209,7 +209,18 @@ pub enum Shading {
     Unlit,
     /// The blended colour times the lights' irradiance at the blended normal.
     Lambert,
+    /// The same and white highlights (Phong 1975), [`HIGHLIGHT`] times a light's irradiance times `max(0, r . v)^shininess`,
+    /// where r is the light's direction mirrored at the normal and v the direction toward the eye. Phong's own term stops short where a
+    /// light sets behind the surface; with the irradiance as a factor (Lewis 1994) it ends there at 0.
+    Phong,
 }
+
+/// What a highlight of [`Shading::Phong`] adds, of a light's irradiance, where the light is mirrored into the eye.
+/// With one light of 1 it does not clip the colour of surfels that have none (`DEFAULT_COLOR`).
+pub const HIGHLIGHT: f64 = 0.3;
+
+/// Exponents that [`RenderOptions::shininess`] may have: with more, the cosine's rounding in f32 would show.
+pub const SHININESS_RANGE: (f32, f32) = (1.0, 1000.0);
 
 /// Maps beside the colour. Every one is normalised by the weight sum; all but `decision` exist on every backend.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -245,7 +256,9 @@ pub struct RenderOptions {
     pub raster: Option<Raster>,
     /// Shading model.
     pub shading: Shading,
-    /// Lights of the Lambert model.
+    /// Exponent of [`Shading::Phong`], in [`SHININESS_RANGE`]: the higher, the smaller a highlight is.
+    pub shininess: f32,
+    /// Lights of the shading models; unlit pixels have none.
     pub lights: Vec<Light>,
     /// What lies behind the scene: linear RGB and straight alpha.
     pub background: [f32; 4],
@@ -263,6 +276,7 @@ impl Default for RenderOptions {
             organisation: Organisation::Auto,
             raster: None,
             shading: Shading::Lambert,
+            shininess: 32.0,
             lights: vec![Light::Headlight { intensity: 1.0 }],
             background: [0.0; 4],
             maps: Maps::default(),

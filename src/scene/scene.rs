@@ -122,6 +122,7 @@ impl Scene {
             Colors::Constant(_) => 0,
             Colors::Srgb8(codes) => codes.len(),
             Colors::Linear(colors) => colors.len(),
+            Colors::Textured(textured) => textured.colors().len(),
         };
         let merge = |(low, high): ([f32; 4], [f32; 4]), (other_low, other_high): ([f32; 4], [f32; 4])| {
             let low = std::array::from_fn(|i| f32::min(low[i], other_low[i]));

@@ -27,7 +27,7 @@ impl ColorGatherer {
                 None => {}
                 Some(Colors::Srgb8(codes)) => codes.resize(total, default_code()),
                 Some(Colors::Linear(colors)) => colors.resize(total, DEFAULT_COLOR),
-                Some(Colors::Constant(_)) => {}
+                Some(Colors::Constant(_) | Colors::Textured(_)) => {}
             },
             Some(Colors::Srgb8(mut added)) => {
                 added.resize(count, default_code());
@@ -57,6 +57,12 @@ impl ColorGatherer {
                     }
                     color[3] = color[3].clamp(0.0, 1.0);
                 }
+                added.resize(count, DEFAULT_COLOR);
+                self.append_linear(added, before);
+            }
+            // The inputs of a scene may have different textures: the means over the disks.
+            Some(Colors::Textured(textured)) => {
+                let mut added = textured.colors().to_vec();
                 added.resize(count, DEFAULT_COLOR);
                 self.append_linear(added, before);
             }

@@ -110,6 +110,10 @@ fn retain_colors(colors: &mut Colors, keep: &[bool]) {
         Colors::Srgb8(codes) => retain(codes, keep),
         Colors::Linear(colors) => retain(colors, keep),
         Colors::Constant(_) => {}
+        Colors::Textured(textured) => {
+            let kept = keep.iter().enumerate().filter(|(_, keep)| **keep).map(|(index, _)| index);
+            *textured = textured.taken(&kept.collect::<Vec<_>>());
+        }
     }
 }
 

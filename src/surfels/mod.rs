@@ -19,6 +19,7 @@ pub mod simplify;
 mod sizes;
 #[cfg(test)]
 mod tests;
+mod texture;
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -32,12 +33,15 @@ use self::estimate::{Estimate, Estimates, RADIUS_RANGE};
 use self::gather::Gathered;
 use self::positions::{DistinctPositions, exponent, power_of_two};
 use crate::io::Points;
-use crate::scene::{Bounds, Scene, Surfel, Up};
-use crate::{Progress, Result};
+use crate::scene::{Bounds, Colors, Scene, Surfel, Texture, Up};
+use crate::{Error, Progress, Result};
 
 /// The largest absolute coordinate of a point, world units (in metres, a hundred light years). Larger ones are treated
 /// like ones that are not finite, because products of f32 lengths would overflow on the way to the image.
 pub const LARGEST_COORDINATE: f64 = 1e18;
+
+/// The largest absolute texture coordinate: f32 ones beyond have no digits after the point that a texture could use.
+const LARGEST_PLACE: f32 = 1e4;
 
 /// What was done to the points on the way to a scene.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
@@ -54,6 +58,8 @@ pub struct Preparation {
     pub estimated_radii: u64,
     /// Surfels whose colour was not finite and was replaced by [`DEFAULT_COLOR`](crate::scene::color::DEFAULT_COLOR).
     pub replaced_colors: u64,
+    /// Points whose texture coordinates were not finite or too large and became 0; counted where a texture paints them.
+    pub replaced_places: u64,
     /// Different positions among the surfels; None if nothing had to be estimated, so nobody looked.
     pub distinct_positions: Option<u64>,
     /// Median distance between an estimated position and the nearest other one, world units; None if nothing had to be
@@ -68,6 +74,7 @@ impl Preparation {
         let notes = [
             counted(self.dropped_non_finite, "were dropped: a coordinate is not finite or too large"),
             counted(self.replaced_colors, "had a colour that is not finite and became grey"),
+            counted(self.replaced_places, "had texture coordinates that are not finite or too large and became 0"),
         ];
         notes.into_iter().flatten().collect()
     }
@@ -83,7 +90,34 @@ impl Preparation {
 /// [`Error::EmptyScene`](crate::Error::EmptyScene) if no input holds a usable point, and
 /// [`Error::Usage`](crate::Error::Usage) if normals or radii are missing and there are more than 2^32 - 1 points.
 pub fn build(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Preparation)> {
-    let Gathered { positions, normals, radii, axes, colors, up, mut preparation, .. } = gather::gather(inputs)?;
+    let gathered = gather::gather(inputs)?;
+    built(gathered, progress)
+}
+
+/// The same, painted with `texture` at the points' texture coordinates, instead of their colours.
+///
+/// # Errors
+///
+/// Those of [`build`], and [`Error::Usage`](crate::Error::Usage) if an input has no texture coordinates.
+pub fn build_textured(inputs: Vec<Points>, texture: Texture, progress: &dyn Progress) -> Result<(Scene, Preparation)> {
+    if inputs.iter().any(|input| input.texture.is_none() && !input.positions.is_empty()) {
+        return Err(Error::Usage("a texture paints points that have texture coordinates, and some have none".into()));
+    }
+    let mut gathered = gather::gather(inputs)?;
+    let mut places = gathered.texture.take().unwrap_or_default();
+    let unusable = |place: &[f32; 2]| !place.iter().all(|turns| turns.abs() <= LARGEST_PLACE);
+    for place in places.iter_mut().filter(|place| unusable(place)) {
+        *place = [0.0; 2];
+        gathered.preparation.replaced_places += 1;
+    }
+    let (mut scene, preparation) = built(gathered, progress)?;
+    let bounds = scene.bounds();
+    scene.colors = Colors::Textured(texture::painted(&scene.surfels, &bounds, texture.into(), &places, progress)?);
+    Ok((scene, preparation))
+}
+
+fn built(gathered: Gathered, progress: &dyn Progress) -> Result<(Scene, Preparation)> {
+    let Gathered { positions, normals, radii, axes, colors, up, mut preparation, .. } = gathered;
     let colors = colors::folded(colors);
     let bounds = bounds_of(&positions);
     let origin = origin_for(&bounds);

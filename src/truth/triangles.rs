@@ -19,7 +19,6 @@ use super::nearest::{nearest, triangle_squared_distance};
 use crate::error::Result;
 use crate::io::Mesh;
 use crate::scene::Bounds;
-use crate::scene::color::DEFAULT_COLOR;
 use crate::surfels::LARGEST_COORDINATE;
 
 /// How much a box is larger than its triangle on each side, in radii of the mesh. A ray starts within 2 radii of the
@@ -38,6 +37,8 @@ pub struct TriangleTree {
     center: DVec3,
     /// Half the diagonal of its bounds, world units.
     radius: f64,
+    /// The mesh without its positions and normals.
+    paint: Box<Mesh>,
 }
 
 /// One that has an area.
@@ -49,8 +50,8 @@ struct Triangle {
     normal: DVec3,
     /// Of its corners, unit or zero; all zero without.
     normals: [DVec3; 3],
-    /// Of its corners: linear RGB, straight alpha.
-    colors: [[f32; 4]; 3],
+    /// Which of the mesh's.
+    index: usize,
 }
 
 impl TriangleTree {
@@ -69,7 +70,6 @@ impl TriangleTree {
         let used = mesh.triangles.iter().filter(|triangle| finite(triangle)).flatten();
         let bounds = used.fold(Bounds::EMPTY, |bounds, &vertex| bounds.with_point(corner(vertex)));
         let (center, radius) = (bounds.center(), 0.5 * bounds.extent().length());
-        let color = |vertex: u32| mesh.colors.as_ref().map_or(DEFAULT_COLOR, |colors| colors.linear(vertex as usize));
         let mut triangles = Vec::new();
         for (index, vertices) in mesh.triangles.iter().enumerate().filter(|(_, triangle)| finite(triangle)) {
             let corners = vertices.map(|vertex| (corner(vertex) - center) / radius);
@@ -77,7 +77,7 @@ impl TriangleTree {
             let Some(normal) = (b - a).cross(c - a).try_normalize() else { continue };
             let unit = |n: [f32; 3]| DVec3::from(n.map(f64::from)).normalize_or_zero();
             let normals = mesh.normals.as_ref().map_or([DVec3::ZERO; 3], |normals| normals[index].map(unit));
-            triangles.push(Triangle { corners, normal, normals, colors: vertices.map(color) });
+            triangles.push(Triangle { corners, normal, normals, index });
         }
         let boxes: Vec<Aabb> = triangles.iter().map(padded_box).collect();
         // The builder takes no empty list in all of its steps.
@@ -86,7 +86,15 @@ impl TriangleTree {
         } else {
             build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut Duration::default())
         };
-        Ok(Self { tree, triangles, center, radius })
+        let paint = Mesh {
+            triangles: mesh.triangles.clone(),
+            colors: mesh.colors.clone(),
+            texture: mesh.texture.clone(),
+            materials: mesh.materials.clone(),
+            material: mesh.material.clone(),
+            ..Mesh::default()
+        };
+        Ok(Self { tree, triangles, center, radius, paint: Box::new(paint) })
     }
 
     /// The middle of the mesh's bounds, world coordinates.
@@ -140,7 +148,7 @@ impl TriangleTree {
             distance: (t + line.shift) * self.radius / direction.length(),
             normal: triangle.normal_at(weights),
             facet: triangle.normal,
-            color: triangle.color_at(weights),
+            color: self.paint.color_at(triangle.index, weights),
         })
     }
 }
@@ -156,18 +164,6 @@ impl Triangle {
     fn normal_at(&self, weights: DVec3) -> DVec3 {
         let [a, b, c] = self.normals;
         (a * weights.x + b * weights.y + c * weights.z).try_normalize().unwrap_or(self.normal)
-    }
-
-    /// Interpolated premultiplied, as splats are blended.
-    fn color_at(&self, weights: DVec3) -> [f32; 4] {
-        let mut sum = [0.0; 4];
-        for (color, weight) in self.colors.iter().zip(weights.to_array()) {
-            let [r, g, b, alpha] = color.map(f64::from);
-            let covers = weight * alpha;
-            sum = [sum[0] + covers * r, sum[1] + covers * g, sum[2] + covers * b, sum[3] + covers];
-        }
-        let [r, g, b, alpha] = sum;
-        if alpha > 0.0 { [r / alpha, g / alpha, b / alpha, alpha].map(|c| c as f32) } else { [0.0; 4] }
     }
 }
 

@@ -12,7 +12,7 @@ use epsplat::gpu::Gpu;
 use epsplat::gpu::layout::{ONE, View};
 use epsplat::passes::accumulate::{ACCUMULATORS, Accumulator};
 use epsplat::scene::{
-    BlendFormat, ColorNeed, KernelShape, LowPass, Projection, Raster, RasterDepth, RenderOptions, SceneNeeds,
+    BlendFormat, ColorNeed, KernelShape, LowPass, Projection, Raster, RasterDepth, RenderOptions, SceneNeeds, Shading,
 };
 
 /// What one unit in a sum of the accumulator `fixed` is of a full weight.
@@ -63,7 +63,7 @@ pub fn all_needs() -> Vec<SceneNeeds> {
                     next = (next + 101) % base.len();
                     let low_pass = [LowPass::None, LowPass::Max, LowPass::Ewa][next % 3];
                     let accumulator = row.name;
-                    let tiles = accumulator == ACCUMULATORS[0].name;
+                    let tiles = accumulator == ACCUMULATORS[0].name && base[next].color != ColorNeed::Textured;
                     let gather = tiles && next % 2 == 0;
                     all.push(SceneNeeds { accumulator, tiles, gather, kernel, epsilon_radius, low_pass, ..base[next] });
                     if accumulator == ACCUMULATORS[0].name {
@@ -76,9 +76,10 @@ pub fn all_needs() -> Vec<SceneNeeds> {
             }
         }
     }
+    let rastered: Vec<_> = base.iter().filter(|needs| needs.color != ColorNeed::Textured).collect();
     // The rasteriser's, with as many targets as the sums take.
     for (step, (depth, _)) in (0..240).zip(RasterDepth::ALL.iter().cycle()) {
-        let (kernel, base) = (shapes[step % 4], base[(step * 101) % base.len()]);
+        let (kernel, base) = (shapes[step % 4], rastered[(step * 101) % rastered.len()]);
         let low_pass = [LowPass::None, LowPass::Max, LowPass::Ewa][step / 3 % 3];
         let raster = Some(Raster { format: BlendFormat::ALL[step / 7 % 3].0, depth: *depth });
         let triangles = step / 2 % 2 == 0;
@@ -91,7 +92,7 @@ pub fn all_needs() -> Vec<SceneNeeds> {
             cull: false,
             tiles: false,
             gather: false,
-            ..base
+            ..*base
         });
     }
     all
@@ -103,9 +104,14 @@ fn base_needs() -> Vec<SceneNeeds> {
     let mut all = Vec::new();
     for bits in 0..1u32 << 8 {
         let bit = |k: u32| bits >> k & 1 == 1;
-        let (lambert, normal_map, turn_normals, alpha) = (bit(0), bit(1), bit(2), bit(3));
-        let normal = lambert || normal_map;
-        for color in [ColorNeed::Constant, ColorNeed::Srgb8, ColorNeed::Linear] {
+        let (lit, normal_map, turn_normals, alpha) = (bit(0), bit(1), bit(2), bit(3));
+        let normal = lit || normal_map;
+        let shading = match (lit, bits.count_ones() % 2 == 0) {
+            (false, _) => Shading::Unlit,
+            (true, true) => Shading::Lambert,
+            (true, false) => Shading::Phong,
+        };
+        for color in [ColorNeed::Constant, ColorNeed::Srgb8, ColorNeed::Linear, ColorNeed::Textured] {
             if (turn_normals && !normal) || (alpha && color == ColorNeed::Constant) {
                 continue;
             }
@@ -116,8 +122,8 @@ fn base_needs() -> Vec<SceneNeeds> {
                 accumulator: ACCUMULATORS[0].name,
                 wide_sums: false,
                 atomics_u64: false,
-                tiles: bits * 37 / 8 % 4 == 0,
-                gather: bits * 37 / 8 % 8 == 0,
+                tiles: bits * 37 / 8 % 4 == 0 && color != ColorNeed::Textured,
+                gather: bits * 37 / 8 % 8 == 0 && color != ColorNeed::Textured,
                 // Both, of each of the others.
                 subgroups: bits.count_ones() % 3 == 0,
                 cull: bits.count_ones() % 2 == 0,
@@ -131,7 +137,7 @@ fn base_needs() -> Vec<SceneNeeds> {
                 turn_normals,
                 depth,
                 count,
-                lambert,
+                shading,
                 normal_map,
                 weight_map,
                 ..plain

@@ -202,6 +202,7 @@ pub fn shuffled(scene: &Scene, seed: u64) -> Scene {
         Colors::Constant(color) => Colors::Constant(*color),
         Colors::Srgb8(codes) => Colors::Srgb8(order.iter().map(|&k| codes[k]).collect()),
         Colors::Linear(colors) => Colors::Linear(order.iter().map(|&k| colors[k]).collect()),
+        Colors::Textured(textured) => Colors::Textured(textured.taken(&order)),
     };
     Scene { surfels: order.iter().map(|&k| scene.surfels[k]).collect(), colors, ..scene.clone() }
 }

@@ -101,7 +101,7 @@ impl Properties {
                 None => ColorProperties::Absent,
                 Some(Colors::Srgb8(codes)) if codes.iter().all(|code| code[3] == 255) => ColorProperties::Srgb8,
                 Some(Colors::Srgb8(_)) => ColorProperties::Srgb8Alpha,
-                Some(Colors::Linear(_) | Colors::Constant(_)) => ColorProperties::Linear,
+                Some(Colors::Linear(_) | Colors::Constant(_) | Colors::Textured(_)) => ColorProperties::Linear,
             },
             texture: points.texture.is_some(),
         }
@@ -223,6 +223,7 @@ pub fn write_points(path: &Path, points: &Points, progress: &dyn Progress) -> Re
                 Some(Colors::Srgb8(codes)) => codes.get(index).map(|code| Color::Srgb8(*code)),
                 Some(Colors::Linear(colors)) => colors.get(index).map(|color| Color::Linear(*color)),
                 Some(Colors::Constant(color)) => Some(Color::Linear(*color)),
+                Some(Colors::Textured(textured)) => textured.colors().get(index).map(|color| Color::Linear(*color)),
                 None => None,
             },
             texture: of(&points.texture, index).unwrap_or_default(),

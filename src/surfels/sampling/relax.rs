@@ -4,9 +4,10 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::candidates::Candidate;
-use super::surface::{MeshSurface, Place, mean_color};
+use super::surface::{MeshSurface, Place};
 use crate::error::Result;
 use crate::progress::Progress;
+use crate::scene::color::mean_color;
 use crate::surfels::neighbours::NeighbourSearch;
 use crate::surfels::positions::DistinctPositions;
 use crate::truth::nearest::closest_weights;

@@ -1,11 +1,10 @@
 //! The surface that is sampled: the triangles of a mesh that have an area, and what the mesh says at a point of them.
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 
 use crate::error::{Error, Result};
 use crate::io::Mesh;
 use crate::scene::Bounds;
-use crate::scene::color::DEFAULT_COLOR;
 use crate::surfels::LARGEST_COORDINATE;
 
 /// A triangle that has an area.
@@ -100,9 +99,7 @@ impl<'a> MeshSurface<'a> {
 
     /// Texture coordinates there, if the mesh has any.
     pub(super) fn texture(&self, at: Place) -> Option<[f32; 2]> {
-        let [a, b, c] = self.mesh.texture.as_ref()?[self.triangles[at.triangle as usize].index]
-            .map(|[u, v]| DVec2::new(u.into(), v.into()));
-        Some((a * at.weights.x + b * at.weights.y + c * at.weights.z).as_vec2().to_array())
+        self.mesh.texture_at(self.triangles[at.triangle as usize].index, at.weights)
     }
 
     /// Whether the mesh says anything of colours.
@@ -110,37 +107,10 @@ impl<'a> MeshSurface<'a> {
         self.mesh.colors.is_some() || self.mesh.material.is_some()
     }
 
-    /// The colour there: linear RGB, straight alpha. A texture times its material's diffuse colour, if there is one; else the
-    /// interpolated colours of the vertices; else the diffuse colour.
+    /// The colour there: linear RGB, straight alpha.
     pub(super) fn color(&self, at: Place) -> [f32; 4] {
-        let index = self.triangles[at.triangle as usize].index;
-        let material = self.mesh.material_of(index);
-        let textured = material.and_then(|material| Some((material, material.texture.as_ref()?)));
-        if let (Some((material, texture)), Some([u, v])) = (textured, self.texture(at)) {
-            let texel = texture.at(u, v);
-            return std::array::from_fn(|k| texel[k] * material.diffuse[k]);
-        }
-        match &self.mesh.colors {
-            Some(colors) => {
-                let corners = self.mesh.triangles[index].map(|vertex| colors.linear(vertex as usize));
-                mean_color(corners.into_iter().zip(at.weights.to_array()))
-            }
-            None => material.map_or(DEFAULT_COLOR, |material| material.diffuse),
-        }
+        self.mesh.color_at(self.triangles[at.triangle as usize].index, at.weights)
     }
-}
-
-/// The weighted mean of straight colours, premultiplied as splats are blended.
-pub(super) fn mean_color(colors: impl Iterator<Item = ([f32; 4], f64)>) -> [f32; 4] {
-    let (mut sum, mut weights) = ([0.0; 4], 0.0);
-    for (color, weight) in colors {
-        let [r, g, b, alpha] = color.map(f64::from);
-        let covers = weight * alpha;
-        sum = [sum[0] + covers * r, sum[1] + covers * g, sum[2] + covers * b, sum[3] + covers];
-        weights += weight;
-    }
-    let [r, g, b, alpha] = sum;
-    if alpha > 0.0 { [r / alpha, g / alpha, b / alpha, alpha / weights].map(|c| c as f32) } else { [0.0; 4] }
 }
 
 /// A point of the surface.

@@ -1,0 +1,274 @@
+//! Surfels painted by a texture: the device against the twin, painted surfels against rays, and what cannot be painted.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use std::f64::consts::{PI, TAU};
+use std::process::Command;
+
+use common::bits;
+use common::scenes::{shuffled, sphere, sphere_camera};
+use epsplat::gpu::Sources;
+use epsplat::io::{Points, Texture};
+use epsplat::passes::project::reference_all;
+use epsplat::passes::{accumulate, visibility};
+use epsplat::render::{Backend, render};
+use epsplat::scene::{
+    Camera, Colors, Lens, LowPass, Maps, Place, Projection, RenderOptions, Scene, Shading, Textured, Up,
+};
+use epsplat::surfels::build_textured;
+use glam::{DVec3, Vec3};
+
+const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data");
+
+/// Waves of 8-bit colours, opaque or not. Neighbouring texels differ by less than [`STEEPEST`].
+fn waves(opaque: bool) -> Texture {
+    let (width, height) = (64u32, 32u32);
+    let texel = |k: u32| {
+        let (x, y) = (TAU * f64::from(k % width) / f64::from(width), TAU * f64::from(k / width) / f64::from(height));
+        let code = |wave: f64| (140.0 + 100.0 * wave.sin()) as u8;
+        [code(3.0 * x), code(2.0 * y), code(x + y), if opaque { 255 } else { code(x - y) }]
+    };
+    Texture::new(width, height, (0..width * height).map(texel).collect()).unwrap()
+}
+
+/// Linear light from texel to texel: 100 codes of a wave of 64 / 3 texels are 30 codes a texel, at most 0.0086 each.
+const STEEPEST: f64 = 30.0 * 0.0086;
+
+/// The belt of a sphere whose texture goes around it once, with a seam from end to end.
+fn globe(count: usize, texture: Texture) -> Scene {
+    let whole = sphere(count, 1.5);
+    let centers = whole.surfels.iter().map(|surfel| Vec3::from_array(surfel.center));
+    let belt: Vec<Vec3> = centers.filter(|center| center.y.abs() < 0.8).collect();
+    let around = |p: &Vec3| [(0.5 + f64::from(p.z).atan2(p.x.into()) / TAU) as f32, 1.0 - p.y.acos() / PI as f32];
+    let points = Points {
+        positions: belt.iter().map(|center| center.as_dvec3().to_array()).collect(),
+        normals: Some(belt.iter().map(Vec3::to_array).collect()),
+        radii: Some(vec![whole.surfels[0].radius(); belt.len()]),
+        texture: Some(belt.iter().map(around).collect()),
+        ..Points::default()
+    };
+    build_textured(vec![points], texture, &()).unwrap().0
+}
+
+fn textured(scene: &Scene) -> &Textured {
+    let Colors::Textured(textured) = &scene.colors else { panic!("it is not textured") };
+    textured
+}
+
+/// Toward the seam, which the camera of [`sphere_camera`] does not see.
+fn camera(size: u32, projection: Projection) -> Camera {
+    let eye = DVec3::new(-2.6, 0.7, 0.9);
+    let lens = sphere_camera(size, projection);
+    let lens = match projection {
+        Projection::Pinhole => Lens::Intrinsics([lens.fx, lens.fy, lens.cx, lens.cy]),
+        Projection::Orthographic => Lens::OrthographicHeight(2.1),
+    };
+    Camera::look_at((size, size), lens, eye, DVec3::ZERO, None, Up::Y, 1e-5).unwrap()
+}
+
+/// Pixels at which the device's colour is farther from the twin's than the sums' bound, the texture's slope and the passage
+/// between the texture and the blended colour allow; and how many were looked at, were undecided, and lie in the passage.
+fn beyond_bounds(scene: &Scene, camera: &Camera, accumulator: &'static str, sources: &Sources) -> Option<[usize; 4]> {
+    let gpu = common::gpu()?;
+    let options = RenderOptions { accumulator, ..unlit() };
+    let row = accumulate::accumulator(accumulator).unwrap();
+    let fraction_bits = row.fraction_bits(scene.surfels.len() as u64);
+    let backend = Backend::Gpu { gpu: Box::new(gpu), sources: sources.clone() };
+    let (device, _) = render(scene, camera, &options, &backend, &()).unwrap();
+    let exact = RenderOptions { maps: Maps { decision: true, normal: true, ..options.maps }, ..options };
+    let (twin, _) = render(scene, camera, &exact, &Backend::Reference, &()).unwrap();
+    let splats = reference_all(scene, camera, &exact);
+    let nearest = visibility::reference(splats.iter(), camera, LowPass::None, 0, camera.height);
+    let sums = accumulate::reference(splats.iter(), scene, camera, &exact, 0, &nearest);
+    let range = textured(scene).range();
+    let [width, height] = textured(scene).texture().size().map(f64::from);
+    // Colour for a step in the texture, of one in u or in v.
+    let slope = STEEPEST * width.hypot(height);
+    let (mut found, mut worst) = ([0; 4], 0f64);
+    for (pixel, sum) in sums.iter().enumerate().filter(|(_, sum)| sum.weight > 0.0) {
+        found[1] += 1;
+        if twin.decision.as_ref().unwrap()[pixel] < 1e-5 {
+            found[2] += 1;
+            continue;
+        }
+        let [u, v, squared, reach_2] = sum.place.map(|total| total / sum.weight);
+        let variance = squared - u * u - v * v;
+        // Of a mean as a fraction of its range; and what f32 makes of a fragment's weight and of its place on the disk.
+        let mean = 3.0 * (row.error_bound)(sum.count.max(1).into(), sum.weight, fraction_bits);
+        let fragment = 2e-6;
+        let apart = variance.max(0.0).sqrt() + reach_2.sqrt();
+        // A fragment's point errs by a few roundings of its distance, which is about 3, and along the surface by more the more
+        // that is tilted; the coordinates gain less than 0.4 for a unit.
+        let normal = Vec3::from_array(twin.normal.as_ref().unwrap()[pixel]).as_dvec3();
+        let (x, y) = (pixel as u32 % camera.width, pixel as u32 / camera.width);
+        let cosine = normal.dot(camera.ray(f64::from(x) + 0.5, f64::from(y) + 0.5).normalize()).abs();
+        let of_point = 4.0 * (-24f64).exp2() * 3.0 * 0.4 / (cosine * cosine).max(1e-4);
+        let of_lookup = slope * f64::from(range.span) * (mean + fragment * apart + of_point);
+        // The variance is a difference of means of size 1/2 at most; where it is far from the passage the share is 0 or 1 for both.
+        let of_ratio = 3.0 * mean / reach_2 + fragment * (1.0 + variance / reach_2);
+        let ratio = variance / reach_2;
+        let in_passage = ratio > 1.0 - of_ratio && ratio < 2.0 + of_ratio;
+        found[3] += usize::from(in_passage);
+        let alpha = f64::from(twin.color[pixel][3]).max(0.3);
+        let limit = (mean + fragment + of_lookup + if in_passage { of_ratio } else { 0.0 }) / alpha;
+        let differs = (0..4).map(|k| f64::from((device.color[pixel][k] - twin.color[pixel][k]).abs()));
+        let difference = differs.fold(0.0, f64::max);
+        worst = worst.max(difference / limit);
+        found[0] += usize::from(difference > limit);
+    }
+    eprintln!("{accumulator}: {found:?}, at most {worst:.2} of the bounds");
+    Some(found)
+}
+
+fn unlit() -> RenderOptions {
+    RenderOptions { shading: Shading::Unlit, ..RenderOptions::default() }
+}
+
+#[test]
+fn the_device_paints_as_its_twin_does() {
+    let Some(gpu) = common::gpu() else { return };
+    let globe = globe(3000, waves(true));
+    for row in common::accumulators(&gpu) {
+        let camera = camera(160, Projection::Pinhole);
+        let Some(found) = beyond_bounds(&globe, &camera, row.name, &Sources::default()) else { return };
+        let [wrong, covered, open, passing] = found;
+        assert!(wrong == 0 && covered > 8000 && open < covered / 50 && passing > 0, "{}: {found:?}", row.name);
+    }
+    for (scene, projection) in
+        [(&globe, Projection::Orthographic), (&self::globe(3000, waves(false)), Projection::Pinhole)]
+    {
+        let found = beyond_bounds(scene, &camera(160, projection), "fixed", &Sources::default()).unwrap();
+        assert!(found[0] == 0 && found[1] > 8000, "{found:?}");
+    }
+    for (file, from, to) in [
+        ("texture.wgsl", "fract(turns)", "fract(turns + 0.001)"),
+        ("texture.wgsl", "clamp(2.0 -", "clamp(200.0 -"),
+        ("texture.wgsl", "(point - place.position) * view.world", "(point - place.position) * (0.9 * view.world)"),
+        ("texture.wgsl", "texel(column + 1, row + 1), share.x)", "texel(column + 1, row + 1), 0.99 * share.x)"),
+        ("srgb.wgsl", "(code >> 8u) & 0xffu", "(code >> 9u) & 0xffu"),
+        ("resolve.wgsl", "textured(sums_of, weight, resolve_color(sums_of, weight))", "resolve_color(sums_of, weight)"),
+    ] {
+        let broken = Sources::default().replace(file, from, to).unwrap();
+        let found = beyond_bounds(&globe, &camera(160, Projection::Pinhole), "fixed", &broken).unwrap();
+        assert!(found[0] >= 20, "{from} became {to}, and {found:?}");
+    }
+}
+
+#[test]
+fn a_painted_image_does_not_depend_on_the_order_of_surfels() {
+    let Some(gpu) = common::gpu() else { return };
+    let (scene, camera) = (globe(2000, waves(true)), camera(96, Projection::Pinhole));
+    let backend = Backend::gpu(gpu);
+    let drawn = |scene: &Scene| bits(&render(scene, &camera, &unlit(), &backend, &()).unwrap().0);
+    let first = drawn(&scene);
+    assert_eq!(first, drawn(&shuffled(&scene, 7)));
+    // Another texture makes another image.
+    assert_ne!(first, drawn(&globe(2000, waves(false))));
+}
+
+/// A scene with other places.
+fn with_places(scene: &Scene, other: impl Fn(&Place) -> Place) -> Scene {
+    let painted = textured(scene);
+    let places = painted.places().iter().map(other).collect();
+    let again = Textured::new(painted.texture().clone().into(), places, painted.colors().to_vec()).unwrap();
+    Scene { colors: Colors::Textured(again), ..scene.clone() }
+}
+
+/// The root of the mean squared difference between what is drawn of [`globe`] and the texture at the very points of the sphere,
+/// away from the outline and the belt's ends: over all pixels, and over those within two surfels of the seam.
+fn apart_from_the_sphere(scene: &Scene, texture: &Texture, spacing: f64) -> [f64; 2] {
+    let camera = camera(240, Projection::Pinhole);
+    let (frame, _) = render(scene, &camera, &unlit(), &Backend::Reference, &()).unwrap();
+    let mut sums = [[0.0; 2]; 2];
+    for (pixel, color) in frame.color.iter().enumerate() {
+        let (x, y) = ((pixel % 240) as f64 + 0.5, (pixel / 240) as f64 + 0.5);
+        let (start, toward) = (camera.eye, camera.ray(x, y).normalize());
+        let nearest = -start.dot(toward);
+        let half_2 = 1.0 - start.length_squared() + nearest * nearest;
+        let point = start + (nearest - half_2.max(0.0).sqrt()) * toward;
+        if half_2 <= 0.0 || point.dot(toward) > -0.4 || point.y.abs() > 0.6 {
+            continue;
+        }
+        let [u, v] = [0.5 + point.z.atan2(point.x) / TAU, 1.0 - point.y.acos() / PI];
+        let texel = texture.premultiplied_at([u, v]);
+        let squared = (0..3).map(|k| (f64::from(color[k]) - texel[k]).powi(2)).sum::<f64>() / 3.0;
+        let at_seam = point.x < 0.0 && point.z.abs() < 2.0 * spacing;
+        for (sum, counts) in sums.iter_mut().zip([true, at_seam]) {
+            *sum = if counts { [sum[0] + squared, sum[1] + 1.0] } else { *sum };
+        }
+    }
+    assert!(sums[0][1] > 10_000.0 && sums[1][1] > 500.0, "{sums:?}");
+    sums.map(|[sum, count]| (sum / count).sqrt())
+}
+
+#[test]
+fn a_texture_shows_what_is_finer_than_surfels() {
+    // A wave of the texture is as long as three surfels.
+    let texel = |k: u32| {
+        let (x, y) = (TAU * f64::from(k % 512) / 512.0, TAU * f64::from(k / 512) / 256.0);
+        let code = |wave: f64| (128.0 + 110.0 * wave) as u8;
+        [code((24.0 * x).sin()), code((12.0 * y).sin()), code((24.0 * x).cos() * (12.0 * y).cos()), 255]
+    };
+    let texture = Texture::new(512, 256, (0..512 * 256).map(texel).collect()).unwrap();
+    let count = 1500;
+    let spacing = (4.0 * PI / count as f64).sqrt();
+    let painted = globe(count, texture.clone());
+    let at_centers = textured(&painted).places().iter().map(|place| texture.at(place.center[0], place.center[1]));
+    let colored = Scene { colors: Colors::Linear(at_centers.collect()), ..painted.clone() };
+    // Of the paper's TexZ map: a splat has the coordinates of its centre.
+    let of_centers = with_places(&painted, |place| Place { slopes: [[0.0; 3]; 2], ..*place });
+    // Seams are not told from anything else.
+    let across_seams = with_places(&painted, |place| Place { reach: 10.0, ..*place });
+    let apart = |scene: &Scene| apart_from_the_sphere(scene, &texture, spacing);
+    let [by_texture, by_color, of_centers, across] = [&painted, &colored, &of_centers, &across_seams].map(apart);
+    eprintln!("texture {by_texture:.4?}, colour {by_color:.4?}, centres {of_centers:.4?}, across seams {across:.4?}");
+    assert!(by_texture[0] < 0.5 * by_color[0] && by_texture[0] < 0.5 * of_centers[0]);
+    assert!(by_texture[1] < 0.8 * across[1] && by_texture[0] < across[0]);
+}
+
+fn refused(arguments: &[&str]) -> (i32, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("out.png");
+    let run = Command::new(env!("CARGO_BIN_EXE_epsplat")).arg("render").args(arguments).arg("-o").arg(&output).output();
+    let run = run.unwrap();
+    assert!(!output.exists());
+    (run.status.code().unwrap(), String::from_utf8(run.stderr).unwrap())
+}
+
+#[test]
+fn what_cannot_be_painted_is_told() {
+    let (bunny, cube) = (&format!("{DATA}/bunny.obj"), &format!("{DATA}/cube.png"));
+    let reference = ["--backend", "reference"];
+    for (arguments, code, words) in [
+        ([&[bunny, "--texture", cube][..], &reference].concat(), 1, ["bunny.obj", "no texture coordinates"]),
+        ([&[bunny, "--texture", bunny][..], &reference].concat(), 1, ["bunny.obj", "PNG"]),
+        ([&[bunny, "--texture", "none.png"][..], &reference].concat(), 1, ["none.png", "No such file"]),
+        (vec![bunny, "--texture", cube, "--backend", "raster"], 2, ["raster", "--texture"]),
+        (vec![bunny, "--texture", cube, "--organisation", "tile"], 2, ["tile", "--texture"]),
+        (vec![bunny, "--shininess", "5"], 2, ["--shininess", "phong"]),
+        (vec![bunny, "--shading", "phong", "--shininess", "0"], 2, ["--shininess", "1000"]),
+    ] {
+        let (status, told) = refused(&arguments);
+        assert!(status == code && words.iter().all(|word| told.contains(word)), "{arguments:?}: {status} {told}");
+    }
+    let bare = Points { positions: vec![[0.0; 3]; 3], ..Points::default() };
+    assert!(build_textured(vec![bare], waves(true), &()).unwrap_err().to_string().contains("texture coordinates"));
+}
+
+#[test]
+fn places_that_are_no_numbers_are_counted() {
+    let points = Points {
+        positions: (0..25).map(|k| [f64::from(k % 5), f64::from(k / 5), 0.0]).collect(),
+        texture: Some((0..25).map(|k| [0.1 * (k % 5) as f32, if k == 12 { f32::NAN } else { 0.5 }]).collect()),
+        ..Points::default()
+    };
+    let (scene, preparation) = build_textured(vec![points], waves(true), &()).unwrap();
+    assert_eq!(preparation.replaced_places, 1);
+    assert!(preparation.notes().iter().any(|note| note.contains("1 points had texture coordinates")));
+    assert_eq!(textured(&scene).places()[12].center, [0.0; 2]);
+    // Along x the coordinate gains 0.1 a unit.
+    let [u_slope, v_slope] = textured(&scene).places()[6].slopes.map(Vec3::from_array);
+    assert!(u_slope.distance(0.1 * Vec3::X) < 1e-6 && v_slope.length() < 1e-6, "{u_slope} {v_slope}");
+}

@@ -1,0 +1,27 @@
+// Lambert's term as in shade_lambert.wgsl, and beside it white highlights where the eye is near a light's mirrored
+// direction r = 2 (n . l) n - l: sum of intensity * (n . l) * max(0, r . v)^SHININESS. Twin: src/passes/resolve.rs.
+
+override SHININESS: f32;
+// As in shade_lambert.wgsl.
+override LIGHTS: u32;
+
+// HIGHLIGHT of src/scene/options.rs.
+const HIGHLIGHT: f32 = 0.3;
+
+fn shade(color: vec3<f32>, normal: vec3<f32>, x: u32, y: u32) -> vec3<f32> {
+    let toward_eye = -ray(x, y);
+    let facing_eye = dot(normal, toward_eye);
+    var irradiance = 0.0;
+    var highlight = 0.0;
+    for (var i = 0u; i < LIGHTS; i++) {
+        let light = view.lights[i];
+        let is_headlight = all(light.xyz == vec3<f32>(0.0));
+        let toward = select(light.xyz, toward_eye, is_headlight);
+        let facing = dot(normal, toward);
+        let received = light.w * select(max(0.0, facing), abs(facing), is_headlight);
+        let mirrored = 2.0 * facing * facing_eye - dot(toward, toward_eye);
+        irradiance += received;
+        highlight += received * pow(max(0.0, mirrored), SHININESS);
+    }
+    return color * irradiance + HIGHLIGHT * highlight;
+}

@@ -1,0 +1,75 @@
+// Surfels that are painted by a texture: what is summed of their places in it, and its lookup at the mean of these.
+// Twin: src/scene/texture.rs.
+
+override PLACE_CHANNEL: u32;
+
+// Rows from the top, four bytes of sRGB and straight alpha each.
+@group(0) @binding(36) var<storage, read> texels: array<u32>;
+
+// Texture coordinates are in units of their range.
+struct Place {
+    // Of the surfel's centre, mapped to [0, 1].
+    center: vec2<f32>,
+    // Mapped to [0, 1] from its own range.
+    reach_2: f32,
+    // The centre itself, device units.
+    position: vec3<f32>,
+    // What the coordinates gain for a world unit along each axis.
+    u_slope: vec3<f32>,
+    v_slope: vec3<f32>,
+}
+
+fn place_of(index: u32) -> Place {
+    let center = surfels[index].center;
+    let at = colors[4u * index + 1u];
+    return Place(
+        at.xy,
+        at.z,
+        vec3<f32>(center[0], center[1], center[2]) * view.unit,
+        colors[4u * index + 2u].xyz,
+        colors[4u * index + 3u].xyz,
+    );
+}
+
+fn accumulate_place(pixel: u32, weight: Term, place: Place, depth: f32) {
+    let point = point_at(pixel % held.width, pixel / held.width + held.first_row, depth);
+    let step = (point - place.position) * view.world;
+    let at = place.center + vec2<f32>(dot(step, place.u_slope), dot(step, place.v_slope));
+    let offset = at - 0.5;
+    add_pair(pixel, PLACE_CHANNEL, term(weight, at.x), term(weight, at.y));
+    // Of coordinates in [0, 1] the squared distance from the middle is at most 1/2.
+    add_pair(pixel, PLACE_CHANNEL + 2u, term(weight, 2.0 * dot(offset, offset)), term(weight, place.reach_2));
+}
+
+fn texel(column: i32, row: i32) -> vec4<f32> {
+    let size = vec2<i32>(i32(view.texture_width), i32(view.texture_height));
+    // Both are at least -1 and at most the size.
+    let at = (vec2<i32>(column, row) + size) % size;
+    return premultiplied_of(texels[at.y * size.x + at.x]);
+}
+
+// Premultiplied linear colour at texture coordinates, origin bottom left: between the middles of texels interpolated, beyond
+// [0, 1] repeated.
+fn texture_at(place: vec2<f32>) -> vec4<f32> {
+    let turns = vec2<f32>(place.x, 1.0 - place.y);
+    let at = fract(turns) * vec2<f32>(f32(view.texture_width), f32(view.texture_height)) - 0.5;
+    let low = floor(at);
+    let share = at - low;
+    let column = i32(low.x);
+    let row = i32(low.y);
+    let above = mix(texel(column, row), texel(column + 1, row), share.x);
+    let below = mix(texel(column, row + 1), texel(column + 1, row + 1), share.x);
+    return mix(above, below, share.y);
+}
+
+// The premultiplied colour of a pixel: by the texture where the places agree, else as blended.
+fn textured(pixel: u32, weight: f32, blended: vec4<f32>) -> vec4<f32> {
+    var mean: vec4<f32>;
+    for (var k = 0u; k < 4u; k++) {
+        mean[k] = sum_at(pixel, PLACE_CHANNEL + k) / weight;
+    }
+    let offset = mean.xy - 0.5;
+    let variance = 0.5 * mean.z - dot(offset, offset);
+    let share = clamp(2.0 - variance / (mean.w * view.place.w), 0.0, 1.0);
+    return blended + share * (texture_at(view.place.xy + offset * view.place.z) - blended);
+}

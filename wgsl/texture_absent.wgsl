@@ -1,0 +1,13 @@
+struct Place {
+    nothing: u32,
+}
+
+fn place_of(index: u32) -> Place {
+    return Place(0u);
+}
+
+fn accumulate_place(pixel: u32, weight: Term, place: Place, depth: f32) {}
+
+fn textured(pixel: u32, weight: f32, blended: vec4<f32>) -> vec4<f32> {
+    return blended;
+}

@@ -118,11 +118,7 @@ fn a_wrong_tile_is_noticed() {
     // Of tiles that gather all splats, large and small; and of those that add the large ones to what is stored, of several pages.
     let gathered = [
         ("bin.wgsl", "atomicStore(&lists[at], index)", "atomicStore(&lists[at], 0u)"),
-        (
-            "bin.wgsl",
-            "enter_cells(index, splat, TILE_SIDE, vec2<u32>(0u), 1u)",
-            "enter_cells(index, splat, TILE_SIDE, vec2<u32>(0u), 2u)",
-        ),
+        ("bin.wgsl", "TILE_SIDE, vec2<u32>(0u), 1u, true)", "TILE_SIDE, vec2<u32>(0u), 2u, true)"),
         ("tile.wgsl", "b.w = nearer(b.w, splat, filter_, column.x, column.y + 7u);", ""),
         ("tile.wgsl", "deepest_accepted(farthest_of(a, b))", "farthest_of(a, b)"),
         ("tile.wgsl", "select(Term(0), weight_of(fragment), accepted)", "weight_of(fragment)"),

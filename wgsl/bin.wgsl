@@ -35,22 +35,9 @@ fn cells_of(pixels: Rectangle, side: u32) -> Rectangle {
     return Rectangle((pixels.first - top) / side, (pixels.last - top) / side);
 }
 
-// Counts the splat in its cells, of these those from `offset` on in steps of `step`.
-fn count_cells(splat: Splat, side: u32, offset: vec2<u32>, step: u32) {
-    let pixels = reach(splat);
-    if (any(pixels.first > pixels.last)) {
-        return;
-    }
-    let cells = cells_of(pixels, side);
-    for (var y = cells.first.y + offset.y; y <= cells.last.y; y += step) {
-        for (var x = cells.first.x + offset.x; x <= cells.last.x; x += step) {
-            atomicAdd(&lists[LIST_ENDS + 1u + y * cells_across(side) + x], 1u);
-        }
-    }
-}
-
-// Enters it in their lists.
-fn enter_cells(index: u32, splat: Splat, side: u32, offset: vec2<u32>, step: u32) {
+// Counts the splat in its cells, of these those from `offset` on in steps of `step`; once counts are starts, this `enters` it
+// in their lists.
+fn list_in_cells(index: u32, splat: Splat, side: u32, offset: vec2<u32>, step: u32, enters: bool) {
     let pixels = reach(splat);
     if (any(pixels.first > pixels.last)) {
         return;
@@ -59,10 +46,16 @@ fn enter_cells(index: u32, splat: Splat, side: u32, offset: vec2<u32>, step: u32
     for (var y = cells.first.y + offset.y; y <= cells.last.y; y += step) {
         for (var x = cells.first.x + offset.x; x <= cells.last.x; x += step) {
             let at = lists_start(side) + atomicAdd(&lists[LIST_ENDS + 1u + y * cells_across(side) + x], 1u);
-            if (at < arrayLength(&lists)) {
+            if (enters && at < arrayLength(&lists)) {
                 atomicStore(&lists[at], index);
             }
         }
+    }
+}
+
+fn list_large(index: u32, local: vec2<u32>, enters: bool) {
+    if (index < arrayLength(&projected)) {
+        list_in_cells(index, projected[index], BLOCK_SIDE, local, 8u, enters);
     }
 }
 
@@ -86,7 +79,7 @@ fn bin_count(
         splats[index].bounds_first = 0xffffffffu;
         splats[index].bounds_last = 0u;
     } else {
-        count_cells(splat, TILE_SIDE, vec2<u32>(0u), 1u);
+        list_in_cells(index, splat, TILE_SIDE, vec2<u32>(0u), 1u, false);
     }
 }
 
@@ -100,7 +93,7 @@ fn bin_place(
     if (index < arrayLength(&projected)) {
         let splat = projected[index];
         if (!is_large(splat)) {
-            enter_cells(index, splat, TILE_SIDE, vec2<u32>(0u), 1u);
+            list_in_cells(index, splat, TILE_SIDE, vec2<u32>(0u), 1u, true);
         }
     }
 }
@@ -112,10 +105,7 @@ fn bin_count_large(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_id) local: vec3<u32>,
 ) {
-    let index = large_splat(workgroup, workgroups);
-    if (index < arrayLength(&projected)) {
-        count_cells(projected[index], BLOCK_SIDE, local.xy, 8u);
-    }
+    list_large(large_splat(workgroup, workgroups), local.xy, false);
 }
 
 @compute @workgroup_size(8, 8)
@@ -124,10 +114,7 @@ fn bin_place_large(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_id) local: vec3<u32>,
 ) {
-    let index = large_splat(workgroup, workgroups);
-    if (index < arrayLength(&projected)) {
-        enter_cells(index, projected[index], BLOCK_SIDE, local.xy, 8u);
-    }
+    list_large(large_splat(workgroup, workgroups), local.xy, true);
 }
 
 const SCANNERS: u32 = 256u;

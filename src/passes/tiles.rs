@@ -141,7 +141,9 @@ impl Tiles {
         }
         let needed = self.lists(of).needed(gpu)?;
         let room = Room { entries: needed.entries + needed.entries / 4, longest: needed.longest };
-        let most = Room { entries: gpu.buffer_limit() / 4, longest: LONGEST };
+        // These have no entries yet: what they are long is what precedes the entries.
+        let before = self.lists(of).words.len;
+        let most = Room { entries: (gpu.buffer_limit() / 4).saturating_sub(before), longest: LONGEST };
         if !most.holds(room) {
             return Ok(false);
         }

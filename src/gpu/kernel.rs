@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::device::Gpu;
 use super::layout::WORKGROUP;
+use super::loops;
 use crate::error::{Error, Result};
 
 macro_rules! wgsl {
@@ -117,6 +118,15 @@ impl Sources {
         Ok(self)
     }
 
+    /// Whether all loops of `files` are known to end.
+    pub(super) fn all_end(&self, files: &[&str]) -> bool {
+        let ends = |file: &&str| match self.0.get(file) {
+            Some(Cow::Borrowed(text)) => loops::all_end(file, text),
+            _ => false,
+        };
+        files.iter().all(ends)
+    }
+
     /// One module of `files`: WGSL's module scope is free of order, so joining is concatenation.
     pub fn join(&self, files: &[&str]) -> String {
         files.iter().map(|name| self.0.get(name).map_or("", |text| text)).collect::<Vec<_>>().join("\n")
@@ -151,23 +161,23 @@ pub(crate) struct Programs(Mutex<HashMap<ProgramKey, Arc<Program>>>);
 type ProgramKey = (String, Vec<(&'static str, u64)>, String);
 
 impl Programs {
-    /// The entry points `stages` of the module `text`, which follow from it, and `draws`.
+    /// The entry points `stages` of the module of `files`, and `draws`.
     pub(crate) fn get(
         &self,
         gpu: &Gpu,
-        text: String,
+        (sources, files): (&Sources, &[&str]),
         stages: &[&str],
         draws: &[Draw],
         constants: &[(&'static str, f64)],
     ) -> Result<Arc<Program>> {
         let bits = constants.iter().map(|&(name, value)| (name, value.to_bits())).collect();
-        let key = (text, bits, format!("{stages:?} {draws:?}"));
+        let key = (sources.join(files), bits, format!("{stages:?} {draws:?}"));
         // A poisoned lock means that another thread panicked while it compiled; the map itself is whole.
         let mut programs = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(program) = programs.get(&key) {
             return Ok(Arc::clone(program));
         }
-        let program = Arc::new(Program::compile(gpu, key.0.clone(), stages, draws, constants)?);
+        let program = Arc::new(Program::compile(gpu, (sources, files), stages, draws, constants)?);
         programs.insert(key, Arc::clone(&program));
         Ok(program)
     }
@@ -193,17 +203,21 @@ pub struct Program {
 }
 
 impl Program {
-    /// Compiles the entry points `stages` of the module `text`, and `draws`. Of `constants` those are set that it declares.
-    fn compile(gpu: &Gpu, text: String, stages: &[&str], draws: &[Draw], constants: &[(&str, f64)]) -> Result<Self> {
+    /// Compiles the entry points `stages` of the module of `files`, and `draws`. Of `constants` those are set that it declares.
+    fn compile(
+        gpu: &Gpu,
+        (sources, files): (&Sources, &[&str]),
+        stages: &[&str],
+        draws: &[Draw],
+        constants: &[(&str, f64)],
+    ) -> Result<Self> {
+        let text = sources.join(files);
         let (_, mut bindings, declared) =
             reflect(&text).map_err(|e| gpu.error(format!("a kernel is not valid WGSL: {e}")))?;
         let constants: Vec<_> =
             constants.iter().copied().filter(|(name, _)| declared.iter().any(|d| d == name)).collect();
         let guard = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
-        let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some("epsplat"),
-            source: wgpu::ShaderSource::Wgsl(text.into()),
-        });
+        let module = loops::module(gpu, sources, files, text);
         let refused = |error| gpu.error(format!("the driver refused a kernel: {error}"));
         // Each on a thread of its own: half of a first frame's time would else go by here.
         let pipelines = stages.par_iter().map(|&stage| {

@@ -4,6 +4,7 @@ pub mod buffers;
 pub mod device;
 pub mod kernel;
 pub mod layout;
+mod loops;
 pub mod timing;
 
 pub use device::{AdapterDescription, Gpu, adapters};

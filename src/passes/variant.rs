@@ -67,12 +67,12 @@ impl Variant {
     /// The compiled kernels; `gpu` keeps them.
     pub fn compile(&self, gpu: &Gpu, sources: &Sources) -> Result<Arc<Program>> {
         let draws = self.needs.raster.map_or_else(Vec::new, |raster| raster::draws(raster, self.pixel));
-        gpu.programs.get(gpu, sources.join(&files(&self.needs)), &stages(&self.needs), &draws, &self.constants)
+        gpu.programs.get(gpu, (sources, &files(&self.needs)), &stages(&self.needs), &draws, &self.constants)
     }
 
     /// The compiled kernels of the tiles; `gpu` keeps them.
     pub fn compile_tiles(&self, gpu: &Gpu, sources: &Sources) -> Result<Arc<Program>> {
-        gpu.programs.get(gpu, sources.join(&tile_files(&self.needs)), &tile_stages(&self.needs), &[], &self.constants)
+        gpu.programs.get(gpu, (sources, &tile_files(&self.needs)), &tile_stages(&self.needs), &[], &self.constants)
     }
 
     /// u32 words of a pixel's sums in storage; the rasteriser's are in textures, those of tiles that gather in registers.

@@ -64,7 +64,7 @@ fn accumulate_large(
     @builtin(local_invocation_id) local: vec3<u32>,
 ) {
     hold();
-    let index = large_splat(workgroup, workgroups);
+    let index = large_splat(workgroup.y * workgroups.x + workgroup.x);
     if (index < arrayLength(&projected)) {
         let splat = projected[index];
         accumulate_splat(index, splat, filter_of(index), reach(splat), local.xy, TILE);

@@ -35,16 +35,16 @@ fn cells_of(pixels: Rectangle, side: u32) -> Rectangle {
     return Rectangle((pixels.first - top) / side, (pixels.last - top) / side);
 }
 
-// Counts the splat in its cells, of these those from `offset` on in steps of `step`; once counts are starts, this `enters` it
-// in their lists.
-fn list_in_cells(index: u32, splat: Splat, side: u32, offset: vec2<u32>, step: u32, enters: bool) {
+// Counts the splat in its cells, of each row those from `offset` on in steps of `step`; once counts are starts, this `enters`
+// it in their lists.
+fn list_in_cells(index: u32, splat: Splat, side: u32, offset: u32, step: u32, enters: bool) {
     let pixels = reach(splat);
     if (any(pixels.first > pixels.last)) {
         return;
     }
     let cells = cells_of(pixels, side);
-    for (var y = cells.first.y + offset.y; y <= cells.last.y; y += step) {
-        for (var x = cells.first.x + offset.x; x <= cells.last.x; x += step) {
+    for (var y = cells.first.y; y <= cells.last.y; y++) {
+        for (var x = cells.first.x + offset; x <= cells.last.x; x += step) {
             let at = lists_start(side) + atomicAdd(&lists[LIST_ENDS + 1u + y * cells_across(side) + x], 1u);
             if (enters && at < arrayLength(&lists)) {
                 atomicStore(&lists[at], index);
@@ -53,9 +53,11 @@ fn list_in_cells(index: u32, splat: Splat, side: u32, offset: vec2<u32>, step: u
     }
 }
 
-fn list_large(index: u32, local: vec2<u32>, enters: bool) {
+// A row of the workgroup for each large splat.
+fn list_large(workgroup: vec3<u32>, workgroups: vec3<u32>, local: vec3<u32>, enters: bool) {
+    let index = large_splat((workgroup.y * workgroups.x + workgroup.x) * LISTED_AT_ONCE + local.y);
     if (index < arrayLength(&projected)) {
-        list_in_cells(index, projected[index], BLOCK_SIDE, local, 8u, enters);
+        list_in_cells(index, projected[index], BLOCK_SIDE, local.x, 8u, enters);
     }
 }
 
@@ -79,7 +81,7 @@ fn bin_count(
         splats[index].bounds_first = 0xffffffffu;
         splats[index].bounds_last = 0u;
     } else {
-        list_in_cells(index, splat, TILE_SIDE, vec2<u32>(0u), 1u, false);
+        list_in_cells(index, splat, TILE_SIDE, 0u, 1u, false);
     }
 }
 
@@ -93,28 +95,27 @@ fn bin_place(
     if (index < arrayLength(&projected)) {
         let splat = projected[index];
         if (!is_large(splat)) {
-            list_in_cells(index, splat, TILE_SIDE, vec2<u32>(0u), 1u, true);
+            list_in_cells(index, splat, TILE_SIDE, 0u, 1u, true);
         }
     }
 }
 
-// One workgroup a large splat, in a square of eight invocations.
-@compute @workgroup_size(8, 8)
+@compute @workgroup_size(8, LISTED_AT_ONCE)
 fn bin_count_large(
     @builtin(workgroup_id) workgroup: vec3<u32>,
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_id) local: vec3<u32>,
 ) {
-    list_large(large_splat(workgroup, workgroups), local.xy, false);
+    list_large(workgroup, workgroups, local, false);
 }
 
-@compute @workgroup_size(8, 8)
+@compute @workgroup_size(8, LISTED_AT_ONCE)
 fn bin_place_large(
     @builtin(workgroup_id) workgroup: vec3<u32>,
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_id) local: vec3<u32>,
 ) {
-    list_large(large_splat(workgroup, workgroups), local.xy, true);
+    list_large(workgroup, workgroups, local, true);
 }
 
 const SCANNERS: u32 = 256u;

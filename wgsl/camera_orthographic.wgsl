@@ -101,6 +101,10 @@ fn intersect(abc: vec3<f32>) -> Fragment {
     return Fragment(rho2 <= 1.0 && abc.z >= held.near, abc.z, rho2, 1.0);
 }
 
+fn rim(most: f32) -> f32 {
+    return 1.0;
+}
+
 fn nearest_between(low: f32, high: f32) -> f32 {
     return low;
 }

@@ -237,6 +237,11 @@ fn intersect(abc: vec3<f32>) -> Fragment {
     return Fragment(reached && depth >= held.near, depth, select(rho2, min(rho2, 1.0), reached), 1.0);
 }
 
+// The longest (u/z, v/z) on the disk where 1/z is at most `most`.
+fn rim(most: f32) -> f32 {
+    return max(most, 0.0);
+}
+
 // The least depth of a fragment where row c has values between `low` and `high`.
 fn nearest_between(low: f32, high: f32) -> f32 {
     return select(3e38, 1.0 / high, high > 0.0);

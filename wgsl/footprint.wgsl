@@ -68,9 +68,8 @@ fn is_large(splat: Splat) -> bool {
 const QUEUE_START: u32 = 8u;
 const TILE: u32 = 16u;
 
-// The splat of this workgroup, or none (a number that is no index).
-fn large_splat(workgroup: vec3<u32>, workgroups: vec3<u32>) -> u32 {
-    let place = workgroup.y * workgroups.x + workgroup.x;
+// The large splat of a place in the queue, or none (a number that is no index).
+fn large_splat(place: u32) -> u32 {
     return select(0xffffffffu, queued[QUEUE_START + place], place < queued[0]);
 }
 

@@ -4,8 +4,9 @@
 
 @group(0) @binding(2) var<storage, read> surfels: array<Surfel>;
 @group(0) @binding(3) var<storage, read_write> splats: array<Splat>;
-// Word 0 counts the large splats, word 1 all that are out of view; three words from QUEUE_GRID on are the grid of workgroups
-// that draws the large ones, and from QUEUE_START on come their indices.
+// Word 0 counts the large splats, word 1 all that are out of view; three words from QUEUE_GRID on are a grid with a workgroup
+// for each large one, three from QUEUE_LISTING on one with a workgroup for LISTED_AT_ONCE of them, and from QUEUE_START on come
+// their indices.
 @group(0) @binding(4) var<storage, read_write> queue: array<atomic<u32>>;
 
 // The rare ones, in the same form; the grid is project_rare's.
@@ -13,6 +14,9 @@
 @group(0) @binding(22) var<storage, read> listed: array<u32>;
 
 const QUEUE_GRID: u32 = 2u;
+const QUEUE_LISTING: u32 = 5u;
+// Large splats that a workgroup lists (bin.wgsl).
+const LISTED_AT_ONCE: u32 = 8u;
 const MOST_GROUPS: u32 = 65535u;
 
 var<workgroup> group_unseen: atomic<u32>;
@@ -153,12 +157,14 @@ fn rows_of(groups: u32) -> vec3<u32> {
     return vec3<u32>((groups + max(rows, 1u) - 1u) / max(rows, 1u), rows, 1u);
 }
 
-// After all surfels: a workgroup for each large splat.
+// After all surfels.
 @compute @workgroup_size(1)
 fn arrange() {
     let large = atomicLoad(&queue[0]);
     let grid = rows_of(large);
+    let listing = rows_of((large + LISTED_AT_ONCE - 1u) / LISTED_AT_ONCE);
     for (var k = 0u; k < 3u; k++) {
         atomicStore(&queue[QUEUE_GRID + k], grid[k]);
+        atomicStore(&queue[QUEUE_LISTING + k], listing[k]);
     }
 }

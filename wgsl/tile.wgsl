@@ -54,7 +54,9 @@ fn fetch(place: u32, listed: u32, column: Column, deepest: f32) -> u32 {
         let first = vec2<u32>(column.x / TILE_SIDE * TILE_SIDE, column.y);
         let last = first + TILE_SIDE - 1u;
         let pixels = Rectangle(max(extent.first, first), min(extent.last, last));
-        wanted = all(pixels.first <= pixels.last) && nearest_reached(own_splat, own_filter, pixels) <= deepest;
+        wanted = all(pixels.first <= pixels.last)
+            && nearest_reached(own_splat, own_filter, pixels) <= deepest
+            && !misses(own_splat, own_filter, pixels);
     }
     return offered(wanted);
 }

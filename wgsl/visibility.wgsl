@@ -57,7 +57,7 @@ fn visibility_large(
     @builtin(local_invocation_id) local: vec3<u32>,
 ) {
     hold();
-    let index = large_splat(workgroup, workgroups);
+    let index = large_splat(workgroup.y * workgroups.x + workgroup.x);
     if (index >= arrayLength(&projected)) {
         return;
     }

@@ -18,12 +18,15 @@ pub const LARGE_BY_TILES: u32 = 256;
 /// Where there are no tiles, splats whose bounds hold more pixels than this get a workgroup each instead of an invocation.
 pub const LARGE_BY_WORKGROUPS: u32 = 1024;
 
-/// Words at the start of a page's queue of large splats: how many there are, how many splats are out of view, and the grid
-/// that has a workgroup for each of the large ones.
+/// Words at the start of a page's queue of large splats: how many there are, how many splats are out of view, and two grids of
+/// workgroups.
 pub const QUEUE_START: u32 = 8;
 
-/// Word of the queue at which that grid starts.
+/// Word of the queue at which the grid starts that has a workgroup for each large splat.
 pub const QUEUE_GRID: u32 = 2;
+
+/// Word of the queue at which the grid starts that lists the large splats in tiles, some a workgroup.
+pub const QUEUE_LISTING: u32 = 5;
 
 /// Side of a tile, pixels (`wgsl/bin.wgsl`).
 pub const TILE_SIDE: u32 = 8;

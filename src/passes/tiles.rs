@@ -25,7 +25,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::kernel::{Bound, Grid, Program};
-use crate::gpu::layout::{BLOCK_SIDE, LIST_ENDS, QUEUE_GRID, TILE_SIDE, WORKGROUP};
+use crate::gpu::layout::{BLOCK_SIDE, LIST_ENDS, QUEUE_LISTING, TILE_SIDE, WORKGROUP};
 use crate::scene::{Camera, RenderOptions, Scene};
 
 /// The fewest tiles that a splat touches on average for all to be summed by tiles. On a software adapter at 1024x1024 frames
@@ -222,7 +222,7 @@ impl Tiles {
         };
         let list = |pass: &mut wgpu::ComputePass<'_>, kernel| {
             if of == Listed::Large {
-                let grid = Grid::In(&page.queue.raw, u64::from(QUEUE_GRID) * 4);
+                let grid = Grid::In(&page.queue.raw, u64::from(QUEUE_LISTING) * 4);
                 return self.program.dispatch(gpu, pass, kernel, &bound, grid);
             }
             for &part in self.parts {

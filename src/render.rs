@@ -241,7 +241,7 @@ impl<'a> Renderer<'a> {
                 if fresh && rows.first == 0 && (needs.gather || needs.tiles && splats.most_large(gpu)? > 0) {
                     let kernels = variant.compile_tiles(gpu, sources)?;
                     let small = if needs.gather { parts } else { &[] };
-                    let mut new = Tiles::new(gpu, kernels, (camera.width, &pixels.bands), small)?;
+                    let mut new = Tiles::new(gpu, (kernels, &needs), (camera.width, &pixels.bands), small)?;
                     let room = new.make_room(&mut recorder, Listed::Large, &splats, &pixels.bands, nearest)?;
                     tiles = room.then_some(new);
                 }

@@ -12,7 +12,8 @@ use epsplat::gpu::Sources;
 use epsplat::gpu::kernel::{FILES, reflect};
 use epsplat::gpu::layout::{
     AWAY, BATCH, BLOCK_SIDE, Band, Filter, LIST_ENDS, LIST_START, MOST_GROUPS, OCCLUSION_TILE, ONE, ONE_WIDE,
-    QUEUE_GRID, QUEUE_START, Splat, TILE, TILE_SIDE, View, WORKGROUP,
+    QUEUE_GRID, QUEUE_LISTING, QUEUE_START, Splat, TILE, TILE_ROWS_PLAIN, TILE_ROWS_SHARED, TILE_WIDTH, View,
+    WORKGROUP,
 };
 use epsplat::passes::accumulate::accumulator;
 use epsplat::passes::variant::{COLOR_CHANNEL, PixelLayout, color_channels, modules};
@@ -396,6 +397,7 @@ fn constants_agree() {
             ("TILE", TILE),
             ("QUEUE_START", QUEUE_START),
             ("QUEUE_GRID", QUEUE_GRID),
+            ("QUEUE_LISTING", QUEUE_LISTING),
             ("MOST_GROUPS", MOST_GROUPS),
             ("AWAY", AWAY),
             ("NOTHING", f32::INFINITY.to_bits()),
@@ -405,7 +407,9 @@ fn constants_agree() {
         }
         let tile = needs.raster.is_none().then_some(f64::from(OCCLUSION_TILE));
         assert_eq!(constant("OCCLUSION_TILE"), tile);
-        let of_tiles = [("TILE_SIDE", TILE_SIDE), ("BLOCK_SIDE", BLOCK_SIDE), ("LIST_ENDS", LIST_ENDS)];
+        let rows = if needs.subgroups { TILE_ROWS_SHARED } else { TILE_ROWS_PLAIN };
+        let of_tiles =
+            [("TILE_WIDTH", TILE_WIDTH), ("TILE_ROWS", rows), ("BLOCK_SIDE", BLOCK_SIDE), ("LIST_ENDS", LIST_ENDS)];
         let of_batches = [("BATCH", BATCH), ("LIST_START", LIST_START)];
         for (exists, constants) in [(tiles, &of_tiles[..]), (needs.cull, &of_batches)] {
             for &(name, value) in constants {

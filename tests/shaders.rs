@@ -257,7 +257,7 @@ fn absent_parts_have_their_partners_signatures() {
     alike("tile_add", &["add"]);
     alike("tile_deposit", &["deposit_sums"]);
     alike("splat_", &["hold_lane", "fetcher", "offered", "farthest_in_tile", "handed"]);
-    alike("tile_filter", &["handed_filter"]);
+    alike("tile_filter", &["handed_filter", "filter_misses"]);
     alike("tile_small", &["small_list", "small_entry"]);
     alike("kernel_", &["kernel_weight"]);
     alike("epsilon", &["radius_of", "deepest_accepted", "farthest_accepted"]);

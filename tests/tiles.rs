@@ -118,9 +118,13 @@ fn a_wrong_tile_is_noticed() {
     // Of tiles that gather all splats, large and small; and of those that add the large ones to what is stored, of several pages.
     let gathered = [
         ("bin.wgsl", "atomicStore(&lists[at], index)", "atomicStore(&lists[at], 0u)"),
-        ("bin.wgsl", "TILE_SIDE, vec2<u32>(0u), 1u, true)", "TILE_SIDE, vec2<u32>(0u), 2u, true)"),
-        ("tile.wgsl", "b.w = nearer(b.w, splat, filter_, column.x, column.y + 7u);", ""),
+        ("bin.wgsl", "TILE_SIZE, 0u, 1u, true)", "TILE_SIZE, 1u, 1u, true)"),
+        ("bin.wgsl", "LISTED_AT_ONCE + local.y", "LISTED_AT_ONCE"),
+        ("tile.wgsl", "b = nearer(b, splat, filter_, column.x, column.y + 4u);", ""),
+        ("tile.wgsl", "d = nearer(d, splat, filter_, column.x, column.y + 12u);", ""),
         ("tile.wgsl", "deepest_accepted(farthest_of(a, b))", "farthest_of(a, b)"),
+        ("tile.wgsl", "gather_eight(8u, next", "gather_eight(0u, next"),
+        ("tile_reach.wgsl", "length + s.slack + sqrt", "0.9 * length + s.slack + 0.5 * sqrt"),
         ("tile.wgsl", "select(Term(0), weight_of(fragment), accepted)", "weight_of(fragment)"),
         ("tile_small.wgsl", "small_lists[end]) +", "small_lists[end - 1u]) +"),
         ("tile_sums.wgsl", "high + select(0u, 1u, sum < low)", "high"),

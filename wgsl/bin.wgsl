@@ -9,43 +9,45 @@
 
 const LIST_ENDS: u32 = 2u;
 
-// Pixels of a tile, across and down.
-const TILE_SIDE: u32 = 8u;
+// Pixels of a tile, across and down; TILE_ROWS is splat_shared.wgsl's or splat_plain.wgsl's.
+const TILE_WIDTH: u32 = 8u;
+const TILE_SIZE: vec2<u32> = vec2<u32>(TILE_WIDTH, TILE_ROWS);
 // Of a large splat's cell.
 const BLOCK_SIDE: u32 = 16u;
+const BLOCK_SIZE: vec2<u32> = vec2<u32>(BLOCK_SIDE, BLOCK_SIDE);
 
-// Cells of `side` pixels in a row of the image.
-fn cells_across(side: u32) -> u32 {
-    return (view.width + side - 1u) / side;
+// Cells of `size` pixels in a row of the image.
+fn cells_across(size: vec2<u32>) -> u32 {
+    return (view.width + size.x - 1u) / size.x;
 }
 
-// Cells of `side` pixels in the band.
-fn cells_in_band(side: u32) -> u32 {
-    return cells_across(side) * ((band.rows + side - 1u) / side);
+// Cells of `size` pixels in the band.
+fn cells_in_band(size: vec2<u32>) -> u32 {
+    return cells_across(size) * ((band.rows + size.y - 1u) / size.y);
 }
 
-// The word at which the lists of cells of `side` pixels start.
-fn lists_start(side: u32) -> u32 {
-    return LIST_ENDS + 1u + cells_in_band(side);
+// The word at which the lists of cells of `size` pixels start.
+fn lists_start(size: vec2<u32>) -> u32 {
+    return LIST_ENDS + 1u + cells_in_band(size);
 }
 
 // The cells that hold `pixels`, which are some, x and y.
-fn cells_of(pixels: Rectangle, side: u32) -> Rectangle {
+fn cells_of(pixels: Rectangle, size: vec2<u32>) -> Rectangle {
     let top = vec2<u32>(0u, band.first_row);
-    return Rectangle((pixels.first - top) / side, (pixels.last - top) / side);
+    return Rectangle((pixels.first - top) / size, (pixels.last - top) / size);
 }
 
 // Counts the splat in its cells, of each row those from `offset` on in steps of `step`; once counts are starts, this `enters`
 // it in their lists.
-fn list_in_cells(index: u32, splat: Splat, side: u32, offset: u32, step: u32, enters: bool) {
+fn list_in_cells(index: u32, splat: Splat, size: vec2<u32>, offset: u32, step: u32, enters: bool) {
     let pixels = reach(splat);
     if (any(pixels.first > pixels.last)) {
         return;
     }
-    let cells = cells_of(pixels, side);
+    let cells = cells_of(pixels, size);
     for (var y = cells.first.y; y <= cells.last.y; y++) {
         for (var x = cells.first.x + offset; x <= cells.last.x; x += step) {
-            let at = lists_start(side) + atomicAdd(&lists[LIST_ENDS + 1u + y * cells_across(side) + x], 1u);
+            let at = lists_start(size) + atomicAdd(&lists[LIST_ENDS + 1u + y * cells_across(size) + x], 1u);
             if (enters && at < arrayLength(&lists)) {
                 atomicStore(&lists[at], index);
             }
@@ -57,7 +59,7 @@ fn list_in_cells(index: u32, splat: Splat, side: u32, offset: u32, step: u32, en
 fn list_large(workgroup: vec3<u32>, workgroups: vec3<u32>, local: vec3<u32>, enters: bool) {
     let index = large_splat((workgroup.y * workgroups.x + workgroup.x) * LISTED_AT_ONCE + local.y);
     if (index < arrayLength(&projected)) {
-        list_in_cells(index, projected[index], BLOCK_SIDE, local.x, 8u, enters);
+        list_in_cells(index, projected[index], BLOCK_SIZE, local.x, 8u, enters);
     }
 }
 
@@ -81,7 +83,7 @@ fn bin_count(
         splats[index].bounds_first = 0xffffffffu;
         splats[index].bounds_last = 0u;
     } else {
-        list_in_cells(index, splat, TILE_SIDE, 0u, 1u, false);
+        list_in_cells(index, splat, TILE_SIZE, 0u, 1u, false);
     }
 }
 
@@ -95,7 +97,7 @@ fn bin_place(
     if (index < arrayLength(&projected)) {
         let splat = projected[index];
         if (!is_large(splat)) {
-            list_in_cells(index, splat, TILE_SIDE, 0u, 1u, true);
+            list_in_cells(index, splat, TILE_SIZE, 0u, 1u, true);
         }
     }
 }
@@ -124,12 +126,12 @@ var<workgroup> partial: array<u32, SCANNERS>;
 // Counts of small splats become starts. One workgroup; each invocation has a run of cells.
 @compute @workgroup_size(SCANNERS)
 fn bin_scan(@builtin(local_invocation_index) local: u32) {
-    scan(local, cells_in_band(TILE_SIDE));
+    scan(local, cells_in_band(TILE_SIZE));
 }
 
 @compute @workgroup_size(SCANNERS)
 fn bin_scan_large(@builtin(local_invocation_index) local: u32) {
-    scan(local, cells_in_band(BLOCK_SIDE));
+    scan(local, cells_in_band(BLOCK_SIZE));
 }
 
 fn scan(local: u32, cells: u32) {

@@ -35,11 +35,3 @@ fn filter_rho2(filter_: Filter, d: vec2<f32>) -> f32 {
     let r = vec2<f32>(filter_.r_xx * x.x + filter_.r_xy * x.y, filter_.r_yy * x.y);
     return dot(r, r);
 }
-
-// Whether the filter adds no fragment between the pixels `low` and `high`, relative to the anchor's.
-fn filter_misses(filter_: Filter, low: vec2<f32>, high: vec2<f32>) -> bool {
-    let center = vec2<f32>(filter_.center_x, filter_.center_y);
-    let across = vec2<f32>(filter_.r_xx, 0.0);
-    let down = vec2<f32>(filter_.r_xy, filter_.r_yy);
-    return filter_.gain == 0.0 || exceeds(span(across, down, vec2<f32>(0.0), low - center, high - center), 1.0);
-}

@@ -16,10 +16,6 @@ fn least_filtered(filter_: Filter) -> f32 {
     return 3e38;
 }
 
-fn filter_misses(filter_: Filter, low: vec2<f32>, high: vec2<f32>) -> bool {
-    return true;
-}
-
 fn filtered(fragment: Fragment, abc: vec3<f32>, filter_: Filter, d: vec2<f32>) -> Fragment {
     return fragment;
 }

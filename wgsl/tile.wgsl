@@ -1,5 +1,7 @@
 // Stages 2 to 4 by tiles of the image, whose lists bin.wgsl made. An invocation keeps a column of a tile's pixels in registers,
-// eight of them a tile. The footprint, and so every bit, is that of visibility.wgsl and accumulate.wgsl.
+// eight of them a tile. What a splat costs a tile
+// is mostly its fetch and its hand-out, so a tile may be twice as high as wide; its upper and lower eight rows are drawn apart, each
+// by the splats that reach them. The footprint, and so every bit, is that of visibility.wgsl and accumulate.wgsl.
 // Host side: src/passes/tiles.rs.
 
 // The lists of the large splats.
@@ -19,14 +21,14 @@ struct Column {
 // A workgroup has tiles next to each other.
 fn column_of(workgroup: vec3<u32>, local: u32) -> Column {
     let x = workgroup.x * WORKGROUP + local;
-    let row = workgroup.y * TILE_SIDE;
+    let row = workgroup.y * TILE_ROWS;
     var column = Column(x, row + band.first_row, row * view.width + x, 0u, vec2<u32>(0u), vec2<u32>(0u));
-    if (x / TILE_SIDE < cells_across(TILE_SIDE)) {
-        let end = LIST_ENDS + 1u + row / BLOCK_SIDE * cells_across(BLOCK_SIDE) + x / BLOCK_SIDE;
-        let list = vec2<u32>(large_lists[end - 1u], large_lists[end]) + lists_start(BLOCK_SIDE);
+    if (x / TILE_SIZE.x < cells_across(TILE_SIZE)) {
+        let end = LIST_ENDS + 1u + row / BLOCK_SIZE.y * cells_across(BLOCK_SIZE) + x / BLOCK_SIZE.x;
+        let list = vec2<u32>(large_lists[end - 1u], large_lists[end]) + lists_start(BLOCK_SIZE);
         column.large = min(list, vec2<u32>(arrayLength(&large_lists)));
-        column.small = small_list(x / TILE_SIDE, workgroup.y);
-        column.pixels = select(0u, min(TILE_SIDE, band.rows - row), x < view.width);
+        column.small = small_list(x / TILE_SIZE.x, workgroup.y);
+        column.pixels = select(0u, min(TILE_ROWS, band.rows - row), x < view.width);
     }
     return column;
 }
@@ -37,11 +39,11 @@ var<private> own_splat: Splat;
 var<private> own_filter: Filter;
 
 // Fetches of the first `listed` splats, of which the large come first, those from `place` on; a bit for each that could have a
-// fragment in the tile no deeper than `deepest`.
-fn fetch(place: u32, listed: u32, column: Column, deepest: f32) -> u32 {
+// fragment no deeper than `deepest`, of the tile's upper and lower half.
+fn fetch(place: u32, listed: u32, column: Column, deepest: vec2<f32>) -> vec2<u32> {
     let at = place + fetcher();
     let large = column.large.y - column.large.x;
-    var wanted = false;
+    var wanted = vec2<bool>(false);
     if (at < listed) {
         if (at < large) {
             own_index = large_lists[column.large.x + at];
@@ -50,15 +52,10 @@ fn fetch(place: u32, listed: u32, column: Column, deepest: f32) -> u32 {
         }
         own_splat = projected[own_index];
         own_filter = filter_of(own_index);
-        let extent = reach(own_splat);
-        let first = vec2<u32>(column.x / TILE_SIDE * TILE_SIDE, column.y);
-        let last = first + TILE_SIDE - 1u;
-        let pixels = Rectangle(max(extent.first, first), min(extent.last, last));
-        wanted = all(pixels.first <= pixels.last)
-            && nearest_reached(own_splat, own_filter, pixels) <= deepest
-            && !misses(own_splat, own_filter, pixels);
+        wanted.x = reaches(own_splat, own_filter, column, 0u, deepest.x);
+        wanted.y = TILE_ROWS > 8u && reaches(own_splat, own_filter, column, 8u, deepest.y);
     }
-    return offered(wanted);
+    return vec2<u32>(offered(wanted.x), offered(wanted.y));
 }
 
 fn handed_number(number: f32, from_: u32) -> f32 {
@@ -100,14 +97,38 @@ fn handed_attributes(own: Attributes, from_: u32) -> Attributes {
     );
 }
 
-fn nearer(front: f32, splat: Splat, filter_: Filter, x: u32, y: u32) -> f32 {
-    let fragment = footprint(splat, filter_, x, y);
-    return select(front, min(front, fragment.depth), fragment.hit);
+// Four pixels, from row `y` down.
+fn nearer(front: vec4<f32>, splat: Splat, filter_: Filter, x: u32, y: u32) -> vec4<f32> {
+    var nearest_ = front;
+    for (var k = 0u; k < 4u; k++) {
+        let fragment = footprint(splat, filter_, x, y + k);
+        nearest_[k] = select(front[k], min(front[k], fragment.depth), fragment.hit);
+    }
+    return nearest_;
 }
 
 fn farthest_of(a: vec4<f32>, b: vec4<f32>) -> f32 {
     let m = max(a, b);
     return farthest_in_tile(max(max(m.x, m.y), max(m.z, m.w)));
+}
+
+// The nearest depths of four pixels from the column's `first` on. Those past its end are as near as can be.
+fn load(column: Column, first: u32) -> vec4<f32> {
+    var depths = vec4<f32>(0.0);
+    for (var k = 0u; k < 4u; k++) {
+        if (first + k < column.pixels) {
+            depths[k] = bitcast<f32>(atomicLoad(&nearest[column.pixel + (first + k) * view.width]));
+        }
+    }
+    return depths;
+}
+
+fn store(column: Column, first: u32, depths: vec4<f32>) {
+    for (var k = 0u; k < 4u; k++) {
+        if (first + k < column.pixels) {
+            atomicStore(&nearest[column.pixel + (first + k) * view.width], bitcast<u32>(depths[k]));
+        }
+    }
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -122,42 +143,33 @@ fn tile_visibility(
     if (listed == 0u) {
         return;
     }
-    // Pixels past the edge are as near as can be.
-    var a = vec4<f32>(0.0);
-    var b = vec4<f32>(0.0);
-    for (var k = 0u; k < 4u; k++) {
-        if (k < column.pixels) {
-            a[k] = bitcast<f32>(atomicLoad(&nearest[column.pixel + k * view.width]));
-        }
-        if (k + 4u < column.pixels) {
-            b[k] = bitcast<f32>(atomicLoad(&nearest[column.pixel + (k + 4u) * view.width]));
-        }
-    }
+    var a = load(column, 0u);
+    var b = load(column, 4u);
+    var c = load(column, 8u);
+    var d = load(column, 12u);
     for (var place = 0u; place < listed; place += FETCHED) {
-        var wanted = fetch(place, listed, column, farthest_of(a, b));
-        while (wanted != 0u) {
-            let next = firstTrailingBit(wanted);
-            wanted &= wanted - 1u;
+        var wanted = fetch(place, listed, column, vec2<f32>(farthest_of(a, b), farthest_of(c, d)));
+        while (wanted.x != 0u) {
+            let next = firstTrailingBit(wanted.x);
+            wanted.x &= wanted.x - 1u;
             let splat = handed_splat(next);
             let filter_ = handed_filter(own_filter, next);
-            a.x = nearer(a.x, splat, filter_, column.x, column.y);
-            a.y = nearer(a.y, splat, filter_, column.x, column.y + 1u);
-            a.z = nearer(a.z, splat, filter_, column.x, column.y + 2u);
-            a.w = nearer(a.w, splat, filter_, column.x, column.y + 3u);
-            b.x = nearer(b.x, splat, filter_, column.x, column.y + 4u);
-            b.y = nearer(b.y, splat, filter_, column.x, column.y + 5u);
-            b.z = nearer(b.z, splat, filter_, column.x, column.y + 6u);
-            b.w = nearer(b.w, splat, filter_, column.x, column.y + 7u);
+            a = nearer(a, splat, filter_, column.x, column.y);
+            b = nearer(b, splat, filter_, column.x, column.y + 4u);
+        }
+        while (wanted.y != 0u) {
+            let next = firstTrailingBit(wanted.y);
+            wanted.y &= wanted.y - 1u;
+            let splat = handed_splat(next);
+            let filter_ = handed_filter(own_filter, next);
+            c = nearer(c, splat, filter_, column.x, column.y + 8u);
+            d = nearer(d, splat, filter_, column.x, column.y + 12u);
         }
     }
-    for (var k = 0u; k < 4u; k++) {
-        if (k < column.pixels) {
-            atomicStore(&nearest[column.pixel + k * view.width], bitcast<u32>(a[k]));
-        }
-        if (k + 4u < column.pixels) {
-            atomicStore(&nearest[column.pixel + (k + 4u) * view.width], bitcast<u32>(b[k]));
-        }
-    }
+    store(column, 0u, a);
+    store(column, 4u, b);
+    store(column, 8u, c);
+    store(column, 12u, d);
 }
 
 // A pixel without anything is 0, which no fragment is within epsilon of.
@@ -169,6 +181,10 @@ fn front_of(column: Column, k: u32) -> f32 {
     return select(front, 0.0, bitcast<u32>(front) == NOTHING);
 }
 
+fn fronts_of(column: Column, k: u32) -> vec4<f32> {
+    return vec4<f32>(front_of(column, k), front_of(column, k + 1u), front_of(column, k + 2u), front_of(column, k + 3u));
+}
+
 fn gather(slot: u32, splat: Splat, filter_: Filter, attributes: Attributes, front: f32, column: Column) {
     let fragment = footprint(splat, filter_, column.x, column.y + slot);
     // Selected, as a branch would select what is stored of each sum.
@@ -177,29 +193,42 @@ fn gather(slot: u32, splat: Splat, filter_: Filter, attributes: Attributes, fron
     blend_weighted(slot, weight, select(front, fragment.depth, accepted), front, attributes);
 }
 
+// The column's pixels from `slot` on, four with each of `a` and `b`. Written out, so that no register is indexed by a number
+// that only the device knows.
+fn gather_eight(slot: u32, next: u32, own_attributes: Attributes, a: vec4<f32>, b: vec4<f32>, column: Column) {
+    let splat = handed_splat(next);
+    let filter_ = handed_filter(own_filter, next);
+    let attributes = handed_attributes(own_attributes, next);
+    gather(slot, splat, filter_, attributes, a.x, column);
+    gather(slot + 1u, splat, filter_, attributes, a.y, column);
+    gather(slot + 2u, splat, filter_, attributes, a.z, column);
+    gather(slot + 3u, splat, filter_, attributes, a.w, column);
+    gather(slot + 4u, splat, filter_, attributes, b.x, column);
+    gather(slot + 5u, splat, filter_, attributes, b.y, column);
+    gather(slot + 6u, splat, filter_, attributes, b.z, column);
+    gather(slot + 7u, splat, filter_, attributes, b.w, column);
+}
+
 // Sums the fragments of the tile's splats in registers.
 fn sum_tile(column: Column) {
-    let a = vec4<f32>(front_of(column, 0u), front_of(column, 1u), front_of(column, 2u), front_of(column, 3u));
-    let b = vec4<f32>(front_of(column, 4u), front_of(column, 5u), front_of(column, 6u), front_of(column, 7u));
-    let deepest = deepest_accepted(farthest_of(a, b));
+    let a = fronts_of(column, 0u);
+    let b = fronts_of(column, 4u);
+    let c = fronts_of(column, 8u);
+    let d = fronts_of(column, 12u);
+    let deepest = vec2<f32>(deepest_accepted(farthest_of(a, b)), deepest_accepted(farthest_of(c, d)));
     let listed = (column.large.y - column.large.x) + (column.small.y - column.small.x);
     for (var place = 0u; place < listed; place += FETCHED) {
         var wanted = fetch(place, listed, column, deepest);
         let own_attributes = attributes_of(own_index, own_splat);
-        while (wanted != 0u) {
-            let next = firstTrailingBit(wanted);
-            wanted &= wanted - 1u;
-            let splat = handed_splat(next);
-            let filter_ = handed_filter(own_filter, next);
-            let attributes = handed_attributes(own_attributes, next);
-            gather(0u, splat, filter_, attributes, a.x, column);
-            gather(1u, splat, filter_, attributes, a.y, column);
-            gather(2u, splat, filter_, attributes, a.z, column);
-            gather(3u, splat, filter_, attributes, a.w, column);
-            gather(4u, splat, filter_, attributes, b.x, column);
-            gather(5u, splat, filter_, attributes, b.y, column);
-            gather(6u, splat, filter_, attributes, b.z, column);
-            gather(7u, splat, filter_, attributes, b.w, column);
+        while (wanted.x != 0u) {
+            let next = firstTrailingBit(wanted.x);
+            wanted.x &= wanted.x - 1u;
+            gather_eight(0u, next, own_attributes, a, b, column);
+        }
+        while (wanted.y != 0u) {
+            let next = firstTrailingBit(wanted.y);
+            wanted.y &= wanted.y - 1u;
+            gather_eight(8u, next, own_attributes, c, d, column);
         }
     }
 }

@@ -1,4 +1,4 @@
-// The low-pass of a splat that another invocation fetched (tile.wgsl).
+// The low-pass in tiles: of a splat that another invocation fetched (tile.wgsl), and where it adds nothing (tile_reach.wgsl).
 
 fn handed_filter(own: Filter, from_: u32) -> Filter {
     return Filter(
@@ -11,4 +11,12 @@ fn handed_filter(own: Filter, from_: u32) -> Filter {
         handed_number(own.r_yy, from_),
         handed_number(own.gain, from_),
     );
+}
+
+// Whether the filter adds no fragment between the pixels `low` and `high`, relative to the anchor's.
+fn filter_misses(filter_: Filter, low: vec2<f32>, high: vec2<f32>) -> bool {
+    let center = vec2<f32>(filter_.center_x, filter_.center_y);
+    let across = vec2<f32>(filter_.r_xx, 0.0);
+    let down = vec2<f32>(filter_.r_xy, filter_.r_yy);
+    return filter_.gain == 0.0 || exceeds(span(across, down, vec2<f32>(0.0), low - center, high - center), 1.0);
 }

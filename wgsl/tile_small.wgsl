@@ -4,8 +4,8 @@
 
 // Where the list of the tile in column `x` and row `y` starts and ends.
 fn small_list(x: u32, y: u32) -> vec2<u32> {
-    let end = LIST_ENDS + 1u + y * cells_across(TILE_SIDE) + x;
-    let list = vec2<u32>(small_lists[end - 1u], small_lists[end]) + lists_start(TILE_SIDE);
+    let end = LIST_ENDS + 1u + y * cells_across(TILE_SIZE) + x;
+    let list = vec2<u32>(small_lists[end - 1u], small_lists[end]) + lists_start(TILE_SIZE);
     return min(list, vec2<u32>(arrayLength(&small_lists)));
 }
 

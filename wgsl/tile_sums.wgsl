@@ -1,10 +1,10 @@
-// The registers of tile.wgsl's sums: of eight pixels and at most twelve channels, low and high word.
+// The registers of tile.wgsl's sums: of sixteen pixels and at most twelve channels, low and high word.
 
 override CHANNELS: u32;
 
 const MOST_CHANNELS: u32 = 12u;
-var<private> kept_low: array<u32, 96>;
-var<private> kept_high: array<u32, 96>;
+var<private> kept_low: array<u32, 192>;
+var<private> kept_high: array<u32, 192>;
 
 fn add_words(pixel: u32, channel: u32, low: u32, high: u32) {
     let at = pixel * MOST_CHANNELS + channel;
@@ -34,6 +34,14 @@ fn show_channel(slot: u32, channel: u32) {
     if (slot == 5u) { low = kept_low[60u + channel]; high = kept_high[60u + channel]; }
     if (slot == 6u) { low = kept_low[72u + channel]; high = kept_high[72u + channel]; }
     if (slot == 7u) { low = kept_low[84u + channel]; high = kept_high[84u + channel]; }
+    if (slot == 8u) { low = kept_low[96u + channel]; high = kept_high[96u + channel]; }
+    if (slot == 9u) { low = kept_low[108u + channel]; high = kept_high[108u + channel]; }
+    if (slot == 10u) { low = kept_low[120u + channel]; high = kept_high[120u + channel]; }
+    if (slot == 11u) { low = kept_low[132u + channel]; high = kept_high[132u + channel]; }
+    if (slot == 12u) { low = kept_low[144u + channel]; high = kept_high[144u + channel]; }
+    if (slot == 13u) { low = kept_low[156u + channel]; high = kept_high[156u + channel]; }
+    if (slot == 14u) { low = kept_low[168u + channel]; high = kept_high[168u + channel]; }
+    if (slot == 15u) { low = kept_low[180u + channel]; high = kept_high[180u + channel]; }
     shown_low[channel] = low;
     shown_high[channel] = high;
 }

@@ -89,6 +89,7 @@ pub const FILES: &[(&str, &str)] = wgsl![
     "tile_deposit_pairs.wgsl",
     "tile_filter.wgsl",
     "tile_filter_absent.wgsl",
+    "tile_reach.wgsl",
     "tile_small.wgsl",
     "tile_small_absent.wgsl",
     "tile_sums.wgsl",

@@ -28,8 +28,14 @@ pub const QUEUE_GRID: u32 = 2;
 /// Word of the queue at which the grid starts that lists the large splats in tiles, some a workgroup.
 pub const QUEUE_LISTING: u32 = 5;
 
-/// Side of a tile, pixels (`wgsl/bin.wgsl`).
-pub const TILE_SIDE: u32 = 8;
+/// Pixels of a tile across (`wgsl/bin.wgsl`).
+pub const TILE_WIDTH: u32 = 8;
+
+/// Pixels of a tile down, where its invocations share what they fetch (`wgsl/splat_shared.wgsl`).
+pub const TILE_ROWS_SHARED: u32 = 16;
+
+/// Pixels of a tile down, where each fetches for itself (`wgsl/splat_plain.wgsl`).
+pub const TILE_ROWS_PLAIN: u32 = 8;
 
 /// Words at the start of the lists of tiles: what they needed.
 pub const LIST_ENDS: u32 = 2;

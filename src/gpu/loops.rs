@@ -39,7 +39,7 @@ const ENDING: &[(&str, usize, &[u32])] = &[
     ("shade_lambert.wgsl", 1, &[1]),
     ("shade_phong.wgsl", 1, &[1]),
     ("texture.wgsl", 1, &[1]),
-    ("tile.wgsl", 8, &[1, 3]),
+    ("tile.wgsl", 11, &[1, 3]),
     ("tile_sums.wgsl", 1, &[1]),
     ("visibility.wgsl", 3, &[1, 2]),
 ];

@@ -25,8 +25,10 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::kernel::{Bound, Grid, Program};
-use crate::gpu::layout::{BLOCK_SIDE, LIST_ENDS, QUEUE_LISTING, TILE_SIDE, WORKGROUP};
-use crate::scene::{Camera, RenderOptions, Scene};
+use crate::gpu::layout::{
+    BLOCK_SIDE, LIST_ENDS, QUEUE_LISTING, TILE_ROWS_PLAIN, TILE_ROWS_SHARED, TILE_WIDTH, WORKGROUP,
+};
+use crate::scene::{Camera, RenderOptions, Scene, SceneNeeds};
 
 /// The fewest tiles that a splat touches on average for all to be summed by tiles. On a software adapter at 1024x1024 frames
 /// of 1,000,000 splats that touch 1.4, 1.7 and, of 300,000, 3.6 tiles take 1.36, 1.03 and 0.74 times as long by tiles as by scatter.
@@ -41,8 +43,11 @@ pub fn gathers(scene: &Scene, camera: &Camera, options: &RenderOptions) -> bool 
     let step = scene.surfels.len().div_ceil(SAMPLED).max(1);
     let sampled = scene.surfels.iter().step_by(step);
     let splats = sampled.filter_map(|surfel| project::reference(0, surfel, scene.origin, camera, &design));
-    let across = |first: u32, last: u32| 1.0 + f64::from(last.saturating_sub(first)) / f64::from(TILE_SIDE);
-    let touched = splats.map(|splat| across(splat.first[0], splat.last[0]) * across(splat.first[1], splat.last[1]));
+    let across = |first: u32, last: u32, size: u32| 1.0 + f64::from(last.saturating_sub(first)) / f64::from(size);
+    let touched = splats.map(|splat| {
+        let ([left, top], [right, bottom]) = (splat.first, splat.last);
+        across(left, right, TILE_WIDTH) * across(top, bottom, TILE_ROWS_SHARED)
+    });
     let (sum, count) = touched.fold((0.0, 0.0), |(sum, count), tiles| (sum + tiles, count + 1.0));
     sum >= TOUCHED_TILES * count
 }
@@ -50,7 +55,10 @@ pub fn gathers(scene: &Scene, camera: &Camera, options: &RenderOptions) -> bool 
 /// The tiles of an image.
 pub struct Tiles {
     program: Arc<Program>,
+    /// Columns of the image.
     width: u32,
+    /// Rows of a tile.
+    rows: u32,
     /// The parts of which small splats are listed too.
     parts: &'static [Part],
     large: Lists,
@@ -74,6 +82,16 @@ pub enum Listed {
     Small,
 }
 
+impl Listed {
+    /// Pixels of a cell, across and down, where tiles have `rows`.
+    fn cell(self, rows: u32) -> [u32; 2] {
+        match self {
+            Self::Large => [BLOCK_SIDE; 2],
+            Self::Small => [TILE_WIDTH, rows],
+        }
+    }
+}
+
 /// What the lists of a page and band hold at most.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Room {
@@ -95,13 +113,9 @@ impl Room {
 }
 
 impl Lists {
-    /// Lists with room for `entries`.
-    fn new(gpu: &Gpu, of: Listed, (width, bands): (u32, &[Rows]), entries: u64) -> Result<Self> {
-        let side = match of {
-            Listed::Large => BLOCK_SIDE,
-            Listed::Small => TILE_SIDE,
-        };
-        let cells = |rows: &Rows| u64::from(width.div_ceil(side)) * u64::from(rows.count.div_ceil(side));
+    /// Lists of cells of `cell` pixels, across and down, with room for `entries`.
+    fn new(gpu: &Gpu, cell: [u32; 2], (width, bands): (u32, &[Rows]), entries: u64) -> Result<Self> {
+        let cells = |rows: &Rows| u64::from(width.div_ceil(cell[0])) * u64::from(rows.count.div_ceil(cell[1]));
         let most = bands.iter().map(cells).max().unwrap_or(0);
         let words = Buffer::storage(gpu, "lists of splats", u64::from(LIST_ENDS) + 1 + most + entries)?;
         Ok(Self { words, entries })
@@ -117,9 +131,15 @@ impl Lists {
 impl Tiles {
     /// Tiles for each of `bands` of an image of `width` columns, drawn by `program`, that have the large splats, and the small
     /// ones of `parts`. They have no room yet.
-    pub fn new(gpu: &Gpu, program: Arc<Program>, image: (u32, &[Rows]), parts: &'static [Part]) -> Result<Self> {
-        let [large, small] = [Listed::Large, Listed::Small].map(|of| Lists::new(gpu, of, image, 0));
-        Ok(Self { program, width: image.0, parts, large: large?, small: small? })
+    pub fn new(
+        gpu: &Gpu,
+        (program, needs): (Arc<Program>, &SceneNeeds),
+        image: (u32, &[Rows]),
+        parts: &'static [Part],
+    ) -> Result<Self> {
+        let rows = if needs.subgroups { TILE_ROWS_SHARED } else { TILE_ROWS_PLAIN };
+        let [large, small] = [Listed::Large, Listed::Small].map(|of| Lists::new(gpu, of.cell(rows), image, 0));
+        Ok(Self { program, width: image.0, rows, parts, large: large?, small: small? })
     }
 
     /// Makes room for the splats that are projected now, and a quarter more for the next view; false if there are more than a
@@ -147,7 +167,7 @@ impl Tiles {
         if !most.holds(room) {
             return Ok(false);
         }
-        let lists = Lists::new(gpu, of, (self.width, bands), room.entries)?;
+        let lists = Lists::new(gpu, of.cell(self.rows), (self.width, bands), room.entries)?;
         match of {
             Listed::Large => self.large = lists,
             Listed::Small => self.small = lists,
@@ -249,7 +269,7 @@ impl Tiles {
         buffers: &[(&str, wgpu::BindingResource<'_>)],
     ) -> Result<()> {
         let gpu = recorder.gpu;
-        let groups = (self.width.div_ceil(WORKGROUP), rows.count.div_ceil(TILE_SIDE));
+        let groups = (self.width.div_ceil(WORKGROUP), rows.count.div_ceil(self.rows));
         let mut own = vec![("large_lists", self.large.words.bound()), ("small_lists", self.small.words.bound())];
         own.extend_from_slice(buffers);
         let bound = self.bindings(recorder, page, rows, &own);

@@ -165,7 +165,7 @@ fn tile_files(needs: &SceneNeeds) -> Vec<&'static str> {
     let mut files: Vec<_> = files(needs).into_iter().filter(|file| !stored.contains(file)).collect();
     files.extend(accumulate::tile_files(needs));
     let pick = |needed, file, absent| if needed { file } else { absent };
-    files.extend(["bin.wgsl", "tile.wgsl"]);
+    files.extend(["bin.wgsl", "tile.wgsl", "tile_reach.wgsl"]);
     files.push(pick(needs.low_pass == LowPass::None, "tile_filter_absent.wgsl", "tile_filter.wgsl"));
     files.push(pick(needs.gather, "tile_small.wgsl", "tile_small_absent.wgsl"));
     files.push(pick(needs.subgroups, "splat_shared.wgsl", "splat_plain.wgsl"));

@@ -1,0 +1,53 @@
+// Which rows of a tile a splat can have fragments in: conservative, so that no image depends on it.
+
+// An affine map at the middle of a rectangle of pixels, and what it changes by toward the right and the lower edge.
+struct Span {
+    middle: vec2<f32>,
+    right: vec2<f32>,
+    down: vec2<f32>,
+    // Bounds its rounding at any of the pixels.
+    slack: f32,
+}
+
+fn span(x: vec2<f32>, y: vec2<f32>, rest: vec2<f32>, low: vec2<f32>, high: vec2<f32>) -> Span {
+    let middle = 0.5 * (low + high);
+    let half = 0.5 * (high - low);
+    let most = max(abs(low), abs(high));
+    let magnitude = abs(x) * most.x + abs(y) * most.y + abs(rest);
+    return Span(x * middle.x + y * middle.y + rest, x * half.x, y * half.y, 4e-6 * (magnitude.x + magnitude.y));
+}
+
+// Whether the map's values are nowhere as short as `length`: its least is at least that of the middle less the longer of the
+// ways to two corners, as the map is affine.
+fn exceeds(s: Span, length: f32) -> bool {
+    let one = s.right + s.down;
+    let other = s.right - s.down;
+    let shortest = length + s.slack + sqrt(max(dot(one, one), dot(other, other)));
+    return dot(s.middle, s.middle) * (1.0 - 2e-6) > shortest * shortest;
+}
+
+// Whether the splat has no fragment at `pixels`, which lie in its bounds: its ellipse can leave out their corners.
+fn misses(splat: Splat, filter_: Filter, pixels: Rectangle) -> bool {
+    let low = vec2<f32>(vec2<i32>(pixels.first) - vec2<i32>(splat.anchor_x, splat.anchor_y));
+    let high = vec2<f32>(vec2<i32>(pixels.last) - vec2<i32>(splat.anchor_x, splat.anchor_y));
+    let disk = span(
+        vec2<f32>(splat.a[0] + splat.a_low[0], splat.b[0]),
+        vec2<f32>(splat.a[1] + splat.a_low[1], splat.b[1]),
+        vec2<f32>(splat.a[2] + splat.a_low[2], splat.b[2]),
+        low,
+        high,
+    );
+    let c = span(vec2<f32>(splat.c[0], 0.0), vec2<f32>(splat.c[1], 0.0), vec2<f32>(splat.c[2], 0.0), low, high);
+    let most = c.middle.x + abs(c.right.x) + abs(c.down.x) + c.slack;
+    return exceeds(disk, rim(most)) && filter_misses(filter_, low, high);
+}
+
+// Of eight rows of the tile from `row` on: whether the splat could have a fragment there no deeper than `deepest`.
+fn reaches(splat: Splat, filter_: Filter, column: Column, row: u32, deepest: f32) -> bool {
+    let extent = reach(splat);
+    let first = vec2<u32>(column.x / TILE_WIDTH * TILE_WIDTH, column.y + row);
+    let pixels = Rectangle(max(extent.first, first), min(extent.last, first + 7u));
+    return all(pixels.first <= pixels.last)
+        && nearest_reached(splat, filter_, pixels) <= deepest
+        && !misses(splat, filter_, pixels);
+}

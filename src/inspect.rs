@@ -87,7 +87,7 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
     let uniform = Buffer::uniform(gpu, "view", &view)?;
     let timing = Timing::new(gpu, 5)?;
     let mut recorder = Recorder { gpu, program: &program, view: &uniform, variant: &variant, timing };
-    let projected = SplatBuffer::new(gpu, SurfelBuffer::upload(gpu, scene, &needs, &())?, needs.low_pass)?;
+    let projected = SplatBuffer::new(gpu, SurfelBuffer::upload(gpu, scene, &needs, true, &())?, needs.low_pass)?;
     let nearest = VisibilityBuffer::new(gpu, &bands)?;
     let sums = AttributeBuffer::new(gpu, &variant, rows.pixels)?;
     project::record(&mut recorder, &projected, Part::All, (rows, Some(&nearest)))?;

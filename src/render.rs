@@ -26,7 +26,7 @@ use crate::passes::variant::Variant;
 use crate::passes::{Recorder, accumulate, project, raster, resolve, tiles, visibility};
 use crate::progress::Progress;
 use crate::scene::light::MAX_LIGHTS;
-use crate::scene::{Bounds, Camera, Organisation, RenderOptions, Scene, SceneNeeds};
+use crate::scene::{Bounds, Camera, Optimisation, Organisation, RenderOptions, Scene, SceneNeeds};
 
 /// Who renders.
 pub enum Backend {
@@ -156,7 +156,10 @@ impl<'a> Renderer<'a> {
     /// A limit of the adapter, and whatever a device may report.
     pub fn frame(&mut self, camera: &Camera, progress: &dyn Progress) -> Result<(Frame, Report)> {
         match self.backend {
-            Backend::Gpu { gpu, sources } => self.on_gpu(gpu, sources, camera, progress),
+            Backend::Gpu { gpu, sources } if self.options.has(Optimisation::UncountedLoops) => {
+                self.on_gpu(gpu, sources, camera, progress)
+            }
+            Backend::Gpu { gpu, sources } => self.on_gpu(gpu, &sources.clone().with_counted_loops(), camera, progress),
             Backend::Reference => Ok(reference::frame(self.scene, camera, self.options, progress)),
         }
     }
@@ -174,30 +177,33 @@ impl<'a> Renderer<'a> {
         progress: &dyn Progress,
     ) -> Result<(Frame, Report)> {
         let needs = SceneNeeds::of(self.scene, &self.color_range, camera, self.options)
-            .with_atomics_u64(gpu.adapter.atomics_u64);
+            .with_atomics_u64(gpu.adapter.atomics_u64 && self.options.has(Optimisation::Pairs));
         let surfels = self.scene.surfels.len() as u64;
         let rows = rows_per_band(gpu, camera, &Variant::of(&needs, self.options, surfels)?)?;
-        let shared = gpu.adapter.subgroups && gpu.adapter.kind == "software";
+        let shared = gpu.adapter.subgroups && gpu.adapter.kind == "software" && self.options.has(Optimisation::Sharing);
         let bands = camera.height.div_ceil(rows);
         let gather = bands == 1
             && surfels <= page_len(gpu, size_of::<Splat>())
             && !self.crowded
+            && self.options.has(Optimisation::Gathering)
             && match self.options.organisation {
                 Organisation::Auto => shared && tiles::gathers(self.scene, camera, self.options),
                 Organisation::Tile => true,
                 Organisation::Scatter => false,
             };
         let needs = needs.with_bands(bands).with_subgroups(shared).with_gather(gather);
+        let needs = if self.options.has(Optimisation::Culling) { needs } else { SceneNeeds { cull: false, ..needs } };
         let variant = Variant::of(&needs, self.options, surfels)?;
         match needs.raster {
             Some(raster) => raster::check(gpu, raster, &needs, camera)?,
             None => variant.accumulator.check(gpu)?,
         }
         let program = variant.compile(gpu, sources)?;
+        let ordered = self.options.has(Optimisation::Order);
         let splats = match self.splats.take() {
             Some(splats) => splats,
             None => {
-                let surfels = SurfelBuffer::upload(gpu, self.scene, &needs, progress)?;
+                let surfels = SurfelBuffer::upload(gpu, self.scene, &needs, ordered, progress)?;
                 SplatBuffer::new(gpu, surfels, needs.low_pass)?
             }
         };

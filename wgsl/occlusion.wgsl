@@ -38,10 +38,16 @@ fn occlude(
     farthest_in(linear_index(workgroup, workgroups, local), 0u);
 }
 
+// 0 where a study leaves this out.
+override HIDES: u32;
+
 // Whether no fragment of the splat can be accepted at `pixels`: accepted depths grow with the nearest one.
 fn hidden(splat: Splat, filter_: Filter, pixels: Rectangle, radius: f32) -> bool {
     if (any(pixels.first > pixels.last)) {
         return true;
+    }
+    if (HIDES == 0u) {
+        return false;
     }
     let reached = nearest_reached(splat, filter_, pixels);
     let tiles = occlusion_tiles();

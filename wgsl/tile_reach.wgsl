@@ -48,6 +48,6 @@ fn reaches(splat: Splat, filter_: Filter, column: Column, row: u32, deepest: f32
     let first = vec2<u32>(column.x / TILE_WIDTH * TILE_WIDTH, column.y + row);
     let pixels = Rectangle(max(extent.first, first), min(extent.last, first + 7u));
     return all(pixels.first <= pixels.last)
-        && nearest_reached(splat, filter_, pixels) <= deepest
+        && (HIDES == 0u || nearest_reached(splat, filter_, pixels) <= deepest)
         && !misses(splat, filter_, pixels);
 }

@@ -9,7 +9,8 @@ use serde::{Deserialize, Deserializer};
 use crate::error::{Error, Result};
 use crate::passes::accumulate::{ACCUMULATORS, Accumulator, accumulator};
 use crate::scene::{
-    BlendFormat, Epsilon, Kernel, LowPass, Maps, Organisation, Raster, RasterDepth, RenderOptions, Shading,
+    BlendFormat, Epsilon, Kernel, LowPass, Maps, Optimisation, Organisation, Raster, RasterDepth, RenderOptions,
+    Shading,
 };
 use crate::surfels::analytic::Shape;
 
@@ -157,6 +158,9 @@ pub struct Config {
     /// How the compute kernels draw splats.
     #[serde(default, deserialize_with = "parsed")]
     pub organisation: Option<Organisation>,
+    /// What is left out that makes frames of the compute kernels faster.
+    #[serde(default, deserialize_with = "all_parsed")]
+    pub without: Vec<Optimisation>,
     /// Depth tolerance.
     #[serde(default, deserialize_with = "parsed")]
     pub epsilon: Option<Epsilon>,
@@ -246,6 +250,11 @@ fn parsed<'de, D: Deserializer<'de>, T: FromStr<Err = Error>>(text: D) -> Result
     String::deserialize(text)?.parse().map(Some).map_err(D::Error::custom)
 }
 
+fn all_parsed<'de, D: Deserializer<'de>, T: FromStr<Err = Error>>(texts: D) -> Result<Vec<T>, D::Error> {
+    let texts = Vec::<String>::deserialize(texts)?;
+    texts.iter().map(|text| text.parse().map_err(D::Error::custom)).collect()
+}
+
 fn accumulator_row<'de, D: Deserializer<'de>>(text: D) -> Result<Option<&'static Accumulator>, D::Error> {
     accumulator(&String::deserialize(text)?).map(Some).map_err(D::Error::custom)
 }
@@ -262,6 +271,7 @@ impl Config {
             low_pass: self.lowpass.unwrap_or(default.low_pass),
             accumulator: self.accumulator().map_or(default.accumulator, |row| row.name),
             organisation: self.organisation.unwrap_or_default(),
+            without: self.without.clone(),
             raster: (self.backend == BackendName::Raster).then(|| Raster {
                 format: self.blend_format.unwrap_or(raster.format),
                 depth: self.raster_depth.unwrap_or(raster.depth),

@@ -151,6 +151,9 @@ impl Config {
         if self.organisation.is_some() && self.accumulator().is_none_or(|row| row.name != ACCUMULATORS[0].name) {
             return Err("organisation: only the accumulator fixed of the backend gpu has more than one".into());
         }
+        if self.backend != BackendName::Gpu && !self.without.is_empty() {
+            return Err("without: only the backend gpu has what it names".into());
+        }
         if self.backend != BackendName::Raster && (self.blend_format.is_some() || self.raster_depth.is_some()) {
             return Err("blend_format, raster_depth: only the backend raster has them".into());
         }
@@ -264,6 +267,8 @@ mod tests {
             ("[[config]]\nname = \"d\"\nbackend = \"raster\"\naccumulator = \"fixed\"\n", &["accumulator:", "gpu"]),
             ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nerror_limit = -1\n", &["error_limit:"]),
             ("[[config]]\nname = \"d\"\nbackend = \"raster\"\norganisation = \"tile\"\n", &["organisation:", "fixed"]),
+            ("[[config]]\nname = \"d\"\nbackend = \"raster\"\nwithout = [\"order\"]\n", &["without:", "gpu"]),
+            ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nwithout = [\"x\"]\n", &["line 6, without:", "culling"]),
             ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nmaps = [\"decision\"]\n", &["maps", "depth"]),
             ("size = [\n", &["line"]),
         ];

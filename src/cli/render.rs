@@ -273,6 +273,7 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
         lights: if arguments.lights.is_empty() { default.lights } else { arguments.lights.clone() },
         background: arguments.background.unwrap_or(default.background),
         maps,
+        without: default.without,
     })
 }
 

@@ -100,18 +100,21 @@ pub const FILES: &[(&str, &str)] = wgsl![
 
 /// The kernels' texts. The built-in ones, of which a researcher (or a test that must fail) may replace parts.
 #[derive(Clone, Debug)]
-pub struct Sources(BTreeMap<&'static str, Cow<'static, str>>);
+pub struct Sources {
+    texts: BTreeMap<&'static str, Cow<'static, str>>,
+    counts_loops: bool,
+}
 
 impl Default for Sources {
     fn default() -> Self {
-        Self(FILES.iter().map(|&(name, text)| (name, Cow::Borrowed(text))).collect())
+        Self { texts: FILES.iter().map(|&(name, text)| (name, Cow::Borrowed(text))).collect(), counts_loops: false }
     }
 }
 
 impl Sources {
     /// Replaces the one place in `file` that reads `from`; an error if there is not exactly one.
     pub fn replace(mut self, file: &str, from: &str, to: &str) -> Result<Self> {
-        let text = self.0.get_mut(file).ok_or_else(|| Error::Usage(format!("there is no kernel file {file}")))?;
+        let text = self.texts.get_mut(file).ok_or_else(|| Error::Usage(format!("there is no kernel file {file}")))?;
         if text.matches(from).count() != 1 {
             return Err(Error::Usage(format!("{file} must hold {from:?} once, to be replaced")));
         }
@@ -119,18 +122,23 @@ impl Sources {
         Ok(self)
     }
 
-    /// Whether all loops of `files` are known to end.
+    /// The same, of which every loop is counted, those that are known to end too.
+    pub(crate) fn with_counted_loops(self) -> Self {
+        Self { counts_loops: true, ..self }
+    }
+
+    /// Whether all loops of `files` are known to end, and so need not be counted.
     pub(super) fn all_end(&self, files: &[&str]) -> bool {
-        let ends = |file: &&str| match self.0.get(file) {
+        let ends = |file: &&str| match self.texts.get(file) {
             Some(Cow::Borrowed(text)) => loops::all_end(file, text),
             _ => false,
         };
-        files.iter().all(ends)
+        !self.counts_loops && files.iter().all(ends)
     }
 
     /// One module of `files`: WGSL's module scope is free of order, so joining is concatenation.
     pub fn join(&self, files: &[&str]) -> String {
-        files.iter().map(|name| self.0.get(name).map_or("", |text| text)).collect::<Vec<_>>().join("\n")
+        files.iter().map(|name| self.texts.get(name).map_or("", |text| text)).collect::<Vec<_>>().join("\n")
     }
 }
 
@@ -158,7 +166,7 @@ pub fn reflect(text: &str) -> std::result::Result<(naga::Module, Bindings, Vec<S
 #[derive(Default)]
 pub(crate) struct Programs(Mutex<HashMap<ProgramKey, Arc<Program>>>);
 
-/// A module's text, its constants by name as bits, and its entry points and draws in words.
+/// A module's text, its constants by name as bits, and in words its entry points, draws and whether its loops end.
 type ProgramKey = (String, Vec<(&'static str, u64)>, String);
 
 impl Programs {
@@ -172,7 +180,7 @@ impl Programs {
         constants: &[(&'static str, f64)],
     ) -> Result<Arc<Program>> {
         let bits = constants.iter().map(|&(name, value)| (name, value.to_bits())).collect();
-        let key = (sources.join(files), bits, format!("{stages:?} {draws:?}"));
+        let key = (sources.join(files), bits, format!("{stages:?} {draws:?} {}", sources.all_end(files)));
         // A poisoned lock means that another thread panicked while it compiled; the map itself is whole.
         let mut programs = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(program) = programs.get(&key) {

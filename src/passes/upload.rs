@@ -37,8 +37,14 @@ pub struct SurfelPage {
 }
 
 impl SurfelBuffer {
-    /// Uploads `scene` as far as `needs` asks for it.
-    pub fn upload(gpu: &Gpu, scene: &Scene, needs: &SceneNeeds, progress: &dyn Progress) -> Result<Self> {
+    /// Uploads `scene` as far as `needs` asks for it, `ordered` to draw well or as it is.
+    pub fn upload(
+        gpu: &Gpu,
+        scene: &Scene,
+        needs: &SceneNeeds,
+        ordered: bool,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         // The splat's record is the largest of what is paged alike.
         // Whole batches, unless one is too large; each is a row of a dispatch, of which every adapter grants so many.
         let most = page_len(gpu, size_of::<Splat>());
@@ -46,7 +52,8 @@ impl SurfelBuffer {
         let len = if whole > 0 { whole.min(u64::from(MOST_GROUPS * BATCH)) } else { most } as usize;
         progress.begin("uploading surfels", scene.surfels.len() as u64);
         let mut pages = Vec::new();
-        let order = order(&scene.surfels, &scene.bounds());
+        let given = || (0..scene.surfels.len() as u32).collect();
+        let order = if ordered { order(&scene.surfels, &scene.bounds()) } else { given() };
         for indices in order.chunks(len) {
             let surfels = Buffer::storage(gpu, "surfels", indices.len() as u64)?;
             surfels.write(gpu, indices.len(), |range| taken(&scene.surfels, &indices[range]), progress)?;

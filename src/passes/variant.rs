@@ -11,7 +11,8 @@ use crate::gpu::kernel::Program;
 use crate::gpu::layout::{LARGE_BY_TILES, LARGE_BY_WORKGROUPS};
 use crate::gpu::{Gpu, Sources};
 use crate::scene::{
-    ColorNeed, Kernel, KernelShape, LowPass, Organisation, Projection, RasterDepth, RenderOptions, SceneNeeds, Shading,
+    ColorNeed, Kernel, KernelShape, LowPass, Optimisation, Organisation, Projection, RasterDepth, RenderOptions,
+    SceneNeeds, Shading,
 };
 
 /// The entry points that a render with `needs` dispatches.
@@ -250,6 +251,7 @@ pub fn overrides(needs: &SceneNeeds, options: &RenderOptions, fraction_bits: u32
     let layout = PixelLayout::of(needs);
     let mut constants = vec![
         ("LARGE", large(needs, options).into()),
+        ("HIDES", u32::from(options.has(Optimisation::Hiding)).into()),
         ("CHANNELS", layout.channels.into()),
         ("FRACTION_BITS", fraction_bits.into()),
         ("COLOR_CHANNELS", color_channels(needs).into()),

@@ -5,6 +5,7 @@ pub mod color;
 pub mod framing;
 pub mod light;
 pub mod needs;
+pub mod optimisation;
 pub mod options;
 pub mod raster;
 #[expect(clippy::module_inception, reason = "the file is named for the type it holds")]
@@ -16,6 +17,7 @@ pub use camera::{Camera, Lens, Projection};
 pub use color::Colors;
 pub use light::Light;
 pub use needs::{ColorNeed, SceneNeeds};
+pub use optimisation::Optimisation;
 pub use options::{Epsilon, Kernel, KernelShape, LowPass, Maps, Organisation, RenderOptions, Shading};
 pub use raster::{BlendFormat, Raster, RasterDepth};
 pub use scene::{Bounds, Scene, Up};

@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use super::{Light, Raster};
+use super::{Light, Optimisation, Raster};
 use crate::error::Error;
 
 /// The depth tolerance: a fragment counts as the visible surface if `z <= nearest + epsilon` (paper 000, section 5.3).
@@ -264,6 +264,15 @@ pub struct RenderOptions {
     pub background: [f32; 4],
     /// Maps wanted beside the colour.
     pub maps: Maps,
+    /// What is left out that makes frames faster; none changes a bit of the image.
+    pub without: Vec<Optimisation>,
+}
+
+impl RenderOptions {
+    /// Whether an optimisation is not left out.
+    pub fn has(&self, optimisation: Optimisation) -> bool {
+        !self.without.contains(&optimisation)
+    }
 }
 
 impl Default for RenderOptions {
@@ -280,6 +289,7 @@ impl Default for RenderOptions {
             lights: vec![Light::Headlight { intensity: 1.0 }],
             background: [0.0; 4],
             maps: Maps::default(),
+            without: Vec::new(),
         }
     }
 }

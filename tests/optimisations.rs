@@ -1,0 +1,86 @@
+//! What makes frames faster changes no bit of them, alone or together, and is really left out where a study asks for it.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use common::bits;
+use common::scenes::{crowded, sphere, sphere_camera};
+use epsplat::frame::Frame;
+use epsplat::gpu::{Gpu, Sources};
+use epsplat::render::{Backend, Report, render};
+use epsplat::scene::{Camera, Epsilon, Maps, Optimisation, Projection, RenderOptions, Scene};
+
+const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
+
+fn options(without: &[Optimisation]) -> RenderOptions {
+    RenderOptions { maps: MAPS, epsilon: Epsilon::Relative(0.02), without: without.to_vec(), ..Default::default() }
+}
+
+/// Splats of many sizes, and a closed surface of small ones, half of it hidden.
+fn scenes() -> Vec<(Scene, Camera)> {
+    vec![crowded().swap_remove(1), (sphere(3000, 1.8), sphere_camera(90, Projection::Pinhole))]
+}
+
+fn on(gpu: Gpu, sources: Sources) -> Backend {
+    Backend::Gpu { gpu: Box::new(gpu), sources }
+}
+
+fn frame((scene, camera): &(Scene, Camera), without: &[Optimisation], backend: &Backend) -> (Frame, Report) {
+    render(scene, camera, &options(without), backend, &()).unwrap()
+}
+
+#[test]
+fn no_optimisation_shows() {
+    let Some(gpu) = common::gpu() else { return };
+    let (pairs, sharing) = (gpu.adapter.atomics_u64, gpu.adapter.subgroups && gpu.adapter.kind == "software");
+    let backend = Backend::gpu(gpu);
+    for scene in scenes() {
+        let (expected, whole) = frame(&scene, &[], &backend);
+        // What there is to be left out.
+        for (need, exists) in [("cull", true), ("atomics-u64", pairs), ("gather", sharing)] {
+            assert_eq!(whole.needs.contains(&need), exists, "{need}");
+        }
+        let each = Optimisation::ALL.map(|(optimisation, _)| vec![optimisation]);
+        let all = Optimisation::ALL.map(|(optimisation, _)| optimisation).to_vec();
+        for without in each.into_iter().chain([all]) {
+            let (found, report) = frame(&scene, &without, &backend);
+            assert!(bits(&found) == bits(&expected), "{without:?} shows");
+            let left_out = |needs: &str| !report.needs.contains(&needs);
+            for optimisation in without {
+                match optimisation {
+                    Optimisation::Culling => assert!(left_out("cull")),
+                    Optimisation::Pairs => assert!(left_out("atomics-u64")),
+                    Optimisation::Gathering | Optimisation::Sharing => assert!(left_out("gather")),
+                    Optimisation::Order | Optimisation::Hiding | Optimisation::UncountedLoops => {}
+                }
+            }
+        }
+    }
+}
+
+/// Kernels that an optimisation would spoil draw the right image without it.
+#[test]
+fn what_is_left_out_is_not_done() {
+    let backend = |file: &str, from: &str, to: &str| {
+        let gpu = common::gpu()?;
+        Some(on(gpu, Sources::default().replace(file, from, to).unwrap()))
+    };
+    let scene = scenes().swap_remove(1);
+    // All splats count as hidden.
+    let all = "return front == 0u || reached > farthest_accepted(bitcast<f32>(front), radius);";
+    let Some(hiding) = backend("occlusion.wgsl", all, "return true;") else { return };
+    // The surfel that is stored first is left out.
+    let Some(first) = backend(
+        "project.wgsl",
+        "let surfel = surfels[index];",
+        "var surfel = surfels[index]; if (index == 0u) { surfel.center[2] = 1e9; }",
+    ) else {
+        return;
+    };
+    for (optimisation, backend) in [(Optimisation::Hiding, hiding), (Optimisation::Order, first)] {
+        let (with, _) = frame(&scene, &[], &backend);
+        let (without, _) = frame(&scene, &[optimisation], &backend);
+        assert!(bits(&with) != bits(&without), "{optimisation:?}");
+    }
+}

@@ -10,8 +10,9 @@ use epsplat::frame::Frame;
 use epsplat::gpu::{Gpu, Sources};
 use epsplat::render::{Backend, Renderer, Report, render};
 use epsplat::scene::{
-    Camera, Colors, Epsilon, Kernel, LowPass, Maps, Organisation, Projection, RenderOptions, Scene, Shading,
+    Camera, Colors, Epsilon, Kernel, LowPass, Maps, Organisation, Projection, RenderOptions, Scene, Shading, Surfel, Up,
 };
+use glam::{DVec3, Vec3};
 
 const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
 
@@ -180,6 +181,36 @@ fn a_view_that_needs_more_room_gets_it() {
             let (fresh, _) = render(&scene, view, &options, &backend, &()).unwrap();
             assert!(bits(&kept) == bits(&fresh), "{organisation:?}");
         }
+    }
+}
+
+/// The longest lists that are drawn, of large and of small splats over the same tile, both of its halves.
+#[test]
+fn the_longest_lists_are_drawn_to_their_end() {
+    const LONGEST: usize = 10_000;
+    for subgroups in [true, false] {
+        let Some(mut gpu) = common::gpu() else { return };
+        gpu.adapter.subgroups &= subgroups;
+        let backend = on(gpu, large_from(100));
+        let disk = |radius: f32| Surfel::disk(Vec3::new(0.0, 0.0, 5.0), Vec3::NEG_Z, radius);
+        // Of eight pixels across, and of the whole image.
+        let surfels = [4.0, 20.0].iter().flat_map(|&radius| vec![disk(radius); LONGEST]).collect();
+        let colors = Colors::Constant([1.0; 4]);
+        let scene = Scene { origin: DVec3::ZERO, surfels, colors, oriented: true, up: Up::Y };
+        let options = RenderOptions {
+            kernel: Kernel::Constant,
+            shading: Shading::Unlit,
+            maps: MAPS,
+            organisation: Organisation::Tile,
+            ..Default::default()
+        };
+        let camera = front(16);
+        let (frame, report) = frame(&scene, &camera, &options, &backend);
+        let counts = frame.count.unwrap();
+        assert!(report.needs.contains(&"gather"));
+        let (middle, corner) = (counts[7 * 16 + 7] as usize, counts[0] as usize);
+        assert_eq!((middle, corner), (2 * LONGEST, LONGEST), "subgroups: {subgroups}");
+        assert_eq!(counts[8 * 16 + 8] as usize, 2 * LONGEST);
     }
 }
 

@@ -18,6 +18,7 @@ use crate::gpu::layout::{Splat, View};
 use crate::gpu::timing::Timing;
 use crate::gpu::{Gpu, Sources};
 use crate::passes::accumulate::ACCUMULATORS;
+use crate::passes::covered::Covered;
 use crate::passes::cull::Part;
 use crate::passes::project::SplatBuffer;
 use crate::passes::tiles::{Listed, Tiles};
@@ -279,11 +280,14 @@ impl<'a> Renderer<'a> {
                         Some(tiles) => tiles::accumulate(&mut recorder, &splats, rows, tiles, (nearest, sums))?,
                         None => accumulate::record_large(&mut recorder, &splats, rows, nearest, sums)?,
                     }
-                    let mut sums = vec![("visible", nearest.nearest.bound()), ("sums", sums.sums.bound())];
+                    let mut sums = vec![("sums", sums.sums.bound())];
                     sums.extend(splats.surfels.texture());
-                    resolve::record(&mut recorder, rows, sums, &pixels.image)?;
+                    resolve::record(&mut recorder, rows, (nearest.covered(rows), sums), &pixels.image)?;
                 }
-                Sums::Targets(_, targets) => resolve::record(&mut recorder, rows, targets.bindings(), &pixels.image)?,
+                Sums::Targets(_, targets) => {
+                    let covered = Covered::new(&targets.covered, 0);
+                    resolve::record(&mut recorder, rows, (covered, targets.bindings()), &pixels.image)?;
+                }
             }
             resolve::read_back(&recorder, rows, &pixels.image, &mut frame)?;
             progress.advance(rows.count.into());

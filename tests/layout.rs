@@ -11,8 +11,8 @@ use std::mem::{offset_of, size_of};
 use epsplat::gpu::Sources;
 use epsplat::gpu::kernel::{FILES, reflect};
 use epsplat::gpu::layout::{
-    AWAY, BATCH, BLOCK_SIDE, Band, Filter, LIST_ENDS, LIST_START, MOST_GROUPS, OCCLUSION_TILE, ONE, ONE_WIDE,
-    QUEUE_GRID, QUEUE_LISTING, QUEUE_START, Splat, TILE, TILE_ROWS_PLAIN, TILE_ROWS_SHARED, TILE_WIDTH, View,
+    AWAY, BATCH, BLOCK_SIDE, Band, COVERED_GRID, COVERED_GRID_OF_EIGHTS, COVERED_LIST, Filter, LIST_ENDS, LIST_START,
+    MOST_GROUPS, OCCLUSION_TILE, ONE, ONE_WIDE, QUEUE_GRID, QUEUE_LISTING, QUEUE_START, Splat, TILE, TILE_WIDTH, View,
     WORKGROUP,
 };
 use epsplat::passes::accumulate::accumulator;
@@ -398,6 +398,10 @@ fn constants_agree() {
             ("QUEUE_START", QUEUE_START),
             ("QUEUE_GRID", QUEUE_GRID),
             ("QUEUE_LISTING", QUEUE_LISTING),
+            ("TILE_WIDTH", TILE_WIDTH),
+            ("COVERED_LIST", COVERED_LIST),
+            ("COVERED_GRID", COVERED_GRID),
+            ("COVERED_GRID_OF_EIGHTS", COVERED_GRID_OF_EIGHTS),
             ("MOST_GROUPS", MOST_GROUPS),
             ("AWAY", AWAY),
             ("NOTHING", f32::INFINITY.to_bits()),
@@ -407,9 +411,7 @@ fn constants_agree() {
         }
         let tile = needs.raster.is_none().then_some(f64::from(OCCLUSION_TILE));
         assert_eq!(constant("OCCLUSION_TILE"), tile);
-        let rows = if needs.subgroups { TILE_ROWS_SHARED } else { TILE_ROWS_PLAIN };
-        let of_tiles =
-            [("TILE_WIDTH", TILE_WIDTH), ("TILE_ROWS", rows), ("BLOCK_SIDE", BLOCK_SIDE), ("LIST_ENDS", LIST_ENDS)];
+        let of_tiles = [("BLOCK_SIDE", BLOCK_SIDE), ("LIST_ENDS", LIST_ENDS)];
         let of_batches = [("BATCH", BATCH), ("LIST_START", LIST_START)];
         for (exists, constants) in [(tiles, &of_tiles[..]), (needs.cull, &of_batches)] {
             for &(name, value) in constants {
@@ -429,7 +431,7 @@ fn constants_agree() {
         assert_eq!(constant("ONE"), one, "{}", needs.accumulator);
         for entry in module.entry_points.iter().filter(|entry| entry.stage == naga::ShaderStage::Compute) {
             let size = match entry.name.as_str() {
-                "arrange" | "arrange_rare" => [1, 1, 1],
+                "arrange" | "arrange_rare" | "arrange_covered" => [1, 1, 1],
                 "bin_count_large" | "bin_place_large" => [8, 8, 1],
                 "bin_scan" | "bin_scan_large" => [256, 1, 1],
                 name if name.ends_with("_large") => [TILE, TILE, 1],

@@ -119,7 +119,7 @@ fn a_wrong_tile_is_noticed() {
     // Of tiles that gather all splats, large and small; and of those that add the large ones to what is stored, of several pages.
     let gathered = [
         ("bin.wgsl", "atomicStore(&lists[at], index)", "atomicStore(&lists[at], 0u)"),
-        ("bin.wgsl", "TILE_SIZE, 0u, 1u, true)", "TILE_SIZE, 1u, 1u, true)"),
+        ("bin.wgsl", "tile_size(), 0u, 1u, true)", "tile_size(), 1u, 1u, true)"),
         ("bin.wgsl", "LISTED_AT_ONCE + local.y", "LISTED_AT_ONCE"),
         ("tile.wgsl", "b = nearer(b, splat, filter_, column.x, column.y + 4u);", ""),
         ("tile.wgsl", "d = nearer(d, splat, filter_, column.x, column.y + 12u);", ""),
@@ -187,7 +187,7 @@ fn a_view_that_needs_more_room_gets_it() {
 /// The longest lists that are drawn, of large and of small splats over the same tile, both of its halves.
 #[test]
 fn the_longest_lists_are_drawn_to_their_end() {
-    const LONGEST: usize = 10_000;
+    const LONGEST: usize = 8_000;
     for subgroups in [true, false] {
         let Some(mut gpu) = common::gpu() else { return };
         gpu.adapter.subgroups &= subgroups;

@@ -40,3 +40,23 @@ fn sum_at(pixel: u32, channel: u32) -> f32 {
 fn weight_at(pixel: u32) -> f32 {
     return sum_at(pixel, WEIGHT_CHANNEL);
 }
+
+// The covered tiles (covered.wgsl).
+@group(0) @binding(6) var<storage, read_write> nearest: array<atomic<u32>>;
+@group(0) @binding(7) var<storage, read> visible: array<u32>;
+
+fn covered_start() -> u32 {
+    return 0u;
+}
+
+fn has_any(tile: u32) -> bool {
+    let first = vec2<u32>(tile % tiles_across() * TILE_WIDTH, tile / tiles_across() * TILE_ROWS);
+    let end = min(first + vec2<u32>(TILE_WIDTH, TILE_ROWS), vec2<u32>(view.width, band.rows));
+    var any = false;
+    for (var y = first.y; y < end.y; y++) {
+        for (var x = first.x; x < end.x; x++) {
+            any = any || weight_at(y * view.width + x) != 0.0;
+        }
+    }
+    return any;
+}

@@ -9,12 +9,14 @@
 
 const LIST_ENDS: u32 = 2u;
 
-// Pixels of a tile, across and down; TILE_ROWS is splat_shared.wgsl's or splat_plain.wgsl's.
-const TILE_WIDTH: u32 = 8u;
-const TILE_SIZE: vec2<u32> = vec2<u32>(TILE_WIDTH, TILE_ROWS);
-// Of a large splat's cell.
+// Pixels of a large splat's cell.
 const BLOCK_SIDE: u32 = 16u;
 const BLOCK_SIZE: vec2<u32> = vec2<u32>(BLOCK_SIDE, BLOCK_SIDE);
+
+// Of a small one's, which is a tile.
+fn tile_size() -> vec2<u32> {
+    return vec2<u32>(TILE_WIDTH, TILE_ROWS);
+}
 
 // Cells of `size` pixels in a row of the image.
 fn cells_across(size: vec2<u32>) -> u32 {
@@ -83,7 +85,7 @@ fn bin_count(
         splats[index].bounds_first = 0xffffffffu;
         splats[index].bounds_last = 0u;
     } else {
-        list_in_cells(index, splat, TILE_SIZE, 0u, 1u, false);
+        list_in_cells(index, splat, tile_size(), 0u, 1u, false);
     }
 }
 
@@ -97,7 +99,7 @@ fn bin_place(
     if (index < arrayLength(&projected)) {
         let splat = projected[index];
         if (!is_large(splat)) {
-            list_in_cells(index, splat, TILE_SIZE, 0u, 1u, true);
+            list_in_cells(index, splat, tile_size(), 0u, 1u, true);
         }
     }
 }
@@ -126,7 +128,7 @@ var<workgroup> partial: array<u32, SCANNERS>;
 // Counts of small splats become starts. One workgroup; each invocation has a run of cells.
 @compute @workgroup_size(SCANNERS)
 fn bin_scan(@builtin(local_invocation_index) local: u32) {
-    scan(local, cells_in_band(TILE_SIZE));
+    scan(local, cells_in_band(tile_size()));
 }
 
 @compute @workgroup_size(SCANNERS)

@@ -27,6 +27,24 @@ fn farthest_in(tile: u32, nothing: u32) {
     atomicStore(&nearest[band_pixels() + tile], farthest);
 }
 
+// The words of the covered tiles follow (covered.wgsl).
+fn covered_start() -> u32 {
+    let tiles = occlusion_tiles();
+    return band_pixels() + tiles.x * tiles.y;
+}
+
+// Whether anything is in a tile of covered.wgsl, which is one tile here, or two.
+fn has_any(tile: u32) -> bool {
+    let tiles = occlusion_tiles();
+    let y = tile / tiles.x * (TILE_ROWS / OCCLUSION_TILE);
+    let upper = band_pixels() + y * tiles.x + tile % tiles.x;
+    var farthest = atomicLoad(&nearest[upper]);
+    if (TILE_ROWS > OCCLUSION_TILE && y + 1u < tiles.y) {
+        farthest |= atomicLoad(&nearest[upper + tiles.x]);
+    }
+    return farthest != 0u;
+}
+
 // When all is drawn: what has nothing stays so. One invocation a tile.
 @compute @workgroup_size(WORKGROUP)
 fn occlude(

@@ -1,5 +1,5 @@
-// Stage 4: sums become the image: divide by the weight, shade, put over the background. One invocation a pixel of the
-// band. Twin: src/passes/resolve.rs.
+// Stage 4: sums become the image: divide by the weight, shade, put over the background. One invocation a pixel of a covered
+// tile. Twin: src/passes/resolve.rs.
 
 // Words of a pixel in the image; the colour's four come first.
 override IMAGE_WORDS: u32;
@@ -19,6 +19,7 @@ fn over(front: vec4<f32>, back: vec4<f32>) -> vec4<f32> {
     return select(vec4<f32>(0.0), vec4<f32>((front.rgb * front.a + back.rgb * behind) / alpha, alpha), alpha > 0.0);
 }
 
+// One workgroup a covered tile.
 @compute @workgroup_size(WORKGROUP)
 fn resolve(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -26,11 +27,15 @@ fn resolve(
     @builtin(local_invocation_index) local: u32,
 ) {
     hold();
-    let pixel = linear_index(workgroup, workgroups, local);
-    if (pixel >= band_pixels()) {
-        return;
+    let tile = covered_tile(workgroup.y * workgroups.x + workgroup.x);
+    let x = tile % tiles_across() * TILE_WIDTH + local % TILE_WIDTH;
+    for (var row = 0u; row < TILE_ROWS; row += WORKGROUP / TILE_WIDTH) {
+        let y = tile / tiles_across() * TILE_ROWS + row + local / TILE_WIDTH;
+        if (tile < tiles_in_band() && x < view.width && y < band.rows) {
+            let pixel = y * view.width + x;
+            resolve_pixel(pixel, pixel, x, y + band.first_row);
+        }
     }
-    resolve_pixel(pixel, pixel, pixel % view.width, pixel / view.width + band.first_row);
 }
 
 // The pixel (x, y), the band's `pixel`th, from what `sums_of` names its sums.

@@ -2,9 +2,6 @@
 
 const FETCHED: u32 = 1u;
 
-// Of a tile.
-const TILE_ROWS: u32 = 8u;
-
 fn hold_lane() {}
 
 // Which of those that are fetched this invocation fetches.

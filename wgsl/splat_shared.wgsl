@@ -4,9 +4,6 @@
 
 const FETCHED: u32 = 8u;
 
-// Of a tile: the more, the fewer tiles fetch the same splat, which takes longer than to draw it.
-const TILE_ROWS: u32 = 16u;
-
 // This invocation's place in its subgroup.
 var<private> lane: u32;
 

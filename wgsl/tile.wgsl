@@ -1,7 +1,7 @@
 // Stages 2 to 4 by tiles of the image, whose lists bin.wgsl made. An invocation keeps a column of a tile's pixels in registers,
-// eight of them a tile. What a splat costs a tile
-// is mostly its fetch and its hand-out, so a tile may be twice as high as wide; its upper and lower eight rows are drawn apart, each
-// by the splats that reach them. The footprint, and so every bit, is that of visibility.wgsl and accumulate.wgsl.
+// eight of them a tile. Where a splat's fetch costs as much as its pixels, tiles are twice as high as wide; their upper and lower
+// eight rows are drawn apart, each by the splats that reach them. The footprint, and so every bit, is that of visibility.wgsl
+// and accumulate.wgsl.
 // Host side: src/passes/tiles.rs.
 
 // The lists of the large splats.
@@ -18,19 +18,25 @@ struct Column {
     small: vec2<u32>,
 }
 
-// A workgroup has tiles next to each other.
-fn column_of(workgroup: vec3<u32>, local: u32) -> Column {
-    let x = workgroup.x * WORKGROUP + local;
-    let row = workgroup.y * TILE_ROWS;
+// The column that is the invocation's of eight tiles, which are each eight invocations'; of a number that is no tile one without
+// pixels.
+fn column_of(tile: u32, local: u32) -> Column {
+    let x = tile % tiles_across() * TILE_WIDTH + local % TILE_WIDTH;
+    let row = tile / tiles_across() * TILE_ROWS;
     var column = Column(x, row + band.first_row, row * view.width + x, 0u, vec2<u32>(0u), vec2<u32>(0u));
-    if (x / TILE_SIZE.x < cells_across(TILE_SIZE)) {
-        let end = LIST_ENDS + 1u + row / BLOCK_SIZE.y * cells_across(BLOCK_SIZE) + x / BLOCK_SIZE.x;
+    if (tile < tiles_in_band()) {
+        let end = LIST_ENDS + 1u + row / BLOCK_SIDE * cells_across(BLOCK_SIZE) + x / BLOCK_SIDE;
         let list = vec2<u32>(large_lists[end - 1u], large_lists[end]) + lists_start(BLOCK_SIZE);
         column.large = min(list, vec2<u32>(arrayLength(&large_lists)));
-        column.small = small_list(x / TILE_SIZE.x, workgroup.y);
+        column.small = small_list(tile);
         column.pixels = select(0u, min(TILE_ROWS, band.rows - row), x < view.width);
     }
     return column;
+}
+
+// This invocation's column where every eight invocations have a tile of their own.
+fn column_of_all(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32) -> Column {
+    return column_of(linear_index(workgroup, workgroups, local) / TILE_WIDTH, local);
 }
 
 // What this invocation fetched.
@@ -134,11 +140,12 @@ fn store(column: Column, first: u32, depths: vec4<f32>) {
 @compute @workgroup_size(WORKGROUP)
 fn tile_visibility(
     @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
     hold();
     hold_lane();
-    let column = column_of(workgroup, local);
+    let column = column_of_all(workgroup, workgroups, local);
     let listed = column.large.y - column.large.x;
     if (listed == 0u) {
         return;
@@ -237,11 +244,12 @@ fn sum_tile(column: Column) {
 @compute @workgroup_size(WORKGROUP)
 fn tile_accumulate(
     @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
     hold();
     hold_lane();
-    let column = column_of(workgroup, local);
+    let column = column_of_all(workgroup, workgroups, local);
     if (column.large.x == column.large.y) {
         return;
     }
@@ -252,15 +260,16 @@ fn tile_accumulate(
     }
 }
 
-// Where the tiles have all splats there are, their sums need not be stored.
+// Where the tiles have all splats there are, their sums need not be stored; those that nothing covers are not looked at.
 @compute @workgroup_size(WORKGROUP)
 fn tile_resolve(
     @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
     hold();
     hold_lane();
-    let column = column_of(workgroup, local);
+    let column = column_of(covered_tile(linear_index(workgroup, workgroups, local) / TILE_WIDTH), local);
     sum_tile(column);
     for (var k = 0u; k < column.pixels; k++) {
         show(k);

@@ -1,6 +1,6 @@
 // Tiles have large splats only. Same interface as tile_small.wgsl.
 
-fn small_list(x: u32, y: u32) -> vec2<u32> {
+fn small_list(tile: u32) -> vec2<u32> {
     return vec2<u32>(0u);
 }
 

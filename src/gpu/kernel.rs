@@ -39,6 +39,7 @@ pub const FILES: &[(&str, &str)] = wgsl![
     "color_sums.wgsl",
     "color_textured.wgsl",
     "count.wgsl",
+    "covered.wgsl",
     "count_absent.wgsl",
     "cull.wgsl",
     "cull_absent.wgsl",

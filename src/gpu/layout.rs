@@ -28,14 +28,24 @@ pub const QUEUE_GRID: u32 = 2;
 /// Word of the queue at which the grid starts that lists the large splats in tiles, some a workgroup.
 pub const QUEUE_LISTING: u32 = 5;
 
-/// Pixels of a tile across (`wgsl/bin.wgsl`).
+/// Pixels of a tile across (`wgsl/covered.wgsl`).
 pub const TILE_WIDTH: u32 = 8;
 
-/// Pixels of a tile down, where its invocations share what they fetch (`wgsl/splat_shared.wgsl`).
+/// Pixels of a tile down, where its invocations share what they fetch (`wgsl/splat_shared.wgsl`): the more, the fewer tiles fetch the
+/// same splat.
 pub const TILE_ROWS_SHARED: u32 = 16;
 
-/// Pixels of a tile down, where each fetches for itself (`wgsl/splat_plain.wgsl`).
+/// Pixels of a tile down elsewhere.
 pub const TILE_ROWS_PLAIN: u32 = 8;
+
+/// Words at the start of the list of covered tiles: how many there are, and two grids of workgroups (`wgsl/covered.wgsl`).
+pub const COVERED_LIST: u32 = 8;
+
+/// Word of that list at which the grid starts that has a workgroup for each tile.
+pub const COVERED_GRID: u32 = 1;
+
+/// Word of that list at which the grid starts that has one for eight tiles.
+pub const COVERED_GRID_OF_EIGHTS: u32 = 4;
 
 /// Words at the start of the lists of tiles: what they needed.
 pub const LIST_ENDS: u32 = 2;

@@ -10,11 +10,13 @@
 //! | [`visibility`] | splats | [`visibility::VisibilityBuffer`] |
 //! | [`accumulate`] | splats, nearest depths | [`accumulate::AttributeBuffer`] |
 //! | [`tiles`] | large splats, or all | the same two, or the next |
+//! | [`covered`] | nearest depths | the tiles that have anything |
 //! | [`resolve`] | sums | [`Frame`](crate::frame::Frame) |
 //!
 //! [`footprint`] is evaluated inside visibility and accumulate, with the [`lowpass`] that [`project`] prepared; [`variant`] says which kernels a render is made of.
 
 pub mod accumulate;
+pub mod covered;
 pub mod cull;
 pub mod footprint;
 pub mod lowpass;

@@ -16,11 +16,13 @@
 //! step of 1/255 of the [`BlendFormat::MOST_WEIGHTS_8`] weights that it can hold: `8 n / (255 w)` for a summed weight w,
 //! and what passes 8 weights is lost. Blending rounds in the order of the quads, so the order of the surfels shows.
 
+use super::covered::Covered;
 use super::project::SplatBuffer;
 use super::variant::PixelLayout;
 use super::{Recorder, Rows};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::gpu::buffers::Buffer;
 use crate::gpu::kernel::{Bound, Draw};
 use crate::scene::{BlendFormat, Camera, ColorNeed, Raster, RasterDepth, SceneNeeds};
 
@@ -154,6 +156,8 @@ pub fn check(gpu: &Gpu, raster: Raster, needs: &SceneNeeds, camera: &Camera) -> 
 pub struct Targets {
     depth: wgpu::TextureView,
     sums: Vec<wgpu::TextureView>,
+    /// The list of covered tiles.
+    pub covered: Buffer<u32>,
     /// Device memory, bytes.
     pub bytes: u64,
 }
@@ -162,8 +166,9 @@ const SUM_NAMES: [&str; 3] = ["sums_0", "sums_1", "sums_2"];
 
 impl Targets {
     /// For an image by `camera`.
-    pub fn new(gpu: &Gpu, raster: Raster, pixel: PixelLayout, camera: &Camera) -> Result<Self> {
-        let mut bytes = 0;
+    pub fn new(gpu: &Gpu, raster: Raster, pixel: PixelLayout, camera: &Camera, bands: &[Rows]) -> Result<Self> {
+        let covered = Buffer::indirect(gpu, "covered tiles", bands.iter().map(Covered::room).max().unwrap_or(0))?;
+        let mut bytes = covered.bytes();
         let guard = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let mut view = |label, format: wgpu::TextureFormat| {
             bytes += u64::from(format.block_copy_size(None).unwrap_or(4)) * camera.pixels() as u64;
@@ -186,7 +191,7 @@ impl Targets {
             return Err(gpu.error("out of memory for the blended sums: choose a smaller image"));
         }
         gpu.check()?;
-        Ok(Self { depth, sums, bytes })
+        Ok(Self { depth, sums, covered, bytes })
     }
 
     /// What resolve reads.

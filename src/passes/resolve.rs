@@ -4,13 +4,14 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::accumulate::PixelSums;
+use super::covered::Covered;
 use super::variant::Variant;
 use super::{Recorder, Rows};
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::{Buffer, Readback};
-use crate::gpu::kernel::{Bound, Grid, grid};
+use crate::gpu::kernel::Bound;
 use crate::scene::options::HIGHLIGHT;
 use crate::scene::{Camera, Colors, Light, RenderOptions, Scene, Shading};
 
@@ -123,23 +124,44 @@ impl ImageBuffer {
         Ok(Self { image, readback })
     }
 
+    /// Clears what covered tiles do not write, and their list.
+    pub(crate) fn clear(
+        &self,
+        variant: &Variant,
+        encoder: &mut wgpu::CommandEncoder,
+        rows: &Rows,
+        covered: Covered<'_>,
+    ) {
+        covered.clear(encoder);
+        if !variant.lists_empty {
+            let bytes = rows.pixels * u64::from(variant.pixel.image_words) * 4;
+            encoder.clear_buffer(&self.image.raw, 0, Some(bytes));
+        }
+    }
+
     /// Memory that it takes, bytes, with what the host reads it through.
     pub fn bytes(&self) -> u64 {
         self.image.bytes() + self.readback.bytes()
     }
 }
 
-/// Records the pass over `rows` of the sums that `bound` binds.
-pub fn record(recorder: &mut Recorder<'_>, rows: &Rows, bound: Bound<'_>, buffer: &ImageBuffer) -> Result<()> {
+/// Records the pass over the covered tiles of `rows`, whose sums `sums` binds.
+pub fn record(
+    recorder: &mut Recorder<'_>,
+    rows: &Rows,
+    (covered, sums): (Covered<'_>, Bound<'_>),
+    buffer: &ImageBuffer,
+) -> Result<()> {
     let (gpu, program) = (recorder.gpu, recorder.program);
     let own = [("view", recorder.view.bound()), ("band", rows.uniform.bound()), ("image", buffer.image.bound())];
-    let bound: Bound<'_> = own.into_iter().chain(bound).collect();
-    recorder.timing.pass(
-        gpu,
-        "resolve",
-        |_| {},
-        |pass| program.dispatch(gpu, pass, "resolve", &bound, Grid::Of(grid(gpu, rows.pixels)?)),
-    )
+    let sums: Bound<'_> = own.into_iter().chain(sums).collect();
+    let bound: Bound<'_> = sums.iter().cloned().chain([("visible", covered.bound())]).collect();
+    let variant = recorder.variant;
+    let clear = |encoder: &mut wgpu::CommandEncoder| buffer.clear(variant, encoder, rows, covered);
+    recorder.timing.pass(gpu, "resolve", clear, |pass| {
+        covered.record((gpu, program), pass, rows, &sums)?;
+        program.dispatch(gpu, pass, "resolve", &bound, covered.each())
+    })
 }
 
 /// Reads resolved rows back into `frame`.

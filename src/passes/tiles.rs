@@ -19,15 +19,14 @@ use super::cull::Part;
 use super::lowpass::Design;
 use super::project::{self, SplatBuffer};
 use super::resolve::ImageBuffer;
+use super::variant::tile_rows;
 use super::visibility::VisibilityBuffer;
 use super::{Recorder, Rows};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
-use crate::gpu::kernel::{Bound, Grid, Program};
-use crate::gpu::layout::{
-    BLOCK_SIDE, LIST_ENDS, QUEUE_LISTING, TILE_ROWS_PLAIN, TILE_ROWS_SHARED, TILE_WIDTH, WORKGROUP,
-};
+use crate::gpu::kernel::{Bound, Grid, Program, grid};
+use crate::gpu::layout::{BLOCK_SIDE, LIST_ENDS, QUEUE_LISTING, TILE_ROWS_SHARED, TILE_WIDTH};
 use crate::scene::{Camera, RenderOptions, Scene, SceneNeeds};
 
 /// The fewest tiles that a splat touches on average for all to be summed by tiles. On a software adapter at 1024x1024 frames
@@ -102,9 +101,10 @@ struct Room {
     longest: u64,
 }
 
-/// The longest list that is drawn: Mesa's llvmpipe ends the loops of an invocation after 65,535 rounds in all, and an entry
-/// takes one for itself and one as it is fetched, of either list.
-const LONGEST: u64 = 16_000;
+/// The longest list that is drawn. Mesa's llvmpipe ends the loops of an invocation after 65,535 rounds in all, of which the last
+/// look at a condition is one. An entry that is fetched alone takes four: to be fetched, to be drawn, and a last look for each half
+/// of the tile; of those fetched in eights, eight take 19, if both halves draw them. There are two lists.
+const LONGEST: u64 = 8_000;
 
 impl Room {
     /// Whether this is enough for `needed`.
@@ -138,7 +138,7 @@ impl Tiles {
         image: (u32, &[Rows]),
         parts: &'static [Part],
     ) -> Result<Self> {
-        let rows = if needs.subgroups { TILE_ROWS_SHARED } else { TILE_ROWS_PLAIN };
+        let rows = tile_rows(needs);
         let [large, small] = [Listed::Large, Listed::Small].map(|of| Lists::new(gpu, of.cell(rows), image, 0));
         Ok(Self { program, width: image.0, rows, parts, large: large?, small: small? })
     }
@@ -260,6 +260,19 @@ impl Tiles {
         })
     }
 
+    /// What the kernels of tiles bind for the splats of a page, beside `buffers`.
+    fn listed<'a>(
+        &'a self,
+        recorder: &Recorder<'a>,
+        page: (&'a SplatBuffer, usize),
+        rows: &'a Rows,
+        buffers: &[(&'a str, wgpu::BindingResource<'a>)],
+    ) -> Bound<'a> {
+        let mut own = vec![("large_lists", self.large.words.bound()), ("small_lists", self.small.words.bound())];
+        own.extend_from_slice(buffers);
+        self.bindings(recorder, page, rows, &own)
+    }
+
     /// Records `kernel` over the tiles of `rows`, for the splats of a page, as a part of `stage`.
     fn draw(
         &self,
@@ -270,12 +283,10 @@ impl Tiles {
         buffers: &[(&str, wgpu::BindingResource<'_>)],
     ) -> Result<()> {
         let gpu = recorder.gpu;
-        let groups = (self.width.div_ceil(WORKGROUP), rows.count.div_ceil(self.rows));
-        let mut own = vec![("large_lists", self.large.words.bound()), ("small_lists", self.small.words.bound())];
-        own.extend_from_slice(buffers);
-        let bound = self.bindings(recorder, page, rows, &own);
-        let kernel =
-            |pass: &mut wgpu::ComputePass<'_>| self.program.dispatch(gpu, pass, kernel, &bound, Grid::Of(groups));
+        let tiles = u64::from(self.width.div_ceil(TILE_WIDTH)) * u64::from(rows.count.div_ceil(self.rows));
+        let bound = self.listed(recorder, page, rows, buffers);
+        let groups = Grid::Of(grid(gpu, tiles * u64::from(TILE_WIDTH))?);
+        let kernel = |pass: &mut wgpu::ComputePass<'_>| self.program.dispatch(gpu, pass, kernel, &bound, groups);
         recorder.timing.pass(gpu, stage, |_| {}, kernel)
     }
 }
@@ -324,9 +335,16 @@ pub fn resolve(
     tiles: &Tiles,
     (visible, buffer): (&VisibilityBuffer, &ImageBuffer),
 ) -> Result<()> {
-    let buffers = [("visible", visible.nearest.bound()), ("image", buffer.image.bound())];
     tiles.bin(recorder, Listed::Small, (splats, 0), (rows, visible), true, true)?;
-    tiles.draw(recorder, ("accumulate", "tile_resolve"), (splats, 0), rows, &buffers)
+    let (gpu, program, variant) = (recorder.gpu, recorder.program, recorder.variant);
+    let covered = visible.covered(rows);
+    let buffers = [("visible", visible.nearest.bound()), ("image", buffer.image.bound())];
+    let bound = tiles.listed(recorder, (splats, 0), rows, &buffers);
+    let clear = |encoder: &mut wgpu::CommandEncoder| buffer.clear(variant, encoder, rows, covered);
+    recorder.timing.pass(gpu, "accumulate", clear, |pass| {
+        covered.record((gpu, program), pass, rows, &bound)?;
+        tiles.program.dispatch(gpu, pass, "tile_resolve", &bound, covered.eights())
+    })
 }
 
 #[cfg(test)]

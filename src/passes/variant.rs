@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use super::accumulate::{self, Accumulator, accumulator};
 use super::lowpass::Design;
-use super::{cull, lowpass, raster};
+use super::{covered, cull, lowpass, raster};
 use crate::error::Result;
 use crate::gpu::kernel::Program;
-use crate::gpu::layout::{LARGE_BY_TILES, LARGE_BY_WORKGROUPS};
+use crate::gpu::layout::{LARGE_BY_TILES, LARGE_BY_WORKGROUPS, TILE_ROWS_PLAIN, TILE_ROWS_SHARED};
 use crate::gpu::{Gpu, Sources};
 use crate::scene::{
     ColorNeed, Kernel, KernelShape, LowPass, Optimisation, Organisation, Projection, RasterDepth, RenderOptions,
@@ -17,7 +17,7 @@ use crate::scene::{
 
 /// The entry points that a render with `needs` dispatches.
 fn stages(needs: &SceneNeeds) -> Vec<&'static str> {
-    let mut stages = vec!["project", "arrange_rare", "project_rare", "arrange"];
+    let mut stages = vec!["project", "arrange_rare", "project_rare", "arrange", "list_covered", "arrange_covered"];
     if needs.raster.is_none() {
         stages.extend(["clear", "visibility", "visibility_large", "occlude"]);
     }
@@ -53,6 +53,8 @@ pub struct Variant {
     pub accumulator: &'static Accumulator,
     /// The room a pixel takes.
     pub pixel: PixelLayout,
+    /// Tiles that nothing covers are resolved too.
+    pub lists_empty: bool,
     /// Overridable constants by name; a module takes those it declares.
     pub constants: Vec<(&'static str, f64)>,
 }
@@ -62,7 +64,8 @@ impl Variant {
     pub fn of(needs: &SceneNeeds, options: &RenderOptions, surfels: u64) -> Result<Self> {
         let accumulator = accumulator(needs.accumulator)?;
         let constants = overrides(needs, options, accumulator.fraction_bits(surfels));
-        Ok(Self { needs: *needs, accumulator, pixel: PixelLayout::of(needs), constants })
+        let lists_empty = covered::lists_empty(options);
+        Ok(Self { needs: *needs, accumulator, pixel: PixelLayout::of(needs), lists_empty, constants })
     }
 
     /// The compiled kernels; `gpu` keeps them.
@@ -113,6 +116,7 @@ fn files(needs: &SceneNeeds) -> Vec<&'static str> {
             KernelShape::Hat => "kernel_hat.wgsl",
             KernelShape::Constant => "kernel_constant.wgsl",
         },
+        "covered.wgsl",
         "resolve.wgsl",
         pick(needs.normal, "normal.wgsl", "normal_absent.wgsl"),
         pick(needs.normal_map, "normal_map.wgsl", "normal_map_absent.wgsl"),
@@ -237,6 +241,11 @@ pub fn color_channels(needs: &SceneNeeds) -> u32 {
     }
 }
 
+/// Pixels of a tile, down.
+pub fn tile_rows(needs: &SceneNeeds) -> u32 {
+    if needs.subgroups { TILE_ROWS_SHARED } else { TILE_ROWS_PLAIN }
+}
+
 /// Splats whose bounds hold more pixels than this are large.
 fn large(needs: &SceneNeeds, options: &RenderOptions) -> u32 {
     match (needs.tiles, options.organisation) {
@@ -251,6 +260,8 @@ pub fn overrides(needs: &SceneNeeds, options: &RenderOptions, fraction_bits: u32
     let layout = PixelLayout::of(needs);
     let mut constants = vec![
         ("LARGE", large(needs, options).into()),
+        ("TILE_ROWS", tile_rows(needs).into()),
+        ("LIST_EMPTY", u32::from(covered::lists_empty(options)).into()),
         ("HIDES", u32::from(options.has(Optimisation::Hiding)).into()),
         ("CHANNELS", layout.channels.into()),
         ("FRACTION_BITS", fraction_bits.into()),

@@ -4,6 +4,7 @@
 //! On the device depths are positive f32, whose bits order as u32: an atomic min. What is then farthest in each tile of
 //! pixels lets the next pass leave out splats that are hidden altogether.
 
+use super::covered::Covered;
 use super::cull::Part;
 use super::footprint::footprint;
 use super::project::{Splat, SplatBuffer};
@@ -39,15 +40,20 @@ pub fn reference<'a>(
 
 /// The nearest depth of each pixel of some rows, as bits, in device units.
 pub struct VisibilityBuffer {
-    /// One word a pixel, then one a tile (occlusion.wgsl).
+    /// One word a pixel, then one a tile (occlusion.wgsl), then the covered tiles.
     pub nearest: Buffer<u32>,
 }
 
 impl VisibilityBuffer {
     /// Room for each of `bands`.
     pub fn new(gpu: &Gpu, bands: &[Rows]) -> Result<Self> {
-        let words = bands.iter().map(|rows| rows.pixels + rows.tiles).max().unwrap_or(0);
-        Ok(Self { nearest: Buffer::storage(gpu, "nearest depths", words)? })
+        let words = bands.iter().map(|rows| rows.pixels + rows.tiles + Covered::room(rows)).max().unwrap_or(0);
+        Ok(Self { nearest: Buffer::indirect(gpu, "nearest depths", words)? })
+    }
+
+    /// Where the covered tiles of `rows` are listed.
+    pub fn covered(&self, rows: &Rows) -> Covered<'_> {
+        Covered::new(&self.nearest, rows.pixels + rows.tiles)
     }
 }
 

@@ -56,7 +56,7 @@ impl PixelBuffers {
         let sums = match variant.needs.raster {
             None if variant.needs.gather => Sums::Gathered(VisibilityBuffer::new(gpu, &bands)?),
             None => Sums::Storage(VisibilityBuffer::new(gpu, &bands)?, AttributeBuffer::new(gpu, variant, most)?),
-            Some(raster) => Sums::Targets(raster, raster::Targets::new(gpu, raster, variant.pixel, camera)?),
+            Some(raster) => Sums::Targets(raster, raster::Targets::new(gpu, raster, variant.pixel, camera, &bands)?),
         };
         Ok(Self {
             made_for: Self::key(camera, variant),

@@ -1,0 +1,58 @@
+// Stage 4, its start: which tiles of the image have anything. The others stay as the image was cleared, and no invocation
+// looks at their pixels. Host side: src/passes/covered.rs.
+
+// Pixels of a tile, across and down.
+const TILE_WIDTH: u32 = 8u;
+override TILE_ROWS: u32;
+
+// 1 where the image differs from 0 even where nothing is, so that all tiles are listed.
+override LIST_EMPTY: u32;
+
+// From covered_start() on: how many tiles are listed; a grid of workgroups with one for each; a grid with one for eight; and
+// from COVERED_LIST on the tiles.
+const COVERED_GRID: u32 = 1u;
+const COVERED_GRID_OF_EIGHTS: u32 = 4u;
+const COVERED_LIST: u32 = 8u;
+
+// Tiles in a row of the image.
+fn tiles_across() -> u32 {
+    return (view.width + TILE_WIDTH - 1u) / TILE_WIDTH;
+}
+
+// Tiles of the band.
+fn tiles_in_band() -> u32 {
+    return tiles_across() * ((band.rows + TILE_ROWS - 1u) / TILE_ROWS);
+}
+
+// One invocation a tile.
+@compute @workgroup_size(WORKGROUP)
+fn list_covered(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    hold();
+    let tile = linear_index(workgroup, workgroups, local);
+    if (tile < tiles_in_band() && (LIST_EMPTY != 0u || has_any(tile))) {
+        // Places depend on the schedule, but tiles share no pixel.
+        let place = atomicAdd(&nearest[covered_start()], 1u);
+        atomicStore(&nearest[covered_start() + COVERED_LIST + place], tile);
+    }
+}
+
+@compute @workgroup_size(1)
+fn arrange_covered() {
+    hold();
+    let listed = atomicLoad(&nearest[covered_start()]);
+    let grid = rows_of(listed);
+    let eighths = rows_of((listed + 7u) / 8u);
+    for (var k = 0u; k < 3u; k++) {
+        atomicStore(&nearest[covered_start() + COVERED_GRID + k], grid[k]);
+        atomicStore(&nearest[covered_start() + COVERED_GRID_OF_EIGHTS + k], eighths[k]);
+    }
+}
+
+// The tile at a place of the list; past its end a number that is no tile.
+fn covered_tile(place: u32) -> u32 {
+    return select(0xffffffffu, visible[covered_start() + COVERED_LIST + place], place < visible[covered_start()]);
+}

@@ -14,6 +14,8 @@ mod las;
 mod memory;
 mod mutate;
 mod obj;
+#[cfg(feature = "pcd")]
+mod pcd;
 mod ply;
 mod random;
 mod render;
@@ -71,4 +73,10 @@ fn camera() {
 #[test]
 fn cameras() {
     session::run(&cameras::TARGET);
+}
+
+#[cfg(feature = "pcd")]
+#[test]
+fn pcd() {
+    session::run(&pcd::TARGET);
 }

@@ -10,6 +10,11 @@
 
 mod camera;
 mod cameras;
+#[cfg(feature = "e57")]
+mod e57;
+#[cfg(feature = "e57")]
+#[path = "../common/e57_page.rs"]
+mod e57_page;
 mod las;
 mod memory;
 mod mutate;
@@ -79,4 +84,10 @@ fn cameras() {
 #[test]
 fn pcd() {
     session::run(&pcd::TARGET);
+}
+
+#[cfg(feature = "e57")]
+#[test]
+fn e57() {
+    session::run(&e57::TARGET);
 }

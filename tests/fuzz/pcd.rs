@@ -85,7 +85,7 @@ fn fields(random: &mut Random) -> Vec<Field> {
 fn header(random: &mut Random, fields: &[Field], points: usize, data: &str) -> String {
     let each = |of: &dyn Fn(&Field) -> String| fields.iter().map(of).collect::<Vec<_>>().join(" ");
     let line = |random: &mut Random, text: &str| if random.one_in(2) { text.to_owned() } else { String::new() };
-    let height = if points % 2 == 0 && random.one_in(3) { 2 } else { 1 };
+    let height = if points.is_multiple_of(2) && random.one_in(3) { 2 } else { 1 };
     [
         line(random, "# .PCD v0.7 - Point Cloud Data file format\n"),
         format!("VERSION 0.7\nFIELDS {}\n", each(&|field| field.name.into())),

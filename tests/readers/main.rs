@@ -3,6 +3,9 @@
 
 #[cfg(feature = "e57")]
 mod e57;
+#[cfg(feature = "e57")]
+#[path = "../common/e57_page.rs"]
+mod e57_page;
 mod las;
 mod las_damage;
 mod mesh;

@@ -12,11 +12,13 @@
 //! | [`tiles`] | large splats, or all | the same two, or the next |
 //! | [`resolve`] | sums | [`Frame`](crate::frame::Frame) |
 //!
-//! [`footprint`] is evaluated inside visibility and accumulate, with the [`lowpass`] that [`project`] prepared; [`variant`] says which kernels a render is made of.
+//! [`footprint`] is evaluated inside visibility and accumulate, with the [`homography`] and the [`lowpass`] that [`project`] prepared;
+//! [`variant`] says which kernels a render is made of.
 
 pub mod accumulate;
 pub mod cull;
 pub mod footprint;
+pub mod homography;
 pub mod lowpass;
 pub mod order;
 pub mod project;

@@ -1,4 +1,4 @@
-//! Stage 1: every surfel becomes a splat, once: its [`homography`](super::homography), the pixels that it may touch, and its
+//! Stage 1: every surfel becomes a splat, once: its [`homography`], the pixels that it may touch, and its
 //! [`lowpass`].
 //!
 //! Bounds only save work: [`footprint`](super::footprint) decides.

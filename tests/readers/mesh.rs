@@ -142,6 +142,32 @@ fn materials_textures_and_what_of_them_is_missing() {
     assert!(colored.material.is_none() && colored.notes.is_empty());
 }
 
+#[test]
+fn libraries_of_other_writers() {
+    let folder = Folder::new();
+    std::fs::create_dir(folder.path("maps")).unwrap();
+    std::fs::write(folder.path("maps/a b.png"), picture(image::ImageFormat::Png)).unwrap();
+    let first = "newmtl one\n\tKa spectral a.rfl\n\tNi\n\tKd 0.5 0 0\n\tTr 0\nnewmtl two\n\
+                 map_Kd -blendu on -s 1 1 1 -o 0.5 -mm 0 1 maps\\a b.png\nmap_Bump\nnewmtl three\nmap_Kd maps/a b.png\n";
+    std::fs::write(folder.path("first.mtl"), format!("\u{feff}{first}").replace('\n', "\r\n")).unwrap();
+    std::fs::write(folder.path("second.mtl"), "newmtl four\nKd 0 1 0\n").unwrap();
+    let faces: Vec<String> =
+        ["one", "two", "three", "four"].map(|name| format!("usemtl {name}\nf 1/1 2/1 3/1\n")).into();
+    let text =
+        |libraries: &str| format!("mtllib {libraries}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.1 0.5\n{}", faces.concat());
+    let mesh = read(&folder, "a.obj", text("first.mtl second.mtl").as_bytes());
+    assert_eq!(mesh.notes, [""; 0]);
+    let material = |triangle: usize| mesh.material_of(triangle).unwrap();
+    assert_eq!((material(0).diffuse, material(3).diffuse), ([0.5, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0]));
+    for painted in [1, 2] {
+        let [r, g, b, _] = material(painted).texture.as_ref().unwrap().at(0.1, 0.5);
+        assert!(r > 0.9 && g + b == 0.0, "{painted}: {r} {g} {b}");
+    }
+    // A name with a space that no file has is one name.
+    let mesh = read(&folder, "a.obj", text("first of all.mtl").as_bytes());
+    assert!(mesh.notes.len() == 1 && mesh.notes[0].contains("first of all.mtl"), "{:?}", mesh.notes);
+}
+
 /// A picture of two columns, red and blue.
 fn picture(format: image::ImageFormat) -> Vec<u8> {
     let column = |x: u32| if x < 8 { image::Rgb([250u8, 0, 0]) } else { image::Rgb([0, 0, 250]) };

@@ -6,7 +6,6 @@ mod source;
 use crate::io::fault::{self, Fault};
 use crate::io::triangles::Triangles;
 use crate::io::{Mesh, Points, Up};
-use crate::scene::Colors;
 use crate::{Progress, Result};
 use source::{Lines, Source};
 use std::fs::File;
@@ -21,7 +20,8 @@ use std::path::Path;
 ///   with one `vn` for each `v` pairs them.
 /// - Radii: 1.1 times the smallest with which disks at a triangle's corners cover it, the largest over the vertex's
 ///   triangles; polygons are fanned into triangles; a vertex of no triangle has none (zero).
-/// - Colours: the three numbers after a vertex's coordinates, sRGB-coded in [0, 1], become linear light.
+/// - Colours: the three numbers after a vertex's coordinates, sRGB-coded in [0, 1], or where any is 2 or more in [0, 255], become
+///   linear light; a fourth is alpha.
 ///
 /// Up is y. Lines, points, curves and materials are passed over, so a missing MTL file is no error.
 ///
@@ -110,6 +110,7 @@ fn faces<'a>(lines: &Lines, models: &'a [tobj::Model]) -> impl Iterator<Item = F
 type Face = ([usize; 3], Option<[Option<[f64; 3]>; 3]>);
 
 fn points(lines: Lines, models: &[tobj::Model]) -> Points {
+    let colors = lines.colors();
     let mut triangles = Triangles::new(&lines.positions);
     for (corners, normals) in faces(&lines, models) {
         triangles.add(corners, normals);
@@ -125,7 +126,7 @@ fn points(lines: Lines, models: &[tobj::Model]) -> Points {
         positions: lines.positions,
         normals,
         radii: has_faces.then_some(radii),
-        colors: (!lines.colors.is_empty()).then_some(Colors::Linear(lines.colors)),
+        colors,
         up: Some(Up::Y),
         ..Points::default()
     }
@@ -151,13 +152,14 @@ fn mesh(lines: Lines, models: &[tobj::Model]) -> (Mesh, Vec<String>, Vec<String>
         material.extend(mesh.indices.as_chunks::<3>().0.iter().map(|_| number));
     }
     let textured = lines.every_corner_has_texture && !texture.is_empty() && texture.len() == triangles.len();
+    let colors = lines.colors();
     let mesh = Mesh {
         normals: (!normals.is_empty() && normals.len() == triangles.len()).then_some(normals),
         texture: textured.then_some(texture),
         material: (!lines.materials.is_empty()).then_some(material),
         triangles,
         positions: lines.positions,
-        colors: (!lines.colors.is_empty()).then_some(Colors::Linear(lines.colors)),
+        colors,
         up: Some(Up::Y),
         ..Mesh::default()
     };

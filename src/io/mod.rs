@@ -16,6 +16,7 @@ pub mod pcd;
 pub mod ply;
 pub mod png;
 pub mod points;
+mod polygon;
 pub mod texture;
 mod triangles;
 mod values;

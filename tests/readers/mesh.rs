@@ -142,6 +142,34 @@ fn materials_textures_and_what_of_them_is_missing() {
     assert!(colored.material.is_none() && colored.notes.is_empty());
 }
 
+/// An arrow, concave at its fourth corner, which a fan from its first leaves.
+#[test]
+fn concave_polygons_hold_their_triangles() {
+    let folder = Folder::new();
+    let arrow: [&[f64]; 5] = [&[0.0, 0.0, 0.0], &[2.0, 0.0, 0.0], &[2.0, 2.0, 0.0], &[1.0, 0.3, 0.0], &[0.0, 2.0, 0.0]];
+    let uv: Vec<f64> = arrow.iter().flat_map(|corner| [corner[0], corner[1]]).collect();
+    let row = [&[5.0, 0.0, 1.0, 2.0, 3.0, 4.0, 10.0], &uv[..]].concat();
+    let face = [("list uchar int", "vertex_indices"), ("list uchar float", "texcoord")];
+    let of_obj: String =
+        arrow.iter().map(|p| format!("v {} {} {}\nvt {} {}\n", p[0], p[1], p[2], p[0], p[1])).collect();
+    let mut meshes = vec![read(&folder, "a.obj", format!("{of_obj}f 1/1 2/2 3/3 4/4 5/5\n").as_bytes())];
+    for encoding in ENCODINGS {
+        meshes.push(read(&folder, "a.ply", &file(encoding, &[("vertex", &XYZ, &arrow), ("face", &face, &[&row])])));
+    }
+    for mesh in meshes {
+        let double_area = |[a, b, c]: [[f64; 3]; 3]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+        let areas: Vec<f64> =
+            mesh.triangles.iter().map(|t| double_area(t.map(|vertex| mesh.positions[vertex as usize]))).collect();
+        // Of a fan one triangle is turned round.
+        assert!(areas.len() == 3 && areas.iter().all(|&area| area > 0.0), "{areas:?}");
+        assert!((areas.iter().sum::<f64>() - 4.6).abs() < 1e-6);
+        for (triangle, corners) in mesh.triangles.iter().zip(mesh.texture.as_ref().unwrap()) {
+            let of = |vertex: u32| [0, 1].map(|axis| mesh.positions[vertex as usize][axis] as f32);
+            assert_eq!(triangle.map(of), *corners);
+        }
+    }
+}
+
 #[test]
 fn libraries_of_other_writers() {
     let folder = Folder::new();

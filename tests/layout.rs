@@ -8,6 +8,7 @@ mod common;
 use std::collections::{BTreeMap, BTreeSet};
 use std::mem::{offset_of, size_of};
 
+use common::modules;
 use epsplat::gpu::Sources;
 use epsplat::gpu::kernel::{FILES, reflect};
 use epsplat::gpu::layout::{
@@ -16,7 +17,7 @@ use epsplat::gpu::layout::{
     WORKGROUP,
 };
 use epsplat::passes::accumulate::accumulator;
-use epsplat::passes::variant::{COLOR_CHANNEL, PixelLayout, color_channels, modules};
+use epsplat::passes::variant::{self, COLOR_CHANNEL, PixelLayout, color_channels};
 use epsplat::scene::camera::MAX_SIDE;
 use epsplat::scene::options::{LEAST_FILTERED_WEIGHT, LEAST_WEIGHT};
 use epsplat::scene::{SceneNeeds, Surfel};
@@ -273,30 +274,9 @@ fn compare(
     }
 }
 
-/// A module and one of the needs that it is made for.
-struct Made {
-    module: Module,
-    needs: SceneNeeds,
-    tiles: bool,
-}
-
-/// The different modules of all needs.
-fn all_modules(sources: &Sources) -> Vec<Made> {
-    let joined = |needs: SceneNeeds| {
-        modules(&needs).into_iter().map(move |(files, _)| (sources.join(&files), (needs, files.contains(&"tile.wgsl"))))
-    };
-    let texts: BTreeMap<String, (SceneNeeds, bool)> = common::all_needs().into_iter().flat_map(joined).collect();
-    let made = |(text, (needs, tiles)): (String, _)| Made {
-        module: reflect(&text).unwrap_or_else(|e| panic!("{e}")).0,
-        needs,
-        tiles,
-    };
-    texts.into_iter().map(made).collect()
-}
-
 /// The first module of `needs`.
 fn first_of(sources: &Sources, needs: &SceneNeeds) -> Module {
-    reflect(&sources.join(&modules(needs)[0].0)).unwrap().0
+    reflect(&sources.join(&variant::modules(needs)[0].0)).unwrap().0
 }
 
 #[test]
@@ -314,9 +294,10 @@ fn mirrors_have_no_gaps() {
 #[test]
 fn every_binding_has_the_hosts_layout() {
     let mut seen = BTreeSet::new();
-    for Made { module, needs, tiles } in all_modules(&Sources::default()) {
+    for made in modules::different() {
+        let (module, needs) = (&made.reflected().module, &made.needs);
         assert_eq!(
-            differences(&module, if tiles { "fixed" } else { kept_as(&needs) }),
+            differences(module, if made.of_tiles() { "fixed" } else { kept_as(needs) }),
             Vec::<String>::new(),
             "{}",
             needs.accumulator
@@ -365,8 +346,8 @@ fn a_changed_layout_is_noticed() {
 fn binding_numbers_are_unique_over_all_files() {
     let mut numbers: BTreeMap<u32, BTreeSet<String>> = BTreeMap::new();
     let mut names: BTreeMap<String, BTreeSet<u32>> = BTreeMap::new();
-    for Made { module, .. } in all_modules(&Sources::default()) {
-        for (_, variable) in module.global_variables.iter() {
+    for made in modules::different() {
+        for (_, variable) in made.reflected().module.global_variables.iter() {
             if let (Some(binding), Some(name)) = (&variable.binding, &variable.name) {
                 assert_eq!(binding.group, 0, "{name}");
                 numbers.entry(binding.binding).or_default().insert(name.clone());
@@ -390,8 +371,9 @@ fn constant(module: &Module, name: &str) -> Option<f64> {
 
 #[test]
 fn constants_agree() {
-    for Made { module, needs, tiles } in all_modules(&Sources::default()) {
-        let constant = |name| constant(&module, name);
+    for made in modules::different() {
+        let (module, needs, tiles) = (&made.reflected().module, made.needs, made.of_tiles());
+        let constant = |name| constant(module, name);
         for (name, value) in [
             ("WORKGROUP", WORKGROUP),
             ("TILE", TILE),

@@ -6,15 +6,16 @@ mod common;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use common::modules::{self, Made, Reflected};
 use epsplat::gpu::Sources;
 use epsplat::gpu::device::STORAGE_BUFFERS;
 use epsplat::gpu::kernel::{FILES, reflect};
 use epsplat::passes::accumulate::{ACCUMULATORS, Features, accumulator};
-use epsplat::passes::variant::{COLOR_CHANNEL, PixelLayout, color_channels, modules, overrides};
-use epsplat::scene::ColorNeed;
-use epsplat::scene::{Kernel, KernelShape, RenderOptions, SceneNeeds};
+use epsplat::passes::variant::{self, COLOR_CHANNEL, PixelLayout, color_channels, overrides};
+use epsplat::scene::{ColorNeed, Kernel, KernelShape, RenderOptions};
 use naga::AddressSpace;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
+use rayon::prelude::*;
 
 /// Storage buffers per stage that core WebGPU grants.
 const CORE_STORAGE_BUFFERS: usize = 8;
@@ -33,36 +34,25 @@ fn is_valid(module: &naga::Module, capabilities: Capabilities) -> Result<(), Str
     outcome.map(|_| ()).map_err(|e| e.into_inner().to_string())
 }
 
-/// The modules of all needs, with their files and entry points.
-fn all_modules() -> Vec<(SceneNeeds, Vec<&'static str>, Vec<&'static str>)> {
-    let of = |needs: SceneNeeds| modules(&needs).into_iter().map(move |(files, stages)| (needs, files, stages));
-    common::all_needs().into_iter().flat_map(of).collect()
-}
-
 #[test]
 fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
-    let sources = Sources::default();
-    let texts: BTreeMap<String, (SceneNeeds, Vec<&str>, Vec<&str>)> = all_modules()
-        .into_iter()
-        .map(|(needs, files, stages)| (sources.join(&files), (needs, files, stages)))
-        .collect();
-    assert!(texts.len() > 500, "{}", texts.len());
-    let mut without = BTreeSet::new();
-    for (text, (needs, files, stages)) in &texts {
-        let module = naga::front::wgsl::parse_str(text).unwrap_or_else(|e| panic!("{}", e.emit_to_string(text)));
+    let different = modules::different();
+    assert!(different.len() > 500, "{}", different.len());
+    let without = different.par_iter().flat_map_iter(|made| {
+        let Made { needs, files, stages, .. } = made;
+        let module = &made.reflected().module;
         let features = match needs.raster {
             None if needs.atomics_u64 => Features::AtomicsU64,
             None => accumulator(needs.accumulator).unwrap().features,
             Some(_) => Features::None,
         };
-        let features = if files.contains(&"tile.wgsl") { Features::None } else { features };
+        let features = if made.of_tiles() { Features::None } else { features };
         let mut needed = capabilities(features);
         needed.extend(files.contains(&"splat_shared.wgsl").then_some(Capabilities::SUBGROUP));
         let all = needed.iter().copied().collect::<Capabilities>();
-        is_valid(&module, all).unwrap_or_else(|e| panic!("{}: {e}", needs.accumulator));
-        for capability in needed {
-            assert!(is_valid(&module, all - capability).is_err(), "{} needs no {capability:?}", needs.accumulator);
-            without.insert(if capability == Capabilities::SUBGROUP { "tiles" } else { needs.accumulator });
+        is_valid(module, all).unwrap_or_else(|e| panic!("{}: {e}", needs.accumulator));
+        for &capability in &needed {
+            assert!(is_valid(module, all - capability).is_err(), "{} needs no {capability:?}", needs.accumulator);
         }
         let entries: BTreeSet<&str> = module.entry_points.iter().map(|entry| entry.name.as_str()).collect();
         let drawn: &[&str] = if needs.raster.is_some() {
@@ -73,15 +63,17 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
         let own: BTreeSet<&str> = stages.iter().chain(drawn).copied().collect();
         // Of a render by tiles each module has entry points that only the other needs.
         let shared = entries.difference(&own).count();
-        let leaves = files.contains(&"tile.wgsl") || needs.gather;
+        let leaves = made.of_tiles() || needs.gather;
         assert!(own.is_subset(&entries) && (shared == 0) != leaves, "{entries:?}");
         for (_, variable) in module.global_variables.iter().filter(|(_, v)| v.binding.is_some()) {
             let buffer = matches!(variable.space, AddressSpace::Uniform | AddressSpace::Storage { .. });
             // Only what the rasteriser wrote is a texture.
             assert!(buffer || (needs.raster.is_some() && variable.space == AddressSpace::Handle));
         }
-        assert!(!text.lines().any(|line| line.starts_with("enable") || line.starts_with("requires")));
-    }
+        assert!(!made.text().lines().any(|line| line.starts_with("enable") || line.starts_with("requires")));
+        needed.into_iter().map(|of| if of == Capabilities::SUBGROUP { "tiles" } else { needs.accumulator })
+    });
+    let without: BTreeSet<&str> = without.collect();
     assert_eq!(without, BTreeSet::from(["fixed", "fixed64", "float", "packed64", "tiles"]));
     // The default runs anywhere.
     assert_eq!(ACCUMULATORS[0].features, Features::None);
@@ -91,10 +83,10 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
 fn an_invalid_kernel_or_one_with_a_feature_is_noticed() {
     let needs = common::all_needs()[0];
     let broken = Sources::default().replace("kernel_ellipse.wgsl", "exp(-KERNEL_A", "exp(-view").unwrap();
-    assert!(reflect(&broken.join(&modules(&needs)[0].0)).is_err());
+    assert!(reflect(&broken.join(&variant::modules(&needs)[0].0)).is_err());
     let wide =
         Sources::default().replace("kernel_ellipse.wgsl", "var power: f32;", "var power: f32; let w = 1lu;").unwrap();
-    let text = wide.join(&modules(&needs)[0].0);
+    let text = wide.join(&variant::modules(&needs)[0].0);
     let module = naga::front::wgsl::parse_str(&text).unwrap();
     assert!(Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module).is_err());
 }
@@ -111,17 +103,16 @@ fn every_file_is_known_and_reached() {
     assert_eq!(on_disk, known);
     assert_eq!(known.len(), FILES.len());
     let reached: BTreeSet<String> =
-        all_modules().into_iter().flat_map(|(_, files, _)| files).map(str::to_owned).collect();
+        modules::all().iter().flat_map(|made| &made.files).map(|&file| file.to_owned()).collect();
     assert_eq!(reached, known);
 }
 
 #[test]
 fn host_and_kernels_agree_about_overrides() {
-    let sources = Sources::default();
     let mut declared_anywhere = BTreeSet::new();
     let mut set_anywhere = BTreeSet::new();
-    for (needs, files, _) in all_modules() {
-        let module = reflect(&sources.join(&files)).unwrap().0;
+    for made in modules::all() {
+        let (needs, module) = (&made.needs, &made.reflected().module);
         let kernel = match needs.kernel {
             KernelShape::Gaussian => Kernel::Gaussian { sigma: 0.4 },
             KernelShape::Ellipse => Kernel::Ellipse { a: 6.0, n: 3.0, smooth: true },
@@ -130,7 +121,7 @@ fn host_and_kernels_agree_about_overrides() {
         };
         assert_eq!(kernel.shape(), needs.kernel);
         let options = RenderOptions { kernel, ..RenderOptions::default() };
-        let constants = overrides(&needs, &options, 24);
+        let constants = overrides(needs, &options, 24);
         assert!(constants.iter().all(|(_, value)| value.is_finite()));
         let set: BTreeSet<String> = constants.into_iter().map(|(name, _)| name.to_owned()).collect();
         for (_, declared) in module.overrides.iter() {
@@ -146,20 +137,19 @@ fn host_and_kernels_agree_about_overrides() {
 
 #[test]
 fn storage_buffers_stay_within_core_limits() {
-    let sources = Sources::default();
     let mut most = 0;
-    for (needs, files, stages) in all_modules() {
-        let (module, bindings, _) = reflect(&sources.join(&files)).unwrap();
+    for made in modules::all() {
+        let Reflected { module, bindings } = made.reflected();
         let stored: BTreeSet<&str> = module
             .global_variables
             .iter()
             .filter(|(_, v)| matches!(v.space, AddressSpace::Storage { .. }))
             .filter_map(|(_, v)| v.name.as_deref())
             .collect();
-        let dispatched = |stage: &str| needs.raster.is_some() || stages.contains(&stage);
+        let dispatched = |stage: &str| made.needs.raster.is_some() || made.stages.contains(&stage);
         for (stage, variables) in bindings.iter().filter(|(stage, _)| dispatched(stage)) {
             let count = variables.iter().filter(|(name, _)| stored.contains(name.as_str())).count();
-            assert!(count <= CORE_STORAGE_BUFFERS, "{stage} of {:?} uses {count}", needs.names());
+            assert!(count <= CORE_STORAGE_BUFFERS, "{stage} of {:?} uses {count}", made.needs.names());
             most = most.max(count);
         }
     }

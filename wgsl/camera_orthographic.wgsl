@@ -1,5 +1,5 @@
 // The orthographic camera x = fx X + cx. Same interface as camera_pinhole.wgsl.
-// Twin: src/passes/project.rs and src/passes/footprint.rs.
+// Twin: src/passes/homography.rs and src/passes/footprint.rs.
 
 fn image_of(position: Double, axis: u32) -> Double {
     let focal = Double(view.intrinsics[axis], view.intrinsics_low[axis]);

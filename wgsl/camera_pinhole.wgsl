@@ -1,5 +1,5 @@
 // The pinhole camera x = fx X/Z + cx: homography and bounds of a disk, and the evaluation at a pixel.
-// Twin: src/passes/project.rs and src/passes/footprint.rs.
+// Twin: src/passes/homography.rs and src/passes/footprint.rs.
 
 fn image_of(position: Double, depth: Double, axis: u32) -> Double {
     let focal = Double(view.intrinsics[axis], view.intrinsics_low[axis]);

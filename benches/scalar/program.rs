@@ -1,7 +1,7 @@
 //! The plain program: scalar Rust on two threads, no GPU and no intrinsics. The four passes are those of `src/render.rs`:
 //!
 //! 1. **project**, in f32: each thread turns half of the surfels into splats and puts each splat into the buckets of the strips
-//!    of [`ROWS`] rows that it may touch. The disk is exact in perspective, as in `src/passes/project.rs`.
+//!    of [`ROWS`] rows that it may touch. The disk is exact in perspective, as in `src/passes/homography.rs`.
 //! 2. **visibility**: a thread takes the next strip and finds the largest 1/z at each pixel, which is linear along a row, so
 //!    that nothing is divided. Which pixels of a row a disk covers are the roots of a quadratic, not tests. Splats that face
 //!    away come last, and are left out where every tile under them is nearer already.

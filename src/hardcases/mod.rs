@@ -3,7 +3,7 @@
 //! A case is rendered by the f64 reference and, with each accumulator, on the device. Its bound is derived pixel by pixel
 //! from the fragments that the reference blends there ([`bounds`]) and is that of the accumulator `fixed`; an accumulator
 //! that is expected to exceed it says why, and must still keep the bound of its own row in
-//! [`ACCUMULATORS`](crate::passes::accumulate::ACCUMULATORS). A verdict looks at:
+//! [`ACCUMULATORS`]. A verdict looks at:
 //!
 //! - every value of every map: none is NaN, and each differs from the reference by no more than its bound;
 //! - pixels that only one of the two covers, and counts of fragments: none differ;

@@ -19,8 +19,8 @@ const MOST_ATTRIBUTES: usize = 64;
 
 /// Reads the points of all scans of an E57 file, in the file's own system: each scan's pose is applied, in f64.
 ///
-/// Coordinates are Cartesian or, where a scan has none, spherical; points that are marked as invalid are left out. Colours are sRGB
-/// codes, in the range that the scan gives or else its type: of 0 to 255 they stay 8-bit, else they become linear light. Without
+/// Coordinates are Cartesian or, where a scan has none, spherical; points that are marked as invalid are left out. Normals, if any
+/// scan has the extension `nor` for them, are turned with its pose, and zero where it has none. Colours are sRGB codes, in the range that the scan gives or else its type: of 0 to 255 they stay 8-bit, else they become linear light. Without
 /// colours, intensities become grey as in a LAS file. Up is z.
 ///
 /// # Errors
@@ -33,9 +33,9 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
         let length = file.metadata()?.len();
         let reader = E57Reader::new(BufReader::with_capacity(1 << 18, file)).map_err(of_e57)?;
         let scans = reader.pointclouds();
-        let mut promised = 0u64;
+        let (mut promised, mut left) = (0u64, length.saturating_mul(8));
         for (number, scan) in (1..).zip(&scans) {
-            check(scan, length).map_err(|what| Fault::Malformed(format!("its scan {number} {what}")))?;
+            left = check(scan, left).map_err(|what| Fault::Malformed(format!("its scan {number} {what}")))?;
             promised = promised.saturating_add(scan.records);
         }
         Ok((reader, scans, promised))
@@ -43,7 +43,8 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
     let (mut reader, scans, promised) = opened.map_err(|fault| fault.of(path))?;
     progress.begin(&format!("reading {}", fault::name(path)), promised);
     let points = surviving(|| {
-        let mut reading = Reading::default();
+        let any_normals = scans.iter().any(|scan| normal(scan).is_some());
+        let mut reading = Reading { normals: any_normals.then(Vec::new), ..Reading::default() };
         scans.iter().try_for_each(|scan| reading.scan(&mut reader, scan, progress))?;
         Ok(reading.into_points())
     });
@@ -65,8 +66,9 @@ fn of_e57(error: ::e57::Error) -> Fault {
     Fault::Malformed(one_line(&error.to_string()))
 }
 
-/// Holds what a scan promises against the file's `length`, before anything is allocated for it.
-fn check(scan: &PointCloud, length: u64) -> Result<(), String> {
+/// Holds what a scan promises against the `left` bits of the file, before anything is allocated for it; the bits that it leaves
+/// to the others.
+fn check(scan: &PointCloud, left: u64) -> Result<u64, String> {
     if Place::of(scan).is_none() {
         return Err("has no coordinates".into());
     }
@@ -75,11 +77,11 @@ fn check(scan: &PointCloud, length: u64) -> Result<(), String> {
     }
     // Values that are all the same take no bits; points of which none takes any would have no end.
     let bits: u64 = scan.prototype.iter().map(|record| bits(&record.data_type)).sum();
-    let held = length.saturating_mul(8).checked_div(bits).unwrap_or(0);
+    let held = left.checked_div(bits).unwrap_or(0);
     if held < scan.records {
         return Err(format!("promises {} points, the file holds {held} at most", scan.records));
     }
-    Ok(())
+    Ok(left - bits * scan.records)
 }
 
 /// Bits of a value in the file.
@@ -118,6 +120,15 @@ fn index(scan: &PointCloud, name: &RecordName) -> Option<usize> {
     scan.prototype.iter().position(|record| record.name == *name)
 }
 
+/// The attributes of the extension `nor` (E57_EXT_surface_normals), by whatever prefix a file has it, if by one at all.
+fn normal(scan: &PointCloud) -> Option<[usize; 3]> {
+    let named = |wanted: &str| {
+        let is = |name: &RecordName| matches!(name, RecordName::Unknown { name, .. } if name == wanted);
+        scan.prototype.iter().position(|record| is(&record.name))
+    };
+    Some([named("normalX")?, named("normalY")?, named("normalZ")?])
+}
+
 fn triple(scan: &PointCloud, names: &[RecordName; 3]) -> Option<[usize; 3]> {
     let [a, b, c] = names.each_ref().map(|name| index(scan, name));
     Some([a?, b?, c?])
@@ -127,6 +138,8 @@ fn triple(scan: &PointCloud, names: &[RecordName; 3]) -> Option<[usize; 3]> {
 #[derive(Default)]
 struct Reading {
     positions: Vec<[f64; 3]>,
+    /// If any scan has normals; zero where there is none.
+    normals: Option<Vec<[f32; 3]>>,
     /// Colours as shares of their range; not numbers where there is none.
     colors: Vec<[f32; 3]>,
     /// Whether any point has a colour, and whether all ranges are 0 to 255.
@@ -147,11 +160,13 @@ impl Reading {
         let (rotation, translation) = pose(scan)?;
         let color = triple(scan, &[RecordName::ColorRed, RecordName::ColorGreen, RecordName::ColorBlue]);
         let ranges = color.map(|color| ranges(scan, color));
+        let normal = normal(scan);
         let color_invalid = index(scan, &RecordName::IsColorInvalid);
         let intensity = index(scan, &RecordName::Intensity);
         let intensity_invalid = index(scan, &RecordName::IsIntensityInvalid);
         self.wide |= ranges.is_some_and(|ranges| ranges != [(0.0, 255.0); 3]);
         reserve(&mut self.positions, scan.records)?;
+        self.normals.as_mut().map_or(Ok(()), |normals| reserve(normals, scan.records))?;
         reserve(&mut self.colors, scan.records)?;
         reserve(&mut self.intensities, scan.records)?;
         let mut unreported = 0;
@@ -174,6 +189,13 @@ impl Reading {
                 DVec3::new(a, b, c)
             };
             self.positions.push((rotation * local + translation).to_array());
+            if let Some(normals) = &mut self.normals {
+                let local = match normal {
+                    Some([x, y, z]) => DVec3::new(number(x)?, number(y)?, number(z)?),
+                    None => DVec3::ZERO,
+                };
+                normals.push((rotation * local).as_vec3().to_array());
+            }
             let mut share = [f32::NAN; 3];
             if let (Some(color), Some(ranges), false) = (color, ranges, marked(color_invalid)?) {
                 for (share, (at, (low, high))) in share.iter_mut().zip(color.into_iter().zip(ranges)) {
@@ -207,7 +229,7 @@ impl Reading {
             };
             Some(Colors::Srgb8(self.colors.into_iter().map(color).collect()))
         };
-        Points { positions: self.positions, colors, up: Some(Up::Z), ..Points::default() }
+        Points { positions: self.positions, normals: self.normals, colors, up: Some(Up::Z), ..Points::default() }
     }
 }
 

@@ -50,7 +50,7 @@ pub fn write(path: &Path, frame: &Frame) -> Outcome<()> {
     write_whole(path, |file| image.write().to_buffered(file).map_err(std::io::Error::other))
 }
 
-/// Reads the layers that [`write`] writes. The colour is the layer `color`, or the first with R, G and B if none is
+/// Reads the layers that [`write()`] writes. The colour is the layer `color`, or the first with R, G and B if none is
 /// called so; others are ignored.
 pub fn read(path: &Path) -> Outcome<Frame> {
     // exr reports a missing file as an I/O error of its own kind; asking first keeps the sentence plain.

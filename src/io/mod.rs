@@ -16,6 +16,7 @@ pub mod pcd;
 pub mod ply;
 pub mod png;
 pub mod points;
+mod polygon;
 pub mod texture;
 mod triangles;
 mod values;
@@ -45,24 +46,31 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
         Some("ply") => ply::read(path, progress),
         Some("las" | "laz") => las::read(path, progress),
         Some("obj") => obj::read(path, progress),
-        #[cfg(feature = "e57")]
-        Some("e57") => e57::read(path, progress),
-        #[cfg(not(feature = "e57"))]
-        Some("e57") => Err(without(path, "e57")),
-        #[cfg(feature = "pcd")]
-        Some("pcd") => pcd::read(path, progress),
-        #[cfg(not(feature = "pcd"))]
-        Some("pcd") => Err(without(path, "pcd")),
+        Some("e57") => read_e57(path, progress),
+        Some("pcd") => read_pcd(path, progress),
         _ => match &magic(path).map_err(|error| Error::read(path, error))? {
             b"ply\n" | b"ply\r" => ply::read(path, progress),
             b"LASF" => las::read(path, progress),
-            #[cfg(feature = "e57")]
-            b"ASTM" => e57::read(path, progress),
-            #[cfg(feature = "pcd")]
-            b"# .P" => pcd::read(path, progress),
-            _ => Err(Error::malformed(path, "its format is not known; PLY, LAS, LAZ and OBJ files are read")),
+            b"ASTM" => read_e57(path, progress),
+            b"# .P" => read_pcd(path, progress),
+            _ => Err(Error::malformed(path, "its format is not known; PLY, LAS, LAZ, OBJ, E57 and PCD files are read")),
         },
     }
+}
+
+#[cfg(feature = "e57")]
+use e57::read as read_e57;
+#[cfg(feature = "pcd")]
+use pcd::read as read_pcd;
+
+#[cfg(not(feature = "e57"))]
+fn read_e57(path: &Path, _: &dyn Progress) -> Result<Points> {
+    Err(without(path, "e57"))
+}
+
+#[cfg(not(feature = "pcd"))]
+fn read_pcd(path: &Path, _: &dyn Progress) -> Result<Points> {
+    Err(without(path, "pcd"))
 }
 
 /// A file of a format whose reader was left out.

@@ -3,6 +3,9 @@
 use crate::scene::color::srgb_to_linear;
 use std::sync::LazyLock;
 
+/// What some editors begin UTF-8 text with; it belongs to no word.
+pub(super) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
 /// Linear light for each 16-bit sRGB code.
 pub(super) static SRGB16_TO_LINEAR: LazyLock<Vec<f32>> =
     LazyLock::new(|| (0..=u16::MAX).map(|code| srgb_to_linear(f64::from(code) / 65535.0) as f32).collect());

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::frame::Frame;
 
 /// Fragments nearer than this (relative) to a decision may rightly be decided otherwise in f32; their pixels are
-/// excused in [`Comparison::decided`].
+/// excused in [`Comparison::rmse_decided`] and [`Comparison::max_abs_decided`].
 pub const DECISION_MARGIN: f32 = 1e-6;
 
 /// The error of image A against image B. Colours are compared as linear RGBA.

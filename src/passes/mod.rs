@@ -13,12 +13,14 @@
 //! | [`covered`] | nearest depths | the tiles that have anything |
 //! | [`resolve`] | sums | [`Frame`](crate::frame::Frame) |
 //!
-//! [`footprint`] is evaluated inside visibility and accumulate, with the [`lowpass`] that [`project`] prepared; [`variant`] says which kernels a render is made of.
+//! [`footprint`] is evaluated inside visibility and accumulate, with the [`homography`] and the [`lowpass`] that [`project`] prepared;
+//! [`variant`] says which kernels a render is made of.
 
 pub mod accumulate;
 pub mod covered;
 pub mod cull;
 pub mod footprint;
+pub mod homography;
 pub mod lowpass;
 pub mod order;
 pub mod project;

@@ -87,8 +87,8 @@ impl Preparation {
 ///
 /// # Errors
 ///
-/// [`Error::EmptyScene`](crate::Error::EmptyScene) if no input holds a usable point, and
-/// [`Error::Usage`](crate::Error::Usage) if normals or radii are missing and there are more than 2^32 - 1 points.
+/// [`Error::EmptyScene`] if no input holds a usable point, and
+/// [`Error::Usage`] if normals or radii are missing and there are more than 2^32 - 1 points.
 pub fn build(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Preparation)> {
     let gathered = gather::gather(inputs)?;
     built(gathered, progress)
@@ -98,7 +98,7 @@ pub fn build(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Pre
 ///
 /// # Errors
 ///
-/// Those of [`build`], and [`Error::Usage`](crate::Error::Usage) if an input has no texture coordinates.
+/// Those of [`build`], and [`Error::Usage`] if an input has no texture coordinates.
 pub fn build_textured(inputs: Vec<Points>, texture: Texture, progress: &dyn Progress) -> Result<(Scene, Preparation)> {
     if inputs.iter().any(|input| input.texture.is_none() && !input.positions.is_empty()) {
         return Err(Error::Usage("a texture paints points that have texture coordinates, and some have none".into()));

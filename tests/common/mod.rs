@@ -5,6 +5,7 @@
 pub mod command;
 pub mod enclosure;
 pub mod meshes;
+pub mod modules;
 pub mod scenes;
 
 use epsplat::frame::Frame;

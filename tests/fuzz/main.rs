@@ -10,10 +10,17 @@
 
 mod camera;
 mod cameras;
+#[cfg(feature = "e57")]
+mod e57;
+#[cfg(feature = "e57")]
+#[path = "../common/e57_page.rs"]
+mod e57_page;
 mod las;
 mod memory;
 mod mutate;
 mod obj;
+#[cfg(feature = "pcd")]
+mod pcd;
 mod ply;
 mod random;
 mod render;
@@ -71,4 +78,16 @@ fn camera() {
 #[test]
 fn cameras() {
     session::run(&cameras::TARGET);
+}
+
+#[cfg(feature = "pcd")]
+#[test]
+fn pcd() {
+    session::run(&pcd::TARGET);
+}
+
+#[cfg(feature = "e57")]
+#[test]
+fn e57() {
+    session::run(&e57::TARGET);
 }

@@ -1,8 +1,10 @@
 //! E57 files, written by the `e57` crate.
 
+use super::e57_page::{CONTENT, PAGE, checksum};
 use super::{Folder, Random, sentence};
 use e57::{
-    ColorLimits, E57Writer, Quaternion, Record, RecordDataType, RecordName, RecordValue, Transform, Translation,
+    ColorLimits, E57Writer, Extension, Quaternion, Record, RecordDataType, RecordName, RecordValue, Transform,
+    Translation,
 };
 use epsplat::io::Up;
 use epsplat::scene::Colors;
@@ -20,6 +22,7 @@ struct Scan {
 fn file(scans: Vec<Scan>) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     let mut writer = E57Writer::new(&mut bytes, "file").unwrap();
+    writer.register_extension(Extension::new("nor", "http://www.libe57.org/E57_EXT_surface_normals.txt")).unwrap();
     for (number, scan) in scans.into_iter().enumerate() {
         let mut of_scan = writer.add_pointcloud(&format!("scan {number}"), scan.prototype).unwrap();
         of_scan.set_transform(scan.pose);
@@ -129,6 +132,55 @@ fn scans_are_put_where_their_poses_say() {
     assert_eq!(codes[1..], [[218, 218, 218, 255], [0, 20, 255, 255], [1, 20, 255, 255]]);
 }
 
+/// The scan, each of whose points has the normal.
+fn with_normals(mut scan: Scan, normal: [f64; 3]) -> Scan {
+    let of = |axis: &str| RecordName::Unknown { namespace: "nor".into(), name: format!("normal{axis}") };
+    let share = RecordDataType::ScaledInteger { min: -1000, max: 1000, scale: 0.001, offset: 0.0 };
+    let kinds = [RecordDataType::F32, RecordDataType::F64, share];
+    scan.prototype.extend(["X", "Y", "Z"].into_iter().zip(kinds).map(|(axis, kind)| record(of(axis), kind)));
+    let [x, y, z] = normal;
+    let values = [RecordValue::Single(x as f32), RecordValue::Double(y), RecordValue::ScaledInteger((z * 1e3) as i64)];
+    scan.points.iter_mut().for_each(|point| point.extend(values.clone()));
+    scan
+}
+
+#[test]
+fn normals_are_turned_with_their_scan() {
+    let folder = Folder::new();
+    let tilted = |scan| with_normals(scan, [0.75, 0.5, -0.25]);
+    let unturned = folder.read("a.e57", &file(vec![tilted(Scan { pose: None, ..spherical() })])).unwrap();
+    assert_eq!(unturned.normals, Some(vec![[0.75, 0.5, -0.25]; 2]));
+    // By a quarter turn around z, not by the translation; of points without normals they are missing.
+    let both = folder.read("a.e57", &file(vec![tilted(spherical()), cartesian(3)])).unwrap();
+    let normals = both.normals.unwrap();
+    for turned in &normals[..2] {
+        assert!(turned.iter().zip([-0.5, 0.75, -0.25]).all(|(a, b)| (a - b).abs() < 1e-6), "{turned:?}");
+    }
+    assert_eq!((&normals[2..], both.positions.len()), (&[[0.0; 3]; 2][..], 4));
+    assert!(both.colors.is_some());
+    // Two of three are none.
+    let mut scan = tilted(spherical());
+    scan.prototype.pop();
+    scan.points.iter_mut().for_each(|point| point.truncate(6));
+    assert_eq!(folder.read("a.e57", &file(vec![scan])).unwrap().normals, None);
+}
+
+#[test]
+fn scans_together_promise_no_more_than_the_file_holds() {
+    let folder = Folder::new();
+    let mut whole = file(vec![cartesian(2000), cartesian(2000)]);
+    assert_eq!(folder.read("a.e57", &whole).unwrap().positions.len(), 2 * 1334);
+    // Each alone would find room.
+    let promise = b"recordCount=\"2000\"";
+    for _ in 0..2 {
+        let at = whole.windows(promise.len()).position(|window| window == promise).unwrap();
+        whole[at..at + promise.len()].copy_from_slice(b"recordCount=\"3500\"");
+    }
+    seal(&mut whole);
+    let message = folder.refusal("a.e57", &whole);
+    assert!(message.starts_with("its scan 2 promises 3500 points, the file holds "), "{message}");
+}
+
 #[test]
 fn colours_of_other_ranges_become_linear() {
     let folder = Folder::new();
@@ -162,17 +214,11 @@ fn colours_of_other_ranges_become_linear() {
     assert_eq!(colors(points)[..3], [light(0.5), light(0.5), 1.0]);
 }
 
-/// The checksums of all pages, as they should be (CRC-32C, big-endian), so that what is inside is read.
+/// The checksums of all pages, as they should be, so that what is inside is read.
 fn seal(bytes: &mut [u8]) {
-    for page in bytes.chunks_exact_mut(1024) {
-        let mut crc = !0u32;
-        for byte in &page[..1020] {
-            crc ^= u32::from(*byte);
-            for _ in 0..8 {
-                crc = (crc >> 1) ^ (0x82f6_3b78 & (crc & 1).wrapping_neg());
-            }
-        }
-        page[1020..].copy_from_slice(&(!crc).to_be_bytes());
+    for page in bytes.chunks_exact_mut(PAGE) {
+        let (content, sum) = page.split_at_mut(CONTENT);
+        sum.copy_from_slice(&checksum(content));
     }
 }
 

@@ -3,6 +3,9 @@
 
 #[cfg(feature = "e57")]
 mod e57;
+#[cfg(feature = "e57")]
+#[path = "../common/e57_page.rs"]
+mod e57_page;
 mod las;
 mod las_damage;
 mod mesh;
@@ -125,7 +128,7 @@ fn files_are_known_by_extension_or_by_their_first_bytes() {
     assert_eq!(folder.read("a.Obj", b"v 1 2 3").unwrap().positions.len(), 1);
     for unknown in [&b""[..], b"pl", b"plyx", b"v 1 2 3"] {
         let said = folder.refusal("a.xyz", unknown);
-        assert_eq!(said, "its format is not known; PLY, LAS, LAZ and OBJ files are read");
+        assert_eq!(said, "its format is not known; PLY, LAS, LAZ, OBJ, E57 and PCD files are read");
     }
 }
 
@@ -147,8 +150,11 @@ fn missing_files_and_directories_cannot_be_read() {
 #[test]
 fn readers_that_were_left_out_are_named() {
     let folder = Folder::new();
-    for (format, left_out) in [("e57", cfg!(not(feature = "e57"))), ("pcd", cfg!(not(feature = "pcd")))] {
-        let said = folder.refusal(&format!("a.{format}"), b"");
-        assert_eq!(said.contains(&format!("'--features {format}'")), left_out, "{said}");
+    let (e57, pcd) = (cfg!(not(feature = "e57")), cfg!(not(feature = "pcd")));
+    for (format, first_bytes, left_out) in [("e57", &b"ASTM-E57"[..], e57), ("pcd", b"# .PCD v0.7", pcd)] {
+        for (name, bytes) in [(format!("a.{format}"), b"".as_slice()), ("scan".into(), first_bytes)] {
+            let said = folder.refusal(&name, bytes);
+            assert_eq!(said.contains(&format!("'--features {format}'")), left_out, "{said}");
+        }
     }
 }

@@ -142,6 +142,60 @@ fn materials_textures_and_what_of_them_is_missing() {
     assert!(colored.material.is_none() && colored.notes.is_empty());
 }
 
+/// An arrow, concave at its fourth corner, which a fan from its first leaves.
+#[test]
+fn concave_polygons_hold_their_triangles() {
+    let folder = Folder::new();
+    let arrow: [&[f64]; 5] = [&[0.0, 0.0, 0.0], &[2.0, 0.0, 0.0], &[2.0, 2.0, 0.0], &[1.0, 0.3, 0.0], &[0.0, 2.0, 0.0]];
+    let uv: Vec<f64> = arrow.iter().flat_map(|corner| [corner[0], corner[1]]).collect();
+    let row = [&[5.0, 0.0, 1.0, 2.0, 3.0, 4.0, 10.0], &uv[..]].concat();
+    let face = [("list uchar int", "vertex_indices"), ("list uchar float", "texcoord")];
+    let of_obj: String =
+        arrow.iter().map(|p| format!("v {} {} {}\nvt {} {}\n", p[0], p[1], p[2], p[0], p[1])).collect();
+    let mut meshes = vec![read(&folder, "a.obj", format!("{of_obj}f 1/1 2/2 3/3 4/4 5/5\n").as_bytes())];
+    for encoding in ENCODINGS {
+        meshes.push(read(&folder, "a.ply", &file(encoding, &[("vertex", &XYZ, &arrow), ("face", &face, &[&row])])));
+    }
+    for mesh in meshes {
+        let double_area = |[a, b, c]: [[f64; 3]; 3]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+        let areas: Vec<f64> =
+            mesh.triangles.iter().map(|t| double_area(t.map(|vertex| mesh.positions[vertex as usize]))).collect();
+        // Of a fan one triangle is turned round.
+        assert!(areas.len() == 3 && areas.iter().all(|&area| area > 0.0), "{areas:?}");
+        assert!((areas.iter().sum::<f64>() - 4.6).abs() < 1e-6);
+        for (triangle, corners) in mesh.triangles.iter().zip(mesh.texture.as_ref().unwrap()) {
+            let of = |vertex: u32| [0, 1].map(|axis| mesh.positions[vertex as usize][axis] as f32);
+            assert_eq!(triangle.map(of), *corners);
+        }
+    }
+}
+
+#[test]
+fn libraries_of_other_writers() {
+    let folder = Folder::new();
+    std::fs::create_dir(folder.path("maps")).unwrap();
+    std::fs::write(folder.path("maps/a b.png"), picture(image::ImageFormat::Png)).unwrap();
+    let first = "newmtl one\n\tKa spectral a.rfl\n\tNi\n\tKd 0.5 0 0\n\tTr 0\nnewmtl two\n\
+                 map_Kd -blendu on -s 1 1 1 -o 0.5 -mm 0 1 maps\\a b.png\nmap_Bump\nnewmtl three\nmap_Kd maps/a b.png\n";
+    std::fs::write(folder.path("first.mtl"), format!("\u{feff}{first}").replace('\n', "\r\n")).unwrap();
+    std::fs::write(folder.path("second.mtl"), "newmtl four\nKd 0 1 0\n").unwrap();
+    let faces: Vec<String> =
+        ["one", "two", "three", "four"].map(|name| format!("usemtl {name}\nf 1/1 2/1 3/1\n")).into();
+    let text =
+        |libraries: &str| format!("mtllib {libraries}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.1 0.5\n{}", faces.concat());
+    let mesh = read(&folder, "a.obj", text("first.mtl second.mtl").as_bytes());
+    assert_eq!(mesh.notes, [""; 0]);
+    let material = |triangle: usize| mesh.material_of(triangle).unwrap();
+    assert_eq!((material(0).diffuse, material(3).diffuse), ([0.5, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0]));
+    for painted in [1, 2] {
+        let [r, g, b, _] = material(painted).texture.as_ref().unwrap().at(0.1, 0.5);
+        assert!(r > 0.9 && g + b == 0.0, "{painted}: {r} {g} {b}");
+    }
+    // A name with a space that no file has is one name.
+    let mesh = read(&folder, "a.obj", text("first of all.mtl").as_bytes());
+    assert!(mesh.notes.len() == 1 && mesh.notes[0].contains("first of all.mtl"), "{:?}", mesh.notes);
+}
+
 /// A picture of two columns, red and blue.
 fn picture(format: image::ImageFormat) -> Vec<u8> {
     let column = |x: u32| if x < 8 { image::Rgb([250u8, 0, 0]) } else { image::Rgb([0, 0, 250]) };

@@ -71,6 +71,32 @@ fn weights_colours_and_alpha_follow_the_coordinates() {
 }
 
 #[test]
+fn colours_may_be_codes_of_eight_bits() {
+    let folder = Folder::new();
+    let colors = |text: &str| match folder.read("a.obj", text.as_bytes()).unwrap().colors {
+        Some(Colors::Linear(colors)) => colors,
+        other => panic!("{other:?}"),
+    };
+    let light = |code: f64| srgb_to_linear(code / 255.0) as f32;
+    let coded = colors("v 1 2 3 0 128 255\nv 1 2 3\nv 1 2 3 1 1 1 0.5\n");
+    assert_eq!(coded, [[0.0, light(128.0), 1.0, 1.0], DEFAULT_COLOR, [light(1.0), light(1.0), light(1.0), 0.5]]);
+    assert_eq!(colors("v 1 2 3 0 2 0 255\n"), [[0.0, light(2.0), 0.0, 1.0]]);
+    // A little more than the whole is no code.
+    assert_eq!(colors("v 1 2 3 1 1.5 0\n"), [[1.0, srgb_to_linear(1.5) as f32, 0.0, 1.0]]);
+}
+
+#[test]
+fn a_byte_order_mark_is_no_part_of_the_first_vertex() {
+    let folder = Folder::new();
+    let text = "v 1 2 3\nv 4 5 6\n";
+    let plain = folder.read("a.obj", text.as_bytes()).unwrap();
+    assert_eq!(folder.read("a.obj", format!("\u{feff}{text}").as_bytes()).unwrap(), plain);
+    assert_eq!(plain.positions.len(), 2);
+    // Only there.
+    assert_eq!(folder.read("a.obj", text.replace("\nv", "\n\u{feff}v").as_bytes()).unwrap().positions.len(), 1);
+}
+
+#[test]
 fn text_of_other_writers() {
     let folder = Folder::new();
     let text =

@@ -82,6 +82,16 @@ fn coordinates_of_every_type_in_every_encoding() {
 }
 
 #[test]
+fn a_byte_order_mark_may_come_before_a_text() {
+    let folder = Folder::new();
+    let properties = [("float", "x"), ("float", "y"), ("float", "z")];
+    let bytes = file("ascii", &[("vertex", &properties, &[&[1.0, 2.0, 3.0]])]);
+    let marked = folder.read("a.ply", &[b"\xef\xbb\xbf", &bytes[..]].concat()).unwrap();
+    assert_eq!(marked.positions, [[1.0, 2.0, 3.0]]);
+    assert!(folder.refusal("a.ply", &[b"\xef\xbb", &bytes[..]].concat()).contains("its first line is not 'ply'"));
+}
+
+#[test]
 fn the_whole_range_of_every_type_survives() {
     let folder = Folder::new();
     for encoding in ENCODINGS {

@@ -2,10 +2,10 @@
 
 use std::fs::File;
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::io::values::{finite, one_line};
+use crate::io::values::{BYTE_ORDER_MARK, finite, one_line};
 use crate::io::{Material, Texture};
 
 /// No material library is longer, in bytes.
@@ -18,8 +18,8 @@ const LONGEST: u64 = 1 << 24;
 pub(super) fn read(path: &Path, libraries: &[String], names: &[String], notes: &mut Vec<String>) -> Vec<Material> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut defined = Vec::new();
-    for library in libraries {
-        match definitions(&folder.join(library)) {
+    for library in libraries.iter().flat_map(|line| names_in(folder, line)) {
+        match definitions(&beside(folder, library)) {
             Ok(materials) => defined.extend(materials),
             Err(error) => {
                 notes.push(format!("the materials in {library} are left out: {}", one_line(&error.to_string())))
@@ -31,7 +31,7 @@ pub(super) fn read(path: &Path, libraries: &[String], names: &[String], notes: &
         if let Some((_, known)) = images.iter().find(|(name, _)| name == map) {
             return known.clone();
         }
-        let read = Texture::read(&folder.join(map.replace('\\', "/"))).map(Arc::new);
+        let read = Texture::read(&beside(folder, map)).map(Arc::new);
         let texture = read.map_err(|error| notes.push(format!("a texture is left out: {error}"))).ok();
         images.push((map.to_owned(), texture.clone()));
         texture
@@ -51,12 +51,50 @@ pub(super) fn read(path: &Path, libraries: &[String], names: &[String], notes: &
 fn definitions(path: &Path) -> io::Result<Vec<tobj::Material>> {
     let mut bytes = Vec::new();
     File::open(path)?.take(LONGEST).read_to_end(&mut bytes)?;
-    let text = String::from_utf8_lossy(&bytes);
-    let (materials, _) = tobj::load_mtl_buf(&mut text.as_bytes()).map_err(io::Error::other)?;
+    let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&bytes);
+    // At one line that it cannot read the parser gives up on all materials, so it is given no other lines than it must.
+    let read = |line: &&str| matches!(line.split_whitespace().next(), Some("newmtl" | "Kd" | "d" | "map_Kd"));
+    let text: Vec<String> = String::from_utf8_lossy(bytes).lines().filter(read).map(str::to_owned).collect();
+    let (materials, _) = tobj::load_mtl_buf(&mut text.join("\n").as_bytes()).map_err(io::Error::other)?;
     Ok(materials)
 }
 
-/// The file's name in what follows `map_Kd`: options before it begin with a dash.
+/// A file that is named in one of `folder`, as Windows may write it.
+fn beside(folder: &Path, name: &str) -> PathBuf {
+    folder.join(name.replace('\\', "/"))
+}
+
+/// The files that follow `mtllib`: several between spaces, or one with spaces in its name.
+fn names_in<'l>(folder: &Path, line: &'l str) -> Vec<&'l str> {
+    let exists = |name: &str| beside(folder, name).exists();
+    if !exists(line) && line.split_whitespace().any(exists) { line.split_whitespace().collect() } else { vec![line] }
+}
+
+/// The file's name, which may have spaces, in what follows `map_Kd`: options come before it.
 fn file_of(map: &str) -> &str {
-    if map.starts_with('-') { map.split_whitespace().next_back().unwrap_or(map) } else { map.trim() }
+    let mut rest = map.trim();
+    while rest.starts_with('-') {
+        let (option, mut beyond) = first_word(rest);
+        let (least, most) = match option {
+            "-o" | "-s" | "-t" => (1, 3),
+            "-mm" => (2, 2),
+            "-blendu" | "-blendv" | "-bm" | "-boost" | "-cc" | "-clamp" | "-imfchan" | "-texres" | "-type" => (1, 1),
+            _ => return rest,
+        };
+        for argument in 0..most {
+            let (word, after) = first_word(beyond);
+            if argument >= least && word.parse::<f64>().is_err() {
+                break;
+            }
+            beyond = after;
+        }
+        rest = beyond;
+    }
+    rest
+}
+
+/// A text's first word, and what follows it.
+fn first_word(text: &str) -> (&str, &str) {
+    let (word, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+    (word, rest.trim_start())
 }

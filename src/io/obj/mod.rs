@@ -5,9 +5,9 @@ mod source;
 
 use crate::io::fault::{self, Fault};
 use crate::io::triangles::Triangles;
-use crate::io::{Mesh, Points, Up};
-use crate::scene::Colors;
+use crate::io::{Mesh, Points, Up, polygon};
 use crate::{Progress, Result};
+use glam::DVec3;
 use source::{Lines, Source};
 use std::fs::File;
 use std::io::{self, BufReader};
@@ -20,8 +20,9 @@ use std::path::Path;
 ///   the mean of its faces' normals, weighted by area. A vertex of no face has none (zero). A file without faces but
 ///   with one `vn` for each `v` pairs them.
 /// - Radii: 1.1 times the smallest with which disks at a triangle's corners cover it, the largest over the vertex's
-///   triangles; polygons are fanned into triangles; a vertex of no triangle has none (zero).
-/// - Colours: the three numbers after a vertex's coordinates, sRGB-coded in [0, 1], become linear light.
+///   triangles; polygons are made of triangles; a vertex of no triangle has none (zero).
+/// - Colours: the three numbers after a vertex's coordinates, sRGB-coded in [0, 1], or where any is 2 or more in [0, 255], become
+///   linear light; a fourth is alpha.
 ///
 /// Up is y. Lines, points, curves and materials are passed over, so a missing MTL file is no error.
 ///
@@ -35,7 +36,7 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
 
 /// Reads the triangles of an OBJ file, those of all groups and materials as one mesh, with every `v` line a vertex.
 ///
-/// Polygons are fanned into triangles. Corners have the `vn` they name where every corner of the file names one, else the
+/// Polygons are made of triangles, concave ones too. Corners have the `vn` they name where every corner of the file names one, else the
 /// mesh is faceted; and so with `vt`. Colours are read as by [`read`], and lines, points and curves are passed over too. A
 /// file without faces is a mesh without triangles, and no error here.
 ///
@@ -69,12 +70,7 @@ fn read_with<T>(
 }
 
 fn parse<R: io::BufRead>(mut source: Source<'_, R>) -> Result<(Lines, Vec<tobj::Model>), Fault> {
-    let options = tobj::LoadOptions {
-        triangulate: true,
-        ignore_points: true,
-        ignore_lines: true,
-        ..tobj::LoadOptions::default()
-    };
+    let options = tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..tobj::LoadOptions::default() };
     // Read line by line: where the parser stops, the source's line is the one it stopped at.
     let loaded =
         tobj::load_obj_buf(&mut BufReader::new(&mut source), &options, |_| Err(tobj::LoadError::OpenFileFailed));
@@ -90,32 +86,62 @@ fn parse<R: io::BufRead>(mut source: Source<'_, R>) -> Result<(Lines, Vec<tobj::
     Ok((lines, models))
 }
 
-/// Each triangle's vertices, by their number in the file, and the normals its corners name, if every corner of the file
-/// names one.
-fn faces<'a>(lines: &Lines, models: &'a [tobj::Model]) -> impl Iterator<Item = Face> + use<'a> {
-    let named = lines.every_corner_has_a_normal;
-    models.iter().flat_map(move |tobj::Model { mesh, .. }| {
-        let number =
-            |index: &u32| mesh.positions.get(3 * *index as usize).map_or(usize::MAX, |number| *number as usize);
-        let normal = |index: &u32| mesh.normals.get(3 * *index as usize..)?.first_chunk().copied();
-        let mut normals = mesh.normal_indices.as_chunks::<3>().0.iter();
-        mesh.indices.as_chunks::<3>().0.iter().map(move |corners| {
-            let named = normals.next().filter(|_| named);
-            (corners.each_ref().map(number), named.map(|named| named.each_ref().map(normal)))
+/// A triangle of a face.
+struct Triangle<'a> {
+    /// The numbers of its vertices in the file.
+    vertices: [usize; 3],
+    /// The normals that its corners name, if every corner of the file names one.
+    normals: Option<[Option<[f64; 3]>; 3]>,
+    /// The group that it is in, and its corners' places there.
+    model: &'a tobj::Model,
+    corners: [usize; 3],
+}
+
+/// The triangles of all faces.
+fn triangles<'a>(lines: &'a Lines, models: &'a [tobj::Model]) -> impl Iterator<Item = Triangle<'a>> {
+    models.iter().flat_map(move |model| {
+        let mesh = &model.mesh;
+        let vertex = move |corner: usize| {
+            let number = mesh.indices.get(corner).and_then(|&index| mesh.positions.get(3 * index as usize));
+            number.map_or(usize::MAX, |number| *number as usize)
+        };
+        let normal = move |corner: usize| {
+            let index = *mesh.normal_indices.get(corner)?;
+            mesh.normals.get(3 * index as usize..)?.first_chunk().copied()
+        };
+        // Where all faces are triangles, the parser says so by no numbers of corners.
+        let all_triangles = mesh.face_arities.is_empty().then(|| std::iter::repeat_n(3, mesh.indices.len() / 3));
+        let arities = mesh.face_arities.iter().map(|&corners| corners as usize);
+        let mut next = 0;
+        let first_and_count = arities.chain(all_triangles.into_iter().flatten()).map(move |count| {
+            next += count;
+            (next - count, count)
+        });
+        let polygon = move |(first, count): (usize, usize)| {
+            let position = |corner| lines.positions.get(vertex(corner)).map_or(DVec3::NAN, |&at| at.into());
+            let of_polygon = match count {
+                3 => vec![[0, 1, 2]],
+                _ => polygon::triangles(&(first..first + count).map(position).collect::<Vec<_>>()),
+            };
+            of_polygon.into_iter().map(move |corners| corners.map(|corner| first + corner))
+        };
+        first_and_count.flat_map(polygon).map(move |corners| Triangle {
+            vertices: corners.map(vertex),
+            normals: lines.every_corner_has_a_normal.then(|| corners.map(normal)),
+            model,
+            corners,
         })
     })
 }
 
-/// The numbers of three vertices, and the normals of the corners.
-type Face = ([usize; 3], Option<[Option<[f64; 3]>; 3]>);
-
 fn points(lines: Lines, models: &[tobj::Model]) -> Points {
-    let mut triangles = Triangles::new(&lines.positions);
-    for (corners, normals) in faces(&lines, models) {
-        triangles.add(corners, normals);
+    let colors = lines.colors();
+    let mut around = Triangles::new(&lines.positions);
+    for triangle in triangles(&lines, models) {
+        around.add(triangle.vertices, triangle.normals);
     }
     let has_faces = models.iter().any(|model| !model.mesh.indices.is_empty());
-    let (face_normals, radii) = triangles.finish();
+    let (face_normals, radii) = around.finish();
     let normals = if has_faces {
         Some(face_normals)
     } else {
@@ -125,7 +151,7 @@ fn points(lines: Lines, models: &[tobj::Model]) -> Points {
         positions: lines.positions,
         normals,
         radii: has_faces.then_some(radii),
-        colors: (!lines.colors.is_empty()).then_some(Colors::Linear(lines.colors)),
+        colors,
         up: Some(Up::Y),
         ..Points::default()
     }
@@ -133,31 +159,32 @@ fn points(lines: Lines, models: &[tobj::Model]) -> Points {
 
 /// The mesh without its materials, the libraries they are in, and their names.
 fn mesh(lines: Lines, models: &[tobj::Model]) -> (Mesh, Vec<String>, Vec<String>) {
-    let (mut triangles, mut normals) = (Vec::new(), Vec::new());
-    for (corners, named) in faces(&lines, models) {
-        // The parser refuses a face whose vertex does not exist, so every number is one of `positions`.
-        triangles.push(corners.map(|corner| u32::try_from(corner).unwrap_or(u32::MAX)));
-        normals.extend(named.map(|named| named.map(|n| n.map_or([0.0; 3], |n| n.map(|c| c as f32)))));
-    }
+    let (mut vertices, mut normals) = (Vec::new(), Vec::new());
     let (mut texture, mut material) = (Vec::new(), Vec::new());
-    for tobj::Model { mesh, name } in models {
-        let at = |index: &u32| {
-            let found = mesh.texcoords.get(2 * *index as usize..).and_then(|rest| rest.first_chunk());
-            found.map_or([0.0; 2], |uv: &[f64; 2]| uv.map(|c| c as f32))
+    for Triangle { vertices: numbers, normals: named, model, corners } in triangles(&lines, models) {
+        let tobj::Model { mesh, name } = model;
+        // The parser refuses a face whose vertex does not exist, so every number is one of `positions`.
+        vertices.push(numbers.map(|number| u32::try_from(number).unwrap_or(u32::MAX)));
+        normals.extend(named.map(|named| named.map(|n| n.map_or([0.0; 3], |n| n.map(|c| c as f32)))));
+        let at = |corner: usize| {
+            let index = *mesh.texcoord_indices.get(corner)?;
+            mesh.texcoords.get(2 * index as usize..)?.first_chunk().map(|uv: &[f64; 2]| uv.map(|c| c as f32))
         };
-        texture.extend(mesh.texcoord_indices.as_chunks::<3>().0.iter().map(|corners| corners.each_ref().map(at)));
+        if let [Some(a), Some(b), Some(c)] = corners.map(at) {
+            texture.push([a, b, c]);
+        }
         // The name of a group is the number of its material; faces before the first have another.
-        let number = name.parse().unwrap_or(u32::MAX);
-        material.extend(mesh.indices.as_chunks::<3>().0.iter().map(|_| number));
+        material.push(name.parse().unwrap_or(u32::MAX));
     }
-    let textured = lines.every_corner_has_texture && !texture.is_empty() && texture.len() == triangles.len();
+    let textured = lines.every_corner_has_texture && !texture.is_empty() && texture.len() == vertices.len();
+    let colors = lines.colors();
     let mesh = Mesh {
-        normals: (!normals.is_empty() && normals.len() == triangles.len()).then_some(normals),
+        normals: (!normals.is_empty() && normals.len() == vertices.len()).then_some(normals),
         texture: textured.then_some(texture),
         material: (!lines.materials.is_empty()).then_some(material),
-        triangles,
+        triangles: vertices,
         positions: lines.positions,
-        colors: (!lines.colors.is_empty()).then_some(Colors::Linear(lines.colors)),
+        colors,
         up: Some(Up::Y),
         ..Mesh::default()
     };

@@ -2,7 +2,8 @@
 
 use crate::Progress;
 use crate::io::fault::Fault;
-use crate::io::values::{finite, parse_number, shown};
+use crate::io::values::{BYTE_ORDER_MARK, finite, parse_number, shown};
+use crate::scene::Colors;
 use crate::scene::color::{DEFAULT_COLOR, srgb_to_linear};
 use std::io::{self, BufRead, Read};
 
@@ -13,8 +14,8 @@ const LINE_LIMIT: usize = 1 << 24;
 #[derive(Debug, Default)]
 pub(super) struct Lines {
     pub(super) positions: Vec<[f64; 3]>,
-    /// One linear colour for each position, or none at all.
-    pub(super) colors: Vec<[f32; 4]>,
+    /// One colour and alpha for each position, or none at all, as the file has them; none of its own is not a number.
+    colors: Vec<[f64; 4]>,
     pub(super) normals: Vec<[f32; 3]>,
     pub(super) every_corner_has_a_normal: bool,
     /// Only if they are wanted, and so for all that follows.
@@ -77,6 +78,9 @@ impl<'a, R: BufRead> Source<'a, R> {
                 return Ok(!self.line.is_empty());
             }
             self.lines.count += 1;
+            if self.lines.count == 1 && self.line.starts_with(BYTE_ORDER_MARK) {
+                self.line.drain(..BYTE_ORDER_MARK.len());
+            }
             self.unreported += bytes as u64;
             if self.unreported >= 1 << 20 {
                 self.progress.advance(std::mem::take(&mut self.unreported));
@@ -198,15 +202,34 @@ impl Lines {
         match color {
             Some([r, g, b, a]) => {
                 // Vertices before the first coloured one.
-                self.colors.resize(self.positions.len(), DEFAULT_COLOR);
-                let [r, g, b] = [r, g, b].map(|code| finite(srgb_to_linear(code)));
-                self.colors.push([r, g, b, finite(a)]);
+                self.colors.resize(self.positions.len(), [f64::NAN; 4]);
+                self.colors.push([r, g, b, a].map(|share| if share.is_nan() { 0.0 } else { share }));
             }
-            None if !self.colors.is_empty() => self.colors.push(DEFAULT_COLOR),
+            None if !self.colors.is_empty() => self.colors.push([f64::NAN; 4]),
             None => {}
         }
         self.positions.push(position);
         Ok(())
+    }
+
+    /// One colour for each position, in linear light, if any has one.
+    ///
+    /// No standard says what colours range over: most programs write shares of 1, some codes of 0 to 255. A channel that comes to
+    /// 2 or more in the file is taken for codes; colour and alpha each for itself.
+    pub(super) fn colors(&self) -> Option<Colors> {
+        let unit = |of: fn(&[f64; 4]) -> f64| {
+            let largest = self.colors.iter().map(of).fold(0.0, f64::max);
+            if largest >= 2.0 { 255.0 } else { 1.0 }
+        };
+        let (full, opaque) = (unit(|[r, g, b, _]| r.max(*g).max(*b)), unit(|[.., a]| *a));
+        let linear = |&[r, g, b, a]: &[f64; 4]| {
+            if r.is_nan() {
+                return DEFAULT_COLOR;
+            }
+            let [r, g, b] = [r, g, b].map(|share| finite(srgb_to_linear(share / full)));
+            [r, g, b, finite(a / opaque)]
+        };
+        (!self.colors.is_empty()).then(|| Colors::Linear(self.colors.iter().map(linear).collect()))
     }
 }
 

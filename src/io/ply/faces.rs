@@ -2,11 +2,13 @@
 
 use super::header::{Element, Kind, Property};
 use crate::io::fault::Fault;
+use crate::io::polygon;
+use glam::DVec3;
 
 /// How a list of vertices becomes triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Shape {
-    /// One polygon, fanned from its first corner.
+    /// One polygon.
     Polygon,
     /// Each vertex makes a triangle with the two before it, every second one turned round; -1 begins another strip.
     Strip,
@@ -28,7 +30,9 @@ pub(super) enum Role {
 /// Triangles while they are read, and the row that they are read from.
 #[derive(Debug, Default)]
 pub(super) struct Faces {
-    pub(super) triangles: Vec<[u32; 3]>,
+    triangles: Vec<[u32; 3]>,
+    /// The polygons of more than three corners: their first triangle, and how many.
+    polygons: Vec<(usize, usize)>,
     /// Whether texture coordinates are read; they may be absent.
     surface: bool,
     /// Texture coordinates of the triangles, one each, or as many as there were before the first face without.
@@ -142,6 +146,11 @@ impl Faces {
 
     /// Ends a row: its triangles get their texture coordinates, in whichever order the row gave the two.
     pub(super) fn end(&mut self) {
+        let made = self.triangles.len() - self.first;
+        // Of one that names a vertex twice, triangles are missing.
+        if self.shape == Some(Shape::Polygon) && made > 1 && made + 2 == self.corner {
+            self.polygons.push((self.first, made));
+        }
         if !self.surface {
             return;
         }
@@ -152,19 +161,35 @@ impl Faces {
         }
     }
 
-    /// The triangles of a file with so many vertices.
-    pub(super) fn finish(self, vertices: usize) -> Result<Triangles, Fault> {
-        let Self { triangles, texture, texture_numbers, .. } = self;
-        match triangles.as_flattened().iter().find(|vertex| **vertex as usize >= vertices) {
-            Some(vertex) => {
-                Err(Fault::Malformed(format!("a face names the vertex {vertex}, but there are {vertices}")))
-            }
-            None => {
-                let texture = Some(texture).filter(|texture| !texture.is_empty() && texture.len() == triangles.len());
-                Ok(Triangles { triangles, texture, texture_numbers })
-            }
+    /// The triangles of a file with these vertices.
+    pub(super) fn finish(self, positions: &[[f64; 3]]) -> Result<Triangles, Fault> {
+        let Self { mut triangles, mut texture, texture_numbers, polygons, .. } = self;
+        let vertices = positions.len();
+        if let Some(vertex) = triangles.as_flattened().iter().find(|vertex| **vertex as usize >= vertices) {
+            return Err(Fault::Malformed(format!("a face names the vertex {vertex}, but there are {vertices}")));
         }
+        for (first, count) in polygons {
+            let fan = first..first + count;
+            let position = |vertex: u32| DVec3::from(positions[vertex as usize]);
+            let corners: Vec<_> = corners_of(&triangles[fan.clone()]).into_iter().map(position).collect();
+            let parts = polygon::triangles(&corners);
+            remake(&mut triangles[fan.clone()], &parts);
+            texture.get_mut(fan).into_iter().for_each(|fan| remake(fan, &parts));
+        }
+        let texture = Some(texture).filter(|texture| !texture.is_empty() && texture.len() == triangles.len());
+        Ok(Triangles { triangles, texture, texture_numbers })
     }
+}
+
+/// What the corners of a polygon have, of which its fan is made.
+fn corners_of<T: Copy>(fan: &[[T; 3]]) -> Vec<T> {
+    fan.iter().take(1).flat_map(|&[a, b, _]| [a, b]).chain(fan.iter().map(|&[.., c]| c)).collect()
+}
+
+/// Makes of a fan the triangles of the same polygon that are named by its corners.
+fn remake<T: Copy>(fan: &mut [[T; 3]], parts: &[[usize; 3]]) {
+    let corners = corners_of(fan);
+    fan.iter_mut().zip(parts).for_each(|(triangle, part)| *triangle = part.map(|corner| corners[corner]));
 }
 
 fn shape_of(element: &Element) -> Option<Shape> {

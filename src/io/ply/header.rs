@@ -2,7 +2,7 @@
 
 use super::faces::Faces;
 use crate::io::fault::Fault;
-use crate::io::values::shown;
+use crate::io::values::{BYTE_ORDER_MARK, shown};
 use std::io::{BufRead, Read};
 
 /// No header line is longer; a comment may hold a processing history.
@@ -111,7 +111,7 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
         line.clear();
         reader.take(LINE_LIMIT).read_until(b'\n', &mut line)?;
         if number == 1 {
-            if line.trim_ascii_end() != b"ply" {
+            if line.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&line).trim_ascii_end() != b"ply" {
                 return Err(Fault::Malformed("it is not a PLY file: its first line is not 'ply'".into()));
             }
             continue;

@@ -48,7 +48,7 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
     Ok(points)
 }
 
-/// Reads the triangles of a PLY file: the polygons of the element `face`, fanned, and the strips of the element `tristrips`.
+/// Reads the triangles of a PLY file: the polygons of the element `face`, concave ones too, and the strips of the element `tristrips`.
 ///
 /// Corners have what their vertices have: normals, colours, texture coordinates; the last from the list `texcoord` of the faces
 /// instead, as MeshLab writes it, where every face has one. What comments `TextureFile` name, PNG or JPEG beside the file, are the
@@ -112,7 +112,7 @@ fn contents(path: &Path, surface: bool, progress: &dyn Progress) -> Result<(Poin
     };
     progress.end();
     let Contents { points, faces } = contents.map_err(in_file)?;
-    let triangles = faces.finish(points.positions.len()).map_err(in_file)?;
+    let triangles = faces.finish(&points.positions).map_err(in_file)?;
     Ok((points, triangles, header.textures))
 }
 

@@ -1,12 +1,12 @@
 //! From a mesh to points on it, by priority and evenly (Tien 2008, chapter 3).
 //!
-//! 1. [`voxels`]: a tree of boxes, halved across their longest side where triangles are ([`overlap`]), ends in voxels.
+//! 1. [`voxels`]: a tree of boxes, halved across their longest side where triangles are (`overlap`), ends in voxels.
 //! 2. [`priority`]: each voxel has a priority; any function of voxels will do.
-//! 3. [`distribute`]: a heap hands out the samples, always to the voxel of the highest priority, which then falls.
-//! 4. [`candidates`]: each voxel's samples begin evenly spread over the triangles in it.
-//! 5. [`relax`]: they move apart, also from those of other voxels, and stay on the triangles.
+//! 3. `distribute`: a heap hands out the samples, always to the voxel of the highest priority, which then falls.
+//! 4. `candidates`: each voxel's samples begin evenly spread over the triangles in it.
+//! 5. `relax`: they move apart, also from those of other voxels, and stay on the triangles.
 //!
-//! Then each sample gets what the surface says there, and a disk that covers the part of the surface nearest to it ([`voronoi`]).
+//! Then each sample gets what the surface says there, and a disk that covers the part of the surface nearest to it (`voronoi`).
 //!
 //! The thesis projects one point a voxel, or several, onto its triangles and does not say which. Where these lie decides
 //! how well a surface is sampled: independent random points leave gaps three times as wide as needed.

@@ -1,0 +1,85 @@
+//! The modules of all needs: joined, parsed and validated once for all tests of a binary.
+
+use std::collections::HashMap;
+use std::sync::LazyLock;
+
+use epsplat::gpu::Sources;
+use epsplat::gpu::kernel::{Bindings, reflect};
+use epsplat::passes::variant::modules;
+use epsplat::scene::SceneNeeds;
+use rayon::prelude::*;
+
+use super::all_needs;
+
+/// What [`reflect`] makes of a text.
+pub struct Reflected {
+    pub module: naga::Module,
+    pub bindings: Bindings,
+}
+
+/// A module of a render with `needs`.
+pub struct Made {
+    pub needs: SceneNeeds,
+    /// The files that are joined.
+    pub files: Vec<&'static str>,
+    /// The entry points that the render dispatches.
+    pub stages: Vec<&'static str>,
+    /// Index of its text among the different ones.
+    text: usize,
+}
+
+impl Made {
+    /// It is the tiles'.
+    pub fn of_tiles(&self) -> bool {
+        self.files.contains(&"tile.wgsl")
+    }
+
+    pub fn text(&self) -> &'static str {
+        &ALL.texts[self.text].0
+    }
+
+    pub fn reflected(&self) -> &'static Reflected {
+        &ALL.texts[self.text].1
+    }
+}
+
+struct All {
+    made: Vec<Made>,
+    /// The different texts, in the order in which they come.
+    texts: Vec<(String, Reflected)>,
+}
+
+static ALL: LazyLock<All> = LazyLock::new(|| {
+    let sources = Sources::default();
+    let (mut made, mut texts, mut numbers) = (Vec::new(), Vec::new(), HashMap::new());
+    for needs in all_needs() {
+        for (files, stages) in modules(&needs) {
+            let text = *numbers.entry(files.clone()).or_insert_with(|| {
+                texts.push(sources.join(&files));
+                texts.len() - 1
+            });
+            made.push(Made { needs, files, stages, text });
+        }
+    }
+    let reflected = texts.into_par_iter().map(|text| {
+        let (module, bindings, _) = reflect(&text).unwrap_or_else(|error| panic!("{error}"));
+        (text, Reflected { module, bindings })
+    });
+    All { texts: reflected.collect(), made }
+});
+
+/// The modules of each of all needs.
+pub fn all() -> &'static [Made] {
+    &ALL.made
+}
+
+/// Of all needs' modules the first with each text.
+pub fn different() -> Vec<&'static Made> {
+    let mut known = 0;
+    let is_new = |made: &&Made| {
+        let new = made.text == known;
+        known += usize::from(new);
+        new
+    };
+    ALL.made.iter().filter(is_new).collect()
+}

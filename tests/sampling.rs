@@ -85,7 +85,9 @@ fn the_bunny_is_sampled_better_than_by_independent_points() {
     assert!(near.mean < 0.82 * far.mean && near.percentile_99 < 0.7 * far.percentile_99, "{near:?} {far:?}");
     // From the mesh to the nearest disk, and from the disks to the mesh.
     let (near, far) = (ours.mesh_to_disks.unwrap(), theirs.mesh_to_disks.unwrap());
-    assert!(near.mean < 0.5 * far.mean && near.percentile_99 < 0.5 * far.percentile_99, "{near:?} {far:?}");
+    // In the mean by little, as the baseline's disks lie in a triangle each and ours in no one of them; but these are all near.
+    assert!(near.mean < far.mean && near.rms < 0.6 * far.rms, "{near:?} {far:?}");
+    assert!(near.percentile_99 < 0.5 * far.percentile_99 && near.max < 0.6 * far.max, "{near:?} {far:?}");
     let (near, far) = (ours.rims_to_mesh.unwrap(), theirs.rims_to_mesh.unwrap());
     assert!(near.mean < 0.9 * far.mean && near.percentile_99 < far.percentile_99, "{near:?} {far:?}");
     // And with smaller disks fewer holes.
@@ -125,6 +127,24 @@ fn a_sphere_is_covered_evenly() {
         (surfel.s, surfel.t) = (surfel.s.map(|c| 0.5 * c), surfel.t.map(|c| 0.5 * c));
     }
     assert!(coverage(&tree, &scene, 64, 128, &()).unwrap().hole_share.unwrap() > 0.01);
+}
+
+#[test]
+fn normals_are_those_of_cells_but_none_blends_across_a_crease() {
+    // A sphere of large facets that names no normals.
+    let mesh = sphere(3, false);
+    let error = |points: &Points| {
+        let normals = points.normals.as_ref().unwrap().iter();
+        let angle = |(p, n): (&[f64; 3], &[f32; 3])| DVec3::from(*p).angle_between(DVec3::from(n.map(f64::from)));
+        points.positions.iter().zip(normals).map(angle).sum::<f64>() / points.positions.len() as f64
+    };
+    // Facets are 0.07 off in the mean.
+    let (ours, facets) = (error(&by(&mesh, 1000, Priority::Area)), error(&uniform(&mesh, 1000)));
+    assert!(ours < 0.6 * facets && facets > 0.03, "{ours} {facets}");
+    let cube = epsplat::io::read_mesh(&Path::new(env!("CARGO_MANIFEST_DIR")).join("data/cube.obj"), &()).unwrap();
+    let points = by(&Mesh { normals: None, ..cube }, 500, Priority::Area);
+    let upright = |n: &[f32; 3]| n.iter().any(|c| c.abs() > 0.999_999);
+    assert!(points.normals.unwrap().iter().all(upright));
 }
 
 #[test]

@@ -6,7 +6,8 @@
 //! 4. `candidates`: each voxel's samples begin evenly spread over the triangles in it.
 //! 5. `relax`: they move apart, also from those of other voxels, and stay on the triangles.
 //!
-//! Then each sample gets what the surface says there, and a disk that covers the part of the surface nearest to it (`voronoi`).
+//! Then each sample gets what the surface says there, or on the part of it that is nearest to it (`relax`), and a disk that
+//! covers that part (`voronoi`).
 //!
 //! The thesis projects one point a voxel, or several, onto its triangles and does not say which. Where these lie decides
 //! how well a surface is sampled: independent random points leave gaps three times as wide as needed.
@@ -22,6 +23,7 @@ mod uniform;
 mod voronoi;
 pub mod voxels;
 
+use glam::DVec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -83,7 +85,8 @@ impl Sampling {
 }
 
 /// Samples a mesh at `count` points: with positions on its triangles, normals, texture coordinates and colours as far as the
-/// mesh has them, and, by [`Method::Stratified`], radii with which the disks cover it.
+/// mesh has them, and, by [`Method::Stratified`], radii with which the disks cover it. Without normals of the mesh those are
+/// of its triangles: the mean of the part that each sample stands for, or of [`Method::Uniform`] of one triangle.
 ///
 /// The same seed gives the same points, whatever the machine's number of threads.
 ///
@@ -113,7 +116,7 @@ pub fn sample(
         Method::Uniform => {
             let places = uniform::places(&surface, count, seed);
             let colors = surface.is_colored().then(|| places.par_iter().map(|place| surface.color(*place)).collect());
-            points(&surface, &places, None, colors)
+            points(&surface, &places, normals_at(&surface, &places), None, colors)
         }
         Method::Stratified { priority, depth } => {
             progress.begin("dividing the mesh", 0);
@@ -129,24 +132,33 @@ pub fn sample(
             let fair: Vec<f64> = priorities.iter().map(|priority| count as f64 * (usable(priority) / sum)).collect();
             let (candidates, mut places) = candidates::candidates(&voxels, &quotas, &fair, seed);
             let cells = relax::relax(&surface, &candidates, &mut places, progress)?;
-            let radii = voronoi::radii(&surface, &places, progress)?;
+            let normals = match mesh.normals {
+                Some(_) => normals_at(&surface, &places),
+                None => relax::normals(&surface, &candidates, &places, &cells),
+            };
+            let radii = voronoi::radii(&surface, &places, &normals, progress)?;
             let colors = surface.is_colored().then(|| relax::colors(&surface, &candidates, &places, &cells));
-            points(&surface, &places, Some(radii), colors)
+            points(&surface, &places, normals, Some(radii), colors)
         }
     };
     Ok((points, sampling))
 }
 
+fn normals_at(surface: &MeshSurface<'_>, places: &[Place]) -> Vec<DVec3> {
+    places.par_iter().map(|place| surface.normal(*place)).collect()
+}
+
 fn points(
     surface: &MeshSurface<'_>,
     places: &[Place],
+    normals: Vec<DVec3>,
     radii: Option<Vec<f32>>,
     colors: Option<Vec<[f32; 4]>>,
 ) -> Points {
     let places = places.par_iter();
     Points {
         positions: places.clone().map(|place| (surface.center + surface.point(*place)).to_array()).collect(),
-        normals: Some(places.clone().map(|place| surface.normal(*place).as_vec3().to_array()).collect()),
+        normals: Some(normals.into_iter().map(|normal| normal.as_vec3().to_array()).collect()),
         radii,
         colors: colors.map(Colors::Linear),
         texture: places.map(|place| surface.texture(*place)).collect(),

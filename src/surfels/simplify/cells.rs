@@ -47,8 +47,10 @@ pub(super) struct Cells {
     corners: Vec<DVec2>,
     /// The distance of the farthest corner from the point.
     pub radii: Vec<f64>,
-    /// For a cell at the end of the surface, or at a crease that the graph has no edge across, how far it goes on there, else
-    /// infinity.
+    /// The edges of each cell beyond which there is no neighbour, as bits like those of [`Cells::pieces`]: the surface ends
+    /// there, or has a crease that the graph has no edge across.
+    ends: Vec<u16>,
+    /// How far such a cell goes on there from its point; zero for other cells.
     pub overhangs: Vec<f64>,
     first_neighbour: Vec<usize>,
     neighbours: Vec<u32>,
@@ -75,6 +77,7 @@ impl Cells {
             first_corner: Vec::with_capacity(samples.len() + 1),
             corners: Vec::new(),
             radii: Vec::with_capacity(samples.len()),
+            ends: Vec::with_capacity(samples.len()),
             overhangs: Vec::with_capacity(samples.len()),
             first_neighbour: Vec::new(),
             neighbours: Vec::new(),
@@ -85,6 +88,7 @@ impl Cells {
             cells.first_corner.push(cells.corners.len());
             cells.corners.extend(&cell.corners);
             cells.radii.push(cell.corners.iter().map(|corner| corner.length()).fold(0.0, f64::max));
+            cells.ends.push(cell.ends);
             cells.overhangs.push(cell.overhang);
             spacings.push(cell.spacing);
         }
@@ -130,6 +134,13 @@ impl Cells {
         ((1u32 << pieces) - 1) as u16
     }
 
+    /// The unit directions, in the basis of the cell's tangent plane, in which it ends: across the edges that have no neighbour.
+    pub fn ends(&self, index: u32) -> impl Iterator<Item = DVec2> {
+        let (corners, ends) = (self.corners(index), self.ends[index as usize]);
+        let open = (0..corners.len()).filter(move |&k| ends >> piece_of(k, corners.len()) & 1 == 1);
+        open.filter_map(|k| (corners[k] - corners[(k + 1) % corners.len()]).perp().try_normalize())
+    }
+
     /// Where the pieces of a cell lie among those of all.
     pub fn first_piece(&self, index: u32) -> usize {
         self.first_corner[index as usize]
@@ -165,6 +176,7 @@ struct Cell {
     corners: Vec<DVec2>,
     /// And how far they are.
     neighbours: Vec<(u32, f64)>,
+    ends: u16,
     overhang: f64,
     spacing: f64,
 }
@@ -187,13 +199,14 @@ fn cell(
         let polygon = Polygon::cut(REACH * spacing, &borders);
         neighbours = polygon.neighbours();
         if polygon.is_closed() {
-            let overhang = polygon.farthest_at_crease().unwrap_or(f64::INFINITY);
-            return Cell { corners: polygon.corners, neighbours, overhang, spacing };
+            let overhang = polygon.farthest_at_end();
+            return Cell { ends: polygon.ends(), corners: polygon.corners, neighbours, overhang, spacing };
         }
     }
     // Where the surface ends, it goes on as far as the surfel does.
     let overhang = samples.radii[index as usize];
-    Cell { corners: Polygon::cut(overhang, &borders).corners, neighbours, overhang, spacing }
+    let polygon = Polygon::cut(overhang, &borders);
+    Cell { ends: polygon.ends(), corners: polygon.corners, neighbours, overhang, spacing }
 }
 
 /// The local spacing; zero without neighbours.
@@ -319,11 +332,22 @@ impl Polygon {
         !self.corners.is_empty() && self.cut_by.iter().all(Option::is_some)
     }
 
-    /// How far the corners are at edges without a neighbour. None without such edges.
-    fn farthest_at_crease(&self) -> Option<f64> {
+    /// Whether the edge has no neighbour: it is the outline's, or a crease's.
+    fn is_end(&self, edge: usize) -> bool {
+        self.cut_by[edge].flatten().is_none()
+    }
+
+    /// The edges without a neighbour as bits.
+    fn ends(&self) -> u16 {
         let count = self.corners.len();
-        let ends = (0..count).filter(|&k| self.cut_by[k] == Some(None)).flat_map(|k| [k, (k + 1) % count]);
-        ends.map(|k| self.corners[k].length()).reduce(f64::max)
+        (0..count).filter(|&k| self.is_end(k)).fold(0, |ends, k| ends | 1 << piece_of(k, count))
+    }
+
+    /// How far the corners are at edges without a neighbour; zero without such edges.
+    fn farthest_at_end(&self) -> f64 {
+        let count = self.corners.len();
+        let ends = (0..count).filter(|&k| self.is_end(k)).flat_map(|k| [k, (k + 1) % count]);
+        ends.map(|k| self.corners[k].length()).fold(0.0, f64::max)
     }
 
     fn neighbours(&self) -> Vec<(u32, f64)> {

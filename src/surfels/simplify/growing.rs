@@ -214,12 +214,13 @@ impl<'a> Grower<'a> {
         let inverse = shape.map(|axis| axis / axis.length_squared());
         let shortest = shape[0].length().min(shape[1].length());
         let (mut low, mut high) = (0f64, 0f64);
-        // The surface ends there.
+        // As large as the ends of the surface so far allow.
         let mut end = f64::INFINITY;
         self.seen[point as usize] = self.number;
         self.confront.push(Reverse((Distance(0.0), point)));
         while let Some(Reverse((Distance(distance), next))) = self.confront.pop() {
             if distance >= end {
+                self.conquered.retain(|conquered| conquered.distance <= end);
                 return end;
             }
             let offset = self.samples.positions.position(next) - center;
@@ -232,22 +233,41 @@ impl<'a> Grower<'a> {
                 return distance;
             }
             self.conquered.push(Conquered { point: next, distance, height });
-            let overhang = self.cells.overhangs[next as usize];
-            if overhang.is_finite() {
-                end = end.min(distance + overhang / shortest);
-            }
+            end = end.min(self.end_at(next, offset, shape));
             for &neighbour in self.cells.neighbours(next) {
-                if self.seen[neighbour as usize] != self.number && self.samples.same_side(point, neighbour) {
+                if self.seen[neighbour as usize] == self.number {
+                    continue;
+                }
+                let offset = self.samples.positions.position(neighbour) - center;
+                let reached = DVec2::new(offset.dot(inverse[0]), offset.dot(inverse[1])).length();
+                if self.samples.same_side(point, neighbour) {
                     self.seen[neighbour as usize] = self.number;
-                    let offset = self.samples.positions.position(neighbour) - center;
-                    let distance = DVec2::new(offset.dot(inverse[0]), offset.dot(inverse[1])).length();
-                    self.confront.push(Reverse((Distance(distance), neighbour)));
+                    self.confront.push(Reverse((Distance(reached), neighbour)));
+                } else {
+                    // The surface turns away, though by no more than the tolerance so far.
+                    end = end.min(self.turn_at(neighbour, offset, shape).unwrap_or(reached).max(distance));
                 }
             }
         }
         // All of a surface is inside: the disk ends with the last cell.
         let reach = self.conquered.iter().map(|c| c.distance + self.cells.radii[c.point as usize] / shortest);
         end.min(reach.fold(0.0, f64::max))
+    }
+
+    /// How large a splat of this shape may be that holds the point `next` at `offset`, for the ends of that point's cell: it
+    /// reaches across an end, in the direction in which that lies, by no more than the cell does from its point.
+    fn end_at(&self, next: u32, offset: DVec3, shape: [DVec3; 2]) -> f64 {
+        let overhang = self.cells.overhangs[next as usize];
+        let [s, t] = tangent_basis(self.samples.normals[next as usize]);
+        let ends = self.cells.ends(next).filter_map(|end| along(s * end.x + t * end.y, shape));
+        ends.map(|(toward, extent)| (offset.dot(toward).max(0.0) + overhang) / extent).fold(f64::INFINITY, f64::min)
+    }
+
+    /// How large it may be before `next`, at `offset`, which faces away from it: the surface turns in the direction in which that
+    /// point faces, or against it. None where it faces the opposite way.
+    fn turn_at(&self, next: u32, offset: DVec3, shape: [DVec3; 2]) -> Option<f64> {
+        let (toward, extent) = along(self.samples.normals[next as usize], shape)?;
+        Some(offset.dot(toward).abs() / extent)
     }
 
     fn covered_pieces(&self, of: &Conquered, center: DVec3, flat: impl Fn(DVec3) -> DVec2, radius: f64) -> u16 {
@@ -270,4 +290,12 @@ impl<'a> Grower<'a> {
         }
         pieces
     }
+}
+
+/// The unit direction of `v` in the plane of an ellipse with perpendicular half-axes `shape`, and how far that reaches in it. None
+/// for a `v` across the plane.
+fn along(v: DVec3, shape: [DVec3; 2]) -> Option<(DVec3, f64)> {
+    let normal = shape[0].cross(shape[1]).normalize();
+    let toward = v.reject_from_normalized(normal).try_normalize()?;
+    Some((toward, toward.dot(shape[0]).hypot(toward.dot(shape[1]))))
 }

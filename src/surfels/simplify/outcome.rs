@@ -19,17 +19,18 @@ const SMALLEST_OVERLAP: f64 = 0.02;
 /// and in between by so many tolerances.
 const OVERLAP_IN_TOLERANCES: f64 = 8.0;
 
-/// The half-axis that a surfel has whose half-axis grew to `grown`, in the unit of the tolerance.
+/// The half-axis that a surfel has, at least, whose half-axis grew to `grown`, in the unit of the tolerance.
 ///
 /// Disks that just cover the surface together leave slits where it is seen aslant, because they lie at different heights. Two
 /// within a tolerance E of the surface are at most 2 E apart where they meet; overlapping by 8 E each they close the slit
-/// for views up to atan 8, 83 degrees, from the normal. More would only show past sharp edges.
+/// for views up to atan 8, 83 degrees, from the normal. More would only show past sharp edges. Between points a rough surface
+/// leaves the tolerance; the surfels that came in cover it there, so none is written smaller than the one that it grew from.
 pub fn written(grown: f64, tolerance: f64) -> f64 {
     let overlap = (OVERLAP_IN_TOLERANCES * tolerance).max(SMALLEST_OVERLAP * grown);
     grown + overlap.min(LARGEST_OVERLAP * grown)
 }
 
-/// The inverse of [`written`]: the half-axis that a surfel grew to.
+/// The inverse of [`written`]: the half-axis that a surfel grew to, or more.
 pub fn grown(written: f64, tolerance: f64) -> f64 {
     let between = written - OVERLAP_IN_TOLERANCES * tolerance;
     between.min(written / (1.0 + SMALLEST_OVERLAP)).max(written / (1.0 + LARGEST_OVERLAP))
@@ -102,7 +103,7 @@ pub(super) fn scene(
             let length = axis.length();
             // Where the surface bends by more than the tolerance, disks that meet are farther apart.
             let tolerance = if splat.deviation > tolerance { f64::INFINITY } else { tolerance };
-            world(axis * (written(length, tolerance) / length))
+            world(axis * (written(length, tolerance).max(samples.radii[splat.point as usize]) / length))
         });
         let [r, g, b, alpha] = color;
         let opaque = if alpha > 0.0 { alpha } else { f64::INFINITY };

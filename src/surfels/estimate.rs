@@ -73,11 +73,14 @@ pub(crate) fn estimate(
     progress.begin("estimating normals and radii", distinct.len() as u64);
     let search = NeighbourSearch::new(distinct, NORMAL_NEIGHBOURS);
     let mut of_position = vec![Estimate::default(); distinct.len()];
-    of_position.par_chunks_mut(CHUNK).enumerate().for_each_init(Vec::new, |neighbours, (chunk, estimates)| {
+    of_position.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, estimates)| {
         let range: Range<usize> = chunk * CHUNK..chunk * CHUNK + estimates.len();
-        for (index, estimate) in range.zip(estimates.iter_mut()).filter(|(index, _)| wanted(*index)) {
-            search.nearest(index as u32, neighbours);
-            *estimate = estimate_at(distinct, index as u32, neighbours, up);
+        if range.clone().any(wanted) {
+            search.of_range(range.clone(), |index, neighbours| {
+                if wanted(index as usize) {
+                    estimates[index as usize - range.start] = estimate_at(distinct, index, neighbours, up);
+                }
+            });
         }
         progress.advance(estimates.len() as u64);
     });

@@ -10,9 +10,7 @@ use super::orient::{self, Orientation};
 use super::outliers::inliers;
 use super::positions::DistinctPositions;
 use super::sheets;
-use super::sizes::{
-    ELLIPSE_NEIGHBOURS, Size, bounding_ellipse, bsp_radii, ellipse_radii, knn_radii, local_limits, offsets,
-};
+use super::sizes::{Size, bsp_radii, ellipse_at, knn_radii, local_limits, offsets};
 use super::{Preparation, bounds_of, guess_up, origin_for, unit, usable_axes};
 use crate::io::Points;
 use crate::{Error, Progress, Result};
@@ -137,15 +135,23 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
             let given = given.iter().flatten().zip(distinct.of_point());
             let given: Vec<_> = given.filter_map(|(normal, &position)| Some((position, (*normal)?))).collect();
             parts = Some(orient::propagate(&distinct, &graph, &mut normals, &given, up, progress));
+            progress.begin("telling sheets apart", 0);
             sheets::refit(&distinct, &graph, &mut normals);
+            progress.end();
         }
     }
 
     progress.begin("measuring surfels", 0);
     let mut collinear = 0;
-    let radii = match options.size {
+    // Those of the positions' own normals.
+    let mut ellipses = Vec::new();
+    let radii: Vec<f64> = match options.size {
         Size::Knn => knn_radii(&distinct, &graph),
-        Size::Ellipse => ellipse_radii(&distinct, &graph, &normals),
+        Size::Ellipse => {
+            let own = normals.par_iter().zip(0..distinct.len() as u32);
+            ellipses = own.map(|(normal, position)| ellipse_at(&distinct, &graph, position, *normal)).collect();
+            ellipses.par_iter().map(|[s, _]| s.length()).collect()
+        }
         Size::Bsp(triangle) => {
             let (radii, degenerate) = bsp_radii(&distinct, triangle, progress);
             collinear = degenerate;
@@ -153,7 +159,6 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
         }
     };
     let limits = local_limits(&graph, &radii, options.largest_ratio);
-    progress.end();
 
     let world = |length: f64| (length / distinct.scale()).clamp(RADIUS_RANGE.0, RADIUS_RANGE.1);
     let limited = radii.iter().zip(&limits).filter(|(radius, limit)| radius > limit).count() as u64;
@@ -168,13 +173,14 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
         if radius > 0.0 { world(radius) } else { LONE_RADIUS }
     };
     let axes = (options.size == Size::Ellipse).then(|| {
-        let ellipse = |(&position, normal): (&u32, &[f32; 3])| {
-            let normal = DVec3::from_array(normal.map(f64::from)).normalize();
-            let [s, t] = bounding_ellipse(offsets(&distinct, &graph, position, ELLIPSE_NEIGHBOURS), normal);
+        let ellipse = |(&position, &normal): (&u32, &[f32; 3])| {
+            let own = normal == normals[position as usize];
+            let [s, t] =
+                if own { ellipses[position as usize] } else { ellipse_at(&distinct, &graph, position, normal) };
             // The length that the position's own ellipse has, within its limit, also where a point has another normal.
             let size = size_of(position);
             let axes = if s == DVec3::ZERO {
-                let (a, b) = normal.any_orthonormal_pair();
+                let (a, b) = DVec3::from_array(normal.map(f64::from)).normalize().any_orthonormal_pair();
                 [a * size, b * size]
             } else {
                 let factor = size.min(world(s.length())) / s.length();
@@ -188,6 +194,7 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
         Some(axes) => axes.par_iter().map(|[s, _]| DVec3::from_array(s.map(f64::from)).length() as f32).collect(),
         None => of_point.par_iter().map(|&position| size_of(position) as f32).collect(),
     };
+    progress.end();
     let Gathered { positions, colors, texture, up, .. } = gathered;
     let points =
         Points { positions, normals: Some(point_normals), radii: Some(point_radii), axes, colors, texture, up };

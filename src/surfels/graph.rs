@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::neighbours::{NeighbourSearch, Walk};
+use super::neighbours::NeighbourSearch;
 use super::positions::DistinctPositions;
 use crate::Progress;
 
@@ -28,13 +28,14 @@ impl NeighbourGraph {
         let search = NeighbourSearch::new(distinct, degree);
         neighbours.par_chunks_mut(CHUNK * degree).enumerate().for_each(|(chunk, rows)| {
             let first = chunk * CHUNK;
-            let mut walk = Walk::new(&search);
-            for (index, row) in (first..).zip(rows.chunks_exact_mut(degree)) {
-                for (slot, neighbour) in row.iter_mut().zip(walk.nearest(index as u32)) {
+            let positions = rows.len() / degree;
+            search.of_range(first..first + positions, |index, nearest| {
+                let row = (index as usize - first) * degree;
+                for (slot, neighbour) in rows[row..].iter_mut().zip(nearest) {
                     *slot = neighbour.index;
                 }
-            }
-            progress.advance((rows.len() / degree) as u64);
+            });
+            progress.advance(positions as u64);
         });
         progress.end();
         Self { degree, neighbours }

@@ -10,7 +10,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 pub(crate) use self::bsp::bsp_radii;
-pub(crate) use self::ellipse::{ELLIPSE_NEIGHBOURS, bounding_ellipse};
+use self::ellipse::{ELLIPSE_NEIGHBOURS, bounding_ellipse};
 pub(crate) use self::limit::local_limits;
 use super::estimate::{RADIUS_NEIGHBOURS, fitted_radius};
 use super::graph::NeighbourGraph;
@@ -85,13 +85,14 @@ pub(crate) fn knn_radii(distinct: &DistinctPositions, graph: &NeighbourGraph) ->
         .collect()
 }
 
-/// The longer half-axis of each position's bounding ellipse, scaled units.
-pub(crate) fn ellipse_radii(distinct: &DistinctPositions, graph: &NeighbourGraph, normals: &[[f32; 3]]) -> Vec<f64> {
-    (0..distinct.len() as u32)
-        .into_par_iter()
-        .map(|index| {
-            let normal = DVec3::from_array(normals[index as usize].map(f64::from)).normalize();
-            bounding_ellipse(offsets(distinct, graph, index, ELLIPSE_NEIGHBOURS), normal)[0].length()
-        })
-        .collect()
+/// The half-axes of the ellipse that bounds the neighbourhood of position `index` across `normal`, scaled units: see
+/// [`bounding_ellipse`].
+pub(crate) fn ellipse_at(
+    distinct: &DistinctPositions,
+    graph: &NeighbourGraph,
+    index: u32,
+    normal: [f32; 3],
+) -> [DVec3; 2] {
+    let normal = DVec3::from_array(normal.map(f64::from)).normalize();
+    bounding_ellipse(offsets(distinct, graph, index, ELLIPSE_NEIGHBOURS), normal)
 }

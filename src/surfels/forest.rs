@@ -51,7 +51,7 @@ pub(crate) struct Membership {
 
 impl Membership {
     /// Where this one's tree is itself a node of `above`.
-    fn within(self, above: &[Self]) -> Self {
+    pub fn within(self, above: &[Self]) -> Self {
         let outer = above[self.tree as usize];
         Self { tree: outer.tree, opposite: self.opposite ^ outer.opposite }
     }

@@ -35,7 +35,7 @@ const SHEET: f64 = 0.5;
 /// number of its connected parts, each of which is oriented on its own.
 ///
 /// Neighbours are compared along the minimum spanning forest of the doubts of [`continued`], over links to the nearest
-/// neighbours. A part of the surface then faces as most of the `given` normals in it do (pairs of position and normal).
+/// neighbours, and what those leave apart is joined by links to farther ones. A part of the surface then faces as most of the `given` normals in it do (pairs of position and normal).
 /// Without any, a sheet faces `up`, unless it stands upright; and all else faces outward where it is outermost, in a vote
 /// of the extreme positions in 26 directions, which lie on the convex hull.
 pub(crate) fn propagate(
@@ -48,17 +48,26 @@ pub(crate) fn propagate(
 ) -> u64 {
     progress.begin("orienting normals", 0);
     let at = |normals: &[[f32; 3]], index: usize| DVec3::from_array(normals[index].map(f64::from));
-    let links: Vec<Link> = graph
-        .links(COMPARED)
-        .map(|(a, b)| {
-            let near = |a: u32, b: u32| graph.of(a).iter().take(NEAREST).any(|&other| other == b);
-            let along = distinct.position(b) - distinct.position(a);
-            let (cosine, doubt) = continued(along, at(normals, a as usize), at(normals, b as usize));
-            let weight = if near(a, b) || near(b, a) { 0.5 * doubt } else { 0.5 + 0.5 * doubt };
-            Link::new([a, b], weight, cosine < 0.0)
+    let compared = |normals: &[[f32; 3]], a: u32, b: u32| {
+        let along = distinct.position(b) - distinct.position(a);
+        let (cosine, doubt) = continued(along, at(normals, a as usize), at(normals, b as usize));
+        (doubt, cosine < 0.0)
+    };
+    let nearest = graph.links(NEAREST).map(|(a, b)| {
+        let (doubt, opposite) = compared(normals, a, b);
+        Link::new([a, b], doubt, opposite)
+    });
+    let (mut members, trees) = spanning_forest(normals.len(), nearest.collect());
+    let joining = graph.links(COMPARED).filter_map(|(a, b)| {
+        let [of_a, of_b] = [a, b].map(|end| members[end as usize]);
+        let apart = of_a.tree != of_b.tree;
+        apart.then(|| {
+            let (doubt, opposite) = compared(normals, a, b);
+            Link::new([of_a.tree, of_b.tree], doubt, opposite ^ of_a.opposite ^ of_b.opposite)
         })
-        .collect();
-    let (members, parts) = spanning_forest(normals.len(), links);
+    });
+    let (above, parts) = spanning_forest(trees, joining.collect());
+    members.par_iter_mut().for_each(|member| *member = member.within(&above));
     turn(normals, |index| members[index].opposite);
     let mut votes = vec![0i64; parts];
     for (index, normal) in given {

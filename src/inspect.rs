@@ -40,8 +40,8 @@ pub struct Stages {
 impl Stages {
     /// The nearest depth of `pixel`, world units, +inf where nothing is. `None` past the image.
     pub fn nearest_depth(&self, pixel: usize) -> Option<f64> {
-        let bits = self.nearest.get(pixel)?;
-        Some(f64::from(f32::from_bits(*bits)) * f64::from(self.view.world))
+        let bits = f32::INFINITY.to_bits() - self.nearest.get(pixel)?;
+        Some(f64::from(f32::from_bits(bits)) * f64::from(self.view.world))
     }
 
     /// The sum of `channel` at `pixel` by the accumulator `fixed`, in units of `1 / one`. `None` past the end.

@@ -193,7 +193,6 @@ impl<'a> Renderer<'a> {
                 Organisation::Scatter => false,
             };
         let needs = needs.with_bands(bands).with_subgroups(shared).with_gather(gather);
-        let needs = if self.options.has(Optimisation::Culling) { needs } else { SceneNeeds { cull: false, ..needs } };
         let variant = Variant::of(&needs, self.options, surfels)?;
         match needs.raster {
             Some(raster) => raster::check(gpu, raster, &needs, camera)?,

@@ -6,7 +6,7 @@
 @group(0) @binding(7) var<storage, read> visible: array<u32>;
 
 fn front_at(pixel: u32) -> f32 {
-    return bitcast<f32>(visible[pixel]);
+    return bitcast<f32>(kept_depth(visible[pixel]));
 }
 
 // The fragments of one invocation: the splat's pixels from `offset` on in steps of `step`. Each round of the outer loop

@@ -84,6 +84,12 @@ const AWAY: u32 = 0x80000000u;
 // The nearest depth where nothing is: +inf.
 const NOTHING: u32 = 0x7f800000u;
 
+// Depths are positive, so the bits of an f32 order as u32. A nearest depth is kept as what its bits lack to those of +inf: a
+// buffer that was cleared has nothing anywhere, and clearing costs no kernel. Its own inverse.
+fn kept_depth(bits: u32) -> u32 {
+    return NOTHING - bits;
+}
+
 // The channel of a pixel's sums that holds the weight.
 const WEIGHT_CHANNEL: u32 = 0u;
 

@@ -19,7 +19,7 @@ fn farthest_in(tile: u32, nothing: u32) {
     var farthest = 0u;
     for (var y = first.y; y < end.y; y++) {
         for (var x = first.x; x < end.x; x++) {
-            let front = atomicLoad(&nearest[y * view.width + x]);
+            let front = kept_depth(atomicLoad(&nearest[y * view.width + x]));
             farthest = max(farthest, select(front, nothing, front == NOTHING));
         }
     }

@@ -123,7 +123,7 @@ fn load(column: Column, first: u32) -> vec4<f32> {
     var depths = vec4<f32>(0.0);
     for (var k = 0u; k < 4u; k++) {
         if (first + k < column.pixels) {
-            depths[k] = bitcast<f32>(atomicLoad(&nearest[column.pixel + (first + k) * view.width]));
+            depths[k] = bitcast<f32>(kept_depth(atomicLoad(&nearest[column.pixel + (first + k) * view.width])));
         }
     }
     return depths;
@@ -132,7 +132,7 @@ fn load(column: Column, first: u32) -> vec4<f32> {
 fn store(column: Column, first: u32, depths: vec4<f32>) {
     for (var k = 0u; k < 4u; k++) {
         if (first + k < column.pixels) {
-            atomicStore(&nearest[column.pixel + (first + k) * view.width], bitcast<u32>(depths[k]));
+            atomicStore(&nearest[column.pixel + (first + k) * view.width], kept_depth(bitcast<u32>(depths[k])));
         }
     }
 }

@@ -1,27 +1,13 @@
 // Stage 2: the nearest depth at every pixel. One invocation a splat, one workgroup a large splat. Twin: src/passes/visibility.rs.
-// Depths are positive, so the bits of an f32 order as u32.
+// The least depth is the greatest kept one (layout.wgsl).
 
 @group(0) @binding(5) var<storage, read> projected: array<Splat>;
 @group(0) @binding(6) var<storage, read_write> nearest: array<atomic<u32>>;
 
-// Before the splats: one invocation a pixel.
-@compute @workgroup_size(WORKGROUP)
-fn clear(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    hold();
-    let pixel = linear_index(workgroup, workgroups, local);
-    if (pixel < band_pixels()) {
-        atomicStore(&nearest[pixel], NOTHING);
-    }
-}
-
 fn cover(splat: Splat, filter_: Filter, x: u32, y: u32) {
     let fragment = footprint(splat, filter_, x, y);
     if (fragment.hit) {
-        atomicMin(&nearest[pixel_index(x, y)], bitcast<u32>(fragment.depth));
+        atomicMax(&nearest[pixel_index(x, y)], kept_depth(bitcast<u32>(fragment.depth)));
     }
 }
 

@@ -19,7 +19,7 @@ use crate::scene::{
 fn stages(needs: &SceneNeeds) -> Vec<&'static str> {
     let mut stages = vec!["project", "arrange_rare", "project_rare", "arrange", "list_covered", "arrange_covered"];
     if needs.raster.is_none() {
-        stages.extend(["clear", "visibility", "visibility_large", "occlude"]);
+        stages.extend(["visibility", "visibility_large", "occlude"]);
     }
     if needs.raster.is_none() && !needs.gather {
         stages.extend(["accumulate", "accumulate_large"]);

@@ -1,7 +1,8 @@
 //! Stage 2: the nearest depth at every pixel, `min z` over the splats that cover it (paper 000, section 5.3, first
 //! pass; there the tolerance is added to the depths, here to the comparison, which is exact).
 //!
-//! On the device depths are positive f32, whose bits order as u32: an atomic min. What is then farthest in each tile of
+//! On the device depths are positive f32, whose bits order as u32: an atomic min. They are kept as what they lack to +inf, so
+//! that it is an atomic max over a buffer of zeros. What is then farthest in each tile of
 //! pixels lets the next pass leave out splats that are hidden altogether.
 
 use super::covered::Covered;
@@ -38,7 +39,7 @@ pub fn reference<'a>(
     nearest
 }
 
-/// The nearest depth of each pixel of some rows, as bits, in device units.
+/// The nearest depth of each pixel of some rows, device units, as what its bits lack to those of +inf.
 pub struct VisibilityBuffer {
     /// One word a pixel, then one a tile (occlusion.wgsl), then the covered tiles.
     pub nearest: Buffer<u32>,
@@ -64,10 +65,12 @@ pub fn record(
     rows: &Rows,
     buffer: &VisibilityBuffer,
 ) -> Result<()> {
-    if part != Part::Far {
-        over(recorder, "clear", (rows, rows.pixels), buffer)?;
-    }
-    splats.dispatch(recorder, ("visibility", &[part]), rows, &[("nearest", buffer.nearest.bound())], |_| {})
+    let clear = |encoder: &mut wgpu::CommandEncoder| {
+        if part != Part::Far {
+            encoder.clear_buffer(&buffer.nearest.raw, 0, Some(rows.pixels * 4));
+        }
+    };
+    splats.dispatch(recorder, ("visibility", &[part]), rows, &[("nearest", buffer.nearest.bound())], clear)
 }
 
 /// Records the pass of the large splats over `rows`, a workgroup each.

@@ -37,7 +37,9 @@ const LONGEST: f64 = 1e12;
 /// the cell is flat from everywhere. A part that slopes against the disk by more than 45 degrees is seen straight on from farther off, so
 /// it takes the tangent of that slope for each unit of height.
 ///
-/// From farther off, cells that are not flat are covered by the disks around them too, if [`OVERLAP`] makes all a little larger.
+/// From farther off, cells that are not flat are covered by the disks around them too, if [`OVERLAP`] makes all a little larger. Of
+/// 3.5 million rays at 57,000 samples of Stanford's bunny from 64 views, 2 find a hole with 1.2, of 3.9 million at igea one, and none
+/// with 1.25; of 4.0 million at the fandisk none with either.
 pub(super) fn disks(
     surface: &MeshSurface<'_>,
     samples: &[Place],

@@ -85,8 +85,8 @@ fn the_bunny_is_sampled_better_than_by_independent_points() {
     assert!(near.mean < 0.82 * far.mean && near.percentile_99 < 0.7 * far.percentile_99, "{near:?} {far:?}");
     // From the mesh to the nearest disk, and from the disks to the mesh.
     let (near, far) = (ours.mesh_to_disks.unwrap(), theirs.mesh_to_disks.unwrap());
-    // In the mean by little, as the baseline's disks lie in a triangle each and large ones in several, of which the nearest counts; but
-    // ours are all near. That each is as near to its own part as a plane can be is tested below.
+    // In the mean by little, as the baseline's disks lie in a triangle each and large ones in several, of which the nearest
+    // counts; but ours are all near. That each is as near to its own part as a plane can be is tested below.
     assert!(near.mean < far.mean && near.rms < 0.6 * far.rms, "{near:?} {far:?}");
     assert!(near.percentile_99 < 0.5 * far.percentile_99 && near.max < 0.6 * far.max, "{near:?} {far:?}");
     let (near, far) = (ours.rims_to_mesh.unwrap(), theirs.rims_to_mesh.unwrap());
@@ -156,8 +156,8 @@ fn flat_sides_are_covered_up_to_sharp_edges_by_disks_that_end_with_their_cells()
     }
 }
 
-/// The samples' planes against those that are tilted by `angle` about eight axes: of how many samples another one is nearer, in the
-/// mean square, to the points of the mesh around.
+/// The samples' planes against those that are tilted by `angle` about eight axes: of how many samples another one is nearer, in
+/// the mean square, to the points of the mesh around.
 fn off_the_nearest_plane(mesh: &Mesh, samples: &Points, angle: f64) -> usize {
     let centers: Vec<DVec3> = samples.positions.iter().map(|p| DVec3::from(*p)).collect();
     let normals = samples.normals.as_ref().unwrap();
@@ -198,9 +198,9 @@ fn disks_lie_in_the_planes_that_are_nearest_to_their_cells() {
         let normals = samples.normals.as_ref().unwrap().iter().map(|n| tilt(*n)).collect();
         Points { normals: Some(normals), ..samples.clone() }
     };
-    // The mean square is a parabola over the tilt, so a plane that is off the nearest by less than half of `angle` is nearer than
-    // any that is tilted by it. Of 500 points in a cell, which are h = 0.015 high and p = 0.06 apart, chance turns the nearest plane by h / p / sqrt(500),
-    // a hundredth.
+    // The mean square is a parabola over the tilt, so a plane that is off the nearest by less than half of `angle` is nearer
+    // than any that is tilted by it. Of 500 points in a cell, which are h = 0.015 high and p = 0.06 apart, chance turns the
+    // nearest plane by h / p / sqrt(500), a hundredth.
     let angle = 0.1;
     assert_eq!(off_the_nearest_plane(&mesh, &samples, angle), 0);
     // Controls: planes that are off by more than half of it; and those of facets, which are 0.07 off the sphere in the mean.

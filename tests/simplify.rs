@@ -247,8 +247,8 @@ fn at_sharp_edges_each_point_has_a_disk_within_the_tolerance_and_none_is_left_op
         let seen = |scene: &Scene| coverage(&tree, scene, 64, 128, &()).unwrap();
         let whole = seen(&simplified);
         assert!(whole.is_hole_free(), "{options:?}: {whole:?}");
-        // Nor is there a hole between disks as they grew, which is what selection sees to: some are written twice as long, as large as
-        // the samples were.
+        // Nor is there a hole between disks as they grew, which is what selection sees to: some are written twice as long, as
+        // large as the samples were.
         let as_they_grew = Scene { surfels, ..simplified.clone() };
         let least = seen(&as_they_grew);
         assert!(least.is_hole_free(), "{options:?}: {least:?}");

@@ -25,21 +25,21 @@ const LONGEST: f64 = 1e12;
 /// # The plane
 ///
 /// Of the planes through the sample it is the one from which the cell's mean square distance is the least: the normal is the
-/// eigenvector of the smallest eigenvalue of the cell's second moments about the sample, which are exact, of polygons. A cell that
-/// is flat lies in its disk's plane, whatever triangles it goes across; one of a rough surface has its disk amid the facets. What
-/// is of another side of the surface than the sample has no part in it.
+/// eigenvector of the smallest eigenvalue of the cell's second moments about the sample, which are exact, of polygons. A cell
+/// that is flat lies in its disk's plane, whatever triangles it goes across; one of a rough surface has its disk amid the
+/// facets. What is of another side of the surface than the sample has no part in it.
 ///
 /// # The radius
 ///
-/// A disk must cover its cell from wherever it is seen. What lies a height h over or under its plane is seen past a rim that ends
-/// h tan(phi) beyond it, from an angle phi off the normal. So it reaches as far as the farthest corner of its cell, in its plane,
-/// and its height more: from up to 45 degrees off its normal it covers all of its cell, whatever the others do, and where
-/// the cell is flat from everywhere. A part that slopes against the disk by more than 45 degrees is seen straight on from farther off, so
-/// it takes the tangent of that slope for each unit of height.
+/// A disk must cover its cell from wherever it is seen. What lies a height h over or under its plane is seen past a rim that
+/// ends h tan(phi) beyond it, from an angle phi off the normal. So it reaches as far as the farthest corner of its cell, in its
+/// plane, and its height more: from up to 45 degrees off its normal it covers all of its cell, whatever the others do, and
+/// where the cell is flat from everywhere. A part that slopes against the disk by more than 45 degrees is seen straight on from
+/// farther off, so it takes the tangent of that slope for each unit of height.
 ///
-/// From farther off, cells that are not flat are covered by the disks around them too, if [`OVERLAP`] makes all a little larger. Of
-/// 3.5 million rays at 57,000 samples of Stanford's bunny from 64 views, 2 find a hole with 1.2, of 3.9 million at igea one, and none
-/// with 1.25; of 4.0 million at the fandisk none with either.
+/// From farther off, cells that are not flat are covered by the disks around them too, if [`OVERLAP`] makes all a little
+/// larger. Of 3.5 million rays at 57,000 samples of Stanford's bunny from 64 views, 2 find a hole with 1.2, of 3.9 million at
+/// igea one, and none with 1.25; of 4.0 million at the fandisk none with either.
 pub(super) fn disks(
     surface: &MeshSurface<'_>,
     samples: &[Place],

@@ -6,11 +6,11 @@ mod common;
 use std::f64::consts::PI;
 use std::path::Path;
 
-use common::meshes::sphere;
+use common::meshes::{bar, sphere};
 use epsplat::Error;
 use epsplat::io::{Mesh, Points, Texture};
 use epsplat::metrics::{SurfaceDistances, coverage};
-use epsplat::scene::Colors;
+use epsplat::scene::{Colors, Scene};
 use epsplat::surfels::build;
 use epsplat::surfels::sampling::voxels::Voxel;
 use epsplat::surfels::sampling::{MeshSurface, Method, Priority, Sampling, sample};
@@ -85,7 +85,8 @@ fn the_bunny_is_sampled_better_than_by_independent_points() {
     assert!(near.mean < 0.82 * far.mean && near.percentile_99 < 0.7 * far.percentile_99, "{near:?} {far:?}");
     // From the mesh to the nearest disk, and from the disks to the mesh.
     let (near, far) = (ours.mesh_to_disks.unwrap(), theirs.mesh_to_disks.unwrap());
-    // In the mean by little, as the baseline's disks lie in a triangle each and ours in no one of them; but these are all near.
+    // In the mean by little, as the baseline's disks lie in a triangle each and large ones in several, of which the nearest
+    // counts; but ours are all near. That each is as near to its own part as a plane can be is tested below.
     assert!(near.mean < far.mean && near.rms < 0.6 * far.rms, "{near:?} {far:?}");
     assert!(near.percentile_99 < 0.5 * far.percentile_99 && near.max < 0.6 * far.max, "{near:?} {far:?}");
     let (near, far) = (ours.rims_to_mesh.unwrap(), theirs.rims_to_mesh.unwrap());
@@ -120,13 +121,99 @@ fn a_sphere_is_covered_evenly() {
     let ordinary = radii.iter().filter(|radius| (0.7..1.5).contains(&in_spacings(radius))).count();
     assert!(ordinary > count * 97 / 100, "{ordinary}");
     let tree = TriangleTree::new(&mesh).unwrap();
-    let (mut scene, _) = build(vec![points], &()).unwrap();
+    let (scene, _) = build(vec![points], &()).unwrap();
     assert!(coverage(&tree, &scene, 64, 128, &()).unwrap().is_hole_free());
     // The radii are no larger than they must be: with half of them there are holes.
+    assert!(coverage(&tree, &longer(&scene, 0.5), 64, 128, &()).unwrap().hole_share.unwrap() > 0.01);
+}
+
+/// The disks of a scene, longer by a factor.
+fn longer(scene: &Scene, factor: f32) -> Scene {
+    let mut scene = scene.clone();
     for surfel in &mut scene.surfels {
-        (surfel.s, surfel.t) = (surfel.s.map(|c| 0.5 * c), surfel.t.map(|c| 0.5 * c));
+        (surfel.s, surfel.t) = (surfel.s.map(|c| factor * c), surfel.t.map(|c| factor * c));
     }
-    assert!(coverage(&tree, &scene, 64, 128, &()).unwrap().hole_share.unwrap() > 0.01);
+    scene
+}
+
+#[test]
+fn flat_sides_are_covered_up_to_sharp_edges_by_disks_that_end_with_their_cells() {
+    // A cell that is flat lies in its disk, which is written a quarter longer than the cell: without that quarter it still hides
+    // every point of the cell, from wherever that is seen, at outlines too. But only if cells end at edges: a disk that is seen
+    // edge-on from where its cell is seen covers nothing.
+    let cube = epsplat::io::read_mesh(&Path::new(env!("CARGO_MANIFEST_DIR")).join("data/cube.obj"), &()).unwrap();
+    for mesh in [cube, bar(3), bar(6)] {
+        let tree = TriangleTree::new(&mesh).unwrap();
+        let (scene, _) = build(vec![by(&mesh, 1500, Priority::Area)], &()).unwrap();
+        let uncovered = |scene: &Scene| coverage(&tree, scene, 64, 96, &()).unwrap().seen.uncovered;
+        // The centres and half-axes are rounded to f32.
+        let mut least = longer(&scene, 0.8 * 1.000_01);
+        assert_eq!(uncovered(&least), 0);
+        // Controls: a tenth less, and with one in ten left out.
+        assert!(uncovered(&longer(&scene, 0.72)) > 0);
+        least.surfels = least.surfels.chunks(10).flat_map(|ten| &ten[1..]).copied().collect();
+        assert!(uncovered(&least) > 0);
+    }
+}
+
+/// The samples' planes against those that are tilted by `angle` about eight axes: of how many samples another one is nearer, in
+/// the mean square, to the points of the mesh around.
+fn off_the_nearest_plane(mesh: &Mesh, samples: &Points, angle: f64) -> usize {
+    let centers: Vec<DVec3> = samples.positions.iter().map(|p| DVec3::from(*p)).collect();
+    let normals = samples.normals.as_ref().unwrap();
+    let frame = |normal: &[f32; 3]| {
+        let normal = DVec3::from(normal.map(f64::from)).normalize();
+        let (s, t) = normal.any_orthonormal_pair();
+        [normal, s, t]
+    };
+    let frames: Vec<[DVec3; 3]> = normals.iter().map(frame).collect();
+    // Sums over the points of each cell of squared heights over the plane itself and over the tilted ones.
+    let mut squares = vec![[0.0; 9]; centers.len()];
+    for point in uniform(mesh, 150_000).positions {
+        let point = DVec3::from(point);
+        let distance = |&a: &usize| centers[a].distance_squared(point);
+        let nearest = (0..centers.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap();
+        let (offset, [normal, s, t]) = (point - centers[nearest], frames[nearest]);
+        let height = offset.dot(normal);
+        squares[nearest][0] += height * height;
+        for k in 0..8 {
+            let (sin, cos) = (PI * k as f64 / 4.0).sin_cos();
+            let tilted = height * angle.cos() + offset.dot(s * cos + t * sin) * angle.sin();
+            squares[nearest][k + 1] += tilted * tilted;
+        }
+    }
+    squares.iter().filter(|[own, tilted @ ..]| tilted.iter().any(|tilted| tilted <= own)).count()
+}
+
+#[test]
+fn disks_lie_in_the_planes_that_are_nearest_to_their_cells() {
+    // A sphere of large facets: a cell goes across several, and each facet stands off the others.
+    let mesh = sphere(3, false);
+    let samples = by(&mesh, 300, Priority::Area);
+    let tilted = |angle: f64| {
+        let tilt = |n: [f32; 3]| {
+            let normal = DVec3::from(n.map(f64::from));
+            (normal + normal.any_orthonormal_vector() * angle).normalize().as_vec3().to_array()
+        };
+        let normals = samples.normals.as_ref().unwrap().iter().map(|n| tilt(*n)).collect();
+        Points { normals: Some(normals), ..samples.clone() }
+    };
+    // The mean square is a parabola over the tilt, so a plane that is off the nearest by less than half of `angle` is nearer
+    // than any that is tilted by it. Of 500 points in a cell, which are h = 0.015 high and p = 0.06 apart, chance turns the
+    // nearest plane by h / p / sqrt(500), a hundredth.
+    let angle = 0.1;
+    assert_eq!(off_the_nearest_plane(&mesh, &samples, angle), 0);
+    // Controls: planes that are off by more than half of it; and those of facets, which are 0.07 off the sphere in the mean.
+    assert_eq!(off_the_nearest_plane(&mesh, &tilted(0.75 * angle), angle), 300);
+    let places = samples.positions.iter().map(|p| DVec3::from(*p).normalize()).collect::<Vec<_>>();
+    let facets = uniform(&mesh, 20_000);
+    let facet = |place: &DVec3| {
+        let off = |k: &usize| DVec3::from(facets.positions[*k]).distance_squared(*place);
+        let nearest = (0..20_000).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap();
+        facets.normals.as_ref().unwrap()[nearest]
+    };
+    let in_facets = Points { normals: Some(places.iter().map(facet).collect()), ..samples.clone() };
+    assert!(off_the_nearest_plane(&mesh, &in_facets, angle) > 100);
 }
 
 #[test]
@@ -138,8 +225,8 @@ fn normals_are_those_of_cells_but_none_blends_across_a_crease() {
         let angle = |(p, n): (&[f64; 3], &[f32; 3])| DVec3::from(*p).angle_between(DVec3::from(n.map(f64::from)));
         points.positions.iter().zip(normals).map(angle).sum::<f64>() / points.positions.len() as f64
     };
-    // Facets are 0.07 off in the mean.
-    let (ours, facets) = (error(&by(&mesh, 1000, Priority::Area)), error(&uniform(&mesh, 1000)));
+    // Facets are 0.07 off in the mean. There are 512, so a cell goes across two or more.
+    let (ours, facets) = (error(&by(&mesh, 300, Priority::Area)), error(&uniform(&mesh, 1000)));
     assert!(ours < 0.6 * facets && facets > 0.03, "{ours} {facets}");
     let cube = epsplat::io::read_mesh(&Path::new(env!("CARGO_MANIFEST_DIR")).join("data/cube.obj"), &()).unwrap();
     let points = by(&Mesh { normals: None, ..cube }, 500, Priority::Area);

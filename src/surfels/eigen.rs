@@ -1,5 +1,7 @@
 //! Eigenvectors of symmetric 3x3 matrices.
 
+use std::ops::{Add, Mul};
+
 use glam::DVec3;
 
 /// The symmetric matrix `[[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]`.
@@ -13,10 +15,42 @@ pub(crate) struct Symmetric3 {
     pub yz: f64,
 }
 
+impl Add for Symmetric3 {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            xx: self.xx + other.xx,
+            yy: self.yy + other.yy,
+            zz: self.zz + other.zz,
+            xy: self.xy + other.xy,
+            xz: self.xz + other.xz,
+            yz: self.yz + other.yz,
+        }
+    }
+}
+
+impl Mul<f64> for Symmetric3 {
+    type Output = Self;
+
+    fn mul(self, factor: f64) -> Self {
+        Self {
+            xx: self.xx * factor,
+            yy: self.yy * factor,
+            zz: self.zz * factor,
+            xy: self.xy * factor,
+            xz: self.xz * factor,
+            yz: self.yz * factor,
+        }
+    }
+}
+
 impl Symmetric3 {
+    pub const ZERO: Self = Self { xx: 0.0, yy: 0.0, zz: 0.0, xy: 0.0, xz: 0.0, yz: 0.0 };
+
     /// The sum of `v v^T` over the vectors.
     pub fn scatter(vectors: impl Iterator<Item = DVec3>) -> Self {
-        let mut sum = Self { xx: 0.0, yy: 0.0, zz: 0.0, xy: 0.0, xz: 0.0, yz: 0.0 };
+        let mut sum = Self::ZERO;
         for v in vectors {
             sum.xx += v.x * v.x;
             sum.yy += v.y * v.y;

@@ -1,6 +1,7 @@
 //! Meshes of shapes that have a formula.
 
 use std::collections::HashMap;
+use std::f64::consts::TAU;
 
 use epsplat::io::Mesh;
 use glam::DVec3;
@@ -32,4 +33,19 @@ pub fn sphere(cuts: u32, smooth: bool) -> Mesh {
     let corner = |vertex: u32| positions[vertex as usize].as_vec3().to_array();
     let normals = smooth.then(|| triangles.iter().map(|triangle| triangle.map(corner)).collect());
     Mesh { positions: positions.iter().map(DVec3::to_array).collect(), triangles, normals, ..Mesh::default() }
+}
+
+/// A bar along z from -1 to 1 whose profile is a regular polygon of `sides` sides and radius 0.6.
+pub fn bar(sides: u32) -> Mesh {
+    let at = |k: u32, z: f64| {
+        let (sin, cos) = (TAU * f64::from(k) / f64::from(sides)).sin_cos();
+        [0.6 * cos, 0.6 * sin, z]
+    };
+    let positions = (0..sides).flat_map(|k| [at(k, -1.0), at(k, 1.0)]).collect();
+    let side = |k: u32| {
+        let [a, b] = [2 * k, 2 * ((k + 1) % sides)];
+        [[a, b, b + 1], [a, b + 1, a + 1]]
+    };
+    let ends = (1..sides - 1).flat_map(|k| [[0, 2 * k + 2, 2 * k], [1, 2 * k + 1, 2 * k + 3]]);
+    Mesh { positions, triangles: (0..sides).flat_map(side).chain(ends).collect(), ..Mesh::default() }
 }

@@ -5,14 +5,14 @@
 //! 3. `distribute`: a heap hands out the samples, always to the voxel of the highest priority, which then falls.
 //! 4. `candidates`: each voxel's samples begin evenly spread over the triangles in it.
 //! 5. `relax`: they move apart, also from those of other voxels, and stay on the triangles.
-//!
-//! Then each sample gets what the surface says there, or on the part of it that is nearest to it (`relax`), and a disk that
-//! covers that part (`voronoi`).
+//! 6. `voronoi`: the part of the surface that is nearest to each sample is cut out of the triangles; and `disks`: a disk covers
+//!    it, in the plane that is nearest to it.
 //!
 //! The thesis projects one point a voxel, or several, onto its triangles and does not say which. Where these lie decides
 //! how well a surface is sampled: independent random points leave gaps three times as wide as needed.
 
 mod candidates;
+mod disks;
 mod distribute;
 mod overlap;
 pub mod priority;
@@ -86,7 +86,7 @@ impl Sampling {
 
 /// Samples a mesh at `count` points: with positions on its triangles, normals, texture coordinates and colours as far as the
 /// mesh has them, and, by [`Method::Stratified`], radii with which the disks cover it. Without normals of the mesh those are
-/// of its triangles: the mean of the part that each sample stands for, or of [`Method::Uniform`] of one triangle.
+/// those of the disks' planes, which lie nearest to the part that each sample stands for, or of [`Method::Uniform`] of triangles.
 ///
 /// The same seed gives the same points, whatever the machine's number of threads.
 ///
@@ -132,11 +132,8 @@ pub fn sample(
             let fair: Vec<f64> = priorities.iter().map(|priority| count as f64 * (usable(priority) / sum)).collect();
             let (candidates, mut places) = candidates::candidates(&voxels, &quotas, &fair, seed);
             let cells = relax::relax(&surface, &candidates, &mut places, progress)?;
-            let normals = match mesh.normals {
-                Some(_) => normals_at(&surface, &places),
-                None => relax::normals(&surface, &candidates, &places, &cells),
-            };
-            let radii = voronoi::radii(&surface, &places, &normals, progress)?;
+            let named = mesh.normals.as_ref().map(|_| normals_at(&surface, &places));
+            let (normals, radii) = disks::disks(&surface, &places, named, progress)?;
             let colors = surface.is_colored().then(|| relax::colors(&surface, &candidates, &places, &cells));
             points(&surface, &places, normals, Some(radii), colors)
         }

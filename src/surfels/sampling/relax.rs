@@ -15,10 +15,6 @@ use crate::truth::nearest::closest_weights;
 /// Rounds of relaxation.
 const ROUNDS: usize = 10;
 
-/// The cosine of the angle between the facets of a sample and of another part of its cell up to which these are one smooth
-/// surface: 45 degrees.
-const SMOOTH: f64 = std::f64::consts::FRAC_1_SQRT_2;
-
 /// The candidates that are nearest to each sample.
 pub(super) struct Cells {
     /// Candidates, sample by sample.
@@ -122,21 +118,4 @@ pub(super) fn colors(
         mean_color(cell.map(|candidate| (surface.color(candidate.place()), f64::from(candidate.area))))
     };
     samples.par_iter().enumerate().map(color).collect()
-}
-
-/// The mean unit normal of each sample's cell: that of the plane which lies nearest to the cell, where one facet of a rough
-/// surface stands off it. Facets across a crease have no part in it.
-pub(super) fn normals(
-    surface: &MeshSurface<'_>,
-    candidates: &[Candidate],
-    samples: &[Place],
-    cells: &Cells,
-) -> Vec<DVec3> {
-    let normal = |(sample, place): (usize, &Place)| {
-        let own = surface.normal(*place);
-        let all = cells.of(sample, candidates).map(|part| (surface.normal(part.place()), f64::from(part.area)));
-        let smooth = all.filter(|(normal, _)| normal.dot(own) > SMOOTH);
-        smooth.map(|(normal, area)| normal * area).sum::<DVec3>().try_normalize().unwrap_or(own)
-    };
-    samples.par_iter().enumerate().map(normal).collect()
 }

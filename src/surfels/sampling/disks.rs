@@ -1,0 +1,209 @@
+//! The disk of each sample: in the plane that is nearest to its cell, and as large as the cell is there.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::surface::{MeshSurface, Place};
+use super::voronoi::{SIDE, Voronoi};
+use crate::error::Result;
+use crate::progress::Progress;
+use crate::surfels::eigen::Symmetric3;
+use crate::surfels::positions::DistinctPositions;
+
+/// How much larger a disk is than what it must cover.
+const OVERLAP: f64 = 1.25;
+
+/// The slope of a part of a cell against the disk that is taken for the steepest, 60 degrees: from where a steeper one is seen
+/// best a disk is hardly seen, and no size helps.
+const STEEPEST: f64 = 1.732;
+
+/// A cell whose mean square length is more than so many times that of its width is a line, and lies in many planes.
+const LONGEST: f64 = 1e12;
+
+/// The unit normal and the radius of each sample's disk. Normals that the mesh names are `named`.
+///
+/// # The plane
+///
+/// Of the planes through the sample it is the one from which the cell's mean square distance is the least: the normal is the
+/// eigenvector of the smallest eigenvalue of the cell's second moments about the sample, which are exact, of polygons. A cell
+/// that is flat lies in its disk's plane, whatever triangles it goes across; one of a rough surface has its disk amid the
+/// facets. What is of another side of the surface than the sample has no part in it.
+///
+/// # The radius
+///
+/// A disk must cover its cell from wherever it is seen. What lies a height h over or under its plane is seen past a rim that
+/// ends h tan(phi) beyond it, from an angle phi off the normal. So it reaches as far as the farthest corner of its cell, in its
+/// plane, and its height more: from up to 45 degrees off its normal it covers all of its cell, whatever the others do, and
+/// where the cell is flat from everywhere. A part that slopes against the disk by more than 45 degrees is seen straight on from
+/// farther off, so it takes the tangent of that slope for each unit of height.
+///
+/// From farther off, cells that are not flat are covered by the disks around them too, if [`OVERLAP`] makes all a little
+/// larger. Of 3.5 million rays at 57,000 samples of Stanford's bunny from 64 views, 2 find a hole with 1.2, of 3.9 million at
+/// igea one, and none with 1.25; of 4.0 million at the fandisk none with either.
+pub(super) fn disks(
+    surface: &MeshSurface<'_>,
+    samples: &[Place],
+    named: Option<Vec<DVec3>>,
+    progress: &dyn Progress,
+) -> Result<(Vec<DVec3>, Vec<f32>)> {
+    let points: Vec<[f64; 3]> = samples.par_iter().map(|place| surface.point(*place).to_array()).collect();
+    let distinct = DistinctPositions::new(&points, &surface.bounds, DVec3::ZERO)?;
+    // Samples that coincide have one cell; the first of them tells its normal.
+    let mut sample_at = vec![u32::MAX; distinct.len()];
+    for (sample, &position) in distinct.of_point().iter().enumerate().rev() {
+        sample_at[position as usize] = sample as u32;
+    }
+    let facet = |&sample: &u32| surface.triangles[samples[sample as usize].triangle as usize].normal;
+    let facets: Vec<DVec3> = sample_at.iter().map(facet).collect();
+    let voronoi = Voronoi::new(surface, &distinct, &facets, progress);
+    let normals = match named {
+        Some(named) => sample_at.iter().map(|&sample| named[sample as usize]).collect(),
+        None => nearest_planes(&voronoi, &facets, progress),
+    };
+    let reaches = voronoi.measure(progress, |sample, triangle, corners| {
+        let normal = normals[sample as usize];
+        let cosine = triangle.normal.dot(normal).abs();
+        let slope = ((1.0 - cosine * cosine).max(0.0).sqrt() / cosine).clamp(1.0, STEEPEST);
+        let over = |corner: &DVec3| {
+            let height = corner.dot(normal);
+            (corner - normal * height).length() + slope * height.abs()
+        };
+        corners.iter().map(over).fold(0.0, f64::max)
+    });
+    let mut reach = vec![0f64; distinct.len()];
+    for (position, distance) in reaches {
+        reach[position as usize] = reach[position as usize].max(distance);
+    }
+    let radius = |&position: &u32| (OVERLAP * reach[position as usize] / distinct.scale()) as f32;
+    let mut radii: Vec<f32> = distinct.of_point().iter().map(radius).collect();
+    // A cell may be less than rounding: there the smallest disk will do.
+    let smallest = radii.iter().copied().filter(|radius| *radius > 0.0).fold(f32::INFINITY, f32::min);
+    radii.iter_mut().filter(|radius| **radius == 0.0).for_each(|radius| *radius = smallest);
+    Ok((distinct.of_point().iter().map(|&position| normals[position as usize]).collect(), radii))
+}
+
+/// The normals of the planes that are nearest to each cell, on the side that the sample's triangle faces.
+fn nearest_planes(voronoi: &Voronoi<'_>, facets: &[DVec3], progress: &dyn Progress) -> Vec<DVec3> {
+    let parts = voronoi.measure(progress, |sample, triangle, corners| {
+        if voronoi.is_of_side(sample, triangle) { second_moments(corners) } else { Symmetric3::ZERO }
+    });
+    let mut moments = vec![Symmetric3::ZERO; facets.len()];
+    for (position, part) in parts {
+        moments[position as usize] = moments[position as usize] + part;
+    }
+    let normal = |(moments, &facet): (&Symmetric3, &DVec3)| {
+        let ([_, width, length], [normal, ..]) = moments.eigen();
+        let normal = if normal.dot(facet) < 0.0 { -normal } else { normal };
+        // Without a cell, or with a needle of one, the triangle's own plane is as near as any.
+        if width * LONGEST > length && normal.dot(facet) > SIDE { normal } else { facet }
+    };
+    moments.par_iter().zip(facets).map(normal).collect()
+}
+
+/// The integral of `x x^T` over a convex polygon in space.
+fn second_moments(corners: &[DVec3]) -> Symmetric3 {
+    let Some((&a, others)) = corners.split_first() else { return Symmetric3::ZERO };
+    let fan = others.windows(2).map(|pair| {
+        let [b, c] = [pair[0], pair[1]];
+        let area = 0.5 * (b - a).cross(c - a).length();
+        // Over a triangle of unit area a product of two linear functions is a twelfth of the sum over the corners and of that of
+        // the sums.
+        Symmetric3::scatter([a, b, c, a + b + c].into_iter()) * (area / 12.0)
+    });
+    fan.fold(Symmetric3::ZERO, |sum, triangle| sum + triangle)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::io::Mesh;
+    use crate::surfels::sampling::random::Random;
+
+    #[test]
+    fn a_disk_reaches_just_as_far_as_its_cell() {
+        let corners = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.2, 0.1, 0.6]];
+        let triangles = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+        let mesh = Mesh { positions: corners, triangles, ..Mesh::default() };
+        let surface = MeshSurface::new(&mesh).unwrap();
+        // Most of them crowd in a corner, where no few neighbours tell how far a cell reaches to the other side.
+        let mut random = Random::stream(1, 0);
+        let place = |k: u32| {
+            let far = if k < 40 { 0.1 } else { 1.0 };
+            let [u, v] = [far * random.number(), far * random.number()];
+            let [u, v] = if u + v > 1.0 { [1.0 - u, 1.0 - v] } else { [u, v] };
+            Place { triangle: k % 4, weights: DVec3::new(1.0 - u - v, u, v) }
+        };
+        let places: Vec<Place> = (0..55).map(place).collect();
+        let (normals, radii) = disks(&surface, &places, None, &()).unwrap();
+        // Sides are flat here: the nearest plane is that of the triangle.
+        for (normal, place) in normals.iter().zip(&places) {
+            assert!(normal.distance(surface.normal(*place)) < 1e-9, "{normal}");
+        }
+
+        let centers: Vec<DVec3> = places.iter().map(|place| surface.point(*place)).collect();
+        // The samples from the nearest on, of one side or of all.
+        let by_distance = |at: DVec3| {
+            let mut order: Vec<usize> = (0..places.len()).collect();
+            order.sort_by(|&a, &b| centers[a].distance_squared(at).total_cmp(&centers[b].distance_squared(at)));
+            order
+        };
+        let mut reached = vec![0f64; places.len()];
+        const STEPS: u32 = 200;
+        let mut shared = 0;
+        for (triangle, facet) in (0..4).zip(&surface.triangles) {
+            // The sides are at angles of more than 90 degrees.
+            let is_of_side = |sample: &usize| places[*sample].triangle == triangle;
+            let is_shared = facet.corners.iter().any(|&corner| !by_distance(corner)[..16].iter().any(is_of_side));
+            shared += u32::from(is_shared);
+            for (i, j) in (0..=STEPS).flat_map(|i| (0..=STEPS - i).map(move |j| (i, j))) {
+                let [u, v] = [i, j].map(|step| f64::from(step) / f64::from(STEPS));
+                let at = surface.point(Place { triangle, weights: DVec3::new(1.0 - u - v, u, v) });
+                let nearest = by_distance(at).into_iter().find(|sample| is_shared || is_of_side(sample)).unwrap();
+                let (offset, normal) = (at - centers[nearest], surface.normal(places[nearest]));
+                let (height, slope) = (offset.dot(normal), normal.angle_between(facet.normal).tan().abs());
+                let over = slope.clamp(1.0, STEEPEST) * height.abs();
+                reached[nearest] = reached[nearest].max((offset - normal * height).length() + over);
+            }
+        }
+        // Where only other sides' samples are near they share a triangle.
+        assert!((1..4).contains(&shared), "{shared}");
+        // Corners of cells lie between the points that were tried, the longest edge is 1.42, and the sum above grows by at most
+        // twice a distance: |(1, STEEPEST)|.
+        let step = 2.0 * 1.42 / f64::from(STEPS);
+        for (radius, reached) in radii.iter().zip(&reached) {
+            let reach = f64::from(*radius) / OVERLAP;
+            assert!((reached - 1e-6..reached + step).contains(&reach), "{reach} {reached}");
+        }
+        assert!(reached.iter().any(|reached| *reached > 0.3) && reached.iter().any(|reached| *reached < 0.1));
+    }
+
+    #[test]
+    fn second_moments_are_those_of_many_points() {
+        let corners = [[0.1, 0.2, 0.3], [1.0, 0.1, 0.2], [1.2, 0.9, 0.5], [0.4, 1.1, 0.4]].map(DVec3::from);
+        // A plane, of which the last corner is made a part.
+        let [a, b, c, d] = corners;
+        let normal = (b - a).cross(c - a).normalize();
+        let corners = [a, b, c, d - normal * (d - a).dot(normal)];
+        let exact = second_moments(&corners);
+        let mut summed = Symmetric3::ZERO;
+        const STEPS: u32 = 300;
+        for [a, b, c] in [[corners[0], corners[1], corners[2]], [corners[0], corners[2], corners[3]]] {
+            let area = 0.5 * (b - a).cross(c - a).length();
+            // The middles of small triangles, of two kinds.
+            let weight = area / f64::from(STEPS * STEPS);
+            let at = |i: u32, j: u32, third: f64| {
+                let [u, v] = [i, j].map(|k| (f64::from(k) + third) / f64::from(STEPS));
+                a + (b - a) * u + (c - a) * v
+            };
+            let upright = (0..STEPS).flat_map(|i| (0..STEPS - i).map(move |j| (i, j, 1.0 / 3.0)));
+            let turned = (0..STEPS - 1).flat_map(|i| (0..STEPS - 1 - i).map(move |j| (i, j, 2.0 / 3.0)));
+            summed = summed + Symmetric3::scatter(upright.chain(turned).map(|(i, j, third)| at(i, j, third))) * weight;
+        }
+        let off = exact + summed * -1.0;
+        for (entry, size) in [(off.xx, exact.xx), (off.yy, exact.yy), (off.xy, exact.xy), (off.xz, exact.xz)] {
+            assert!(entry.abs() < 1e-4 * size, "{exact:?} {summed:?}");
+        }
+        assert_eq!(second_moments(&[]), Symmetric3::ZERO);
+    }
+}

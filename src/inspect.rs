@@ -25,7 +25,8 @@ use crate::scene::{Camera, RenderOptions, Scene, SceneNeeds};
 pub struct Stages {
     /// The record of each surfel, in the order of the scene.
     pub splats: Vec<Splat>,
-    /// The nearest depth of each pixel: bits of an f32 in device units, +inf where nothing is.
+    /// The nearest depth of each pixel, device units, as what its bits lack to those of +inf; see
+    /// [`nearest_depth`](Self::nearest_depth).
     pub nearest: Vec<u32>,
     /// [`Variant::sum_words`] a pixel; see [`sum`](Self::sum).
     pub sums: Vec<u32>,
@@ -40,7 +41,7 @@ pub struct Stages {
 impl Stages {
     /// The nearest depth of `pixel`, world units, +inf where nothing is. `None` past the image.
     pub fn nearest_depth(&self, pixel: usize) -> Option<f64> {
-        let bits = f32::INFINITY.to_bits() - self.nearest.get(pixel)?;
+        let bits = f32::INFINITY.to_bits().wrapping_sub(*self.nearest.get(pixel)?);
         Some(f64::from(f32::from_bits(bits)) * f64::from(self.view.world))
     }
 

@@ -118,7 +118,7 @@ fn a_broken_kernel_fails_a_hard_case() {
         ("camera_pinhole.wgsl", "chord_1) + blur)", "chord_1) - 0.5)", "across the near depth"),
         ("project.wgsl", "d.low - view.eye_low[i]", "d.low", "UTM, a kilometre off"),
         ("project.wgsl", "surfel.center[i] * view.unit", "surfel.center[i]", "coordinates of 1e12"),
-        ("visibility.wgsl", "atomicMin(", "atomicMax(", "intersecting sheets"),
+        ("visibility.wgsl", "kept_depth(", "NOTHING - kept_depth(", "intersecting sheets"),
         (
             "accumulate.wgsl",
             "fragment.depth <= farthest",

@@ -130,6 +130,8 @@ fn a_wrong_tile_is_noticed() {
         ("tile_small.wgsl", "small_lists[end]) +", "small_lists[end - 1u]) +"),
         ("tile_sums.wgsl", "high + select(0u, 1u, sum < low)", "high"),
         ("tile_sums.wgsl", "if (slot == 5u)", "if (slot == 55u)"),
+        ("occlusion.wgsl", "farthest |= atomicLoad", "farthest &= atomicLoad"),
+        ("covered.wgsl", "place < visible[covered_start()]", "place + 1u < visible[covered_start()]"),
         ("splat_shared.wgsl", "(lane & 24u) | from_", "(lane & 24u) | (from_ ^ 1u)"),
     ];
     // A unit of 2^-32 would not show, 2^-4 does.

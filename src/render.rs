@@ -192,7 +192,10 @@ impl<'a> Renderer<'a> {
                 Organisation::Tile => true,
                 Organisation::Scatter => false,
             };
-        let needs = needs.with_bands(bands).with_subgroups(shared).with_gather(gather);
+        // What is drawn first hides what is drawn later in the same band alone.
+        let culled =
+            bands == 1 && self.options.has(Optimisation::Culling) && 6 * self.scene.surfels.len() > camera.pixels();
+        let needs = needs.with_culling(culled).with_subgroups(shared).with_gather(gather);
         let variant = Variant::of(&needs, self.options, surfels)?;
         match needs.raster {
             Some(raster) => raster::check(gpu, raster, &needs, camera)?,

@@ -1,8 +1,8 @@
 //! What a scene and its options need, computed once: the only variant key of the kernels.
 
 use super::{
-    Camera, Colors, Epsilon, KernelShape, LowPass, Optimisation, Organisation, Projection, Raster, RasterDepth,
-    RenderOptions, Scene, Shading,
+    Camera, Colors, Epsilon, KernelShape, LowPass, Organisation, Projection, Raster, RasterDepth, RenderOptions, Scene,
+    Shading,
 };
 
 /// Where a surfel's colour comes from.
@@ -30,9 +30,9 @@ pub struct SceneNeeds {
     pub wide_sums: bool,
     /// The accumulator is `fixed` and the adapter has 64-bit atomics, which make the same sums in half the additions.
     pub atomics_u64: bool,
-    /// Batches of surfels that are out of view or hidden are left out: there is more than a surfel for every six pixels, all of
-    /// which are looked at for what hides. On a software adapter at 1024x1024, frames of 300,000 splats take 0.86 times as
-    /// long by it, of 100,000 1.08 times, of 1,000 small ones 1.13 times.
+    /// Batches of surfels that are out of view or hidden are left out: the image is one band, and there is more than a surfel for
+    /// every six pixels, all of which are looked at for what hides. On a software adapter at 1024x1024, frames of 300,000 splats
+    /// take 0.86 times as long by it, of 100,000 1.08 times, of 1,000 small ones 1.13 times.
     pub cull: bool,
     /// Large splats, at least, are drawn by tiles: the accumulator is `fixed`, the options do not say scatter, and there is no
     /// texture, whose sums are more than a tile's registers hold.
@@ -103,9 +103,7 @@ impl SceneNeeds {
                 && options.accumulator == "fixed"
                 && (low[3] != high[3] || may_be_small(options)),
             atomics_u64: false,
-            cull: options.raster.is_none()
-                && options.has(Optimisation::Culling)
-                && 6 * scene.surfels.len() > camera.pixels(),
+            cull: false,
             tiles: options.accumulator == "fixed"
                 && options.raster.is_none()
                 && color != ColorNeed::Textured
@@ -135,10 +133,9 @@ impl SceneNeeds {
         Self { atomics_u64: atomics_u64 && self.accumulator == "fixed" && self.raster.is_none(), ..self }
     }
 
-    /// The same for an image of one band or of several. In one, what is drawn first hides what is drawn later, and that is
-    /// not projected.
-    pub fn with_bands(self, bands: u32) -> Self {
-        Self { cull: self.cull && bands == 1, ..self }
+    /// The same with batches that are `culled`, or not. The rasteriser draws every splat.
+    pub fn with_culling(self, culled: bool) -> Self {
+        Self { cull: culled && self.raster.is_none(), ..self }
     }
 
     /// The same on an adapter whose `subgroups` should share what they read, or not.

@@ -18,7 +18,7 @@ use crate::passes::variant::{PixelLayout, Variant};
 use crate::passes::visibility::VisibilityBuffer;
 use crate::passes::{Recorder, accumulate, project, visibility};
 use crate::render::bands;
-use crate::scene::{Camera, RenderOptions, Scene, SceneNeeds};
+use crate::scene::{Camera, Optimisation, RenderOptions, Scene, SceneNeeds};
 
 /// What the first three stages leave on the device.
 #[derive(Clone, Debug)]
@@ -70,6 +70,7 @@ impl Stages {
 pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu, sources: &Sources) -> Result<Stages> {
     let color_range = scene.color_range();
     let needs = SceneNeeds { tiles: false, ..SceneNeeds::of(scene, &color_range, camera, options) };
+    let needs = needs.with_long_words(gpu.adapter.integers_u64 && options.has(Optimisation::LongWords));
     let variant = Variant::of(&needs, options, scene.surfels.len() as u64)?;
     variant.accumulator.check(gpu)?;
     let program = variant.compile(gpu, sources)?;

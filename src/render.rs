@@ -178,7 +178,8 @@ impl<'a> Renderer<'a> {
         progress: &dyn Progress,
     ) -> Result<(Frame, Report)> {
         let needs = SceneNeeds::of(self.scene, &self.color_range, camera, self.options)
-            .with_atomics_u64(gpu.adapter.atomics_u64 && self.options.has(Optimisation::Pairs));
+            .with_atomics_u64(gpu.adapter.atomics_u64 && self.options.has(Optimisation::Pairs))
+            .with_long_words(gpu.adapter.integers_u64 && self.options.has(Optimisation::LongWords));
         let surfels = self.scene.surfels.len() as u64;
         let rows = rows_per_band(gpu, camera, &Variant::of(&needs, self.options, surfels)?)?;
         let shared = gpu.adapter.subgroups && gpu.adapter.kind == "software" && self.options.has(Optimisation::Sharing);

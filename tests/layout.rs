@@ -124,6 +124,8 @@ fn mirrors() -> BTreeMap<&'static str, Struct> {
 /// What a binding's elements are on the host.
 enum Element {
     Struct(&'static str),
+    /// A struct, or words of which the kernels make it.
+    Words(&'static str),
     Plain(&'static [Shape]),
 }
 
@@ -144,11 +146,12 @@ fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
     BTreeMap::from([
         ("view", Element::Struct("View")),
         ("band", Element::Struct("Band")),
-        ("surfels", Element::Struct("Surfel")),
-        ("splats", Element::Struct("Splat")),
-        ("projected", Element::Struct("Splat")),
-        ("filters", Element::Struct("Filter")),
-        ("projected_filters", Element::Struct("Filter")),
+        // By words that an adapter reads well, or two words of any surfel.
+        ("surfels", Element::Words("Surfel")),
+        ("splats", Element::Words("Splat")),
+        ("projected", Element::Words("Splat")),
+        ("filters", Element::Words("Filter")),
+        ("projected_filters", Element::Words("Filter")),
         ("queue", Element::Plain(WORD)),
         ("queued", Element::Plain(WORD)),
         ("rare", Element::Plain(WORD)),
@@ -164,7 +167,7 @@ fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         ("sums", Element::Plain(sums_of(accumulator).0)),
         ("overflows", Element::Plain(WORD)),
         ("image", Element::Plain(&[f32::SHAPE])),
-        ("colors", Element::Plain(&[u32::SHAPE, <[f32; 4]>::SHAPE])),
+        ("colors", Element::Plain(&[u32::SHAPE, <[u32; 4]>::SHAPE, <[u64; 2]>::SHAPE])),
         ("texels", Element::Plain(WORD)),
         ("srgb_to_linear", Element::Plain(&[<[f32; 256]>::SHAPE])),
     ])
@@ -215,7 +218,7 @@ fn differences(module: &Module, accumulator: &str) -> Vec<String> {
             continue;
         };
         match (&module.types[ty].inner, element) {
-            (TypeInner::Struct { members, span }, Element::Struct(expected)) => {
+            (TypeInner::Struct { members, span }, Element::Struct(expected) | Element::Words(expected)) => {
                 let device_name = module.types[ty].name.as_deref().unwrap_or("?");
                 if device_name != *expected {
                     found.push(format!("{name} holds {device_name}, on the host {expected}"));
@@ -230,6 +233,20 @@ fn differences(module: &Module, accumulator: &str) -> Vec<String> {
             }
             (TypeInner::Struct { .. }, Element::Plain(_)) => found.push(format!("{name} holds a struct")),
             (_, Element::Struct(expected)) => found.push(format!("{name} does not hold {expected}")),
+            (_, Element::Words(expected)) => {
+                let of_name = |(_, ty): &(_, &naga::Type)| ty.name.as_deref() == Some(*expected);
+                match module.types.iter().find(of_name).map(|(_, ty)| &ty.inner) {
+                    Some(TypeInner::Struct { members, span }) => {
+                        compare(module, expected, members, *span as usize, &mirrors[expected], &mut found);
+                    }
+                    _ => found.push(format!("{name}: there is no {expected}")),
+                }
+                match shape(module, ty) {
+                    Ok(Shape { kind: ScalarKind::Uint, scalars: 1, .. }) if *expected == "Surfel" => {}
+                    Ok(device) if device.kind == ScalarKind::Uint && device.bytes() == mirrors[expected].size => {}
+                    other => found.push(format!("{name} holds {other:?}, on the host {expected}")),
+                }
+            }
             (_, Element::Plain(expected)) => match shape(module, ty) {
                 Ok(device) if expected.contains(&device) => {}
                 Ok(device) => found.push(format!("{name} holds {device:?}, on the host {expected:?}")),
@@ -328,6 +345,10 @@ fn a_changed_layout_is_noticed() {
         "    middle: f32,\n    farthest: f32,\n",
     );
     assert!(exchanged.contains("\"farthest\"") && exchanged.contains("\"middle\""), "{exchanged}");
+    let cut = Sources::default().replace("records.wgsl", "array<Words, 4>", "array<Words, 5>").unwrap();
+    let cut = cut.replace("records.wgsl", "splat.a_low[2]))),", "splat.a_low[2]))), words(vec4<u32>()),").unwrap();
+    let cut = differences(&first_of(&cut, &needs), needs.accumulator).join("; ");
+    assert!(cut.contains("projected holds") && cut.contains("splats holds"), "{cut}");
     let longer = broken("    rows: u32,\n    padding_0: u32,\n", "    rows: u32,\n    padding_0: vec2<u32>,\n");
     assert!(longer.contains("Band"), "{longer}");
     let retyped = broken("    middle: f32,\n", "    middle: u32,\n");

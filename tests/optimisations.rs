@@ -33,12 +33,13 @@ fn frame((scene, camera): &(Scene, Camera), without: &[Optimisation], backend: &
 #[test]
 fn no_optimisation_shows() {
     let Some(gpu) = common::gpu() else { return };
+    let long = gpu.adapter.integers_u64;
     let (pairs, sharing) = (gpu.adapter.atomics_u64, gpu.adapter.subgroups && gpu.adapter.kind == "software");
     let backend = Backend::gpu(gpu);
     for (scene, culled) in scenes() {
         let (expected, whole) = frame(&scene, &[], &backend);
         // What there is to be left out.
-        for (need, exists) in [("cull", culled), ("atomics-u64", pairs), ("gather", sharing)] {
+        for (need, exists) in [("cull", culled), ("atomics-u64", pairs), ("long-words", long), ("gather", sharing)] {
             assert_eq!(whole.needs.contains(&need), exists, "{need}");
         }
         let each = Optimisation::ALL.map(|(optimisation, _)| vec![optimisation]);
@@ -51,6 +52,7 @@ fn no_optimisation_shows() {
                 match optimisation {
                     Optimisation::Culling => assert!(left_out("cull")),
                     Optimisation::Pairs => assert!(left_out("atomics-u64")),
+                    Optimisation::LongWords => assert!(left_out("long-words")),
                     Optimisation::Gathering | Optimisation::Sharing => assert!(left_out("gather")),
                     Optimisation::Order | Optimisation::Hiding | Optimisation::UncountedLoops => {}
                 }
@@ -73,12 +75,16 @@ fn what_is_left_out_is_not_done() {
     // The surfel that is stored first is left out.
     let Some(first) = backend(
         "project.wgsl",
-        "let surfel = surfels[index];",
-        "var surfel = surfels[index]; if (index == 0u) { surfel.center[2] = 1e9; }",
+        "let surfel = surfel_at(index);",
+        "var surfel = surfel_at(index); if (index == 0u) { surfel.center[2] = 1e9; }",
     ) else {
         return;
     };
-    for (optimisation, backend) in [(Optimisation::Hiding, hiding), (Optimisation::Order, first)] {
+    // Of every other surfel the first half-axis ends early.
+    let odd = "array<f32, 3>(b.y, c.x, c.y)";
+    let Some(long) = backend("words_long.wgsl", odd, "array<f32, 3>(b.y, c.x, select(c.y, 0.0, odd))") else { return };
+    let backends = [(Optimisation::Hiding, hiding), (Optimisation::Order, first), (Optimisation::LongWords, long)];
+    for (optimisation, backend) in backends {
         let (with, _) = frame(&scene, &[], &backend);
         let (without, _) = frame(&scene, &[optimisation], &backend);
         assert!(bits(&with) != bits(&without), "{optimisation:?}");

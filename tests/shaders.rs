@@ -49,6 +49,8 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
         let features = if made.of_tiles() { Features::None } else { features };
         let mut needed = capabilities(features);
         needed.extend(files.contains(&"splat_shared.wgsl").then_some(Capabilities::SUBGROUP));
+        let long = files.contains(&"words_long.wgsl") && !needed.contains(&Capabilities::SHADER_INT64);
+        needed.extend(long.then_some(Capabilities::SHADER_INT64));
         let all = needed.iter().copied().collect::<Capabilities>();
         is_valid(module, all).unwrap_or_else(|e| panic!("{}: {e}", needs.accumulator));
         for &capability in &needed {
@@ -71,10 +73,14 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
             assert!(buffer || (needs.raster.is_some() && variable.space == AddressSpace::Handle));
         }
         assert!(!made.text().lines().any(|line| line.starts_with("enable") || line.starts_with("requires")));
-        needed.into_iter().map(|of| if of == Capabilities::SUBGROUP { "tiles" } else { needs.accumulator })
+        needed.into_iter().map(move |of| match of {
+            Capabilities::SUBGROUP => "tiles",
+            Capabilities::SHADER_INT64 if long => "records",
+            _ => needs.accumulator,
+        })
     });
     let without: BTreeSet<&str> = without.collect();
-    assert_eq!(without, BTreeSet::from(["fixed", "fixed64", "float", "packed64", "tiles"]));
+    assert_eq!(without, BTreeSet::from(["fixed", "fixed64", "float", "packed64", "records", "tiles"]));
     // The default runs anywhere.
     assert_eq!(ACCUMULATORS[0].features, Features::None);
 }
@@ -244,6 +250,7 @@ fn absent_parts_have_their_partners_signatures() {
     let with_terms =
         [starting("accumulator_"), starting("terms")].concat().into_iter().filter(|name| !apart.contains(name));
     alike_in("terms", with_terms.collect(), &["quantise", "term"]);
+    alike("words", &["words", "each_word", "surfel_at", "surfels_held"]);
     alike("tile_add", &["add"]);
     alike("tile_deposit", &["deposit_sums"]);
     alike("splat_", &["hold_lane", "fetcher", "offered", "farthest_in_tile", "handed"]);

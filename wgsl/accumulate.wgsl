@@ -48,7 +48,7 @@ fn accumulate(
     hold();
     let index = surfel_of(workgroup, workgroups, local);
     if (index < arrayLength(&projected)) {
-        let splat = projected[index];
+        let splat = splat_of(projected[index]);
         let filter_ = filter_of(index);
         let pixels = reach(splat);
         if (!is_large(splat) && !hidden(splat, filter_, pixels, radius_of(index))) {
@@ -66,7 +66,7 @@ fn accumulate_large(
     hold();
     let index = large_splat(workgroup.y * workgroups.x + workgroup.x);
     if (index < arrayLength(&projected)) {
-        let splat = projected[index];
+        let splat = splat_of(projected[index]);
         accumulate_splat(index, splat, filter_of(index), reach(splat), local.xy, TILE);
     }
 }

@@ -61,7 +61,7 @@ fn list_in_cells(index: u32, splat: Splat, size: vec2<u32>, offset: u32, step: u
 fn list_large(workgroup: vec3<u32>, workgroups: vec3<u32>, local: vec3<u32>, enters: bool) {
     let index = large_splat((workgroup.y * workgroups.x + workgroup.x) * LISTED_AT_ONCE + local.y);
     if (index < arrayLength(&projected)) {
-        list_in_cells(index, projected[index], BLOCK_SIZE, local.x, 8u, enters);
+        list_in_cells(index, splat_of(projected[index]), BLOCK_SIZE, local.x, 8u, enters);
     }
 }
 
@@ -77,13 +77,12 @@ fn bin_count(
     if (index >= arrayLength(&splats)) {
         return;
     }
-    let splat = splats[index];
+    let splat = splat_of(splats[index]);
     if (is_large(splat)) {
         return;
     }
     if (hidden(splat, filter_of(index), reach(splat), radius_of(index))) {
-        splats[index].bounds_first = 0xffffffffu;
-        splats[index].bounds_last = 0u;
+        splats[index][0] = words(vec4<u32>(0u, 0u, 0xffffffffu, 0u));
     } else {
         list_in_cells(index, splat, tile_size(), 0u, 1u, false);
     }
@@ -97,7 +96,7 @@ fn bin_place(
 ) {
     let index = surfel_of(workgroup, workgroups, local);
     if (index < arrayLength(&projected)) {
-        let splat = projected[index];
+        let splat = splat_of(projected[index]);
         if (!is_large(splat)) {
             list_in_cells(index, splat, tile_size(), 0u, 1u, true);
         }

@@ -67,7 +67,7 @@ fn list(batch: u32) {
 }
 
 fn leave_out(batch: u32) {
-    atomicAdd(&queue[1], min(BATCH, arrayLength(&surfels) - batch * BATCH));
+    atomicAdd(&queue[1], min(BATCH, surfels_held() - batch * BATCH));
 }
 
 // Whether the batch reaches the near depth, so that its place in the image says nothing.

@@ -17,11 +17,23 @@ struct Filter {
     gain: f32,
 }
 
-@group(0) @binding(15) var<storage, read_write> filters: array<Filter>;
-@group(0) @binding(16) var<storage, read> projected_filters: array<Filter>;
+@group(0) @binding(15) var<storage, read_write> filters: array<FilterRecord>;
+@group(0) @binding(16) var<storage, read> projected_filters: array<FilterRecord>;
+
+alias FilterRecord = array<Words, 2>;
+
+fn filter_record(filter_: Filter) -> FilterRecord {
+    return FilterRecord(
+        words(bitcast<vec4<u32>>(vec4<f32>(filter_.center_x, filter_.center_y, filter_.depth_low, filter_.depth_high))),
+        words(bitcast<vec4<u32>>(vec4<f32>(filter_.r_xx, filter_.r_xy, filter_.r_yy, filter_.gain))),
+    );
+}
 
 fn filter_of(index: u32) -> Filter {
-    return projected_filters[index];
+    let record = projected_filters[index];
+    let place = bitcast<vec4<f32>>(each_word(record[0]));
+    let shape = bitcast<vec4<f32>>(each_word(record[1]));
+    return Filter(place.x, place.y, place.z, place.w, shape.x, shape.y, shape.z, shape.w);
 }
 
 // The least depth of the fragments that the filter adds, device units.

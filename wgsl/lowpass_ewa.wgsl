@@ -7,7 +7,7 @@ override FILTER_BLUR: f32;
 
 fn low_pass(index: u32, h: ptr<function, Homography>) {
     if (!(*h).centered) {
-        filters[index] = Filter(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+        filters[index] = filter_record(Filter(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0));
         return;
     }
     let s = (*h).s_image;
@@ -25,7 +25,7 @@ fn low_pass(index: u32, h: ptr<function, Homography>) {
     (*h).low = center - extent;
     (*h).high = center + extent;
     let low = max((*h).depth_low, view.near);
-    filters[index] = Filter(
+    let filter_ = Filter(
         (*h).offset.x,
         (*h).offset.y,
         low,
@@ -36,6 +36,7 @@ fn low_pass(index: u32, h: ptr<function, Homography>) {
         // Positive even edge-on: 0 says that there is no filter.
         max(abs(area) / sqrt(determinant), 1e-9),
     );
+    filters[index] = filter_record(filter_);
 }
 
 fn filtered(fragment: Fragment, abc: vec3<f32>, filter_: Filter, d: vec2<f32>) -> Fragment {

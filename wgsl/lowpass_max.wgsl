@@ -6,7 +6,7 @@ const FILTER_RADIUS: f32 = 0.7072;
 
 fn low_pass(index: u32, h: ptr<function, Homography>) {
     if (!(*h).centered) {
-        filters[index] = Filter(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+        filters[index] = filter_record(Filter(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0));
         return;
     }
     let center = vec2<f32>((*h).anchor) + 0.5 + (*h).offset;
@@ -14,7 +14,8 @@ fn low_pass(index: u32, h: ptr<function, Homography>) {
     (*h).high = max((*h).high, center + FILTER_RADIUS);
     let r = 1.0 / FILTER_RADIUS;
     let low = max((*h).depth_low, view.near);
-    filters[index] = Filter((*h).offset.x, (*h).offset.y, low, max((*h).depth_high, low), r, 0.0, r, 1.0);
+    let high = max((*h).depth_high, low);
+    filters[index] = filter_record(Filter((*h).offset.x, (*h).offset.y, low, high, r, 0.0, r, 1.0));
 }
 
 fn filtered(fragment: Fragment, abc: vec3<f32>, filter_: Filter, d: vec2<f32>) -> Fragment {

@@ -7,7 +7,7 @@ override TURN_NORMALS: bool;
 
 // World space, unit, mapped to [0, 1].
 fn normal_of(index: u32, splat: Splat) -> vec3<f32> {
-    let surfel = surfels[index];
+    let surfel = surfel_at(index);
     // In device units, so that no product underflows.
     let s = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * view.unit;
     let t = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]) * view.unit;

@@ -2,8 +2,7 @@
 // that reach the near depth, large splats) are listed and done together, so that the others of a subgroup need not wait.
 // Twin: src/passes/project.rs.
 
-@group(0) @binding(2) var<storage, read> surfels: array<Surfel>;
-@group(0) @binding(3) var<storage, read_write> splats: array<Splat>;
+@group(0) @binding(3) var<storage, read_write> splats: array<SplatRecord>;
 // Word 0 counts the large splats, word 1 all that are out of view; three words from QUEUE_GRID on are a grid with a workgroup
 // for each large one, three from QUEUE_LISTING on one with a workgroup for LISTED_AT_ONCE of them, and from QUEUE_START on come
 // their indices.
@@ -50,7 +49,7 @@ const RARE: u32 = 2u;
 
 // Of a rare surfel the splat is written only if `every` kind is asked for.
 fn project_surfel(index: u32, every: bool) -> u32 {
-    let surfel = surfels[index];
+    let surfel = surfel_at(index);
     var relative: array<Double, 3>;
     for (var i = 0u; i < 3u; i++) {
         let d = two_sum(surfel.center[i] * view.unit, -view.eye[i]);
@@ -92,7 +91,7 @@ fn project_surfel(index: u32, every: bool) -> u32 {
         // Places depend on the schedule, but nothing later depends on places.
         atomicStore(&queue[QUEUE_START + atomicAdd(&queue[0], 1u)], index);
     }
-    splats[index] = splat;
+    splats[index] = splat_record(splat);
     return select(OUT_OF_VIEW, IN_VIEW, visible);
 }
 
@@ -115,7 +114,7 @@ fn project(
 ) {
     let index = surfel_of(workgroup, workgroups, local);
     var fate = IN_VIEW;
-    if (index < arrayLength(&surfels)) {
+    if (index < surfels_held()) {
         fate = project_surfel(index, false);
     }
     if (fate == RARE) {

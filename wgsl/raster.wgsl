@@ -2,7 +2,7 @@
 // depth, its blender for the sums. Splats, footprint, kernel, attributes and resolve are those of the compute path.
 // Host side and what the variants mean: src/passes/raster.rs.
 
-@group(0) @binding(5) var<storage, read> projected: array<Splat>;
+@group(0) @binding(5) var<storage, read> projected: array<SplatRecord>;
 
 // What a splat's fragments need is read once a corner and handed on unchanged: reading the record again at each fragment
 // took a software adapter twice as long.
@@ -73,7 +73,7 @@ fn corner_of(vertex: u32) -> Corner {
     hold();
     let index = vertex / VERTICES;
     let place = vertex % VERTICES;
-    let splat = projected[index];
+    let splat = splat_of(projected[index]);
     // The quad's triangles are 0, 1, 2 and 3, 2, 1.
     let image = corner_image(splat, select(place, 6u - place, place > 2u));
     let clip = image / vec2<f32>(f32(view.width), f32(view.height)) * vec2<f32>(2.0, -2.0) + vec2<f32>(-1.0, 1.0);
@@ -101,7 +101,7 @@ fn shape(@builtin(vertex_index) vertex: u32) -> Corner {
 @vertex
 fn shape_with_attributes(@builtin(vertex_index) vertex: u32) -> Corner {
     var corner = corner_of(vertex);
-    let attributes = attributes_of(corner.index, projected[corner.index]);
+    let attributes = attributes_of(corner.index, splat_of(projected[corner.index]));
     corner.color = attributes.color;
     corner.normal = attributes.normal;
     corner.radius = attributes.radius;

@@ -20,14 +20,14 @@ struct Place {
 }
 
 fn place_of(index: u32) -> Place {
-    let center = surfels[index].center;
-    let at = colors[4u * index + 1u];
+    let center = surfel_at(index).center;
+    let at = color_part(index, 1u);
     return Place(
         at.xy,
         at.z,
         vec3<f32>(center[0], center[1], center[2]) * view.unit,
-        colors[4u * index + 2u].xyz,
-        colors[4u * index + 3u].xyz,
+        color_part(index, 2u).xyz,
+        color_part(index, 3u).xyz,
     );
 }
 

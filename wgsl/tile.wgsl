@@ -56,7 +56,7 @@ fn fetch(place: u32, listed: u32, column: Column, deepest: vec2<f32>) -> vec2<u3
         } else {
             own_index = small_entry(column.small.x + (at - large));
         }
-        own_splat = projected[own_index];
+        own_splat = splat_of(projected[own_index]);
         own_filter = filter_of(own_index);
         wanted.x = reaches(own_splat, own_filter, column, 0u, deepest.x);
         wanted.y = TILE_ROWS > 8u && reaches(own_splat, own_filter, column, 8u, deepest.y);

@@ -1,7 +1,7 @@
 // Stage 2: the nearest depth at every pixel. One invocation a splat, one workgroup a large splat. Twin: src/passes/visibility.rs.
 // The least depth is the greatest kept one (layout.wgsl).
 
-@group(0) @binding(5) var<storage, read> projected: array<Splat>;
+@group(0) @binding(5) var<storage, read> projected: array<SplatRecord>;
 @group(0) @binding(6) var<storage, read_write> nearest: array<atomic<u32>>;
 
 fn cover(splat: Splat, filter_: Filter, x: u32, y: u32) {
@@ -22,7 +22,7 @@ fn visibility(
     if (index >= arrayLength(&projected)) {
         return;
     }
-    let splat = projected[index];
+    let splat = splat_of(projected[index]);
     if (is_large(splat)) {
         return;
     }
@@ -47,7 +47,7 @@ fn visibility_large(
     if (index >= arrayLength(&projected)) {
         return;
     }
-    let splat = projected[index];
+    let splat = splat_of(projected[index]);
     let pixels = reach(splat);
     let filter_ = filter_of(index);
     for (var y = pixels.first.y + local.y; y <= pixels.last.y; y += TILE) {

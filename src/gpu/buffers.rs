@@ -60,6 +60,8 @@ impl<T: Pod> Buffer<T> {
         // An empty binding is not allowed.
         let len = len.max(1);
         let size = len.saturating_mul(size_of::<T>() as u64);
+        // Whole numbers of 64 bits, by which words_long.wgsl reads.
+        let size = size.checked_next_multiple_of(8).unwrap_or(size);
         if size > limit {
             let storage = usage.contains(wgpu::BufferUsages::STORAGE);
             return Err(Error::Limit {
@@ -79,7 +81,7 @@ impl<T: Pod> Buffer<T> {
         let guard = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let raw = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(what),
-            size: size.next_multiple_of(4),
+            size,
             usage: usage | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
             mapped_at_creation: false,
         });

@@ -31,6 +31,8 @@ pub struct AdapterDescription {
     pub timestamps: bool,
     /// u64 atomic min, max and add in storage buffers.
     pub atomics_u64: bool,
+    /// 64-bit integers.
+    pub integers_u64: bool,
     /// f32 atomic add in storage buffers.
     pub atomics_f32: bool,
     /// Blending into targets of 32-bit floats.
@@ -63,6 +65,7 @@ impl AdapterDescription {
             max_storage_buffers_per_shader_stage: limits.max_storage_buffers_per_shader_stage,
             timestamps: features.contains(wgpu::Features::TIMESTAMP_QUERY),
             atomics_u64: features.contains(wgpu::Features::SHADER_INT64 | wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS),
+            integers_u64: features.contains(wgpu::Features::SHADER_INT64),
             atomics_f32: features.contains(wgpu::Features::SHADER_FLOAT32_ATOMIC),
             blends_f32: features.contains(wgpu::Features::FLOAT32_BLENDABLE),
             subgroups: features.contains(wgpu::Features::SUBGROUP),

@@ -71,6 +71,7 @@ pub const FILES: &[(&str, &str)] = wgsl![
     "raster_targets_1.wgsl",
     "raster_targets_2.wgsl",
     "raster_targets_3.wgsl",
+    "records.wgsl",
     "resolve.wgsl",
     "rows.wgsl",
     "shade_lambert.wgsl",
@@ -97,6 +98,8 @@ pub const FILES: &[(&str, &str)] = wgsl![
     "visibility.wgsl",
     "weight_map.wgsl",
     "weight_map_absent.wgsl",
+    "words.wgsl",
+    "words_long.wgsl",
 ];
 
 /// The kernels' texts. The built-in ones, of which a researcher (or a test that must fail) may replace parts.

@@ -99,6 +99,8 @@ fn files(needs: &SceneNeeds) -> Vec<&'static str> {
     let pick = |needed, file, absent| if needed { file } else { absent };
     let mut files = vec![
         "layout.wgsl",
+        pick(needs.long_words, "words_long.wgsl", "words.wgsl"),
+        "records.wgsl",
         "double.wgsl",
         "rows.wgsl",
         match needs.projection {

@@ -15,6 +15,8 @@ pub enum Optimisation {
     Hiding,
     /// Two sums share a 64-bit word, which one atomic addition serves (`wgsl/accumulator_fixed_pairs.wgsl`).
     Pairs,
+    /// Records are read and written 64 bits at a time (`wgsl/words_long.wgsl`).
+    LongWords,
     /// Tiles sum small splats too (`passes/tiles.rs`).
     Gathering,
     /// The invocations of a tile share what they fetch (`wgsl/splat_shared.wgsl`).
@@ -25,11 +27,12 @@ pub enum Optimisation {
 
 impl Optimisation {
     /// Every one and its name.
-    pub const ALL: [(Self, &'static str); 7] = [
+    pub const ALL: [(Self, &'static str); 8] = [
         (Self::Culling, "culling"),
         (Self::Order, "order"),
         (Self::Hiding, "hiding"),
         (Self::Pairs, "pairs"),
+        (Self::LongWords, "long-words"),
         (Self::Gathering, "gathering"),
         (Self::Sharing, "sharing"),
         (Self::UncountedLoops, "uncounted-loops"),

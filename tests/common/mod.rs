@@ -123,6 +123,7 @@ fn base_needs() -> Vec<SceneNeeds> {
                 accumulator: ACCUMULATORS[0].name,
                 wide_sums: false,
                 atomics_u64: false,
+                long_words: bits.count_ones() % 4 < 2,
                 tiles: bits * 37 / 8 % 4 == 0 && color != ColorNeed::Textured,
                 gather: bits * 37 / 8 % 8 == 0 && color != ColorNeed::Textured,
                 // Both, of each of the others.

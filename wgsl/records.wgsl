@@ -1,0 +1,30 @@
+// A splat's record: sixteen words.
+
+alias SplatRecord = array<Words, 4>;
+
+fn splat_record(splat: Splat) -> SplatRecord {
+    let anchor = vec2<u32>(bitcast<u32>(splat.anchor_x), bitcast<u32>(splat.anchor_y));
+    return SplatRecord(
+        words(vec4<u32>(anchor, splat.bounds_first, splat.bounds_last)),
+        words(bitcast<vec4<u32>>(vec4<f32>(splat.a[0], splat.a[1], splat.a[2], splat.b[0]))),
+        words(bitcast<vec4<u32>>(vec4<f32>(splat.b[1], splat.b[2], splat.c[0], splat.c[1]))),
+        words(bitcast<vec4<u32>>(vec4<f32>(splat.c[2], splat.a_low[0], splat.a_low[1], splat.a_low[2]))),
+    );
+}
+
+fn splat_of(record: SplatRecord) -> Splat {
+    let head = each_word(record[0]);
+    let first = bitcast<vec4<f32>>(each_word(record[1]));
+    let second = bitcast<vec4<f32>>(each_word(record[2]));
+    let third = bitcast<vec4<f32>>(each_word(record[3]));
+    return Splat(
+        bitcast<i32>(head.x),
+        bitcast<i32>(head.y),
+        head.z,
+        head.w,
+        array<f32, 3>(first.x, first.y, first.z),
+        array<f32, 3>(first.w, second.x, second.y),
+        array<f32, 3>(second.z, second.w, third.x),
+        array<f32, 3>(third.y, third.z, third.w),
+    );
+}

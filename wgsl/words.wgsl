@@ -1,0 +1,22 @@
+// How kernels read and write records: four words at a time, and surfels, which have nine, as they are. Same interface as
+// words_long.wgsl.
+
+alias Words = vec4<u32>;
+
+fn words(each: vec4<u32>) -> Words {
+    return each;
+}
+
+fn each_word(four: Words) -> vec4<u32> {
+    return four;
+}
+
+@group(0) @binding(2) var<storage, read> surfels: array<Surfel>;
+
+fn surfel_at(index: u32) -> Surfel {
+    return surfels[index];
+}
+
+fn surfels_held() -> u32 {
+    return arrayLength(&surfels);
+}

@@ -283,7 +283,7 @@ impl<'a> Renderer<'a> {
                         Some(tiles) => tiles::accumulate(&mut recorder, &splats, rows, tiles, (nearest, sums))?,
                         None => accumulate::record_large(&mut recorder, &splats, rows, nearest, sums)?,
                     }
-                    let mut sums = vec![("sums", sums.sums.bound())];
+                    let mut sums = vec![("sums", sums.sums.bound()), ("added", sums.sums.bound())];
                     sums.extend(splats.surfels.texture());
                     resolve::record(&mut recorder, rows, (nearest.covered(rows), sums), &pixels.image)?;
                 }

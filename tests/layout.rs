@@ -165,6 +165,7 @@ fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         ("nearest", Element::Plain(WORD)),
         ("visible", Element::Plain(WORD)),
         ("sums", Element::Plain(sums_of(accumulator).0)),
+        ("added", Element::Plain(&[<[u64; 2]>::SHAPE])),
         ("overflows", Element::Plain(WORD)),
         ("image", Element::Plain(&[f32::SHAPE])),
         ("colors", Element::Plain(&[u32::SHAPE, <[u32; 4]>::SHAPE, <[u64; 2]>::SHAPE])),

@@ -10,32 +10,32 @@ fn front_at(pixel: u32) -> f32 {
 }
 
 // The fragments of one invocation: the splat's pixels from `offset` on in steps of `step`. Each round of the outer loop
-// finds the invocation's next accepted fragment and then adds it, so that the invocations of a subgroup, whose accepted
-// fragments lie at different places, do the costly part together.
+// finds the invocation's next fragment and then adds it if it is accepted, so that the invocations of a subgroup, whose
+// fragments lie at different places, do the costly part together. Most are accepted: what is hidden was left out.
 fn accumulate_splat(index: u32, splat: Splat, filter_: Filter, pixels: Rectangle, offset: vec2<u32>, step: u32) {
     let first = pixels.first + offset;
     let attributes = attributes_of(index, splat);
     var at = select(first, vec2<u32>(0u, pixels.last.y + 1u), first.x > pixels.last.x);
     loop {
         var fragment: Fragment;
-        var pixel: u32;
-        var front: f32;
-        var accepted = false;
-        while (at.y <= pixels.last.y && !accepted) {
-            pixel = pixel_index(at.x, at.y);
+        var place: vec2<u32>;
+        var hit = false;
+        while (at.y <= pixels.last.y && !hit) {
+            place = at;
             fragment = footprint(splat, filter_, at.x, at.y);
-            if (fragment.hit) {
-                front = front_at(pixel);
-                accepted = fragment.depth <= farthest_accepted(front, attributes.radius);
-            }
+            hit = fragment.hit;
             at.x += step;
             let wrapped = at.x > pixels.last.x;
             at = select(at, vec2<u32>(first.x, at.y + step), wrapped);
         }
-        if (!accepted) {
+        if (!hit) {
             break;
         }
-        blend(pixel, fragment, front, attributes);
+        let pixel = pixel_index(place.x, place.y);
+        let front = front_at(pixel);
+        if (fragment.depth <= farthest_accepted(front, attributes.radius)) {
+            blend(pixel, fragment, front, attributes);
+        }
     }
 }
 

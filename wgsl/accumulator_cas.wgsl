@@ -36,6 +36,8 @@ fn add_pair(pixel: u32, channel: u32, first: Term, second: Term) {
 
 fn settle(pixel: u32) {}
 
+fn show(pixel: u32) {}
+
 fn sum_at(pixel: u32, channel: u32) -> f32 {
     return bitcast<f32>(atomicLoad(&sums[pixel * CHANNELS + channel]));
 }

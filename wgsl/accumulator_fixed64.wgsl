@@ -32,6 +32,8 @@ fn add_pair(pixel: u32, channel: u32, first: Term, second: Term) {
 fn settle(pixel: u32) {}
 
 // Rounded as accumulator_fixed_wide.wgsl does, which has the same sums in two words.
+fn show(pixel: u32) {}
+
 fn sum_at(pixel: u32, channel: u32) -> f32 {
     let sum = atomicLoad(&sums[pixel * CHANNELS + channel]);
     return f32(u32(sum >> 32u)) * 4294967296.0 + f32(u32(sum & 0xfffffffflu));

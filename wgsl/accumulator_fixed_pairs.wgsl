@@ -1,11 +1,11 @@
 // The sums of accumulator_fixed.wgsl, bit for bit, for adapters with 64-bit atomics: two neighbouring sums in the halves
 // of one u64, so that a fragment makes half as many additions. What wraps in the low half runs into the high one; both
-// halves' carries are counted in a u64 of their own, so that it can be taken out again.
+// halves' carries are counted in a u64 of their own, which follows, so that it can be taken out again.
 // Error bound: src/passes/accumulate.rs.
 
 override CHANNELS: u32;
 
-// For each pair of each pixel's channels a u64 of sums; after those of the whole band, as many of carries.
+// For each pair of a pixel's channels a u64 of sums and one of carries.
 @group(0) @binding(8) var<storage, read_write> sums: array<atomic<u64>>;
 
 // What wrapped under the fragment in work, three bits a pair: whether its low half did, and how often its high half, which
@@ -13,7 +13,7 @@ override CHANNELS: u32;
 var<private> carries: u32;
 
 fn add_halves(pixel: u32, pair: u32, low: Term, high: Term) {
-    let before = atomicAdd(&sums[pixel * (CHANNELS / 2u) + pair], (u64(high) << 32u) | u64(low));
+    let before = atomicAdd(&sums[pixel * CHANNELS + 2u * pair], (u64(high) << 32u) | u64(low));
     let before_low = u32(before & 0xfffffffflu);
     let before_high = u32(before >> 32u);
     let from_low = select(0u, 1u, before_low + low < before_low);
@@ -36,21 +36,37 @@ fn settle(pixel: u32) {
     while (carries != 0u) {
         let pair = firstTrailingBit(carries) / 3u;
         let wraps = (carries >> (3u * pair)) & 7u;
-        atomicAdd(&sums[(band_pixels() + pixel) * (CHANNELS / 2u) + pair], (u64(wraps >> 1u) << 32u) | u64(wraps & 1u));
+        atomicAdd(&sums[pixel * CHANNELS + 2u * pair + 1u], (u64(wraps >> 1u) << 32u) | u64(wraps & 1u));
         carries &= ~(7u << (3u * pair));
     }
 }
 
-// A sum read back, in the units of the terms; ratios of two sums have no unit.
+// The same when all is added: sums and carries of a pair.
+@group(0) @binding(37) var<storage, read> added: array<vec2<u64>>;
+
+// The sums of the pixel that is shown, low and high words: both of a pair are read at once.
+var<private> shown_low: array<u32, 16>;
+var<private> shown_high: array<u32, 16>;
+
+fn show_pair(pixel: u32, pair: u32) {
+    let of_pair = added[pixel * (CHANNELS / 2u) + pair];
+    let high = u32(of_pair.x >> 32u);
+    let from_low = u32(of_pair.y & 0xfffffffflu);
+    shown_low[2u * pair] = u32(of_pair.x & 0xfffffffflu);
+    shown_high[2u * pair] = from_low;
+    shown_low[2u * pair + 1u] = high - from_low;
+    shown_high[2u * pair + 1u] = u32(of_pair.y >> 32u) - select(0u, 1u, high < from_low);
+}
+
+fn show(pixel: u32) {
+    for (var pair = 0u; pair < CHANNELS / 2u; pair++) {
+        show_pair(pixel, pair);
+    }
+}
+
+// A sum of the shown pixel, in the units of the terms; ratios of two sums have no unit.
 fn sum_at(pixel: u32, channel: u32) -> f32 {
-    let at = pixel * (CHANNELS / 2u) + (channel >> 1u);
-    let halves = atomicLoad(&sums[at]);
-    let wraps = atomicLoad(&sums[at + band_pixels() * (CHANNELS / 2u)]);
-    let from_low = wraps & 0xfffffffflu;
-    let low = (from_low << 32u) | (halves & 0xfffffffflu);
-    let high = (wraps & 0xffffffff00000000lu) | (halves >> 32u);
-    let sum = select(low, high - from_low, (channel & 1u) == 1u);
-    return f32(u32(sum >> 32u)) * 4294967296.0 + f32(u32(sum & 0xfffffffflu));
+    return f32(shown_high[channel]) * 4294967296.0 + f32(shown_low[channel]);
 }
 
 fn weight_at(pixel: u32) -> f32 {

@@ -50,6 +50,8 @@ fn add_pair(pixel: u32, channel: u32, first: Term, second: Term) {
     add_halves((pixel * CHANNELS + channel) / 2u, first, second);
 }
 
+fn show(pixel: u32) {}
+
 fn sum_at(pixel: u32, channel: u32) -> f32 {
     let pair = atomicLoad(&sums[(pixel * CHANNELS + channel) / 2u]);
     return f32(select(u32(pair & 0xfffffffflu), u32(pair >> 32u), (channel & 1u) == 1u));

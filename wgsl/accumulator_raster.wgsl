@@ -32,6 +32,8 @@ fn four_terms(first: u32) -> vec4<f32> {
     return BLEND_SCALE * vec4<f32>(terms[first], terms[first + 1u], terms[first + 2u], terms[first + 3u]);
 }
 
+fn show(pixel: u32) {}
+
 fn sum_at(pixel: u32, channel: u32) -> f32 {
     let place = vec2<u32>(pixel % view.width, pixel / view.width + band.first_row);
     return target_at(place, channel / 4u)[channel % 4u] / BLEND_SCALE;

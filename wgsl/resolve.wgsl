@@ -33,6 +33,7 @@ fn resolve(
         let y = tile / tiles_across() * TILE_ROWS + row + local / TILE_WIDTH;
         if (tile < tiles_in_band() && x < view.width && y < band.rows) {
             let pixel = y * view.width + x;
+            show(pixel);
             resolve_pixel(pixel, pixel, x, y + band.first_row);
         }
     }

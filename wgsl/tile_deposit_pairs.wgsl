@@ -1,9 +1,9 @@
-// Stored sums as accumulator_fixed_pairs.wgsl has them: the low words of two sums in a u64, and after those of the band what
-// wrapped of each; the second sum also counts what wrapped of the first.
+// Stored sums as accumulator_fixed_pairs.wgsl has them: the low words of two sums in a u64, and in the next what wrapped of
+// each; the second sum also counts what wrapped of the first.
 
 fn deposit_sums(pixel: u32, channel: u32, first: vec2<u32>, second: vec2<u32>) {
-    let word = pixel * CHANNELS + channel;
-    let carries = (band_pixels() + pixel) * CHANNELS + channel;
+    let word = 2u * (pixel * CHANNELS + channel);
+    let carries = word + 2u;
     let low = sum_words(vec2<u32>(sums[word], sums[carries]), first);
     let carried = low.y - sums[carries];
     let high = sum_words(sum_words(vec2<u32>(sums[word + 1u], sums[carries + 1u]), second), vec2<u32>(carried, 0u));

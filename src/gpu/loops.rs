@@ -26,7 +26,7 @@ use super::kernel::Sources;
 const ENDING: &[(&str, usize, &[u32])] = &[
     ("accumulate.wgsl", 2, &[2, 4]),
     ("accumulator_fixed.wgsl", 1, &[3]),
-    ("accumulator_fixed_pairs.wgsl", 1, &[3]),
+    ("accumulator_fixed_pairs.wgsl", 2, &[1, 3]),
     ("accumulator_raster.wgsl", 2, &[1]),
     ("bin.wgsl", 5, &[1]),
     ("camera_pinhole.wgsl", 2, &[1]),

@@ -26,6 +26,7 @@ fn evaluate(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
+    hold_view();
     let index = linear_index(workgroup, workgroups, local);
     if (index >= arrayLength(&inputs)) {
         return;
@@ -143,6 +144,6 @@ fn the_comparison_notices_lost_digits() {
     let coarse = errors(&gpu, &changed("rest / b.high);", "0.0);"));
     assert!(coarse[4] > 1e-10, "{}", in_words(&coarse));
     // Whether this adapter's compiler needs `keep` is its own affair: said, not asserted.
-    let bare = errors(&gpu, &changed("return bitcast<f32>(bitcast<u32>(x) ^ view.zero);", "return x;"));
+    let bare = errors(&gpu, &changed("return bitcast<f32>(bitcast<u32>(x) ^ held.zero);", "return x;"));
     eprintln!("{} without keep: {}", gpu.adapter.name, in_words(&bare));
 }

@@ -266,3 +266,47 @@ fn absent_parts_have_their_partners_signatures() {
         assert_eq!(pinhole.get(function), orthographic.get(function));
     }
 }
+
+/// Names in a kernel's code, in order; comments have none.
+fn names(text: &str) -> Vec<&str> {
+    let code = text.lines().map(|line| line.split("//").next().unwrap_or(""));
+    let part = |c: char| !c.is_alphanumeric() && c != '_';
+    code.flat_map(|line| line.split(part).filter(|name| !name.is_empty())).collect()
+}
+
+/// Of a kernel's text, its compute entry points, each with the first name in its body.
+fn beginnings(text: &str) -> Vec<(&str, &str)> {
+    let of_entry = |part| -> (&str, &str) {
+        let (head, body) = str::split_once(part, "{\n").unwrap();
+        (head.split("fn ").nth(1).unwrap().split('(').next().unwrap(), names(body)[0])
+    };
+    text.split("@compute").skip(1).map(of_entry).collect()
+}
+
+/// Uniforms are read by hold() alone, with which entry points begin that use any: all invocations still take part there.
+#[test]
+fn uniforms_are_read_once_and_first() {
+    for (file, text) in FILES {
+        let read = names(text).into_iter().filter(|name| ["view", "band"].contains(name)).count();
+        // Both are declared, and read, in the one file.
+        assert_eq!(read, if *file == "layout.wgsl" { 4 } else { 0 }, "{file}");
+        for (entry, first) in beginnings(text) {
+            let without = ["arrange", "arrange_rare"].contains(&entry);
+            assert_eq!(["hold", "hold_view"].contains(&first), !without, "{entry} in {file} begins with {first}");
+        }
+    }
+    modules::different().par_iter().for_each(|made| {
+        let module = &made.reflected().module;
+        let info = Validator::new(ValidationFlags::all(), Capabilities::all()).validate(module).unwrap();
+        for (index, entry) in module.entry_points.iter().enumerate() {
+            let uses = |name: &str| {
+                let mut all = module.global_variables.iter();
+                all.any(|(handle, v)| {
+                    v.name.as_deref() == Some(name) && !info.get_entry_point(index)[handle].is_empty()
+                })
+            };
+            assert_eq!(uses("held"), uses("view"), "{}", entry.name);
+            assert!(!uses("held_band") || uses("band"), "{}", entry.name);
+        }
+    });
+}

@@ -136,7 +136,7 @@ fn a_wrong_tile_is_noticed() {
     ];
     // A unit of 2^-32 would not show, 2^-4 does.
     let stored = [
-        ("tile.wgsl", "deposit(column.pixel + k * view.width)", "deposit(column.pixel)"),
+        ("tile.wgsl", "deposit(column.pixel + k * held.width)", "deposit(column.pixel)"),
         ("tile_deposit_pairs.wgsl", "vec2<u32>(carried, 0u)", "vec2<u32>(carried << 28u, 0u)"),
     ];
     for (wrong, gathers) in [(&gathered[..], true), (&stored[..], false)] {

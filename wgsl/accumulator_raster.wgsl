@@ -35,7 +35,7 @@ fn four_terms(first: u32) -> vec4<f32> {
 fn show(pixel: u32) {}
 
 fn sum_at(pixel: u32, channel: u32) -> f32 {
-    let place = vec2<u32>(pixel % view.width, pixel / view.width + band.first_row);
+    let place = vec2<u32>(pixel % held.width, pixel / held.width + held_band.first_row);
     return target_at(place, channel / 4u)[channel % 4u] / BLEND_SCALE;
 }
 
@@ -53,11 +53,11 @@ fn covered_start() -> u32 {
 
 fn has_any(tile: u32) -> bool {
     let first = vec2<u32>(tile % tiles_across() * TILE_WIDTH, tile / tiles_across() * TILE_ROWS);
-    let end = min(first + vec2<u32>(TILE_WIDTH, TILE_ROWS), vec2<u32>(view.width, band.rows));
+    let end = min(first + vec2<u32>(TILE_WIDTH, TILE_ROWS), vec2<u32>(held.width, held_band.rows));
     var any = false;
     for (var y = first.y; y < end.y; y++) {
         for (var x = first.x; x < end.x; x++) {
-            any = any || weight_at(y * view.width + x) != 0.0;
+            any = any || weight_at(y * held.width + x) != 0.0;
         }
     }
     return any;

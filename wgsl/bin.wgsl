@@ -20,12 +20,12 @@ fn tile_size() -> vec2<u32> {
 
 // Cells of `size` pixels in a row of the image.
 fn cells_across(size: vec2<u32>) -> u32 {
-    return (view.width + size.x - 1u) / size.x;
+    return (held.width + size.x - 1u) / size.x;
 }
 
 // Cells of `size` pixels in the band.
 fn cells_in_band(size: vec2<u32>) -> u32 {
-    return cells_across(size) * ((band.rows + size.y - 1u) / size.y);
+    return cells_across(size) * ((held_band.rows + size.y - 1u) / size.y);
 }
 
 // The word at which the lists of cells of `size` pixels start.
@@ -35,7 +35,7 @@ fn lists_start(size: vec2<u32>) -> u32 {
 
 // The cells that hold `pixels`, which are some, x and y.
 fn cells_of(pixels: Rectangle, size: vec2<u32>) -> Rectangle {
-    let top = vec2<u32>(0u, band.first_row);
+    let top = vec2<u32>(0u, held_band.first_row);
     return Rectangle((pixels.first - top) / size, (pixels.last - top) / size);
 }
 
@@ -94,6 +94,7 @@ fn bin_place(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
+    hold();
     let index = surfel_of(workgroup, workgroups, local);
     if (index < arrayLength(&projected)) {
         let splat = splat_of(projected[index]);
@@ -109,6 +110,7 @@ fn bin_count_large(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_id) local: vec3<u32>,
 ) {
+    hold();
     list_large(workgroup, workgroups, local, false);
 }
 
@@ -118,6 +120,7 @@ fn bin_place_large(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_id) local: vec3<u32>,
 ) {
+    hold();
     list_large(workgroup, workgroups, local, true);
 }
 
@@ -127,11 +130,13 @@ var<workgroup> partial: array<u32, SCANNERS>;
 // Counts of small splats become starts. One workgroup; each invocation has a run of cells.
 @compute @workgroup_size(SCANNERS)
 fn bin_scan(@builtin(local_invocation_index) local: u32) {
+    hold();
     scan(local, cells_in_band(tile_size()));
 }
 
 @compute @workgroup_size(SCANNERS)
 fn bin_scan_large(@builtin(local_invocation_index) local: u32) {
+    hold();
     scan(local, cells_in_band(BLOCK_SIZE));
 }
 

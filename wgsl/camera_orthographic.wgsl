@@ -2,15 +2,15 @@
 // Twin: src/passes/homography.rs and src/passes/footprint.rs.
 
 fn image_of(position: Double, axis: u32) -> Double {
-    let focal = Double(view.intrinsics[axis], view.intrinsics_low[axis]);
-    let principal = Double(view.intrinsics[axis + 2u], view.intrinsics_low[axis + 2u]);
+    let focal = Double(held.intrinsics[axis], held.intrinsics_low[axis]);
+    let principal = Double(held.intrinsics[axis + 2u], held.intrinsics_low[axis + 2u]);
     return sum(product(focal, position), principal);
 }
 
 // The part of the image (low x, y; high x, y) that a ball covers.
 fn ball_extent(center: vec3<f32>, radius: f32, nearest: f32) -> vec4<f32> {
-    let image = center.xy * view.intrinsics.xy + view.intrinsics.zw;
-    let extent = radius * view.intrinsics.xy;
+    let image = center.xy * held.intrinsics.xy + held.intrinsics.zw;
+    let extent = radius * held.intrinsics.xy;
     return vec4<f32>(image - extent, image + extent);
 }
 
@@ -19,8 +19,8 @@ fn precise_rows(s_world: vec3<f32>, t_world: vec3<f32>, offset_x: Double, offset
     let s = rotate(widen(s_world));
     let t = rotate(widen(t_world));
     let away = minor(s[0], t[1], s[1], t[0]);
-    let per_x = quotient(single(1.0), product(away, Double(view.intrinsics.x, view.intrinsics_low.x)));
-    let per_y = quotient(single(1.0), product(away, Double(view.intrinsics.y, view.intrinsics_low.y)));
+    let per_x = quotient(single(1.0), product(away, Double(held.intrinsics.x, held.intrinsics_low.x)));
+    let per_y = quotient(single(1.0), product(away, Double(held.intrinsics.y, held.intrinsics_low.y)));
     return thin_rows(
         product(t[1], per_x),
         product(negative(t[0]), per_y),
@@ -48,10 +48,10 @@ fn homography(
     let y = image_of(center[1], 1u);
     let image = vec2<f32>(x.high, y.high);
     let slope = sqrt(s.z * s.z + t.z * t.z);
-    if (p_z + slope < view.near) {
+    if (p_z + slope < held.near) {
         return h;
     }
-    let focal = view.intrinsics.xy;
+    let focal = held.intrinsics.xy;
     // Edge-on the rows vanish, and then u is set to 2: outside the disk.
     let edge_on = h.away == 0.0;
     let scale = select(1.0 / (h.away * focal), vec2<f32>(0.0), edge_on);
@@ -114,12 +114,12 @@ fn plane_depth(abc: vec3<f32>, low: f32, high: f32) -> f32 {
 }
 
 fn ray(x: u32, y: u32) -> vec3<f32> {
-    return view.rotation[2].xyz;
+    return held.rotation[2].xyz;
 }
 
 fn point_at(x: u32, y: u32, depth: f32) -> vec3<f32> {
-    let image = (vec2<f32>(f32(x), f32(y)) + 0.5 - view.intrinsics.zw) / view.intrinsics.xy;
-    return view.eye.xyz + image.x * view.rotation[0].xyz + image.y * view.rotation[1].xyz + depth * view.rotation[2].xyz;
+    let image = (vec2<f32>(f32(x), f32(y)) + 0.5 - held.intrinsics.zw) / held.intrinsics.xy;
+    return held.eye.xyz + image.x * held.rotation[0].xyz + image.y * held.rotation[1].xyz + depth * held.rotation[2].xyz;
 }
 
 fn homogeneous_row(splat: Splat) -> vec3<f32> {
@@ -128,7 +128,7 @@ fn homogeneous_row(splat: Splat) -> vec3<f32> {
 
 // For the rasteriser's depth test; see camera_pinhole.wgsl.
 fn depth_of(c: f32) -> f32 {
-    return clamp(c, view.near, view.farthest);
+    return clamp(c, held.near, held.farthest);
 }
 
 fn depth_order(z: f32) -> f32 {

@@ -2,8 +2,8 @@
 // Twin: src/passes/homography.rs and src/passes/footprint.rs.
 
 fn image_of(position: Double, depth: Double, axis: u32) -> Double {
-    let focal = Double(view.intrinsics[axis], view.intrinsics_low[axis]);
-    let principal = Double(view.intrinsics[axis + 2u], view.intrinsics_low[axis + 2u]);
+    let focal = Double(held.intrinsics[axis], held.intrinsics_low[axis]);
+    let principal = Double(held.intrinsics[axis + 2u], held.intrinsics_low[axis + 2u]);
     return sum(product(focal, quotient(position, depth)), principal);
 }
 
@@ -60,9 +60,9 @@ fn clipped_extent(
 // for the second order.
 fn ball_extent(center: vec3<f32>, radius: f32, nearest: f32) -> vec4<f32> {
     let ratio = center.xy / center.z;
-    let image = ratio * view.intrinsics.xy + view.intrinsics.zw;
+    let image = ratio * held.intrinsics.xy + held.intrinsics.zw;
     let turned = radius * sqrt(1.0 + ratio * ratio) / nearest;
-    let extent = (turned + turned * turned) * view.intrinsics.xy;
+    let extent = (turned + turned * turned) * held.intrinsics.xy;
     return vec4<f32>(image - extent, image + extent);
 }
 
@@ -80,8 +80,8 @@ fn precise_rows(
     let a_y = minor(t[2], p[0], t[0], p[2]);
     let a_z = minor(t[0], p[1], t[1], p[0]);
     let away = sum(sum(product(s[0], a_x), product(s[1], a_y)), product(s[2], a_z));
-    let per_x = quotient(single(1.0), product(away, Double(view.intrinsics.x, view.intrinsics_low.x)));
-    let per_y = quotient(single(1.0), product(away, Double(view.intrinsics.y, view.intrinsics_low.y)));
+    let per_x = quotient(single(1.0), product(away, Double(held.intrinsics.x, held.intrinsics_low.x)));
+    let per_y = quotient(single(1.0), product(away, Double(held.intrinsics.y, held.intrinsics_low.y)));
     return thin_rows(
         product(a_x, per_x),
         product(a_y, per_y),
@@ -108,7 +108,7 @@ fn homography(
     for (var i = 0u; i < 3u; i++) {
         scaled[i] = Double(center[i].high * scale, center[i].low * scale);
     }
-    var h = scaled_homography(scaled, s * scale, t * scale, s_world * scale, t_world * scale, view.near * scale, every);
+    var h = scaled_homography(scaled, s * scale, t * scale, s_world * scale, t_world * scale, held.near * scale, every);
     // The rows are inverse lengths.
     h.a *= scale;
     h.a_low *= scale;
@@ -139,7 +139,7 @@ fn scaled_homography(
     if (p.z + slope < near) {
         return h;
     }
-    let focal = view.intrinsics.xy;
+    let focal = held.intrinsics.xy;
     // Edge-on the rows vanish, and then u is set to 2: outside the disk.
     let edge_on = away == 0.0;
     let scale = select(vec3<f32>(1.0 / (away * focal), 1.0 / away), vec3<f32>(0.0), edge_on);
@@ -194,8 +194,8 @@ fn scaled_homography(
     }
     // The disk reaches the near depth, or its centre lies far outside the image: no useful centre pixel, so the
     // homography is anchored in the image and the bounds are those of the part in front.
-    h.anchor = vec2<i32>(vec2<u32>(view.width, view.height) / 2u);
-    let d = vec3<f32>((vec2<f32>(h.anchor) + 0.5 - view.intrinsics.zw) / focal, 1.0);
+    h.anchor = vec2<i32>(vec2<u32>(held.width, held.height) / 2u);
+    let d = vec3<f32>((vec2<f32>(h.anchor) + 0.5 - held.intrinsics.zw) / focal, 1.0);
     let unscaled = vec3<f32>(focal, 1.0);
     h.a = vec3<f32>(a.xy, dot(a * unscaled, d));
     h.b = vec3<f32>(b.xy, dot(b * unscaled, d));
@@ -209,8 +209,8 @@ fn scaled_homography(
         end_0 = along * steepest + half * vec2<f32>(-steepest.y, steepest.x);
         end_1 = along * steepest - half * vec2<f32>(-steepest.y, steepest.x);
     }
-    let across = clipped_extent(s.xz, t.xz, p.xz, end_0, end_1, near) * focal.x + view.intrinsics.z;
-    let down = clipped_extent(s.yz, t.yz, p.yz, end_0, end_1, near) * focal.y + view.intrinsics.w;
+    let across = clipped_extent(s.xz, t.xz, p.xz, end_0, end_1, near) * focal.x + held.intrinsics.z;
+    let down = clipped_extent(s.yz, t.yz, p.yz, end_0, end_1, near) * focal.y + held.intrinsics.w;
     h.low = vec2<f32>(across.x, down.x) - 1.0;
     h.high = vec2<f32>(across.y, down.y) + 1.0;
     return h;
@@ -254,14 +254,14 @@ fn plane_depth(abc: vec3<f32>, low: f32, high: f32) -> f32 {
 
 // The world direction, of unit length, of the ray through the centre of the pixel.
 fn ray(x: u32, y: u32) -> vec3<f32> {
-    let image = (vec2<f32>(f32(x), f32(y)) + 0.5 - view.intrinsics.zw) / view.intrinsics.xy;
-    return normalize(image.x * view.rotation[0].xyz + image.y * view.rotation[1].xyz + view.rotation[2].xyz);
+    let image = (vec2<f32>(f32(x), f32(y)) + 0.5 - held.intrinsics.zw) / held.intrinsics.xy;
+    return normalize(image.x * held.rotation[0].xyz + image.y * held.rotation[1].xyz + held.rotation[2].xyz);
 }
 
 // The point at a depth on that ray, relative to the scene's origin, device units.
 fn point_at(x: u32, y: u32, depth: f32) -> vec3<f32> {
-    let image = (vec2<f32>(f32(x), f32(y)) + 0.5 - view.intrinsics.zw) / view.intrinsics.xy * depth;
-    return view.eye.xyz + image.x * view.rotation[0].xyz + image.y * view.rotation[1].xyz + depth * view.rotation[2].xyz;
+    let image = (vec2<f32>(f32(x), f32(y)) + 0.5 - held.intrinsics.zw) / held.intrinsics.xy * depth;
+    return held.eye.xyz + image.x * held.rotation[0].xyz + image.y * held.rotation[1].xyz + depth * held.rotation[2].xyz;
 }
 
 // The third row of the matrix that takes an image point to (u, v, 1), up to a factor.
@@ -273,14 +273,14 @@ fn homogeneous_row(splat: Splat) -> vec3<f32> {
 // linear over the image of a plane, in [0, 1] and largest in front; and the cosine between the ray through an image
 // point and the camera's axis.
 fn depth_of(c: f32) -> f32 {
-    return 1.0 / max(c, 1.0 / view.farthest);
+    return 1.0 / max(c, 1.0 / held.farthest);
 }
 
 fn depth_order(z: f32) -> f32 {
-    return min(view.near / z, 1.0);
+    return min(held.near / z, 1.0);
 }
 
 fn along_axis(image: vec2<f32>) -> f32 {
-    let d = (image - view.intrinsics.zw) / view.intrinsics.xy;
+    let d = (image - held.intrinsics.zw) / held.intrinsics.xy;
     return inverseSqrt(1.0 + dot(d, d));
 }

@@ -9,5 +9,5 @@ fn accumulate_color(pixel: u32, weight: Term, color: vec4<f32>) {
 }
 
 fn resolve_color(pixel: u32, weight: f32) -> vec4<f32> {
-    return view.color_low;
+    return held.color_low;
 }

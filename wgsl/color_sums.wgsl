@@ -6,7 +6,7 @@ const COLOR_CHANNEL: u32 = 1u;
 override COLOR_CHANNELS: u32;
 
 fn in_range(premultiplied: vec4<f32>) -> vec4<f32> {
-    return (premultiplied - view.color_low) * view.color_scale;
+    return (premultiplied - held.color_low) * held.color_scale;
 }
 
 fn accumulate_color(pixel: u32, weight: Term, color: vec4<f32>) {
@@ -22,5 +22,5 @@ fn resolve_color(pixel: u32, weight: f32) -> vec4<f32> {
     for (var k = 0u; k < COLOR_CHANNELS; k++) {
         mean[k] = sum_at(pixel, COLOR_CHANNEL + k) / weight;
     }
-    return view.color_low + view.color_span * mean;
+    return held.color_low + held.color_span * mean;
 }

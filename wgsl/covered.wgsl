@@ -16,12 +16,12 @@ const COVERED_LIST: u32 = 8u;
 
 // Tiles in a row of the image.
 fn tiles_across() -> u32 {
-    return (view.width + TILE_WIDTH - 1u) / TILE_WIDTH;
+    return (held.width + TILE_WIDTH - 1u) / TILE_WIDTH;
 }
 
 // Tiles of the band.
 fn tiles_in_band() -> u32 {
-    return tiles_across() * ((band.rows + TILE_ROWS - 1u) / TILE_ROWS);
+    return tiles_across() * ((held_band.rows + TILE_ROWS - 1u) / TILE_ROWS);
 }
 
 // One invocation a tile.

@@ -36,11 +36,11 @@ struct Ball {
 
 fn ball_of(batch: u32) -> Ball {
     let ball = balls[batch];
-    let relative = ball.xyz * view.unit - view.eye.xyz;
+    let relative = ball.xyz * held.unit - held.eye.xyz;
     var b: Ball;
     b.center = rotate_plain(relative);
     // Ten roundings of f32 in these lengths.
-    b.radius = ball.w * view.unit + 1e-6 * (length(relative) + length(view.eye.xyz));
+    b.radius = ball.w * held.unit + 1e-6 * (length(relative) + length(held.eye.xyz));
     b.nearest = b.center.z - b.radius;
     b.farthest = b.center.z + b.radius;
     return b;
@@ -55,7 +55,7 @@ fn pixels_of(ball: Ball) -> Rectangle {
     // A pixel more on each side, as splats' own bounds have a margin, and one for rounding.
     let margin = FILTER_REACH + 2.0 + 1e-5 * (abs(extent.xy) + abs(extent.zw));
     let first = max(extent.xy - margin, vec2<f32>(0.0));
-    let last = min(extent.zw + margin, vec2<f32>(f32(view.width), f32(view.height)) - 1.0);
+    let last = min(extent.zw + margin, vec2<f32>(f32(held.width), f32(held.height)) - 1.0);
     if (!all(first <= last)) {
         return Rectangle(vec2<u32>(1u), vec2<u32>(0u));
     }
@@ -72,7 +72,7 @@ fn leave_out(batch: u32) {
 
 // Whether the batch reaches the near depth, so that its place in the image says nothing.
 fn reaches_near(ball: Ball) -> bool {
-    return !(ball.nearest > view.near);
+    return !(ball.nearest > held.near);
 }
 
 // One invocation a batch.
@@ -82,6 +82,7 @@ fn cull_near(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
+    hold_view();
     let batch = linear_index(workgroup, workgroups, local);
     if (batch >= arrayLength(&balls)) {
         return;
@@ -89,9 +90,9 @@ fn cull_near(
     let ball = ball_of(batch);
     let near = reaches_near(ball);
     let pixels = pixels_of(ball);
-    if (ball.farthest < view.near || (!near && any(pixels.first > pixels.last))) {
+    if (ball.farthest < held.near || (!near && any(pixels.first > pixels.last))) {
         leave_out(batch);
-    } else if (near || ball.center.z <= view.middle) {
+    } else if (near || ball.center.z <= held.middle) {
         list(batch);
     } else {
         let place = atomicAdd(&surviving[LIST_REST], 1u);

@@ -11,10 +11,10 @@ fn accumulate_depth(pixel: u32, weight: Term, depth: f32, front: f32) {
 
 fn write_depth(out: u32, pixel: u32, weight: f32, front: f32) {
     let mean = sum_at(pixel, DEPTH_CHANNEL) / weight;
-    image[out + DEPTH_IMAGE] = (front + mean * (deepest_accepted(front) - front)) * view.world;
+    image[out + DEPTH_IMAGE] = (front + mean * (deepest_accepted(front) - front)) * held.world;
 }
 
 // +inf.
 fn write_no_depth(out: u32) {
-    image[out + DEPTH_IMAGE] = bitcast<f32>(NOTHING ^ view.zero);
+    image[out + DEPTH_IMAGE] = bitcast<f32>(NOTHING ^ held.zero);
 }

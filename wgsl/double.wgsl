@@ -11,7 +11,7 @@ struct Double {
 }
 
 fn keep(x: f32) -> f32 {
-    return bitcast<f32>(bitcast<u32>(x) ^ view.zero);
+    return bitcast<f32>(bitcast<u32>(x) ^ held.zero);
 }
 
 // a + b exactly, for |a| >= |b| or a = 0.

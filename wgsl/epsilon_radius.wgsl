@@ -3,8 +3,8 @@
 // Device units.
 fn radius_of(index: u32) -> f32 {
     let surfel = surfel_at(index);
-    let s = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * view.unit;
-    let t = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]) * view.unit;
+    let s = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * held.unit;
+    let t = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]) * held.unit;
     return max(length(s), length(t));
 }
 

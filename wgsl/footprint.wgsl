@@ -1,36 +1,6 @@
 // The splat's record evaluated at a pixel: the one place where coverage, depth and rho are decided, in every pass.
 // Twin: src/passes/footprint.rs.
 
-// What is needed of the uniforms at each fragment, read once an invocation: some drivers read uniforms again wherever they
-// are used, which took a tenth of the frame. Every entry point that evaluates fragments starts with hold().
-struct Held {
-    near: f32,
-    farthest: f32,
-    epsilon_relative: f32,
-    epsilon_absolute: f32,
-    epsilon_radius: f32,
-    epsilon_deepest: f32,
-    width: u32,
-    first_row: u32,
-    pixels: u32,
-}
-
-var<private> held: Held;
-
-fn hold() {
-    held = Held(
-        view.near,
-        view.farthest,
-        view.epsilon_relative,
-        view.epsilon_absolute,
-        view.epsilon_radius,
-        view.epsilon_deepest,
-        view.width,
-        band.first_row,
-        band.rows * view.width,
-    );
-}
-
 struct Rectangle {
     first: vec2<u32>,
     last: vec2<u32>,
@@ -47,8 +17,8 @@ fn bounds(splat: Splat) -> Rectangle {
 fn reach(splat: Splat) -> Rectangle {
     let extent = bounds(splat);
     return Rectangle(
-        vec2<u32>(extent.first.x, max(extent.first.y, band.first_row)),
-        vec2<u32>(extent.last.x, min(extent.last.y, band.first_row + band.rows - 1u)),
+        vec2<u32>(extent.first.x, max(extent.first.y, held_band.first_row)),
+        vec2<u32>(extent.last.x, min(extent.last.y, held_band.first_row + held_band.rows - 1u)),
     );
 }
 
@@ -87,15 +57,15 @@ fn footprint(splat: Splat, filter_: Filter, x: u32, y: u32) -> Fragment {
 
 // Depths times this power of two lie in (0, 1).
 fn depth_scale() -> f32 {
-    return 0.5 * bitcast<f32>(0x7f000000u - (bitcast<u32>(view.farthest) & 0x7f800000u));
+    return 0.5 * bitcast<f32>(0x7f000000u - (bitcast<u32>(held.farthest) & 0x7f800000u));
 }
 
 // Pixels of the band; its buffers may have room for more.
 fn band_pixels() -> u32 {
-    return held.pixels;
+    return held_band.rows * held.width;
 }
 
 // The pixel's place in the band's buffers.
 fn pixel_index(x: u32, y: u32) -> u32 {
-    return (y - held.first_row) * held.width + x;
+    return (y - held_band.first_row) * held.width + x;
 }

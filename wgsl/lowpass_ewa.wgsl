@@ -24,7 +24,7 @@ fn low_pass(index: u32, h: ptr<function, Homography>) {
     let extent = sqrt(vec2<f32>(xx, yy));
     (*h).low = center - extent;
     (*h).high = center + extent;
-    let low = max((*h).depth_low, view.near);
+    let low = max((*h).depth_low, held.near);
     let filter_ = Filter(
         (*h).offset.x,
         (*h).offset.y,

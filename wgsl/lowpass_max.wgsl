@@ -13,7 +13,7 @@ fn low_pass(index: u32, h: ptr<function, Homography>) {
     (*h).low = min((*h).low, center - FILTER_RADIUS);
     (*h).high = max((*h).high, center + FILTER_RADIUS);
     let r = 1.0 / FILTER_RADIUS;
-    let low = max((*h).depth_low, view.near);
+    let low = max((*h).depth_low, held.near);
     let high = max((*h).depth_high, low);
     filters[index] = filter_record(Filter((*h).offset.x, (*h).offset.y, low, high, r, 0.0, r, 1.0));
 }

@@ -9,8 +9,8 @@ override TURN_NORMALS: bool;
 fn normal_of(index: u32, splat: Splat) -> vec3<f32> {
     let surfel = surfel_at(index);
     // In device units, so that no product underflows.
-    let s = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * view.unit;
-    let t = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]) * view.unit;
+    let s = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * held.unit;
+    let t = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]) * held.unit;
     let n = cross(s, t);
     let unit_normal = normalize(n / max(max(abs(n.x), abs(n.y)), abs(n.z)));
     let normal = select(unit_normal, -unit_normal, TURN_NORMALS && (splat.bounds_last & AWAY) != 0u);

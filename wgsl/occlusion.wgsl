@@ -5,7 +5,7 @@
 const OCCLUSION_TILE: u32 = 8u;
 
 fn occlusion_tiles() -> vec2<u32> {
-    return (vec2<u32>(view.width, band.rows) + OCCLUSION_TILE - 1u) / OCCLUSION_TILE;
+    return (vec2<u32>(held.width, held_band.rows) + OCCLUSION_TILE - 1u) / OCCLUSION_TILE;
 }
 
 // The farthest of the tile's nearest depths; a pixel where nothing is counts as `nothing`.
@@ -15,11 +15,11 @@ fn farthest_in(tile: u32, nothing: u32) {
         return;
     }
     let first = vec2<u32>(tile % tiles.x, tile / tiles.x) * OCCLUSION_TILE;
-    let end = min(first + OCCLUSION_TILE, vec2<u32>(view.width, band.rows));
+    let end = min(first + OCCLUSION_TILE, vec2<u32>(held.width, held_band.rows));
     var farthest = 0u;
     for (var y = first.y; y < end.y; y++) {
         for (var x = first.x; x < end.x; x++) {
-            let front = kept_depth(atomicLoad(&nearest[y * view.width + x]));
+            let front = kept_depth(atomicLoad(&nearest[y * held.width + x]));
             farthest = max(farthest, select(front, nothing, front == NOTHING));
         }
     }
@@ -69,8 +69,8 @@ fn hidden(splat: Splat, filter_: Filter, pixels: Rectangle, radius: f32) -> bool
     }
     let reached = nearest_reached(splat, filter_, pixels);
     let tiles = occlusion_tiles();
-    let first = (pixels.first - vec2<u32>(0u, band.first_row)) / OCCLUSION_TILE;
-    let last = (pixels.last - vec2<u32>(0u, band.first_row)) / OCCLUSION_TILE;
+    let first = (pixels.first - vec2<u32>(0u, held_band.first_row)) / OCCLUSION_TILE;
+    let last = (pixels.last - vec2<u32>(0u, held_band.first_row)) / OCCLUSION_TILE;
     // Positive f32 order as their bits.
     var front = 0u;
     let start = band_pixels();

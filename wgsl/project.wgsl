@@ -24,8 +24,8 @@ var<workgroup> group_unseen: atomic<u32>;
 fn rotate(world: array<Double, 3>) -> array<Double, 3> {
     var camera: array<Double, 3>;
     for (var row = 0u; row < 3u; row++) {
-        let high = view.rotation[row];
-        let low = view.rotation_low[row];
+        let high = held.rotation[row];
+        let low = held.rotation_low[row];
         camera[row] = sum(
             sum(product(Double(high.x, low.x), world[0]), product(Double(high.y, low.y), world[1])),
             product(Double(high.z, low.z), world[2]),
@@ -36,9 +36,9 @@ fn rotate(world: array<Double, 3>) -> array<Double, 3> {
 
 fn rotate_plain(world: vec3<f32>) -> vec3<f32> {
     return vec3<f32>(
-        dot(view.rotation[0].xyz, world),
-        dot(view.rotation[1].xyz, world),
-        dot(view.rotation[2].xyz, world),
+        dot(held.rotation[0].xyz, world),
+        dot(held.rotation[1].xyz, world),
+        dot(held.rotation[2].xyz, world),
     );
 }
 
@@ -52,12 +52,12 @@ fn project_surfel(index: u32, every: bool) -> u32 {
     let surfel = surfel_at(index);
     var relative: array<Double, 3>;
     for (var i = 0u; i < 3u; i++) {
-        let d = two_sum(surfel.center[i] * view.unit, -view.eye[i]);
-        relative[i] = quick_two_sum(d.high, d.low - view.eye_low[i]);
+        let d = two_sum(surfel.center[i] * held.unit, -held.eye[i]);
+        relative[i] = quick_two_sum(d.high, d.low - held.eye_low[i]);
     }
     // f32 serves for the half-axes of most splats; thin ones come back for more (rows.wgsl).
-    let s_world = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * view.unit;
-    let t_world = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]) * view.unit;
+    let s_world = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * held.unit;
+    let t_world = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]) * held.unit;
     let center = rotate(relative);
     let s = rotate_plain(s_world);
     let t = rotate_plain(t_world);
@@ -68,7 +68,7 @@ fn project_surfel(index: u32, every: bool) -> u32 {
     low_pass(index, &h);
 
     // Bounds are conservative: the margin covers the rounding of the extent, and `intersect` decides.
-    let size = vec2<f32>(f32(view.width), f32(view.height));
+    let size = vec2<f32>(f32(held.width), f32(held.height));
     let margin = 0.01 + 1e-5 * (abs(h.low) + abs(h.high));
     let first = max(ceil(h.low - margin - 0.5), vec2<f32>(0.0));
     let last = min(floor(h.high + margin - 0.5), size - 1.0);
@@ -112,6 +112,7 @@ fn project(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
+    hold_view();
     let index = surfel_of(workgroup, workgroups, local);
     var fate = IN_VIEW;
     if (index < surfels_held()) {
@@ -129,6 +130,7 @@ fn project_rare(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
+    hold_view();
     let place = linear_index(workgroup, workgroups, local);
     var fate = IN_VIEW;
     if (place < listed[0]) {

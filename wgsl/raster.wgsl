@@ -76,7 +76,7 @@ fn corner_of(vertex: u32) -> Corner {
     let splat = splat_of(projected[index]);
     // The quad's triangles are 0, 1, 2 and 3, 2, 1.
     let image = corner_image(splat, select(place, 6u - place, place > 2u));
-    let clip = image / vec2<f32>(f32(view.width), f32(view.height)) * vec2<f32>(2.0, -2.0) + vec2<f32>(-1.0, 1.0);
+    let clip = image / vec2<f32>(f32(held.width), f32(held.height)) * vec2<f32>(2.0, -2.0) + vec2<f32>(-1.0, 1.0);
     let extent = bounds(splat);
     let empty = any(extent.first > extent.last);
     var corner: Corner;

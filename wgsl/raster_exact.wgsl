@@ -18,9 +18,9 @@ fn raster_visibility(corner: Corner) -> @builtin(frag_depth) f32 {
 }
 
 fn front_at(pixel: u32) -> f32 {
-    let place = vec2<u32>(pixel % view.width, pixel / view.width + band.first_row);
+    let place = vec2<u32>(pixel % held.width, pixel / held.width + held_band.first_row);
     let depth = textureLoad(nearest_depth, place, 0);
-    return select(depth / depth_scale(), bitcast<f32>(NOTHING ^ view.zero), depth == 1.0);
+    return select(depth / depth_scale(), bitcast<f32>(NOTHING ^ held.zero), depth == 1.0);
 }
 
 @fragment

@@ -15,7 +15,7 @@ fn corner_depth(splat: Splat, image: vec2<f32>, index: u32) -> f32 {
         return depth_order(z);
     }
     // A fraction of the depth is the same fraction of the distance; a length along the ray is less of a depth.
-    let fraction = z * view.epsilon_relative;
+    let fraction = z * held.epsilon_relative;
     let length = farthest_accepted(z, radius_of(index)) - z - fraction;
     return depth_order(z + fraction + select(length, length * along_axis(image), ALONG_RAY));
 }

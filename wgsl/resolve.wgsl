@@ -31,10 +31,10 @@ fn resolve(
     let x = tile % tiles_across() * TILE_WIDTH + local % TILE_WIDTH;
     for (var row = 0u; row < TILE_ROWS; row += WORKGROUP / TILE_WIDTH) {
         let y = tile / tiles_across() * TILE_ROWS + row + local / TILE_WIDTH;
-        if (tile < tiles_in_band() && x < view.width && y < band.rows) {
-            let pixel = y * view.width + x;
+        if (tile < tiles_in_band() && x < held.width && y < held_band.rows) {
+            let pixel = y * held.width + x;
             show(pixel);
-            resolve_pixel(pixel, pixel, x, y + band.first_row);
+            resolve_pixel(pixel, pixel, x, y + held_band.first_row);
         }
     }
 }
@@ -49,7 +49,7 @@ fn resolve_pixel(sums_of: u32, pixel: u32, x: u32, y: u32) {
         weight = sum_at(sums_of, WEIGHT_CHANNEL);
     }
     if (weight == 0.0) {
-        write_color(out, view.background);
+        write_color(out, held.background);
         write_normal(out, vec3<f32>(0.0));
         write_no_depth(out);
         write_weight(out, 0.0);
@@ -60,7 +60,7 @@ fn resolve_pixel(sums_of: u32, pixel: u32, x: u32, y: u32) {
     let alpha = premultiplied.a;
     let color = select(vec3<f32>(0.0), premultiplied.rgb / alpha, alpha > 0.0);
     let normal = resolve_normal(sums_of, weight);
-    write_color(out, over(vec4<f32>(shade(color, normal, x, y), alpha), view.background));
+    write_color(out, over(vec4<f32>(shade(color, normal, x, y), alpha), held.background));
     write_normal(out, normal);
     write_depth(out, sums_of, weight, front);
     write_weight(out, weight_at(sums_of));

@@ -8,7 +8,7 @@ fn shade(color: vec3<f32>, normal: vec3<f32>, x: u32, y: u32) -> vec3<f32> {
     let toward_eye = -ray(x, y);
     var irradiance = 0.0;
     for (var i = 0u; i < LIGHTS; i++) {
-        let light = view.lights[i];
+        let light = held.lights[i];
         if (all(light.xyz == vec3<f32>(0.0))) {
             irradiance += light.w * abs(dot(normal, toward_eye));
         } else {

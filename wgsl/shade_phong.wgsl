@@ -14,7 +14,7 @@ fn shade(color: vec3<f32>, normal: vec3<f32>, x: u32, y: u32) -> vec3<f32> {
     var irradiance = 0.0;
     var highlight = 0.0;
     for (var i = 0u; i < LIGHTS; i++) {
-        let light = view.lights[i];
+        let light = held.lights[i];
         let is_headlight = all(light.xyz == vec3<f32>(0.0));
         let toward = select(light.xyz, toward_eye, is_headlight);
         let facing = dot(normal, toward);

@@ -25,15 +25,15 @@ fn place_of(index: u32) -> Place {
     return Place(
         at.xy,
         at.z,
-        vec3<f32>(center[0], center[1], center[2]) * view.unit,
+        vec3<f32>(center[0], center[1], center[2]) * held.unit,
         color_part(index, 2u).xyz,
         color_part(index, 3u).xyz,
     );
 }
 
 fn accumulate_place(pixel: u32, weight: Term, place: Place, depth: f32) {
-    let point = point_at(pixel % held.width, pixel / held.width + held.first_row, depth);
-    let step = (point - place.position) * view.world;
+    let point = point_at(pixel % held.width, pixel / held.width + held_band.first_row, depth);
+    let step = (point - place.position) * held.world;
     let at = place.center + vec2<f32>(dot(step, place.u_slope), dot(step, place.v_slope));
     let offset = at - 0.5;
     add_pair(pixel, PLACE_CHANNEL, term(weight, at.x), term(weight, at.y));
@@ -42,7 +42,7 @@ fn accumulate_place(pixel: u32, weight: Term, place: Place, depth: f32) {
 }
 
 fn texel(column: i32, row: i32) -> vec4<f32> {
-    let size = vec2<i32>(i32(view.texture_width), i32(view.texture_height));
+    let size = vec2<i32>(i32(held.texture_width), i32(held.texture_height));
     // Both are at least -1 and at most the size.
     let at = (vec2<i32>(column, row) + size) % size;
     return premultiplied_of(texels[at.y * size.x + at.x]);
@@ -52,7 +52,7 @@ fn texel(column: i32, row: i32) -> vec4<f32> {
 // [0, 1] repeated.
 fn texture_at(place: vec2<f32>) -> vec4<f32> {
     let turns = vec2<f32>(place.x, 1.0 - place.y);
-    let at = fract(turns) * vec2<f32>(f32(view.texture_width), f32(view.texture_height)) - 0.5;
+    let at = fract(turns) * vec2<f32>(f32(held.texture_width), f32(held.texture_height)) - 0.5;
     let low = floor(at);
     let share = at - low;
     let column = i32(low.x);
@@ -70,6 +70,6 @@ fn textured(pixel: u32, weight: f32, blended: vec4<f32>) -> vec4<f32> {
     }
     let offset = mean.xy - 0.5;
     let variance = 0.5 * mean.z - dot(offset, offset);
-    let share = clamp(2.0 - variance / (mean.w * view.place.w), 0.0, 1.0);
-    return blended + share * (texture_at(view.place.xy + offset * view.place.z) - blended);
+    let share = clamp(2.0 - variance / (mean.w * held.place.w), 0.0, 1.0);
+    return blended + share * (texture_at(held.place.xy + offset * held.place.z) - blended);
 }

@@ -23,13 +23,13 @@ struct Column {
 fn column_of(tile: u32, local: u32) -> Column {
     let x = tile % tiles_across() * TILE_WIDTH + local % TILE_WIDTH;
     let row = tile / tiles_across() * TILE_ROWS;
-    var column = Column(x, row + band.first_row, row * view.width + x, 0u, vec2<u32>(0u), vec2<u32>(0u));
+    var column = Column(x, row + held_band.first_row, row * held.width + x, 0u, vec2<u32>(0u), vec2<u32>(0u));
     if (tile < tiles_in_band()) {
         let end = LIST_ENDS + 1u + row / BLOCK_SIDE * cells_across(BLOCK_SIZE) + x / BLOCK_SIDE;
         let list = vec2<u32>(large_lists[end - 1u], large_lists[end]) + lists_start(BLOCK_SIZE);
         column.large = min(list, vec2<u32>(arrayLength(&large_lists)));
         column.small = small_list(tile);
-        column.pixels = select(0u, min(TILE_ROWS, band.rows - row), x < view.width);
+        column.pixels = select(0u, min(TILE_ROWS, held_band.rows - row), x < held.width);
     }
     return column;
 }
@@ -123,7 +123,7 @@ fn load(column: Column, first: u32) -> vec4<f32> {
     var depths = vec4<f32>(0.0);
     for (var k = 0u; k < 4u; k++) {
         if (first + k < column.pixels) {
-            depths[k] = bitcast<f32>(kept_depth(atomicLoad(&nearest[column.pixel + (first + k) * view.width])));
+            depths[k] = bitcast<f32>(kept_depth(atomicLoad(&nearest[column.pixel + (first + k) * held.width])));
         }
     }
     return depths;
@@ -132,7 +132,7 @@ fn load(column: Column, first: u32) -> vec4<f32> {
 fn store(column: Column, first: u32, depths: vec4<f32>) {
     for (var k = 0u; k < 4u; k++) {
         if (first + k < column.pixels) {
-            atomicStore(&nearest[column.pixel + (first + k) * view.width], kept_depth(bitcast<u32>(depths[k])));
+            atomicStore(&nearest[column.pixel + (first + k) * held.width], kept_depth(bitcast<u32>(depths[k])));
         }
     }
 }
@@ -184,7 +184,7 @@ fn front_of(column: Column, k: u32) -> f32 {
     if (k >= column.pixels) {
         return 0.0;
     }
-    let front = front_at(column.pixel + k * view.width);
+    let front = front_at(column.pixel + k * held.width);
     return select(front, 0.0, bitcast<u32>(front) == NOTHING);
 }
 
@@ -256,7 +256,7 @@ fn tile_accumulate(
     sum_tile(column);
     for (var k = 0u; k < column.pixels; k++) {
         show(k);
-        deposit(column.pixel + k * view.width);
+        deposit(column.pixel + k * held.width);
     }
 }
 
@@ -273,6 +273,6 @@ fn tile_resolve(
     sum_tile(column);
     for (var k = 0u; k < column.pixels; k++) {
         show(k);
-        resolve_pixel(k, column.pixel + k * view.width, column.x, column.y + k);
+        resolve_pixel(k, column.pixel + k * held.width, column.x, column.y + k);
     }
 }

@@ -145,7 +145,7 @@ fn the_device_paints_as_its_twin_does() {
     for (file, from, to) in [
         ("texture.wgsl", "fract(turns)", "fract(turns + 0.001)"),
         ("texture.wgsl", "clamp(2.0 -", "clamp(200.0 -"),
-        ("texture.wgsl", "(point - place.position) * view.world", "(point - place.position) * (0.9 * view.world)"),
+        ("texture.wgsl", "(point - place.position) * held.world", "(point - place.position) * (0.9 * held.world)"),
         ("texture.wgsl", "texel(column + 1, row + 1), share.x)", "texel(column + 1, row + 1), 0.99 * share.x)"),
         ("srgb.wgsl", "(code >> 8u) & 0xffu", "(code >> 9u) & 0xffu"),
         ("resolve.wgsl", "textured(sums_of, weight, resolve_color(sums_of, weight))", "resolve_color(sums_of, weight)"),

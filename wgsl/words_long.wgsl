@@ -22,7 +22,7 @@ fn each_word(four: Words) -> vec4<u32> {
 // Two words each; the host fills up the last.
 @group(0) @binding(2) var<storage, read> surfels: array<u64>;
 
-// Where two words start at the middle of the first, the second's other half follows.
+// Two words that start with the first, or at its middle.
 fn shifted(first: u64, second: u64, odd: bool) -> vec2<f32> {
     let low = select(low_word(first), high_word(first), odd);
     let high = select(high_word(first), low_word(second), odd);

@@ -1,0 +1,197 @@
+//! WGSL states the layout, Rust mirrors it, this decides: name, offset, size and scalar kind of every member of every
+//! struct that a binding of any reachable module can see, and the constants that both sides hold.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+#[path = "../common/mod.rs"]
+mod common;
+mod mirrors;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use common::modules;
+use epsplat::gpu::Sources;
+use epsplat::gpu::kernel::{FILES, reflect};
+use epsplat::gpu::layout::{
+    AWAY, BATCH, BLOCK_SIDE, COVERED_GRID, COVERED_GRID_OF_EIGHTS, COVERED_LIST, LIST_ENDS, LIST_START, MOST_GROUPS,
+    OCCLUSION_TILE, ONE, ONE_WIDE, QUEUE_GRID, QUEUE_LISTING, QUEUE_START, TILE, TILE_WIDTH, WORKGROUP,
+};
+use epsplat::passes::accumulate::accumulator;
+use epsplat::passes::variant::{self, COLOR_CHANNEL, PixelLayout, color_channels};
+use epsplat::scene::SceneNeeds;
+use epsplat::scene::camera::MAX_SIDE;
+use epsplat::scene::options::{LEAST_FILTERED_WEIGHT, LEAST_WEIGHT};
+use mirrors::{differences, elements, kept_as, mirrors};
+use naga::{AddressSpace, Expression, Literal, Module};
+
+/// The first module of `needs`.
+fn first_of(sources: &Sources, needs: &SceneNeeds) -> Module {
+    reflect(&sources.join(&variant::modules(needs)[0].0)).unwrap().0
+}
+
+#[test]
+fn mirrors_have_no_gaps() {
+    for (name, mirror) in mirrors() {
+        let mut next = 0;
+        for member in &mirror.members {
+            assert_eq!(member.offset, next, "{name}.{}", member.name);
+            next += member.shape.bytes();
+        }
+        assert_eq!(next, mirror.size, "{name}");
+    }
+}
+
+#[test]
+fn every_binding_has_the_hosts_layout() {
+    let mut seen = BTreeSet::new();
+    for made in modules::different() {
+        let (module, needs) = (&made.reflected().module, &made.needs);
+        assert_eq!(
+            differences(module, if made.of_tiles() { "fixed" } else { kept_as(needs) }),
+            Vec::<String>::new(),
+            "{}",
+            needs.accumulator
+        );
+        let buffers = module.global_variables.iter().filter(|(_, v)| v.space != AddressSpace::Handle);
+        seen.extend(buffers.filter_map(|(_, v)| v.binding.and(v.name.clone())));
+    }
+    let known: BTreeSet<String> = elements("fixed").keys().map(|name| (*name).to_owned()).collect();
+    assert_eq!(seen, known, "buffers in WGSL, and those the host knows");
+}
+
+#[test]
+fn a_changed_layout_is_noticed() {
+    // So that no kernel uses `middle`, and the module stays valid.
+    let needs = common::all_needs().into_iter().find(|needs| !needs.cull).unwrap();
+    let broken = |from: &str, to: &str| {
+        let sources = Sources::default().replace("layout.wgsl", from, to).unwrap();
+        differences(&first_of(&sources, &needs), needs.accumulator).join("; ")
+    };
+    let swapped =
+        broken("    a: array<f32, 3>,\n    b: array<f32, 3>,\n", "    b: array<f32, 3>,\n    a: array<f32, 3>,\n");
+    assert!(swapped.contains("Splat") && swapped.contains("\"a\""), "{swapped}");
+    let renamed = broken("    middle: f32,\n", "    center: f32,\n");
+    assert!(renamed.contains("View.center exists in WGSL only"), "{renamed}");
+    assert!(renamed.contains("View.middle exists in Rust only"), "{renamed}");
+    let exchanged = broken(
+        "    farthest: f32,\n    // Depth of the middle of the scene's bounds, device units.\n    middle: f32,\n",
+        "    middle: f32,\n    farthest: f32,\n",
+    );
+    assert!(exchanged.contains("\"farthest\"") && exchanged.contains("\"middle\""), "{exchanged}");
+    let cut = Sources::default().replace("records.wgsl", "array<Words, 4>", "array<Words, 5>").unwrap();
+    let cut = cut.replace("records.wgsl", "splat.a_low[2]))),", "splat.a_low[2]))), words(vec4<u32>()),").unwrap();
+    let cut = differences(&first_of(&cut, &needs), needs.accumulator).join("; ");
+    assert!(cut.contains("projected holds") && cut.contains("splats holds"), "{cut}");
+    let longer = broken("    rows: u32,\n    padding_0: u32,\n", "    rows: u32,\n    padding_0: vec2<u32>,\n");
+    assert!(longer.contains("Band"), "{longer}");
+    let retyped = broken("    middle: f32,\n", "    middle: u32,\n");
+    assert!(retyped.contains("middle") && retyped.contains("Uint"), "{retyped}");
+    // Sums of another kind than the accumulator's.
+    let wide = SceneNeeds { accumulator: "fixed64", ..needs };
+    let other = &first_of(&Sources::default(), &wide);
+    assert_eq!(differences(other, "packed64"), Vec::<String>::new());
+    for name in ["fixed", "float"] {
+        let sums = differences(other, name).join("; ");
+        assert!(sums.contains("sums holds"), "{sums}");
+    }
+}
+
+#[test]
+fn binding_numbers_are_unique_over_all_files() {
+    let mut numbers: BTreeMap<u32, BTreeSet<String>> = BTreeMap::new();
+    let mut names: BTreeMap<String, BTreeSet<u32>> = BTreeMap::new();
+    for made in modules::different() {
+        for (_, variable) in made.reflected().module.global_variables.iter() {
+            if let (Some(binding), Some(name)) = (&variable.binding, &variable.name) {
+                assert_eq!(binding.group, 0, "{name}");
+                numbers.entry(binding.binding).or_default().insert(name.clone());
+                names.entry(name.clone()).or_default().insert(binding.binding);
+            }
+        }
+    }
+    assert!(numbers.len() >= 14);
+    assert!(numbers.values().all(|names| names.len() == 1), "{numbers:?}");
+    assert!(names.values().all(|numbers| numbers.len() == 1), "{names:?}");
+}
+
+fn constant(module: &Module, name: &str) -> Option<f64> {
+    let (_, constant) = module.constants.iter().find(|(_, c)| c.name.as_deref() == Some(name))?;
+    match module.global_expressions[constant.init] {
+        Expression::Literal(Literal::U32(value)) => Some(f64::from(value)),
+        Expression::Literal(Literal::F32(value)) => Some(f64::from(value)),
+        ref other => panic!("{name} is {other:?}"),
+    }
+}
+
+#[test]
+fn constants_agree() {
+    for made in modules::different() {
+        let (module, needs, tiles) = (&made.reflected().module, made.needs, made.of_tiles());
+        let constant = |name| constant(module, name);
+        for (name, value) in [
+            ("WORKGROUP", WORKGROUP),
+            ("TILE", TILE),
+            ("QUEUE_START", QUEUE_START),
+            ("QUEUE_GRID", QUEUE_GRID),
+            ("QUEUE_LISTING", QUEUE_LISTING),
+            ("TILE_WIDTH", TILE_WIDTH),
+            ("COVERED_LIST", COVERED_LIST),
+            ("COVERED_GRID", COVERED_GRID),
+            ("COVERED_GRID_OF_EIGHTS", COVERED_GRID_OF_EIGHTS),
+            ("MOST_GROUPS", MOST_GROUPS),
+            ("AWAY", AWAY),
+            ("NOTHING", f32::INFINITY.to_bits()),
+            ("WEIGHT_CHANNEL", 0),
+        ] {
+            assert_eq!(constant(name), Some(f64::from(value)), "{name}");
+        }
+        let tile = needs.raster.is_none().then_some(f64::from(OCCLUSION_TILE));
+        assert_eq!(constant("OCCLUSION_TILE"), tile);
+        let of_tiles = [("BLOCK_SIDE", BLOCK_SIDE), ("LIST_ENDS", LIST_ENDS)];
+        let of_batches = [("BATCH", BATCH), ("LIST_START", LIST_START)];
+        for (exists, constants) in [(tiles, &of_tiles[..]), (needs.cull, &of_batches)] {
+            for &(name, value) in constants {
+                assert_eq!(constant(name), exists.then_some(f64::from(value)), "{name}");
+            }
+        }
+        assert_eq!(constant("LEAST_WEIGHT"), Some(LEAST_WEIGHT));
+        assert_eq!(constant("LEAST_FILTERED_WEIGHT"), Some(LEAST_FILTERED_WEIGHT));
+        let colors = color_channels(&needs) > 0;
+        assert_eq!(constant("COLOR_CHANNEL"), colors.then_some(f64::from(COLOR_CHANNEL)));
+        let one = match needs.accumulator {
+            _ if needs.raster.is_some() => None,
+            "fixed" if !needs.wide_sums => Some(f64::from(ONE)),
+            "fixed" | "fixed64" => Some(ONE_WIDE as f64),
+            _ => None,
+        };
+        assert_eq!(constant("ONE"), one, "{}", needs.accumulator);
+        for entry in module.entry_points.iter().filter(|entry| entry.stage == naga::ShaderStage::Compute) {
+            let size = match entry.name.as_str() {
+                "arrange" | "arrange_rare" | "arrange_covered" => [1, 1, 1],
+                "bin_count_large" | "bin_place_large" => [8, 8, 1],
+                "bin_scan" | "bin_scan_large" => [256, 1, 1],
+                name if name.ends_with("_large") => [TILE, TILE, 1],
+                _ => [WORKGROUP, 1, 1],
+            };
+            assert_eq!(entry.workgroup_size, size, "{}", entry.name);
+        }
+    }
+    // The least weight is a whole number of units, and the bits that follow from it are kept.
+    assert_eq!((f64::from(ONE) * LEAST_WEIGHT).fract(), 0.0);
+    // A pixel's row fits beside the flag, its column below the row.
+    assert_eq!((MAX_SIDE - 1) << 16 & AWAY, 0);
+    const { assert!(MAX_SIDE - 1 <= 0xffff) };
+    // The scale is stated once: no kernel repeats it as a number.
+    let repeated = FILES.iter().map(|(_, text)| text.matches(&ONE.to_string()).count()).sum::<usize>();
+    assert_eq!(repeated, 1);
+}
+
+#[test]
+fn the_hosts_room_for_a_pixels_sums_is_the_devices() {
+    for needs in common::all_needs() {
+        let (channels, row) = (PixelLayout::of(&needs).channels, accumulator(needs.accumulator).unwrap());
+        let (shapes, halves) = sums_of(row.name);
+        let bytes = channels as usize * halves as usize * shapes[0].bytes() / 2;
+        assert_eq!(bytes, 4 * (channels * row.words) as usize, "{}", row.name);
+    }
+}

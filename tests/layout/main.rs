@@ -21,7 +21,7 @@ use epsplat::passes::variant::{self, COLOR_CHANNEL, PixelLayout, color_channels}
 use epsplat::scene::SceneNeeds;
 use epsplat::scene::camera::MAX_SIDE;
 use epsplat::scene::options::{LEAST_FILTERED_WEIGHT, LEAST_WEIGHT};
-use mirrors::{differences, elements, kept_as, mirrors};
+use mirrors::{differences, elements, kept_as, mirrors, sums_of};
 use naga::{AddressSpace, Expression, Literal, Module};
 
 /// The first module of `needs`.

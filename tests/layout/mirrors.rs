@@ -114,7 +114,7 @@ pub enum Element {
 }
 
 /// What an accumulator keeps a sum in, and how many of them (twice, as packed ones hold two sums).
-fn sums_of(accumulator: &str) -> (&'static [Shape], u32) {
+pub fn sums_of(accumulator: &str) -> (&'static [Shape], u32) {
     match accumulator {
         "fixed" => (&[u32::SHAPE], 4),
         "fixed32" | "cas" => (&[u32::SHAPE], 2),

@@ -109,7 +109,9 @@ fn measure(scene: &Scene, backend: &Backend, rounds: usize) -> Result<Measured> 
         let start = Instant::now();
         let (_frame, report) = renderer.frame(&camera, &())?;
         let total = start.elapsed().as_secs_f64() * 1e3;
-        let [project, visibility, accumulate, resolve] = PASSES.map(|pass| report.passes[&format!("{pass}_ms")]);
+        // Tiles that gather resolve their pixels as they accumulate.
+        let of_pass = |pass| report.passes.get(&format!("{pass}_ms")).copied().unwrap_or(0.0);
+        let [project, visibility, accumulate, resolve] = PASSES.map(of_pass);
         epsplat.push([total, project, visibility, accumulate, resolve]);
     }
     let radius = f64::from(scene.largest_radius()) * camera.fx / camera.to_camera(DVec3::ZERO).z;

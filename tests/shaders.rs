@@ -251,6 +251,7 @@ fn absent_parts_have_their_partners_signatures() {
         [starting("accumulator_"), starting("terms")].concat().into_iter().filter(|name| !apart.contains(name));
     alike_in("terms", with_terms.collect(), &["quantise", "term"]);
     alike("words", &["words", "each_word", "surfel_at", "surfels_held"]);
+    alike("image_", &["write_color"]);
     alike("tile_add", &["add"]);
     alike("tile_deposit", &["deposit_sums"]);
     alike("splat_", &["hold_lane", "fetcher", "offered", "farthest_in_tile", "handed"]);

@@ -1,16 +1,8 @@
 // Stage 4: sums become the image: divide by the weight, shade, put over the background. One invocation a pixel of a covered
 // tile. Twin: src/passes/resolve.rs.
 
-// Words of a pixel in the image; the colour's four come first.
+// Words of a pixel in the image (image_*.wgsl); the colour's four come first.
 override IMAGE_WORDS: u32;
-
-@group(0) @binding(10) var<storage, read_write> image: array<f32>;
-
-fn write_color(out: u32, color: vec4<f32>) {
-    for (var k = 0u; k < 4u; k++) {
-        image[out + k] = color[k];
-    }
-}
 
 // Straight alpha over straight alpha.
 fn over(front: vec4<f32>, back: vec4<f32>) -> vec4<f32> {

@@ -51,6 +51,8 @@ pub const FILES: &[(&str, &str)] = wgsl![
     "epsilon_radius.wgsl",
     "filter.wgsl",
     "footprint.wgsl",
+    "image_color.wgsl",
+    "image_maps.wgsl",
     "kernel_constant.wgsl",
     "kernel_ellipse.wgsl",
     "kernel_gaussian.wgsl",

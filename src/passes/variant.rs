@@ -120,6 +120,7 @@ fn files(needs: &SceneNeeds) -> Vec<&'static str> {
         },
         "covered.wgsl",
         "resolve.wgsl",
+        pick(has_maps(needs), "image_maps.wgsl", "image_color.wgsl"),
         pick(needs.normal, "normal.wgsl", "normal_absent.wgsl"),
         pick(needs.normal_map, "normal_map.wgsl", "normal_map_absent.wgsl"),
         pick(needs.weight_map, "weight_map.wgsl", "weight_map_absent.wgsl"),
@@ -164,6 +165,11 @@ fn files(needs: &SceneNeeds) -> Vec<&'static str> {
     }
     files.push(pick(needs.color == ColorNeed::Textured, "texture.wgsl", "texture_absent.wgsl"));
     files
+}
+
+/// Whether pixels of the image have more than a colour.
+fn has_maps(needs: &SceneNeeds) -> bool {
+    needs.normal_map || needs.depth || needs.weight_map || needs.count
 }
 
 /// The files of the tiles' module.

@@ -1,0 +1,9 @@
+// The image where maps follow each pixel's colour.
+
+@group(0) @binding(10) var<storage, read_write> image: array<f32>;
+
+fn write_color(out: u32, color: vec4<f32>) {
+    for (var k = 0u; k < 4u; k++) {
+        image[out + k] = color[k];
+    }
+}

@@ -14,8 +14,8 @@
 //!   `atomicAdd(high, 1)`. They overflow after 2^32 full weights.
 //!   A term errs by a relative u of itself, which moves the mean by at most u, and by half a unit, which moves it by
 //!   `n / (2 sum W)`; rounding the weights moves it by as much again, times the spread of the attributes, which is at most
-//!   1: `n / (F w)`. Reading two sums, dividing, and mapping back are four f32 operations: `5 u` in all. A carry for each
-//!   full weight is still rarer than fragments, whose weights are mostly small, and was not measurable in frame times;
+//!   1: `n / (F w)`. Reading two sums, dividing, and mapping back are four f32 operations: `5 u` in all. A sum carries
+//!   once for each full weight, which is rarer than fragments (on a software adapter carries are a fifth of the pass);
 //!   and the rim of the paper's kernel, exp(-6), keeps 23 bits. Where weights may be smaller still, or alphas differ
 //!   ([`SceneNeeds::wide_sums`](crate::scene::SceneNeeds::wide_sums)), terms are those of `fixed64` in two words, which
 //!   takes two additions for most. An adapter with 64-bit atomics makes the same sums in half the additions.

@@ -14,7 +14,7 @@ use pixels::{PixelBuffers, Sums, rows_per_band};
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::buffers::page_len;
-use crate::gpu::layout::{Splat, View};
+use crate::gpu::layout::{BATCH, Splat, View};
 use crate::gpu::timing::Timing;
 use crate::gpu::{Gpu, Sources};
 use crate::passes::accumulate::ACCUMULATORS;
@@ -24,7 +24,7 @@ use crate::passes::project::SplatBuffer;
 use crate::passes::tiles::{Listed, Tiles};
 use crate::passes::upload::SurfelBuffer;
 use crate::passes::variant::Variant;
-use crate::passes::{Recorder, accumulate, project, raster, resolve, tiles, visibility};
+use crate::passes::{Recorder, accumulate, cull, project, raster, resolve, tiles, visibility};
 use crate::progress::Progress;
 use crate::scene::light::MAX_LIGHTS;
 use crate::scene::{Bounds, Camera, Optimisation, Organisation, RenderOptions, Scene, SceneNeeds};
@@ -194,8 +194,10 @@ impl<'a> Renderer<'a> {
                 Organisation::Scatter => false,
             };
         // What is drawn first hides what is drawn later in the same band alone.
-        let culled =
-            bands == 1 && self.options.has(Optimisation::Culling) && 6 * self.scene.surfels.len() > camera.pixels();
+        let culled = bands == 1
+            && self.options.has(Optimisation::Culling)
+            && 6 * self.scene.surfels.len() > camera.pixels()
+            && page_len(gpu, size_of::<Splat>()) >= BATCH.into();
         let needs = needs.with_culling(culled).with_subgroups(shared).with_gather(gather);
         let variant = Variant::of(&needs, self.options, surfels)?;
         match needs.raster {
@@ -204,13 +206,16 @@ impl<'a> Renderer<'a> {
         }
         let program = variant.compile(gpu, sources)?;
         let ordered = self.options.has(Optimisation::Order);
-        let splats = match self.splats.take() {
+        let mut splats = match self.splats.take() {
             Some(splats) => splats,
             None => {
                 let surfels = SurfelBuffer::upload(gpu, self.scene, &needs, ordered, progress)?;
                 SplatBuffer::new(gpu, surfels, needs.low_pass)?
             }
         };
+        if !needs.cull {
+            splats.make_room_for_all(gpu)?;
+        }
         let pixels = match self.pixels.take() {
             Some(pixels) if pixels.made_for == PixelBuffers::key(camera, &variant) => pixels,
             other => {
@@ -227,13 +232,12 @@ impl<'a> Renderer<'a> {
         progress.begin("rendering rows", camera.height.into());
         let start = Instant::now();
         pixels.view.set(gpu, &self.view(camera));
-        let passes_of_pages = if needs.tiles { 6 * splats.pages.len() as u32 } else { 0 };
-        let timing = Timing::new(gpu, 3 + (6 + passes_of_pages) * pixels.bands.len() as u32)?;
+        let timing = Timing::new(gpu);
         let mut recorder = Recorder { gpu, program: &program, view: &pixels.view, variant: &variant, timing };
         let mut frame = Frame::new(camera, &self.options.maps);
         let parts: &'static [Part] = if needs.cull { &[Part::Near, Part::Far] } else { &[Part::All] };
         if let ([first, ..], Sums::Targets(options, targets)) = (&pixels.bands[..], &pixels.sums) {
-            project::record(&mut recorder, &splats, Part::All, (first, None))?;
+            project::record(&mut recorder, &splats, Part::All)?;
             raster::record(&mut recorder, *options, &splats, first, targets)?;
         }
         for rows in &pixels.bands {
@@ -241,7 +245,11 @@ impl<'a> Renderer<'a> {
                 for &part in parts {
                     // Bands share their splats.
                     if rows.first == 0 {
-                        project::record(&mut recorder, &splats, part, (rows, Some(nearest)))?;
+                        if needs.cull {
+                            cull::record(&mut recorder, &splats, part, (rows, nearest))?;
+                            splats.make_room(gpu, part)?;
+                        }
+                        project::record(&mut recorder, &splats, part)?;
                     }
                     visibility::record(&mut recorder, (&splats, part), rows, nearest)?;
                     if part == Part::Near {
@@ -250,8 +258,7 @@ impl<'a> Renderer<'a> {
                 }
                 if fresh && rows.first == 0 && (needs.gather || needs.tiles && splats.most_large(gpu)? > 0) {
                     let kernels = variant.compile_tiles(gpu, sources)?;
-                    let small = if needs.gather { parts } else { &[] };
-                    let mut new = Tiles::new(gpu, (kernels, &needs), (camera.width, &pixels.bands), small)?;
+                    let mut new = Tiles::new(gpu, (kernels, &needs), (camera.width, &pixels.bands))?;
                     let room = new.make_room(&mut recorder, Listed::Large, &splats, &pixels.bands, nearest)?;
                     tiles = room.then_some(new);
                 }
@@ -278,7 +285,7 @@ impl<'a> Renderer<'a> {
                     tiles::resolve(&mut recorder, &splats, rows, tiles, (nearest, &pixels.image))?;
                 }
                 Sums::Storage(nearest, sums) => {
-                    accumulate::record(&mut recorder, (&splats, parts), rows, nearest, sums)?;
+                    accumulate::record(&mut recorder, &splats, rows, nearest, sums)?;
                     match &tiles {
                         Some(tiles) => tiles::accumulate(&mut recorder, &splats, rows, tiles, (nearest, sums))?,
                         None => accumulate::record_large(&mut recorder, &splats, rows, nearest, sums)?,
@@ -301,9 +308,11 @@ impl<'a> Renderer<'a> {
             Sums::Storage(_, sums) => sums.overflows(gpu)?,
             Sums::Gathered(_) | Sums::Targets(..) => 0,
         };
-        if let Some(tiles) = &tiles
-            && !tiles.held(gpu)?
-        {
+        let held = match &tiles {
+            Some(tiles) => tiles.held(gpu)?,
+            None => true,
+        };
+        if !(held && (!needs.cull || splats.held(gpu)?)) {
             // The next try measures the room that it needs.
             (self.splats, self.pixels) = (Some(splats), Some(pixels));
             let (frame, report) = self.on_gpu(gpu, sources, camera, progress)?;

@@ -12,9 +12,9 @@ fn front_at(pixel: u32) -> f32 {
 // The fragments of one invocation: the splat's pixels from `offset` on in steps of `step`. Each round of the outer loop
 // finds the invocation's next fragment and then adds it if it is accepted, so that the invocations of a subgroup, whose
 // fragments lie at different places, do the costly part together. Most are accepted: what is hidden was left out.
-fn accumulate_splat(index: u32, splat: Splat, filter_: Filter, pixels: Rectangle, offset: vec2<u32>, step: u32) {
+fn accumulate_splat(surfel: u32, splat: Splat, filter_: Filter, pixels: Rectangle, offset: vec2<u32>, step: u32) {
     let first = pixels.first + offset;
-    let attributes = attributes_of(index, splat);
+    let attributes = attributes_of(surfel, splat);
     var at = select(first, vec2<u32>(0u, pixels.last.y + 1u), first.x > pixels.last.x);
     loop {
         var fragment: Fragment;
@@ -46,13 +46,15 @@ fn accumulate(
     @builtin(local_invocation_index) local: u32,
 ) {
     hold();
-    let index = surfel_of(workgroup, workgroups, local);
-    if (index < arrayLength(&projected)) {
-        let splat = splat_of(projected[index]);
-        let filter_ = filter_of(index);
+    let slot = slot_of(workgroup, workgroups, local);
+    if (slot < arrayLength(&projected)) {
+        let record = projected[slot];
+        let splat = splat_of(record);
+        let surfel = surfel_in(record, slot);
+        let filter_ = filter_of(slot);
         let pixels = reach(splat);
-        if (!is_large(splat) && !hidden(splat, filter_, pixels, radius_of(index))) {
-            accumulate_splat(index, splat, filter_, pixels, vec2<u32>(0u), 1u);
+        if (!is_large(splat) && !hidden(splat, filter_, pixels, radius_of(surfel))) {
+            accumulate_splat(surfel, splat, filter_, pixels, vec2<u32>(0u), 1u);
         }
     }
 }
@@ -64,9 +66,10 @@ fn accumulate_large(
     @builtin(local_invocation_id) local: vec3<u32>,
 ) {
     hold();
-    let index = large_splat(workgroup.y * workgroups.x + workgroup.x);
-    if (index < arrayLength(&projected)) {
-        let splat = splat_of(projected[index]);
-        accumulate_splat(index, splat, filter_of(index), reach(splat), local.xy, TILE);
+    let slot = large_splat(workgroup.y * workgroups.x + workgroup.x);
+    if (slot < arrayLength(&projected)) {
+        let record = projected[slot];
+        let splat = splat_of(record);
+        accumulate_splat(surfel_in(record, slot), splat, filter_of(slot), reach(splat), local.xy, TILE);
     }
 }

@@ -41,7 +41,7 @@ fn cells_of(pixels: Rectangle, size: vec2<u32>) -> Rectangle {
 
 // Counts the splat in its cells, of each row those from `offset` on in steps of `step`; once counts are starts, this `enters`
 // it in their lists.
-fn list_in_cells(index: u32, splat: Splat, size: vec2<u32>, offset: u32, step: u32, enters: bool) {
+fn list_in_cells(slot: u32, splat: Splat, size: vec2<u32>, offset: u32, step: u32, enters: bool) {
     let pixels = reach(splat);
     if (any(pixels.first > pixels.last)) {
         return;
@@ -51,7 +51,7 @@ fn list_in_cells(index: u32, splat: Splat, size: vec2<u32>, offset: u32, step: u
         for (var x = cells.first.x + offset; x <= cells.last.x; x += step) {
             let at = lists_start(size) + atomicAdd(&lists[LIST_ENDS + 1u + y * cells_across(size) + x], 1u);
             if (enters && at < arrayLength(&lists)) {
-                atomicStore(&lists[at], index);
+                atomicStore(&lists[at], slot);
             }
         }
     }
@@ -59,9 +59,9 @@ fn list_in_cells(index: u32, splat: Splat, size: vec2<u32>, offset: u32, step: u
 
 // A row of the workgroup for each large splat.
 fn list_large(workgroup: vec3<u32>, workgroups: vec3<u32>, local: vec3<u32>, enters: bool) {
-    let index = large_splat((workgroup.y * workgroups.x + workgroup.x) * LISTED_AT_ONCE + local.y);
-    if (index < arrayLength(&projected)) {
-        list_in_cells(index, splat_of(projected[index]), BLOCK_SIZE, local.x, 8u, enters);
+    let slot = large_splat((workgroup.y * workgroups.x + workgroup.x) * LISTED_AT_ONCE + local.y);
+    if (slot < arrayLength(&projected)) {
+        list_in_cells(slot, splat_of(projected[slot]), BLOCK_SIZE, local.x, 8u, enters);
     }
 }
 
@@ -73,18 +73,19 @@ fn bin_count(
     @builtin(local_invocation_index) local: u32,
 ) {
     hold();
-    let index = surfel_of(workgroup, workgroups, local);
-    if (index >= arrayLength(&splats)) {
+    let slot = slot_of(workgroup, workgroups, local);
+    if (slot >= arrayLength(&splats)) {
         return;
     }
-    let splat = splat_of(splats[index]);
+    let record = splats[slot];
+    let splat = splat_of(record);
     if (is_large(splat)) {
         return;
     }
-    if (hidden(splat, filter_of(index), reach(splat), radius_of(index))) {
-        splats[index][0] = words(vec4<u32>(0u, 0u, 0xffffffffu, 0u));
+    if (hidden(splat, filter_of(slot), reach(splat), radius_of(surfel_in(record, slot)))) {
+        splats[slot][0] = words(vec4<u32>(0u, 0u, 0xffffffffu, 0u));
     } else {
-        list_in_cells(index, splat, tile_size(), 0u, 1u, false);
+        list_in_cells(slot, splat, tile_size(), 0u, 1u, false);
     }
 }
 
@@ -95,11 +96,11 @@ fn bin_place(
     @builtin(local_invocation_index) local: u32,
 ) {
     hold();
-    let index = surfel_of(workgroup, workgroups, local);
-    if (index < arrayLength(&projected)) {
-        let splat = splat_of(projected[index]);
+    let slot = slot_of(workgroup, workgroups, local);
+    if (slot < arrayLength(&projected)) {
+        let splat = splat_of(projected[slot]);
         if (!is_large(splat)) {
-            list_in_cells(index, splat, tile_size(), 0u, 1u, true);
+            list_in_cells(slot, splat, tile_size(), 0u, 1u, true);
         }
     }
 }

@@ -56,7 +56,7 @@ fn homography(
     let edge_on = h.away == 0.0;
     let scale = select(1.0 / (h.away * focal), vec2<f32>(0.0), edge_on);
     // A centre farther out than this is no better an anchor for the pixels of the image, and whole numbers stay exact.
-    let pixel = clamp(floor(image), vec2<f32>(-4194304.0), vec2<f32>(4194304.0));
+    let pixel = clamp(floor(image), vec2<f32>(-4194304.0), vec2<f32>(4194303.0));
     let offset = (image - pixel) + vec2<f32>(x.low, y.low) - 0.5;
     let a = vec2<f32>(t.y, -t.x) * scale;
     let b = vec2<f32>(-s.y, s.x) * scale;

@@ -1,18 +1,21 @@
 // Stage 1, its start: which batches of surfels are projected at all. First those in view that lie nearer than the middle of
 // the scene; once these are drawn, those of the others that are not hidden behind them. A batch is left out only if none of
-// its fragments could be nearest or within epsilon of the nearest, so no image depends on it.
+// its fragments could be nearest or within epsilon of the nearest, so no image depends on it. The splats of the others are
+// stored one batch after the other, in slots: those that are left out take no room.
 // Host side and twin: src/passes/cull.rs.
 
 // A batch's bounding ball: centre and radius, world units relative to the scene's origin.
 @group(0) @binding(23) var<storage, read> balls: array<vec4<f32>>;
-// The grid of workgroups that draws the listed batches, of which word 1 counts them; then how many more may be drawn after
-// them; from LIST_START on the numbers of the listed, and from the end back those of the others.
+// The grid of workgroups that draws all listed batches, of which word 1 counts them; from LIST_FAR on that of the far ones;
+// and from LIST_START on the numbers of the near ones and then of the far ones.
 @group(0) @binding(24) var<storage, read_write> surviving: array<atomic<u32>>;
 @group(0) @binding(25) var<storage, read> drawn: array<u32>;
+// Those in view that are not near: how many they are, and their numbers.
+@group(0) @binding(38) var<storage, read_write> rest: array<atomic<u32>>;
 
 const BATCH: u32 = 64u;
-const LIST_START: u32 = 4u;
-const LIST_REST: u32 = 3u;
+const LIST_FAR: u32 = 3u;
+const LIST_START: u32 = 6u;
 
 // Past so many tiles a batch counts as seen: one invocation should not look at a whole image.
 const MOST_TILES: u32 = 4096u;
@@ -20,9 +23,34 @@ const MOST_TILES: u32 = 4096u;
 // What the rounding of rows c may add to or take from a depth, relative (src/passes/cull.rs).
 const DEPTH_SLACK: f32 = 1e-3;
 
-// The surfel of this invocation: a row of the grid is a batch.
-fn surfel_of(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32) -> u32 {
-    return drawn[LIST_START + workgroup.y] * BATCH + workgroup.x * WORKGROUP + local;
+// The slot of this invocation: a row of the grid is a batch, and its rows are the last that are listed so far.
+fn slot_of(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32) -> u32 {
+    return (drawn[1] - workgroups.y + workgroup.y) * BATCH + workgroup.x * WORKGROUP + local;
+}
+
+// The surfel whose splat belongs there; past the last for some in the slots of the last batch.
+fn surfel_for(slot: u32) -> u32 {
+    return drawn[LIST_START + slot / BATCH] * BATCH + slot % BATCH;
+}
+
+// No coordinate of an anchor is past 2^22 (camera_pinhole.wgsl, camera_orthographic.wgsl), so the two leave 18 bits of their
+// words, and those have the number of the batch, of which a page has fewer than 2^16.
+const SPARE: vec2<u32> = vec2<u32>(9u);
+
+fn anchor_words(splat: Splat, surfel: u32) -> vec2<u32> {
+    let anchor = bitcast<vec2<u32>>(vec2<i32>(splat.anchor_x, splat.anchor_y));
+    let batch = surfel / BATCH;
+    return ((anchor << SPARE) >> SPARE) | (vec2<u32>(batch, batch >> SPARE.x) << (32u - SPARE));
+}
+
+fn anchor_of(words: vec2<u32>) -> vec2<i32> {
+    return bitcast<vec2<i32>>(words << SPARE) >> SPARE;
+}
+
+// The surfel of the splat that is stored in a slot.
+fn surfel_in(record: SplatRecord, slot: u32) -> u32 {
+    let spare = each_word(record[0]).xy >> (32u - SPARE);
+    return (spare.x | spare.y << SPARE.x) * BATCH + slot % BATCH;
 }
 
 struct Ball {
@@ -95,8 +123,7 @@ fn cull_near(
     } else if (near || ball.center.z <= held.middle) {
         list(batch);
     } else {
-        let place = atomicAdd(&surviving[LIST_REST], 1u);
-        atomicStore(&surviving[arrayLength(&surviving) - 1u - place], batch);
+        atomicStore(&rest[1u + atomicAdd(&rest[0], 1u)], batch);
     }
 }
 
@@ -120,15 +147,16 @@ fn cull_far(
 ) {
     hold();
     let place = linear_index(workgroup, workgroups, local);
-    if (place >= drawn[LIST_REST]) {
+    if (place >= atomicLoad(&rest[0])) {
         return;
     }
-    let batch = drawn[arrayLength(&drawn) - 1u - place];
+    let batch = atomicLoad(&rest[1u + place]);
     let ball = ball_of(batch);
     if (behind(ball, pixels_of(ball))) {
         leave_out(batch);
     } else {
         list(batch);
+        atomicAdd(&surviving[LIST_FAR + 1u], 1u);
     }
 }
 

@@ -1,5 +1,21 @@
-// Every surfel is projected. Same interface as cull.wgsl.
+// Every surfel is projected, and its splat has the slot of its own number. Same interface as cull.wgsl.
 
-fn surfel_of(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32) -> u32 {
+fn slot_of(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32) -> u32 {
     return linear_index(workgroup, workgroups, local);
+}
+
+fn surfel_for(slot: u32) -> u32 {
+    return slot;
+}
+
+fn anchor_words(splat: Splat, surfel: u32) -> vec2<u32> {
+    return bitcast<vec2<u32>>(vec2<i32>(splat.anchor_x, splat.anchor_y));
+}
+
+fn anchor_of(words: vec2<u32>) -> vec2<i32> {
+    return bitcast<vec2<i32>>(words);
+}
+
+fn surfel_in(record: SplatRecord, slot: u32) -> u32 {
+    return slot;
 }

@@ -29,8 +29,8 @@ fn filter_record(filter_: Filter) -> FilterRecord {
     );
 }
 
-fn filter_of(index: u32) -> Filter {
-    let record = projected_filters[index];
+fn filter_of(slot: u32) -> Filter {
+    let record = projected_filters[slot];
     let place = bitcast<vec4<f32>>(each_word(record[0]));
     let shape = bitcast<vec4<f32>>(each_word(record[1]));
     return Filter(place.x, place.y, place.z, place.w, shape.x, shape.y, shape.z, shape.w);

@@ -38,7 +38,7 @@ fn is_large(splat: Splat) -> bool {
 const QUEUE_START: u32 = 8u;
 const TILE: u32 = 16u;
 
-// The large splat of a place in the queue, or none (a number that is no index).
+// The slot of the large splat at a place in the queue, or none (a number that is no slot).
 fn large_splat(place: u32) -> u32 {
     return select(0xffffffffu, queued[QUEUE_START + place], place < queued[0]);
 }

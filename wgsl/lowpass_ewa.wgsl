@@ -5,9 +5,9 @@
 // (pixel's sigma / kernel's sigma)^2, pixels^2.
 override FILTER_BLUR: f32;
 
-fn low_pass(index: u32, h: ptr<function, Homography>) {
+fn low_pass(slot: u32, h: ptr<function, Homography>) {
     if (!(*h).centered) {
-        filters[index] = filter_record(Filter(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0));
+        filters[slot] = filter_record(Filter(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0));
         return;
     }
     let s = (*h).s_image;
@@ -36,7 +36,7 @@ fn low_pass(index: u32, h: ptr<function, Homography>) {
         // Positive even edge-on: 0 says that there is no filter.
         max(abs(area) / sqrt(determinant), 1e-9),
     );
-    filters[index] = filter_record(filter_);
+    filters[slot] = filter_record(filter_);
 }
 
 fn filtered(fragment: Fragment, abc: vec3<f32>, filter_: Filter, d: vec2<f32>) -> Fragment {

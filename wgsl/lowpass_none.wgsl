@@ -6,11 +6,11 @@ struct Filter {
     nothing: u32,
 }
 
-fn filter_of(index: u32) -> Filter {
+fn filter_of(slot: u32) -> Filter {
     return Filter(0u);
 }
 
-fn low_pass(index: u32, h: ptr<function, Homography>) {}
+fn low_pass(slot: u32, h: ptr<function, Homography>) {}
 
 fn least_filtered(filter_: Filter) -> f32 {
     return 3e38;

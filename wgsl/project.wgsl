@@ -5,7 +5,7 @@
 @group(0) @binding(3) var<storage, read_write> splats: array<SplatRecord>;
 // Word 0 counts the large splats, word 1 all that are out of view; three words from QUEUE_GRID on are a grid with a workgroup
 // for each large one, three from QUEUE_LISTING on one with a workgroup for LISTED_AT_ONCE of them, and from QUEUE_START on come
-// their indices.
+// their slots.
 @group(0) @binding(4) var<storage, read_write> queue: array<atomic<u32>>;
 
 // The rare ones, in the same form; the grid is project_rare's.
@@ -48,7 +48,8 @@ const IN_VIEW: u32 = 1u;
 const RARE: u32 = 2u;
 
 // Of a rare surfel the splat is written only if `every` kind is asked for.
-fn project_surfel(index: u32, every: bool) -> u32 {
+fn project_into(slot: u32, every: bool) -> u32 {
+    let index = surfel_for(slot);
     let surfel = surfel_at(index);
     var relative: array<Double, 3>;
     for (var i = 0u; i < 3u; i++) {
@@ -65,14 +66,15 @@ fn project_surfel(index: u32, every: bool) -> u32 {
     if (h.rare) {
         return RARE;
     }
-    low_pass(index, &h);
+    low_pass(slot, &h);
 
     // Bounds are conservative: the margin covers the rounding of the extent, and `intersect` decides.
     let size = vec2<f32>(f32(held.width), f32(held.height));
     let margin = 0.01 + 1e-5 * (abs(h.low) + abs(h.high));
     let first = max(ceil(h.low - margin - 0.5), vec2<f32>(0.0));
     let last = min(floor(h.high + margin - 0.5), size - 1.0);
-    let visible = all(first <= last);
+    let exists = index < surfels_held();
+    let visible = exists && all(first <= last);
 
     var splat: Splat;
     splat.bounds_first = 0xffffffffu;
@@ -89,10 +91,10 @@ fn project_surfel(index: u32, every: bool) -> u32 {
     }
     if (visible && is_large(splat)) {
         // Places depend on the schedule, but nothing later depends on places.
-        atomicStore(&queue[QUEUE_START + atomicAdd(&queue[0], 1u)], index);
+        atomicStore(&queue[QUEUE_START + atomicAdd(&queue[0], 1u)], slot);
     }
-    splats[index] = splat_record(splat);
-    return select(OUT_OF_VIEW, IN_VIEW, visible);
+    splats[slot] = splat_record(splat, index);
+    return select(OUT_OF_VIEW, IN_VIEW, visible || !exists);
 }
 
 // Most splats are in view, so those that are not are counted.
@@ -113,13 +115,13 @@ fn project(
     @builtin(local_invocation_index) local: u32,
 ) {
     hold_view();
-    let index = surfel_of(workgroup, workgroups, local);
+    let slot = slot_of(workgroup, workgroups, local);
     var fate = IN_VIEW;
-    if (index < surfels_held()) {
-        fate = project_surfel(index, false);
+    if (slot < arrayLength(&splats)) {
+        fate = project_into(slot, false);
     }
     if (fate == RARE) {
-        atomicStore(&rare[QUEUE_START + atomicAdd(&rare[0], 1u)], index);
+        atomicStore(&rare[QUEUE_START + atomicAdd(&rare[0], 1u)], slot);
     }
     count_unseen(local, fate == OUT_OF_VIEW);
 }
@@ -134,7 +136,7 @@ fn project_rare(
     let place = linear_index(workgroup, workgroups, local);
     var fate = IN_VIEW;
     if (place < listed[0]) {
-        fate = project_surfel(listed[QUEUE_START + place], true);
+        fate = project_into(listed[QUEUE_START + place], true);
     }
     count_unseen(local, fate == OUT_OF_VIEW);
 }

@@ -1,11 +1,10 @@
-// A splat's record: sixteen words.
+// A splat's record: sixteen words, which say of which surfel it is where that is not its slot (cull.wgsl).
 
 alias SplatRecord = array<Words, 4>;
 
-fn splat_record(splat: Splat) -> SplatRecord {
-    let anchor = vec2<u32>(bitcast<u32>(splat.anchor_x), bitcast<u32>(splat.anchor_y));
+fn splat_record(splat: Splat, surfel: u32) -> SplatRecord {
     return SplatRecord(
-        words(vec4<u32>(anchor, splat.bounds_first, splat.bounds_last)),
+        words(vec4<u32>(anchor_words(splat, surfel), splat.bounds_first, splat.bounds_last)),
         words(bitcast<vec4<u32>>(vec4<f32>(splat.a[0], splat.a[1], splat.a[2], splat.b[0]))),
         words(bitcast<vec4<u32>>(vec4<f32>(splat.b[1], splat.b[2], splat.c[0], splat.c[1]))),
         words(bitcast<vec4<u32>>(vec4<f32>(splat.c[2], splat.a_low[0], splat.a_low[1], splat.a_low[2]))),
@@ -14,12 +13,13 @@ fn splat_record(splat: Splat) -> SplatRecord {
 
 fn splat_of(record: SplatRecord) -> Splat {
     let head = each_word(record[0]);
+    let anchor = anchor_of(head.xy);
     let first = bitcast<vec4<f32>>(each_word(record[1]));
     let second = bitcast<vec4<f32>>(each_word(record[2]));
     let third = bitcast<vec4<f32>>(each_word(record[3]));
     return Splat(
-        bitcast<i32>(head.x),
-        bitcast<i32>(head.y),
+        anchor.x,
+        anchor.y,
         head.z,
         head.w,
         array<f32, 3>(first.x, first.y, first.z),

@@ -40,7 +40,7 @@ fn column_of_all(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32) -> Col
 }
 
 // What this invocation fetched.
-var<private> own_index: u32;
+var<private> own_surfel: u32;
 var<private> own_splat: Splat;
 var<private> own_filter: Filter;
 
@@ -51,13 +51,16 @@ fn fetch(place: u32, listed: u32, column: Column, deepest: vec2<f32>) -> vec2<u3
     let large = column.large.y - column.large.x;
     var wanted = vec2<bool>(false);
     if (at < listed) {
+        var slot: u32;
         if (at < large) {
-            own_index = large_lists[column.large.x + at];
+            slot = large_lists[column.large.x + at];
         } else {
-            own_index = small_entry(column.small.x + (at - large));
+            slot = small_entry(column.small.x + (at - large));
         }
-        own_splat = splat_of(projected[own_index]);
-        own_filter = filter_of(own_index);
+        let record = projected[slot];
+        own_surfel = surfel_in(record, slot);
+        own_splat = splat_of(record);
+        own_filter = filter_of(slot);
         wanted.x = reaches(own_splat, own_filter, column, 0u, deepest.x);
         wanted.y = TILE_ROWS > 8u && reaches(own_splat, own_filter, column, 8u, deepest.y);
     }
@@ -226,7 +229,7 @@ fn sum_tile(column: Column) {
     let listed = (column.large.y - column.large.x) + (column.small.y - column.small.x);
     for (var place = 0u; place < listed; place += FETCHED) {
         var wanted = fetch(place, listed, column, deepest);
-        let own_attributes = attributes_of(own_index, own_splat);
+        let own_attributes = attributes_of(own_surfel, own_splat);
         while (wanted.x != 0u) {
             let next = firstTrailingBit(wanted.x);
             wanted.x &= wanted.x - 1u;

@@ -18,16 +18,16 @@ fn visibility(
     @builtin(local_invocation_index) local: u32,
 ) {
     hold();
-    let index = surfel_of(workgroup, workgroups, local);
-    if (index >= arrayLength(&projected)) {
+    let slot = slot_of(workgroup, workgroups, local);
+    if (slot >= arrayLength(&projected)) {
         return;
     }
-    let splat = splat_of(projected[index]);
+    let splat = splat_of(projected[slot]);
     if (is_large(splat)) {
         return;
     }
     let pixels = reach(splat);
-    let filter_ = filter_of(index);
+    let filter_ = filter_of(slot);
     var at = pixels.first;
     while (at.y <= pixels.last.y) {
         cover(splat, filter_, at.x, at.y);
@@ -43,13 +43,13 @@ fn visibility_large(
     @builtin(local_invocation_id) local: vec3<u32>,
 ) {
     hold();
-    let index = large_splat(workgroup.y * workgroups.x + workgroup.x);
-    if (index >= arrayLength(&projected)) {
+    let slot = large_splat(workgroup.y * workgroups.x + workgroup.x);
+    if (slot >= arrayLength(&projected)) {
         return;
     }
-    let splat = splat_of(projected[index]);
+    let splat = splat_of(projected[slot]);
     let pixels = reach(splat);
-    let filter_ = filter_of(index);
+    let filter_ = filter_of(slot);
     for (var y = pixels.first.y + local.y; y <= pixels.last.y; y += TILE) {
         for (var x = pixels.first.x + local.x; x <= pixels.last.x; x += TILE) {
             cover(splat, filter_, x, y);

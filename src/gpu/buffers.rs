@@ -51,6 +51,17 @@ impl<T: Pod> Buffer<T> {
         self.raw.size()
     }
 
+    /// Makes it one of `len` elements, `what` in an error, of which the first are those that it has. Waits, so that two such
+    /// buffers are held no longer than need be.
+    pub(crate) fn grow(&mut self, gpu: &Gpu, what: &str, len: u64) -> Result<()> {
+        let new = Self::create(gpu, what, len, self.raw.usage(), gpu.buffer_limit())?;
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(&self.raw, 0, &new.raw, 0, self.raw.size().min(new.raw.size()));
+        gpu.queue.submit([encoder.finish()]);
+        *self = new;
+        gpu.wait()
+    }
+
     /// Overwrites the first element.
     pub fn set(&self, gpu: &Gpu, value: &T) {
         gpu.queue.write_buffer(&self.raw, 0, bytemuck::bytes_of(value));

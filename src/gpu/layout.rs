@@ -65,8 +65,11 @@ pub const TILE: u32 = 16;
 /// Surfels of a batch: consecutive in memory, and left out together (`wgsl/cull.wgsl`).
 pub const BATCH: u32 = 64;
 
-/// Words at the start of a list of batches: the grid of workgroups that draws them, and a count of others.
-pub const LIST_START: u32 = 4;
+/// Words at the start of a list of batches: a grid of workgroups that draws all of them, and one that draws the far ones.
+pub const LIST_START: u32 = 6;
+
+/// Word of that list at which the grid of the far ones starts.
+pub const LIST_FAR: u32 = 3;
 
 /// Side of the tiles by which hidden splats are told, pixels.
 pub const OCCLUSION_TILE: u32 = 8;

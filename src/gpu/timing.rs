@@ -7,36 +7,41 @@ use super::buffers::Buffer;
 use super::device::Gpu;
 use crate::error::Result;
 
+/// Passes that a query set has room for.
+const PASSES: usize = 256;
+
 /// Collects the time of each recorded stage.
 pub struct Timing {
-    queries: Option<(wgpu::QuerySet, Buffer<u64>)>,
+    /// Two queries for each stage so far, if the device's own clock is read.
+    queries: Option<Vec<wgpu::QuerySet>>,
     stages: Vec<&'static str>,
     wall: BTreeMap<&'static str, f64>,
 }
 
 impl Timing {
-    /// Room for `passes` recorded passes.
-    pub fn new(gpu: &Gpu, passes: u32) -> Result<Self> {
+    /// Of no stage yet.
+    pub fn new(gpu: &Gpu) -> Self {
         // A software adapter does one thing at a time, so wall time is as good; and Mesa's, once it has drawn triangles,
-        // stamps compute passes before they run. WebGPU bounds a query set at 4,096; beyond that wall time serves.
-        let clock = gpu.adapter.timestamps && gpu.adapter.kind != "software";
-        let queries = if clock && passes * 2 <= wgpu::QUERY_SET_MAX_QUERIES {
-            let set = gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
+        // stamps compute passes before they run.
+        Self::by(gpu.adapter.timestamps && gpu.adapter.kind != "software")
+    }
+
+    /// By the device's clock, or not.
+    fn by(on_device: bool) -> Self {
+        Self { queries: on_device.then(Vec::new), stages: Vec::new(), wall: BTreeMap::new() }
+    }
+
+    /// The queries of the next stage: a set, and the first of two in it.
+    fn next(&mut self, gpu: &Gpu) -> Option<(&wgpu::QuerySet, u32)> {
+        let sets = self.queries.as_mut()?;
+        if self.stages.len() == sets.len() * PASSES {
+            sets.push(gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
                 label: Some("timestamps"),
                 ty: wgpu::QueryType::Timestamp,
-                count: passes * 2,
-            });
-            let raw = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("timestamps"),
-                size: u64::from(passes) * 16,
-                usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
-                mapped_at_creation: false,
-            });
-            Some((set, Buffer::from_raw(raw, u64::from(passes) * 2)))
-        } else {
-            None
-        };
-        Ok(Self { queries, stages: Vec::new(), wall: BTreeMap::new() })
+                count: 2 * PASSES as u32,
+            }));
+        }
+        Some((sets.last()?, 2 * (self.stages.len() % PASSES) as u32))
     }
 
     /// Whether times come from the device's own clock.
@@ -54,10 +59,10 @@ impl Timing {
     ) -> Result<()> {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         before(&mut encoder);
-        let first = 2 * self.stages.len() as u32;
+        let queries = self.next(gpu);
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some(stage),
-            timestamp_writes: self.queries.as_ref().map(|(set, _)| wgpu::ComputePassTimestampWrites {
+            timestamp_writes: queries.map(|(set, first)| wgpu::ComputePassTimestampWrites {
                 query_set: set,
                 beginning_of_pass_write_index: Some(first),
                 end_of_pass_write_index: Some(first + 1),
@@ -78,12 +83,12 @@ impl Timing {
         record: impl FnOnce(&mut wgpu::RenderPass<'_>) -> Result<()>,
     ) -> Result<()> {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        let first = 2 * self.stages.len() as u32;
+        let queries = self.next(gpu);
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some(stage),
             color_attachments: targets,
             depth_stencil_attachment: depth,
-            timestamp_writes: self.queries.as_ref().map(|(set, _)| wgpu::RenderPassTimestampWrites {
+            timestamp_writes: queries.map(|(set, first)| wgpu::RenderPassTimestampWrites {
                 query_set: set,
                 beginning_of_pass_write_index: Some(first),
                 end_of_pass_write_index: Some(first + 1),
@@ -108,17 +113,49 @@ impl Timing {
 
     /// Milliseconds by stage.
     pub fn finish(self, gpu: &Gpu) -> Result<BTreeMap<&'static str, f64>> {
-        let Some((set, buffer)) = self.queries else { return Ok(self.wall) };
-        let count = 2 * self.stages.len() as u32;
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        encoder.resolve_query_set(&set, 0..count, &buffer.raw, 0);
-        gpu.queue.submit([encoder.finish()]);
-        let ticks = buffer.read(gpu, u64::from(count))?;
+        let Some(sets) = self.queries else { return Ok(self.wall) };
         let period_ms = f64::from(gpu.queue.get_timestamp_period()) * 1e-6;
         let mut times = BTreeMap::new();
-        for (stage, pair) in self.stages.iter().zip(ticks.chunks_exact(2)) {
-            *times.entry(*stage).or_default() += pair[1].saturating_sub(pair[0]) as f64 * period_ms;
+        for (set, stages) in sets.iter().zip(self.stages.chunks(PASSES)) {
+            let count = 2 * stages.len() as u64;
+            let raw = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("timestamps"),
+                size: count * 8,
+                usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
+                mapped_at_creation: false,
+            });
+            let buffer = Buffer::<u64>::from_raw(raw, count);
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            encoder.resolve_query_set(set, 0..count as u32, &buffer.raw, 0);
+            gpu.queue.submit([encoder.finish()]);
+            let ticks = buffer.read(gpu, count)?;
+            for (stage, pair) in stages.iter().zip(ticks.chunks_exact(2)) {
+                *times.entry(*stage).or_default() += pair[1].saturating_sub(pair[0]) as f64 * period_ms;
+            }
         }
         Ok(times)
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, clippy::expect_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_device_times_more_passes_than_a_query_set_holds() {
+        let Ok(gpu) = Gpu::open(None) else { return };
+        if !gpu.adapter.timestamps {
+            return;
+        }
+        let mut timing = Timing::by(true);
+        for number in 0..2 * PASSES + 3 {
+            timing.pass(&gpu, if number % 2 == 0 { "even" } else { "odd" }, |_| {}, |_| Ok(())).unwrap();
+        }
+        gpu.wait().unwrap();
+        assert_eq!(timing.queries.as_ref().map(Vec::len), Some(3));
+        let times = timing.finish(&gpu).unwrap();
+        assert_eq!(times.keys().copied().collect::<Vec<_>>(), ["even", "odd"]);
+        assert!(times.values().all(|ms| ms.is_finite() && *ms >= 0.0), "{times:?}");
     }
 }

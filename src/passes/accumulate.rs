@@ -336,16 +336,16 @@ impl AttributeBuffer {
     }
 }
 
-/// Records the pass of `parts` of the small splats over `rows`.
+/// Records the pass of the small splats over `rows`.
 pub fn record(
     recorder: &mut Recorder<'_>,
-    (splats, parts): (&SplatBuffer, &[Part]),
+    splats: &SplatBuffer,
     rows: &Rows,
     visible: &VisibilityBuffer,
     buffer: &AttributeBuffer,
 ) -> Result<()> {
     let bytes = rows.pixels * u64::from(recorder.variant.sum_words()) * 4;
-    splats.dispatch(recorder, ("accumulate", parts), rows, &buffer.bindings(visible), |encoder| {
+    splats.dispatch(recorder, ("accumulate", Part::All), rows, &buffer.bindings(visible), |encoder| {
         encoder.clear_buffer(&buffer.sums.raw, 0, Some(bytes));
         if rows.first == 0 {
             encoder.clear_buffer(&buffer.overflows.raw, 0, None);

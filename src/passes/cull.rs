@@ -11,24 +11,27 @@
 //! some units of 2^-24 over the cosine between ray and normal, and the room is a thousandth.
 //!
 //! There are no normal cones: a surfel is seen from both sides, so that a surface with a border has no holes.
+//!
+//! What is left out takes no room: the splats of the listed batches are stored one batch after the other, in slots, and
+//! [`SplatBuffer::make_room`] reads from the device how many there are.
 
 use glam::{DVec2, DVec3, Vec3};
 
-use super::Rows;
 use super::lowpass::{Design, RADIUS};
 use super::project::SplatBuffer;
 use super::visibility::VisibilityBuffer;
+use super::{Recorder, Rows};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
-use crate::gpu::kernel::{Grid, Program, grid};
-use crate::gpu::layout::{BATCH, LIST_START, WORKGROUP};
+use crate::gpu::kernel::{Grid, grid};
+use crate::gpu::layout::{BATCH, LIST_FAR, LIST_START, QUEUE_START, WORKGROUP};
 use crate::scene::{Camera, LowPass, Projection, Surfel};
 
 /// Which batches a stage draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// Every one: nothing is left out.
+    /// Every one that is projected: of all there are, or where some are left out, the near and the far ones.
     All,
     /// In view and nearer than the middle of the scene.
     Near,
@@ -86,72 +89,77 @@ pub fn reference(center: DVec3, radius: f64, camera: &Camera, filter_reach: f64)
     Some([image - extent, image + extent])
 }
 
-/// The batches of a page that are drawn.
+/// The batches of a page.
 pub(crate) struct Batches {
-    near: Buffer<u32>,
-    far: Buffer<u32>,
+    /// Those that are drawn, as `surviving` in `wgsl/cull.wgsl`.
+    drawn: Buffer<u32>,
+    /// Those that may be.
+    rest: Buffer<u32>,
 }
 
 impl Batches {
     /// Room for the batches of `surfels` surfels.
     pub(crate) fn new(gpu: &Gpu, surfels: u64) -> Result<Self> {
-        let list = |what| -> Result<Buffer<u32>> {
-            let batches = surfels.div_ceil(BATCH.into());
-            let list = Buffer::indirect(gpu, what, batches + u64::from(LIST_START))?;
-            // A row of the grid is a batch.
-            gpu.queue.write_buffer(&list.raw, 0, bytemuck::cast_slice(&[BATCH / WORKGROUP, 0, 1, 0]));
-            Ok(list)
-        };
-        Ok(Self { near: list("near batches")?, far: list("far batches")? })
+        let batches = surfels.div_ceil(BATCH.into());
+        let drawn = Buffer::indirect(gpu, "batches that are drawn", batches + u64::from(LIST_START))?;
+        // A row of a grid is a batch.
+        gpu.queue.write_buffer(&drawn.raw, 0, bytemuck::cast_slice(&[[BATCH / WORKGROUP, 0, 1]; 2]));
+        Ok(Self { drawn, rest: Buffer::storage(gpu, "batches that may be drawn", batches + 1)? })
     }
 
-    /// Those of `part`, if they are listed.
-    pub(crate) fn of(&self, part: Part) -> Option<&Buffer<u32>> {
-        match part {
-            Part::All => None,
-            Part::Near => Some(&self.near),
-            Part::Far => Some(&self.far),
-        }
+    /// A workgroup for every [`WORKGROUP`] slots of `part`, and what says which surfels they are for.
+    pub(super) fn of(&self, part: Part) -> (Grid<'_>, (&'static str, wgpu::BindingResource<'_>)) {
+        let at = if part == Part::Far { u64::from(LIST_FAR) * 4 } else { 0 };
+        (Grid::In(&self.drawn.raw, at), ("drawn", self.drawn.bound()))
+    }
+
+    /// Slots of the batches that are listed. Waits for the device.
+    pub(super) fn slots(&self, gpu: &Gpu) -> Result<u64> {
+        Ok(self.drawn.read(gpu, 2)?.get(1).copied().map_or(0, u64::from) * u64::from(BATCH))
     }
 
     pub(crate) fn bytes(&self) -> u64 {
-        self.near.bytes() + self.far.bytes()
+        self.drawn.bytes() + self.rest.bytes()
     }
 }
 
-/// Empties the lists of `part`.
-pub(crate) fn clear(encoder: &mut wgpu::CommandEncoder, splats: &SplatBuffer, part: Part) {
-    for list in splats.pages.iter().filter_map(|page| page.batches.of(part)) {
-        encoder.clear_buffer(&list.raw, 4, Some(4));
-        encoder.clear_buffer(&list.raw, 12, Some(4));
-    }
-}
-
-/// Records which batches of a page are in its `part`, beside `buffers` of their projection.
-pub(crate) fn record<'a>(
-    gpu: &Gpu,
-    program: &Program,
-    pass: &mut wgpu::ComputePass<'_>,
-    buffers: &[(&'a str, wgpu::BindingResource<'a>)],
-    (splats, index, part): (&'a SplatBuffer, usize, Part),
-    (rows, visible): (&'a Rows, Option<&'a VisibilityBuffer>),
+/// Records which batches of every page are in `part`, [`Part::Near`] or, after `visible` holds the near ones, [`Part::Far`].
+pub fn record(
+    recorder: &mut Recorder<'_>,
+    buffer: &SplatBuffer,
+    part: Part,
+    (rows, visible): (&Rows, &VisibilityBuffer),
 ) -> Result<()> {
-    let (surfels, batches) = (&splats.surfels.pages[index], &splats.pages[index].batches);
-    let (stage, list) = match part {
-        Part::All => return Ok(()),
-        Part::Near => ("cull_near", &batches.near),
-        Part::Far => ("cull_far", &batches.far),
+    let (gpu, program) = (recorder.gpu, recorder.program);
+    let view = recorder.view.bound();
+    let near = part == Part::Near;
+    let clear = |encoder: &mut wgpu::CommandEncoder| {
+        // The far ones follow the near ones.
+        for page in buffer.pages.iter().filter(|_| near) {
+            for word in [1, u64::from(LIST_FAR) + 1] {
+                encoder.clear_buffer(&page.batches.drawn.raw, word * 4, Some(4));
+            }
+            encoder.clear_buffer(&page.batches.rest.raw, 0, Some(4));
+            encoder.clear_buffer(&page.queue.raw, 0, Some(u64::from(QUEUE_START) * 4));
+        }
     };
-    let own = [
-        ("band", rows.uniform.bound()),
-        ("balls", surfels.balls.bound()),
-        ("surviving", list.bound()),
-        ("drawn", batches.near.bound()),
-    ];
-    let mut bound = buffers.to_vec();
-    bound.extend(own);
-    bound.extend(visible.map(|visible| ("visible", visible.nearest.bound())));
-    program.dispatch(gpu, pass, stage, &bound, Grid::Of(grid(gpu, surfels.balls.len)?))
+    recorder.timing.pass(gpu, "project", clear, |pass| {
+        for (surfels, page) in buffer.surfels.pages.iter().zip(&buffer.pages) {
+            let bound = [
+                ("view", view.clone()),
+                ("band", rows.uniform.bound()),
+                ("surfels", surfels.surfels.bound()),
+                ("balls", surfels.balls.bound()),
+                ("queue", page.queue.bound()),
+                ("surviving", page.batches.drawn.bound()),
+                ("rest", page.batches.rest.bound()),
+                ("visible", visible.nearest.bound()),
+            ];
+            let stage = if near { "cull_near" } else { "cull_far" };
+            program.dispatch(gpu, pass, stage, &bound, Grid::Of(grid(gpu, surfels.balls.len)?))?;
+        }
+        Ok(())
+    })
 }
 
 #[cfg(test)]

@@ -6,11 +6,10 @@
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::cull::{self, Batches, Part};
+use super::cull::{Batches, Part};
 use super::homography::{self, slope};
 use super::lowpass::{self, Design, Filter};
 use super::upload::SurfelBuffer;
-use super::visibility::VisibilityBuffer;
 use super::{Recorder, Rows};
 use crate::error::Result;
 use crate::gpu::buffers::Buffer;
@@ -100,15 +99,18 @@ pub struct SplatBuffer {
     pub surfels: SurfelBuffer,
     /// A page of splats for each page of surfels.
     pub pages: Vec<SplatPage>,
+    /// The room that a view needs is known.
+    measured: bool,
 }
 
-/// One page of a [`SplatBuffer`].
+/// One page of a [`SplatBuffer`]. It has slots for the splats of all its surfels, in their order, or, where batches are left
+/// out, of as many batches as there were to be drawn, one after the other ([`cull`](super::cull)).
 pub struct SplatPage {
     /// The records.
     pub splats: Buffer<layout::Splat>,
     /// Which batches are projected.
     pub(super) batches: Batches,
-    /// Counts and a grid, then the indices of the large splats, which get a workgroup each.
+    /// Counts and a grid, then the slots of the large splats, which get a workgroup each.
     pub(super) queue: Buffer<u32>,
     /// In the same form the splats that take long to project, which get a dispatch of their own.
     rare: Buffer<u32>,
@@ -116,29 +118,24 @@ pub struct SplatPage {
     filters: Option<Buffer<layout::Filter>>,
 }
 
-/// Records the projection of `part` of every page; of [`Part::Far`], after `visible` holds the near ones.
-pub fn record(
-    recorder: &mut Recorder<'_>,
-    buffer: &SplatBuffer,
-    part: Part,
-    (rows, visible): (&Rows, Option<&VisibilityBuffer>),
-) -> Result<()> {
-    let (gpu, program) = (recorder.gpu, recorder.program);
+/// Records the projection of `part` of every page; where batches are left out, after [`cull::record`](super::cull::record) has
+/// listed them.
+pub fn record(recorder: &mut Recorder<'_>, buffer: &SplatBuffer, part: Part) -> Result<()> {
+    let (gpu, program, culled) = (recorder.gpu, recorder.program, recorder.variant.needs.cull);
     let view = recorder.view.bound();
     recorder.timing.pass(
         gpu,
         "project",
         |encoder| {
-            cull::clear(encoder, buffer, part);
             for page in &buffer.pages {
-                // The far ones follow the near ones in the queue.
-                for list in [Some(&page.rare), (part != Part::Far).then_some(&page.queue)].into_iter().flatten() {
+                for list in [Some(&page.rare), (!culled).then_some(&page.queue)].into_iter().flatten() {
                     encoder.clear_buffer(&list.raw, 0, Some(u64::from(layout::QUEUE_START) * 4));
                 }
             }
         },
         |pass| {
-            for (index, (surfels, page)) in buffer.surfels.pages.iter().zip(&buffer.pages).enumerate() {
+            for (surfels, page) in buffer.surfels.pages.iter().zip(&buffer.pages) {
+                let (slots, drawn) = page.of(gpu, part, culled)?;
                 let mut buffers = vec![
                     ("view", view.clone()),
                     ("surfels", surfels.surfels.bound()),
@@ -148,9 +145,8 @@ pub fn record(
                     ("listed", page.rare.bound()),
                 ];
                 buffers.extend(page.filters.as_ref().map(|filters| ("filters", filters.bound())));
-                cull::record(gpu, program, pass, &buffers, (buffer, index, part), (rows, visible))?;
-                buffers.extend(page.batches.of(part).map(|list| ("drawn", list.bound())));
-                program.dispatch(gpu, pass, "project", &buffers, page.of(gpu, part)?.0)?;
+                buffers.extend(drawn);
+                program.dispatch(gpu, pass, "project", &buffers, slots)?;
                 program.dispatch(gpu, pass, "arrange_rare", &buffers, Grid::Of((1, 1)))?;
                 let at = u64::from(layout::QUEUE_GRID) * 4;
                 program.dispatch(gpu, pass, "project_rare", &buffers, Grid::In(&page.rare.raw, at))?;
@@ -162,34 +158,87 @@ pub fn record(
 }
 
 impl SplatPage {
-    /// A workgroup for every [`layout::WORKGROUP`] surfels of `part`, and what says which they are.
-    pub(super) fn of(&self, gpu: &Gpu, part: Part) -> Result<(Grid<'_>, Option<(&str, wgpu::BindingResource<'_>)>)> {
-        Ok(match self.batches.of(part) {
-            Some(list) => (Grid::In(&list.raw, 0), Some(("drawn", list.bound()))),
-            None => (Grid::Of(grid(gpu, self.splats.len)?), None),
+    /// A page without slots, for `surfels` surfels.
+    fn new(gpu: &Gpu, surfels: u64, low_pass: LowPass) -> Result<Self> {
+        let list = |what| Buffer::indirect(gpu, what, layout::QUEUE_START.into());
+        Ok(Self {
+            splats: Buffer::storage(gpu, "splats", 0)?,
+            batches: Batches::new(gpu, surfels)?,
+            queue: list("queue of large splats")?,
+            rare: list("list of rare splats")?,
+            filters: match low_pass {
+                LowPass::None => None,
+                _ => Some(Buffer::storage(gpu, "low-pass filters", 0)?),
+            },
         })
+    }
+
+    /// Has at least `slots`, and all that is stored.
+    fn grow(&mut self, gpu: &Gpu, slots: u64) -> Result<()> {
+        if self.splats.len < slots {
+            let list = slots + u64::from(layout::QUEUE_START);
+            self.splats.grow(gpu, "splats", slots)?;
+            self.queue.grow(gpu, "queue of large splats", list)?;
+            self.rare.grow(gpu, "list of rare splats", list)?;
+            if let Some(filters) = &mut self.filters {
+                filters.grow(gpu, "low-pass filters", slots)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// A workgroup for every [`layout::WORKGROUP`] slots of `part`, and what says which surfels they are for where batches are
+    /// left out.
+    pub(super) fn of(
+        &self,
+        gpu: &Gpu,
+        part: Part,
+        culled: bool,
+    ) -> Result<(Grid<'_>, Option<(&'static str, wgpu::BindingResource<'_>)>)> {
+        if culled {
+            let (grid, drawn) = self.batches.of(part);
+            return Ok((grid, Some(drawn)));
+        }
+        Ok((Grid::Of(grid(gpu, self.splats.len)?), None))
     }
 }
 
 impl SplatBuffer {
-    /// Room for the splats of `surfels`.
+    /// Splats of `surfels`. There is no room for them yet.
     pub fn new(gpu: &Gpu, surfels: SurfelBuffer, low_pass: LowPass) -> Result<Self> {
-        let mut pages = Vec::with_capacity(surfels.pages.len());
-        for page in &surfels.pages {
-            let len = page.surfels.len;
-            let list = |what| Buffer::indirect(gpu, what, len + u64::from(layout::QUEUE_START));
-            pages.push(SplatPage {
-                splats: Buffer::storage(gpu, "splats", len)?,
-                batches: Batches::new(gpu, len)?,
-                queue: list("queue of large splats")?,
-                rare: list("list of rare splats")?,
-                filters: match low_pass {
-                    LowPass::None => None,
-                    _ => Some(Buffer::storage(gpu, "low-pass filters", len)?),
-                },
-            });
+        let pages = surfels.pages.iter().map(|page| SplatPage::new(gpu, page.surfels.len, low_pass));
+        Ok(Self { pages: pages.collect::<Result<_>>()?, surfels, measured: false })
+    }
+
+    /// Makes room for the splats of all surfels.
+    pub fn make_room_for_all(&mut self, gpu: &Gpu) -> Result<()> {
+        self.surfels.pages.iter().zip(&mut self.pages).try_for_each(|(of, page)| page.grow(gpu, of.surfels.len))
+    }
+
+    /// Makes room for the splats of the batches that are listed, and, once those of `part` are all, an eighth more for the
+    /// next view. Waits for the device; does nothing where it has been done for an earlier view.
+    pub fn make_room(&mut self, gpu: &Gpu, part: Part) -> Result<()> {
+        if !self.measured {
+            for (of, page) in self.surfels.pages.iter().zip(&mut self.pages) {
+                let slots = page.batches.slots(gpu)?;
+                if slots > page.splats.len {
+                    // Whole batches: the last one may be listed anywhere.
+                    let [slots, all] =
+                        [slots + slots / 8, of.surfels.len].map(|n| n.next_multiple_of(layout::BATCH.into()));
+                    page.grow(gpu, slots.min(all))?;
+                }
+            }
+            self.measured = part == Part::Far;
         }
-        Ok(Self { surfels, pages })
+        Ok(())
+    }
+
+    /// Whether there was room for all that was listed; if not, the next view is measured again. Waits for the device.
+    pub fn held(&mut self, gpu: &Gpu) -> Result<bool> {
+        for page in &self.pages {
+            self.measured &= page.batches.slots(gpu)? <= page.splats.len;
+        }
+        Ok(self.measured)
     }
 
     /// Device memory that the splats and their surfels take, bytes.
@@ -204,9 +253,9 @@ impl SplatBuffer {
     /// Splats that may touch a pixel of the image, and are not known to be hidden. Waits for the projection.
     pub fn drawn(&self, gpu: &Gpu) -> Result<u64> {
         let mut drawn = 0;
-        for page in &self.pages {
+        for (of, page) in self.surfels.pages.iter().zip(&self.pages) {
             let unseen = page.queue.read(gpu, 2)?.get(1).copied().map_or(0, u64::from);
-            drawn += page.splats.len.saturating_sub(unseen);
+            drawn += of.surfels.len.saturating_sub(unseen);
         }
         Ok(drawn)
     }
@@ -235,25 +284,23 @@ impl SplatBuffer {
         bound
     }
 
-    /// Records `stage` over the splats of `parts` of every page, an invocation each.
+    /// Records `stage` over the splats of `part` of every page, an invocation each.
     pub(crate) fn dispatch(
         &self,
         recorder: &mut Recorder<'_>,
-        (stage, parts): (&'static str, &[Part]),
+        (stage, part): (&'static str, Part),
         rows: &Rows,
         buffers: &[(&str, wgpu::BindingResource<'_>)],
         before: impl FnOnce(&mut wgpu::CommandEncoder),
     ) -> Result<()> {
-        let (gpu, program) = (recorder.gpu, recorder.program);
+        let (gpu, program, culled) = (recorder.gpu, recorder.program, recorder.variant.needs.cull);
         let own = with_view(recorder, rows, buffers);
         recorder.timing.pass(gpu, stage, before, |pass| {
             for (index, page) in self.pages.iter().enumerate() {
-                for &part in parts {
-                    let mut bound = self.bindings(index, &own);
-                    let (grid, drawn) = page.of(gpu, part)?;
-                    bound.extend(drawn);
-                    program.dispatch(gpu, pass, stage, &bound, grid)?;
-                }
+                let mut bound = self.bindings(index, &own);
+                let (slots, drawn) = page.of(gpu, part, culled)?;
+                bound.extend(drawn);
+                program.dispatch(gpu, pass, stage, &bound, slots)?;
             }
             Ok(())
         })

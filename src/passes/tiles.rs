@@ -59,8 +59,6 @@ pub struct Tiles {
     width: u32,
     /// Rows of a tile.
     rows: u32,
-    /// The parts of which small splats are listed too.
-    parts: &'static [Part],
     large: Lists,
     small: Lists,
 }
@@ -130,17 +128,15 @@ impl Lists {
 }
 
 impl Tiles {
-    /// Tiles for each of `bands` of an image of `width` columns, drawn by `program`, that have the large splats, and the small
-    /// ones of `parts`. They have no room yet.
+    /// Tiles for each of `bands` of an image of `width` columns, drawn by `program`. They have no room yet.
     pub fn new(
         gpu: &Gpu,
         (program, needs): (Arc<Program>, &SceneNeeds),
         image: (u32, &[Rows]),
-        parts: &'static [Part],
     ) -> Result<Self> {
         let rows = tile_rows(needs);
         let [large, small] = [Listed::Large, Listed::Small].map(|of| Lists::new(gpu, of.cell(rows), image, 0));
-        Ok(Self { program, width: image.0, rows, parts, large: large?, small: small? })
+        Ok(Self { program, width: image.0, rows, large: large?, small: small? })
     }
 
     /// Makes room for the splats that are projected now, and a quarter more for the next view; false if there are more than a
@@ -191,7 +187,7 @@ impl Tiles {
         let held = |lists: &Lists| -> Result<bool> {
             Ok(Room { entries: lists.entries, longest: LONGEST }.holds(lists.needed(gpu)?))
         };
-        Ok(held(&self.large)? && (self.parts.is_empty() || held(&self.small)?))
+        Ok(held(&self.large)? && held(&self.small)?)
     }
 
     fn lists(&self, of: Listed) -> &Lists {
@@ -224,7 +220,7 @@ impl Tiles {
         fresh: bool,
         places: bool,
     ) -> Result<()> {
-        let (gpu, lists) = (recorder.gpu, self.lists(of));
+        let (gpu, culled, lists) = (recorder.gpu, recorder.variant.needs.cull, self.lists(of));
         // The first two words are what it needs.
         let first = if fresh { 0 } else { u64::from(LIST_ENDS) };
         let words = lists.words.len - lists.entries - first;
@@ -246,12 +242,9 @@ impl Tiles {
                 let grid = Grid::In(&page.queue.raw, u64::from(QUEUE_LISTING) * 4);
                 return self.program.dispatch(gpu, pass, kernel, &bound, grid);
             }
-            for &part in self.parts {
-                let (grid, drawn) = page.of(gpu, part)?;
-                let bound: Bound<'_> = bound.iter().cloned().chain(drawn).collect();
-                self.program.dispatch(gpu, pass, kernel, &bound, grid)?;
-            }
-            Ok(())
+            let (slots, drawn) = page.of(gpu, Part::All, culled)?;
+            let bound: Bound<'_> = bound.iter().cloned().chain(drawn).collect();
+            self.program.dispatch(gpu, pass, kernel, &bound, slots)
         };
         recorder.timing.pass(gpu, "bin", clear, |pass| {
             list(pass, count)?;

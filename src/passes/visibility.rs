@@ -70,7 +70,7 @@ pub fn record(
             encoder.clear_buffer(&buffer.nearest.raw, 0, Some(rows.pixels * 4));
         }
     };
-    splats.dispatch(recorder, ("visibility", &[part]), rows, &[("nearest", buffer.nearest.bound())], clear)
+    splats.dispatch(recorder, ("visibility", part), rows, &[("nearest", buffer.nearest.bound())], clear)
 }
 
 /// Records the pass of the large splats over `rows`, a workgroup each.

@@ -14,16 +14,18 @@
 //!   `atomicAdd(high, 1)`. They overflow after 2^32 full weights.
 //!   A term errs by a relative u of itself, which moves the mean by at most u, and by half a unit, which moves it by
 //!   `n / (2 sum W)`; rounding the weights moves it by as much again, times the spread of the attributes, which is at most
-//!   1: `n / (F w)`. Reading two sums, dividing, and mapping back are four f32 operations: `5 u` in all. A sum carries
-//!   once for each full weight, which is rarer than fragments (on a software adapter carries are a fifth of the pass);
-//!   and the rim of the paper's kernel, exp(-6), keeps 23 bits. Where weights may be smaller still, or alphas differ
+//!   1: `n / (F w)`. A sum is read as an f32 with an error of 1.5 u: its upper word, below 2^24, is exact, the rounding of
+//!   the lower one is at most u / 2 of a sum that has an upper one, and only then does adding the two round again. Two
+//!   such sums, dividing, and the product that maps back: `6 u` with the term's own. A sum carries once for each full weight, which is
+//!   rarer than fragments (on a software adapter carries are a fifth of the pass); and the rim of the paper's kernel,
+//!   exp(-6), keeps 23 bits. Where weights may be smaller still, or alphas differ
 //!   ([`SceneNeeds::wide_sums`](crate::scene::SceneNeeds::wide_sums)), terms are those of `fixed64` in two words, which
 //!   takes two additions for most. An adapter with 64-bit atomics makes the same sums in half the additions.
 //! - **fixed32**: the same in one word. B fraction bits, `32 - bits(min(surfels, 255))`, are at least 24 and let 255 full
 //!   weights (or all surfels there are) meet in a pixel; a sum that wraps is noticed and the frame rendered again with
-//!   `fixed`. `n 2^-B / w + 5 u`.
+//!   `fixed`. A sum is read with one rounding: `n 2^-B / w + 5 u`.
 //! - **fixed64**: W = 2^40 w exactly, and W a, rounded as f32 and cut at 2^-40, in one u64: each term errs by a relative u
-//!   of itself, so the mean by u, whatever n: `5 u + n 2^-40 / w`. It overflows after 2^24 full weights.
+//!   of itself, so the mean by u, whatever n: `6 u + n 2^-40 / w`. It overflows after 2^24 full weights.
 //! - **packed64**: the terms of `fixed32`, two sums in the halves of one u64.
 //! - **float**, **cas**: f32 sums, by atomic add or by compare and exchange. A sum of n terms in any order errs by at most
 //!   `(n - 1) u` of itself, and so does the weight's: `2 n u + 4 u`. The order shows.
@@ -122,7 +124,7 @@ pub const ACCUMULATORS: &[Accumulator] = &[
         words: 2,
         deterministic: true,
         features: Features::None,
-        error_bound: |n, w, _| n / (ONE as f64 * w) + 5.0 * U,
+        error_bound: |n, w, _| n / (ONE as f64 * w) + 6.0 * U,
     },
     Accumulator {
         name: "fixed32",
@@ -138,7 +140,7 @@ pub const ACCUMULATORS: &[Accumulator] = &[
         words: 2,
         deterministic: true,
         features: Features::AtomicsU64,
-        error_bound: |n, w, _| n * (-40f64).exp2() / w + 5.0 * U,
+        error_bound: |n, w, _| n * (-40f64).exp2() / w + 6.0 * U,
     },
     Accumulator {
         name: "packed64",

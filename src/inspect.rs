@@ -85,7 +85,7 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
             gpu.adapter.name
         )));
     };
-    let view = View::new(scene, &scene.bounds(), &color_range, camera, options);
+    let view = View::new(scene, (&scene.bounds(), &scene.core()), &color_range, camera, options);
     let uniform = Buffer::uniform(gpu, "view", &view)?;
     let timing = Timing::new(gpu);
     let mut recorder = Recorder { gpu, program: &program, view: &uniform, variant: &variant, timing };
@@ -100,7 +100,7 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
     accumulate::record(&mut recorder, &projected, rows, &nearest, &sums)?;
     accumulate::record_large(&mut recorder, &projected, rows, &nearest, &sums)?;
     let mut splats = vec![Splat::zeroed(); scene.surfels.len()];
-    let mut order = order(&scene.surfels, &scene.bounds()).into_iter();
+    let mut order = order(&scene.surfels, &scene.core()).into_iter();
     for page in &projected.pages {
         for (splat, index) in page.splats.read(gpu, page.splats.len)?.into_iter().zip(&mut order) {
             splats[index as usize] = splat;

@@ -109,6 +109,7 @@ pub struct Renderer<'a> {
     options: &'a RenderOptions,
     backend: &'a Backend,
     bounds: Bounds,
+    core: Bounds,
     color_range: ([f32; 4], [f32; 4]),
     splats: Option<SplatBuffer>,
     pixels: Option<PixelBuffers>,
@@ -142,6 +143,7 @@ impl<'a> Renderer<'a> {
             options,
             backend,
             bounds,
+            core: scene.core(),
             color_range,
             splats: None,
             pixels: None,
@@ -350,6 +352,6 @@ impl<'a> Renderer<'a> {
     }
 
     fn view(&self, camera: &Camera) -> View {
-        View::new(self.scene, &self.bounds, &self.color_range, camera, self.options)
+        View::new(self.scene, (&self.bounds, &self.core), &self.color_range, camera, self.options)
     }
 }

@@ -55,7 +55,7 @@ fn case(kernel: &str, epsilon: Epsilon, projection: Projection) -> Case {
     };
     let (reference, _) = render(&scene, &camera, &options, &Backend::Reference, &()).unwrap();
     let enclosure = enclose(&scene, &camera, &options, &reference_all(&scene, &camera, &options));
-    let view = View::new(&scene, &scene.bounds(), &scene.color_range(), &camera, &options);
+    let view = View::new(&scene, (&scene.bounds(), &scene.core()), &scene.color_range(), &camera, &options);
     Case { name: format!("{kernel}, {epsilon:?}, {projection:?}"), scene, camera, options, reference, enclosure, view }
 }
 

@@ -37,7 +37,7 @@ struct View {
     epsilon_deepest: f32,
     // No surfel lies deeper, device units: an unbounded epsilon accepts up to here.
     farthest: f32,
-    // Depth of the middle of the scene's bounds, device units.
+    // Depth of the middle of the scene's core, device units.
     middle: f32,
     // Texels; 0 without a texture.
     texture_width: u32,

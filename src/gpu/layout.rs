@@ -187,10 +187,10 @@ pub fn device_unit(bounds: &Bounds, eye: DVec3) -> f64 {
 }
 
 impl View {
-    /// The view of `scene` by `camera`; `color_range` is [`Scene::color_range`].
+    /// The view of `scene` by `camera`; `bounds`, `core` and the range of colours are what the scene says of itself.
     pub fn new(
         scene: &Scene,
-        bounds: &Bounds,
+        (bounds, core): (&Bounds, &Bounds),
         (low, high): &([f32; 4], [f32; 4]),
         camera: &Camera,
         options: &RenderOptions,
@@ -257,7 +257,7 @@ impl View {
             epsilon_radius: of_radius as f32,
             epsilon_deepest: (of_radius * f64::from(scene.largest_radius()) * unit) as f32,
             farthest: (farthest * unit) as f32,
-            middle: (camera.rotation.row(2).dot(bounds.center() - eye_relative) * unit) as f32,
+            middle: (camera.rotation.row(2).dot(core.center() - eye_relative) * unit) as f32,
             texture_width,
             texture_height,
             padding_0: 0,

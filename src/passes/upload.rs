@@ -53,7 +53,7 @@ impl SurfelBuffer {
         progress.begin("uploading surfels", scene.surfels.len() as u64);
         let mut pages = Vec::new();
         let given = || (0..scene.surfels.len() as u32).collect();
-        let order = if ordered { order(&scene.surfels, &scene.bounds()) } else { given() };
+        let order = if ordered { order(&scene.surfels, &scene.core()) } else { given() };
         for indices in order.chunks(len) {
             let surfels = Buffer::storage(gpu, "surfels", indices.len() as u64)?;
             surfels.write(gpu, indices.len(), |range| taken(&scene.surfels, &indices[range]), progress)?;

@@ -50,6 +50,12 @@ pub struct Scene {
     pub up: Up,
 }
 
+/// Surfels that [`Scene::core`] looks at, at most.
+const CORE_SAMPLE: usize = 4096;
+
+/// One in so many of them may lie beyond each of its sides.
+const CORE_CUT: usize = 64;
+
 /// An axis-aligned box, world units; for a scene relative to [`Scene::origin`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
@@ -103,6 +109,28 @@ impl Scene {
                 },
             )
             .reduce(|| Bounds::EMPTY, Bounds::union)
+    }
+
+    /// A box of nearly all finite surfel centres, in the same space: those few that lie far from all others, as scanners' stray
+    /// points do, do not widen it. Of a sample, the same each time.
+    pub fn core(&self) -> Bounds {
+        let step = self.surfels.len().div_ceil(CORE_SAMPLE).max(1);
+        let sampled = self.surfels.iter().step_by(step).map(|surfel| surfel.center);
+        let sampled: Vec<_> = sampled.filter(|center| center.iter().all(|x| x.is_finite())).collect();
+        if sampled.is_empty() {
+            return self.bounds();
+        }
+        let mut core = Bounds::EMPTY;
+        for axis in 0..3 {
+            let mut along: Vec<f32> = sampled.iter().map(|center| center[axis]).collect();
+            along.sort_unstable_by(f32::total_cmp);
+            let cut = along.len() / CORE_CUT;
+            let (low, high) = (f64::from(along[cut]), f64::from(along[along.len() - 1 - cut]));
+            // An even distribution reaches past both by as much.
+            let margin = (high - low) / (CORE_CUT - 2) as f64;
+            (core.min[axis], core.max[axis]) = (low - margin, high + margin);
+        }
+        if core.extent() == DVec3::ZERO { self.bounds() } else { core }
     }
 
     /// Smallest and largest premultiplied linear colour `(r a, g a, b a, a)` of the scene, each component on its own,
@@ -168,6 +196,26 @@ mod tests {
         scene.surfels.clear();
         assert!(scene.bounds().is_empty());
         assert_eq!(scene.bounds().extent(), DVec3::ZERO);
+    }
+
+    #[test]
+    fn a_few_far_centres_do_not_widen_the_core() {
+        let mut scene = scene(Colors::Constant([1.0; 4]));
+        let (core, bounds) = (scene.core(), scene.bounds());
+        assert!((core.min - bounds.min).abs().max_element() < 2.0, "{core:?} {bounds:?}");
+        assert!((core.max - bounds.max).abs().max_element() < 2.0, "{core:?} {bounds:?}");
+        for (index, far) in [(3, f32::NAN), (4, 1e9), (5, -1e30), (700, 1e9)] {
+            scene.surfels[index].center = [far; 3];
+        }
+        let moved = scene.core();
+        assert!((moved.min - core.min).abs().max_element() < 5.0, "{moved:?}");
+        assert!((moved.max - core.max).abs().max_element() < 5.0, "{moved:?}");
+        scene.surfels.iter_mut().for_each(|surfel| surfel.center = [2.0; 3]);
+        assert_eq!(scene.core(), scene.bounds());
+        scene.surfels[1].center = [9.0; 3];
+        assert_eq!(scene.core(), scene.bounds());
+        scene.surfels.clear();
+        assert!(scene.core().is_empty());
     }
 
     #[test]

@@ -13,8 +13,8 @@ use common::modules;
 use epsplat::gpu::Sources;
 use epsplat::gpu::kernel::{FILES, reflect};
 use epsplat::gpu::layout::{
-    AWAY, BATCH, BLOCK_SIDE, COVERED_GRID, COVERED_GRID_OF_EIGHTS, COVERED_LIST, LIST_ENDS, LIST_START, MOST_GROUPS,
-    OCCLUSION_TILE, ONE, ONE_WIDE, QUEUE_GRID, QUEUE_LISTING, QUEUE_START, TILE, TILE_WIDTH, WORKGROUP,
+    AWAY, BATCH, BLOCK_SIDE, COVERED_GRID, COVERED_GRID_OF_EIGHTS, COVERED_LIST, LIST_ENDS, LIST_FAR, LIST_START,
+    MOST_GROUPS, OCCLUSION_TILE, ONE, ONE_WIDE, QUEUE_GRID, QUEUE_LISTING, QUEUE_START, TILE, TILE_WIDTH, WORKGROUP,
 };
 use epsplat::passes::accumulate::accumulator;
 use epsplat::passes::variant::{self, COLOR_CHANNEL, PixelLayout, color_channels};
@@ -74,7 +74,7 @@ fn a_changed_layout_is_noticed() {
     assert!(renamed.contains("View.center exists in WGSL only"), "{renamed}");
     assert!(renamed.contains("View.middle exists in Rust only"), "{renamed}");
     let exchanged = broken(
-        "    farthest: f32,\n    // Depth of the middle of the scene's bounds, device units.\n    middle: f32,\n",
+        "    farthest: f32,\n    // Depth of the middle of the scene's core, device units.\n    middle: f32,\n",
         "    middle: f32,\n    farthest: f32,\n",
     );
     assert!(exchanged.contains("\"farthest\"") && exchanged.contains("\"middle\""), "{exchanged}");
@@ -148,7 +148,7 @@ fn constants_agree() {
         let tile = needs.raster.is_none().then_some(f64::from(OCCLUSION_TILE));
         assert_eq!(constant("OCCLUSION_TILE"), tile);
         let of_tiles = [("BLOCK_SIDE", BLOCK_SIDE), ("LIST_ENDS", LIST_ENDS)];
-        let of_batches = [("BATCH", BATCH), ("LIST_START", LIST_START)];
+        let of_batches = [("BATCH", BATCH), ("LIST_START", LIST_START), ("LIST_FAR", LIST_FAR)];
         for (exists, constants) in [(tiles, &of_tiles[..]), (needs.cull, &of_batches)] {
             for &(name, value) in constants {
                 assert_eq!(constant(name), exists.then_some(f64::from(value)), "{name}");
@@ -181,6 +181,8 @@ fn constants_agree() {
     // A pixel's row fits beside the flag, its column below the row.
     assert_eq!((MAX_SIDE - 1) << 16 & AWAY, 0);
     const { assert!(MAX_SIDE - 1 <= 0xffff) };
+    // A batch's number fits what anchors leave of their words (cull.wgsl).
+    const { assert!(MOST_GROUPS < 1 << 18) };
     // The scale is stated once: no kernel repeats it as a number.
     let repeated = FILES.iter().map(|(_, text)| text.matches(&ONE.to_string()).count()).sum::<usize>();
     assert_eq!(repeated, 1);

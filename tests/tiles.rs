@@ -118,7 +118,7 @@ fn a_wrong_tile_is_noticed() {
     options.organisation = Organisation::Tile;
     // Of tiles that gather all splats, large and small; and of those that add the large ones to what is stored, of several pages.
     let gathered = [
-        ("bin.wgsl", "atomicStore(&lists[at], index)", "atomicStore(&lists[at], 0u)"),
+        ("bin.wgsl", "atomicStore(&lists[at], slot)", "atomicStore(&lists[at], 0u)"),
         ("bin.wgsl", "tile_size(), 0u, 1u, true)", "tile_size(), 1u, 1u, true)"),
         ("bin.wgsl", "LISTED_AT_ONCE + local.y", "LISTED_AT_ONCE"),
         ("tile.wgsl", "b = nearer(b, splat, filter_, column.x, column.y + 4u);", ""),

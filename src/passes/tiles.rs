@@ -129,11 +129,7 @@ impl Lists {
 
 impl Tiles {
     /// Tiles for each of `bands` of an image of `width` columns, drawn by `program`. They have no room yet.
-    pub fn new(
-        gpu: &Gpu,
-        (program, needs): (Arc<Program>, &SceneNeeds),
-        image: (u32, &[Rows]),
-    ) -> Result<Self> {
+    pub fn new(gpu: &Gpu, (program, needs): (Arc<Program>, &SceneNeeds), image: (u32, &[Rows])) -> Result<Self> {
         let rows = tile_rows(needs);
         let [large, small] = [Listed::Large, Listed::Small].map(|of| Lists::new(gpu, of.cell(rows), image, 0));
         Ok(Self { program, width: image.0, rows, large: large?, small: small? })

@@ -143,6 +143,7 @@ pub fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         ("balls", Element::Plain(&[<[f32; 4]>::SHAPE])),
         ("surviving", Element::Plain(WORD)),
         ("drawn", Element::Plain(WORD)),
+        ("rest", Element::Plain(WORD)),
         ("lists", Element::Plain(WORD)),
         ("large_lists", Element::Plain(WORD)),
         ("small_lists", Element::Plain(WORD)),

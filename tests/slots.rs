@@ -1,0 +1,136 @@
+//! Splats have room for the batches that are drawn, and no more: what is left out shows in the room, and in no bit.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use common::bits;
+use common::scenes::sphere;
+use epsplat::gpu::Sources;
+use epsplat::render::{Backend, Renderer, render};
+use epsplat::scene::{
+    Camera, Lens, LowPass, Maps, Optimisation, Organisation, RenderOptions, Scene, Shading, Surfel, Up,
+};
+use glam::DVec3;
+
+const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
+
+/// Where the second view is from.
+const OUTSIDE: DVec3 = DVec3::new(1.0, 0.7, 3.0);
+
+/// 199,998 disks on a sphere, and one behind it that faces [`OUTSIDE`], so large that its centre is 60,000 pixels beside the
+/// image and its rim in it. The last batch is not full.
+fn scene() -> Scene {
+    let mut scene = sphere(200_000, 1.5);
+    let last = scene.surfels.len() - 1;
+    let (toward, beside) = (OUTSIDE.normalize(), OUTSIDE.cross(DVec3::Y).normalize());
+    let center = 2400.0 * beside - 3.0 * toward;
+    scene.surfels[last] = Surfel::disk(center.as_vec3(), toward.as_vec3(), 2400.0);
+    let index = scene.surfels.len() / 3;
+    scene.surfels.swap(index, last);
+    scene.surfels.truncate(199_999);
+    if let epsplat::scene::Colors::Srgb8(codes) = &mut scene.colors {
+        codes.truncate(199_999);
+    }
+    scene
+}
+
+/// Views that see more and more, and less again.
+fn views() -> Vec<Camera> {
+    let look = |eye: DVec3, lens| Camera::look_at((128, 128), lens, eye, DVec3::ZERO, None, Up::Y, 1e-3).unwrap();
+    vec![
+        look(OUTSIDE * 0.5, Lens::Fov(15.0)),
+        look(OUTSIDE, Lens::Fov(45.0)),
+        look(DVec3::new(0.1, 0.2, 0.6), Lens::Fov(90.0)),
+        look(OUTSIDE, Lens::OrthographicHeight(2.2)),
+    ]
+}
+
+fn options() -> Vec<RenderOptions> {
+    let lit = RenderOptions { maps: MAPS, ..RenderOptions::default() };
+    vec![
+        RenderOptions { shading: Shading::Unlit, ..RenderOptions::default() },
+        RenderOptions { low_pass: LowPass::Ewa, organisation: Organisation::Scatter, ..lit.clone() },
+        RenderOptions { organisation: Organisation::Tile, ..lit },
+    ]
+}
+
+fn without_culling(options: &RenderOptions) -> RenderOptions {
+    RenderOptions { without: vec![Optimisation::Culling], ..options.clone() }
+}
+
+/// The first view has too little room for the next, which is rendered again; what it needs is then kept.
+#[test]
+fn a_view_that_needs_more_slots_gets_them() {
+    let Some(gpu) = common::gpu() else { return };
+    let (scene, backend) = (scene(), Backend::gpu(gpu));
+    for options in options() {
+        let mut renderer = Renderer::new(&scene, &options, &backend).unwrap();
+        let mut room = Vec::new();
+        for view in views() {
+            let (kept, report) = renderer.frame(&view, &()).unwrap();
+            assert!(report.needs.contains(&"cull"));
+            let (all, of_all) = render(&scene, &view, &without_culling(&options), &backend, &()).unwrap();
+            assert!(!of_all.needs.contains(&"cull"));
+            assert!(bits(&kept) == bits(&all), "{options:?}, {view:?}");
+            room.push(renderer.device_bytes().splats);
+        }
+        assert!(room.is_sorted() && room[0] < room[1], "there was room enough, so the test tests nothing: {room:?}");
+    }
+}
+
+#[test]
+fn what_is_left_out_takes_no_room() {
+    let Some(gpu) = common::gpu() else { return };
+    let (scene, backend) = (scene(), Backend::gpu(gpu));
+    for options in options() {
+        let room = |options: &RenderOptions, view: &Camera| {
+            let mut renderer = Renderer::new(&scene, options, &backend).unwrap();
+            let (_, report) = renderer.frame(view, &()).unwrap();
+            (renderer.device_bytes().splats as f64, report.splats_drawn as f64 / scene.surfels.len() as f64)
+        };
+        // A surfel has 36 bytes and its colour.
+        let surfels = 40.0 * scene.surfels.len() as f64;
+        // A part of the sphere, and half of it; tiles draw nothing early enough to hide anything from the projection.
+        let half = if options.organisation == Organisation::Tile { 1.01 } else { 0.9 };
+        for (view, most) in views().iter().zip([0.15, half]) {
+            let ((all, _), (own, drawn)) = (room(&without_culling(&options), view), room(&options, view));
+            let share = (own - surfels) / (all - surfels);
+            assert!(drawn < share && share < most, "{share} of the room for {drawn} of the surfels: {options:?}");
+        }
+    }
+}
+
+#[test]
+fn wrong_slots_are_noticed() {
+    let Some(gpu) = common::gpu() else { return };
+    // In the third view some batches are far and seen.
+    let (scene, views) = (scene(), &views()[1..3]);
+    let mut backend = Backend::gpu(gpu);
+    let mut image = |sources: Sources, options: &RenderOptions| {
+        if let Backend::Gpu { sources: kept, .. } = &mut backend {
+            *kept = sources;
+        }
+        let frames = views.iter().map(|view| render(&scene, view, options, &backend, &()).unwrap().0);
+        frames.map(|frame| bits(&frame)).collect::<Vec<_>>()
+    };
+    let broken = |file, from, to| Sources::default().replace(file, from, to).unwrap();
+    let wrong = [
+        ("cull.wgsl", "spare.y << SPARE.x", "spare.y"),
+        ("cull.wgsl", "drawn[1] - workgroups.y + workgroup.y", "workgroup.y"),
+        // The large disk's anchor has more than 16 bits.
+        ("cull.wgsl", "const SPARE: vec2<u32> = vec2<u32>(9u)", "const SPARE: vec2<u32> = vec2<u32>(16u)"),
+        ("project.wgsl", "atomicAdd(&rare[0], 1u)], slot)", "atomicAdd(&rare[0], 1u)], surfel_for(slot))"),
+    ];
+    for options in options() {
+        let expected = image(Sources::default(), &options);
+        for (file, from, to) in wrong {
+            assert!(image(broken(file, from, to), &options) != expected, "{from} in {file} may be {to:?}: {options:?}");
+        }
+        // The last surfel is repeated to the end of its batch.
+        let repeated = broken("project.wgsl", "surfel_at(index)", "surfel_at(min(index, surfels_held() - 1u))");
+        assert!(image(repeated.clone(), &options) == expected);
+        let repeated = repeated.replace("project.wgsl", "exists && all(", "all(").unwrap();
+        assert!(image(repeated, &options) != expected, "surfels past the last may be drawn: {options:?}");
+    }
+}

@@ -27,7 +27,7 @@ use crate::passes::variant::Variant;
 use crate::passes::{Recorder, accumulate, cull, project, raster, resolve, tiles, visibility};
 use crate::progress::Progress;
 use crate::scene::light::MAX_LIGHTS;
-use crate::scene::{Bounds, Camera, Optimisation, Organisation, RenderOptions, Scene, SceneNeeds};
+use crate::scene::{Camera, Optimisation, Organisation, Ranges, RenderOptions, Scene, SceneNeeds};
 
 /// Who renders.
 pub enum Backend {
@@ -108,9 +108,7 @@ pub struct Renderer<'a> {
     scene: &'a Scene,
     options: &'a RenderOptions,
     backend: &'a Backend,
-    bounds: Bounds,
-    core: Bounds,
-    color_range: ([f32; 4], [f32; 4]),
+    ranges: Ranges,
     splats: Option<SplatBuffer>,
     pixels: Option<PixelBuffers>,
     tiles: Option<Tiles>,
@@ -137,14 +135,11 @@ impl<'a> Renderer<'a> {
         if options.maps.decision && !matches!(backend, Backend::Reference) {
             return Err(Error::Usage("the decision map is made by the reference backend only".into()));
         }
-        let (bounds, color_range) = (scene.bounds(), scene.color_range());
         Ok(Self {
             scene,
             options,
             backend,
-            bounds,
-            core: scene.core(),
-            color_range,
+            ranges: Ranges::of(scene),
             splats: None,
             pixels: None,
             tiles: None,
@@ -179,7 +174,7 @@ impl<'a> Renderer<'a> {
         camera: &Camera,
         progress: &dyn Progress,
     ) -> Result<(Frame, Report)> {
-        let needs = SceneNeeds::of(self.scene, &self.color_range, camera, self.options)
+        let needs = SceneNeeds::of(self.scene, &self.ranges.color, camera, self.options)
             .with_atomics_u64(gpu.adapter.atomics_u64 && self.options.has(Optimisation::Pairs))
             .with_long_words(gpu.adapter.integers_u64 && self.options.has(Optimisation::LongWords));
         let surfels = self.scene.surfels.len() as u64;
@@ -207,11 +202,11 @@ impl<'a> Renderer<'a> {
             None => variant.accumulator.check(gpu)?,
         }
         let program = variant.compile(gpu, sources)?;
-        let ordered = self.options.has(Optimisation::Order);
+        let core = self.options.has(Optimisation::Order).then_some(&self.ranges.core);
         let mut splats = match self.splats.take() {
             Some(splats) => splats,
             None => {
-                let surfels = SurfelBuffer::upload(gpu, self.scene, &needs, ordered, progress)?;
+                let surfels = SurfelBuffer::upload(gpu, self.scene, &needs, core, progress)?;
                 SplatBuffer::new(gpu, surfels, needs.low_pass)?
             }
         };
@@ -352,6 +347,6 @@ impl<'a> Renderer<'a> {
     }
 
     fn view(&self, camera: &Camera) -> View {
-        View::new(self.scene, (&self.bounds, &self.core), &self.color_range, camera, self.options)
+        View::new(self.scene, &self.ranges, camera, self.options)
     }
 }

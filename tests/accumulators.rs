@@ -16,7 +16,9 @@ use epsplat::hardcases::precision::E;
 use epsplat::passes::accumulate::{ACCUMULATORS, Accumulator};
 use epsplat::passes::project::reference_all;
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Maps, Projection, RenderOptions, Scene, Shading, Surfel};
+use epsplat::scene::{
+    Camera, Colors, Epsilon, Kernel, Maps, Projection, Ranges, RenderOptions, Scene, Shading, Surfel,
+};
 use glam::Vec3;
 
 const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
@@ -55,7 +57,7 @@ fn case(kernel: &str, epsilon: Epsilon, projection: Projection) -> Case {
     };
     let (reference, _) = render(&scene, &camera, &options, &Backend::Reference, &()).unwrap();
     let enclosure = enclose(&scene, &camera, &options, &reference_all(&scene, &camera, &options));
-    let view = View::new(&scene, (&scene.bounds(), &scene.core()), &scene.color_range(), &camera, &options);
+    let view = View::new(&scene, &Ranges::of(&scene), &camera, &options);
     Case { name: format!("{kernel}, {epsilon:?}, {projection:?}"), scene, camera, options, reference, enclosure, view }
 }
 

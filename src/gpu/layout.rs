@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use crate::scene::light::MAX_LIGHTS;
 use crate::scene::texture::PlaceRange;
-use crate::scene::{Bounds, Camera, Colors, Light, RenderOptions, Scene};
+use crate::scene::{Bounds, Camera, Colors, Light, Ranges, RenderOptions, Scene};
 
 /// Invocations of a workgroup, in every kernel.
 pub const WORKGROUP: u32 = 64;
@@ -187,14 +187,10 @@ pub fn device_unit(bounds: &Bounds, eye: DVec3) -> f64 {
 }
 
 impl View {
-    /// The view of `scene` by `camera`; `bounds`, `core` and the range of colours are what the scene says of itself.
-    pub fn new(
-        scene: &Scene,
-        (bounds, core): (&Bounds, &Bounds),
-        (low, high): &([f32; 4], [f32; 4]),
-        camera: &Camera,
-        options: &RenderOptions,
-    ) -> Self {
+    /// The view of `scene`, whose values lie in `ranges`, by `camera`.
+    pub fn new(scene: &Scene, ranges: &Ranges, camera: &Camera, options: &RenderOptions) -> Self {
+        let Ranges { bounds, core, color: (low, high), largest_radius } = ranges;
+        let largest_radius = f64::from(*largest_radius);
         let eye_relative = camera.eye - scene.origin;
         let unit = device_unit(bounds, eye_relative);
         let (eye, eye_low) = split_all((eye_relative * unit).to_array());
@@ -232,7 +228,7 @@ impl View {
             DVec3::new(pick(0), pick(1), pick(2)) - eye_relative
         });
         let farthest = corners.map(|corner| camera.rotation.row(2).dot(corner)).fold(0.0, f64::max);
-        let farthest = (farthest + f64::from(scene.largest_radius())) * 1.001;
+        let farthest = (farthest + largest_radius) * 1.001;
         Self {
             rotation,
             rotation_low,
@@ -255,7 +251,7 @@ impl View {
             epsilon_absolute: (absolute * unit) as f32,
             world: (1.0 / unit) as f32,
             epsilon_radius: of_radius as f32,
-            epsilon_deepest: (of_radius * f64::from(scene.largest_radius()) * unit) as f32,
+            epsilon_deepest: (of_radius * largest_radius * unit) as f32,
             farthest: (farthest * unit) as f32,
             middle: (camera.rotation.row(2).dot(core.center() - eye_relative) * unit) as f32,
             texture_width,

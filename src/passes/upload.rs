@@ -15,7 +15,7 @@ use crate::gpu::kernel::Bound;
 use crate::gpu::layout::{BATCH, MOST_GROUPS, Splat};
 use crate::progress::Progress;
 use crate::scene::color::SRGB8_TO_LINEAR;
-use crate::scene::{ColorNeed, Colors, Scene, SceneNeeds, Surfel};
+use crate::scene::{Bounds, ColorNeed, Colors, Scene, SceneNeeds, Surfel};
 
 /// Surfels and, if they differ in it, their colour.
 pub struct SurfelBuffer {
@@ -37,12 +37,12 @@ pub struct SurfelPage {
 }
 
 impl SurfelBuffer {
-    /// Uploads `scene` as far as `needs` asks for it, `ordered` to draw well or as it is.
+    /// Uploads `scene` as far as `needs` asks for it, in the [`order`] that draws well where its `core` is given, or as it is.
     pub fn upload(
         gpu: &Gpu,
         scene: &Scene,
         needs: &SceneNeeds,
-        ordered: bool,
+        core: Option<&Bounds>,
         progress: &dyn Progress,
     ) -> Result<Self> {
         // The splat's record is the largest of what is paged alike.
@@ -53,7 +53,7 @@ impl SurfelBuffer {
         progress.begin("uploading surfels", scene.surfels.len() as u64);
         let mut pages = Vec::new();
         let given = || (0..scene.surfels.len() as u32).collect();
-        let order = if ordered { order(&scene.surfels, &scene.core()) } else { given() };
+        let order = core.map_or_else(given, |core| order(&scene.surfels, core));
         for indices in order.chunks(len) {
             let surfels = Buffer::storage(gpu, "surfels", indices.len() as u64)?;
             surfels.write(gpu, indices.len(), |range| taken(&scene.surfels, &indices[range]), progress)?;

@@ -7,6 +7,7 @@ pub mod light;
 pub mod needs;
 pub mod optimisation;
 pub mod options;
+pub mod ranges;
 pub mod raster;
 #[expect(clippy::module_inception, reason = "the file is named for the type it holds")]
 pub mod scene;
@@ -19,6 +20,7 @@ pub use light::Light;
 pub use needs::{ColorNeed, SceneNeeds};
 pub use optimisation::Optimisation;
 pub use options::{Epsilon, Kernel, KernelShape, LowPass, Maps, Organisation, RenderOptions, Shading};
+pub use ranges::Ranges;
 pub use raster::{BlendFormat, Raster, RasterDepth};
 pub use scene::{Bounds, Scene, Up};
 pub use surfel::Surfel;

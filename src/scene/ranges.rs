@@ -1,0 +1,28 @@
+//! What a renderer must know of all surfels together, looked up once and not for each frame.
+
+use super::{Bounds, Scene};
+
+/// The ranges that a scene's values lie in.
+#[derive(Clone, Copy, Debug)]
+pub struct Ranges {
+    /// [`Scene::bounds`].
+    pub bounds: Bounds,
+    /// [`Scene::core`].
+    pub core: Bounds,
+    /// [`Scene::color_range`].
+    pub color: ([f32; 4], [f32; 4]),
+    /// [`Scene::largest_radius`].
+    pub largest_radius: f32,
+}
+
+impl Ranges {
+    /// Those of `scene`.
+    pub fn of(scene: &Scene) -> Self {
+        Self {
+            bounds: scene.bounds(),
+            core: scene.core(),
+            color: scene.color_range(),
+            largest_radius: scene.largest_radius(),
+        }
+    }
+}

@@ -27,6 +27,13 @@ impl<T: Pod> Buffer<T> {
         Self::create(gpu, what, len, wgpu::BufferUsages::STORAGE, gpu.buffer_limit())
     }
 
+    /// The same, which the host reads where it lies if the device can let it ([`Readback`]).
+    pub(crate) fn readable(gpu: &Gpu, what: &str, len: u64) -> Result<Self> {
+        let lies_open = gpu.device.features().contains(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS);
+        let read = if lies_open { wgpu::BufferUsages::MAP_READ } else { wgpu::BufferUsages::empty() };
+        Self::create(gpu, what, len, wgpu::BufferUsages::STORAGE | read, gpu.buffer_limit())
+    }
+
     /// The same, which may also hold the arguments of indirect dispatches.
     pub fn indirect(gpu: &Gpu, what: &str, len: u64) -> Result<Self> {
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
@@ -129,8 +136,8 @@ impl<T: Pod> Buffer<T> {
     pub fn read(&self, gpu: &Gpu, len: u64) -> Result<Vec<T>> {
         let len = len.min(self.len);
         let mut values: Vec<T> = Vec::with_capacity(len as usize);
-        let readback = Readback::new(gpu, len * size_of::<T>() as u64, size_of::<T>() as u64);
-        readback.visit(gpu, self, len, |_, bytes| {
+        let bytes = len * size_of::<T>() as u64;
+        Readback::new(gpu, self, bytes, size_of::<T>() as u64).visit(gpu, self, bytes, |_, bytes| {
             // A mapped range need not be aligned for T, so elements are copied bytewise.
             values.extend(bytes.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned::<T>));
         })?;
@@ -138,53 +145,62 @@ impl<T: Pod> Buffer<T> {
     }
 }
 
-/// Memory that both the device and the host see, through which buffers are read back in pieces.
+/// Memory that both the device and the host see, through which a buffer is read back in pieces, unless the host can read the
+/// buffer itself.
 pub(crate) struct Readback {
-    staging: wgpu::Buffer,
+    staging: Option<wgpu::Buffer>,
     step: u64,
 }
 
 impl Readback {
-    /// For reads of up to `bytes`, in pieces of whole records of `record` bytes.
-    pub(crate) fn new(gpu: &Gpu, bytes: u64, record: u64) -> Self {
+    /// For reads of up to `bytes` of `buffer`, in pieces of whole records of `record` bytes.
+    pub(crate) fn new<T>(gpu: &Gpu, buffer: &Buffer<T>, bytes: u64, record: u64) -> Self {
         let step = bytes.min((PIECE / record).max(1) * record).next_multiple_of(4).max(4);
-        let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("readback"),
-            size: step,
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
+        let read = wgpu::BufferUsages::MAP_READ;
+        let staging = (!buffer.raw.usage().contains(read)).then(|| {
+            gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("readback"),
+                size: step,
+                usage: read | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
         });
         Self { staging, step }
     }
 
     /// Memory that it takes, bytes.
     pub(crate) fn bytes(&self) -> u64 {
-        self.staging.size()
+        self.staging.as_ref().map_or(0, wgpu::Buffer::size)
     }
 
-    /// Calls `piece` with the place and the bytes of each piece of the first `len` elements of `buffer`.
-    pub(crate) fn visit<T: Pod>(
+    /// Calls `piece` with the place and the bytes of each piece of the first `bytes` of `buffer`.
+    pub(crate) fn visit<T>(
         &self,
         gpu: &Gpu,
         buffer: &Buffer<T>,
-        len: u64,
+        bytes: u64,
         mut piece: impl FnMut(u64, &[u8]),
     ) -> Result<()> {
-        let bytes = len.min(buffer.len) * size_of::<T>() as u64;
+        let bytes = bytes.min(buffer.raw.size());
         let mut offset = 0;
         while offset < bytes {
-            let size = (bytes - offset).min(self.step);
-            let mut encoder = gpu.device.create_command_encoder(&Default::default());
-            encoder.copy_buffer_to_buffer(&buffer.raw, offset, &self.staging, 0, size);
-            gpu.queue.submit([encoder.finish()]);
-            let slice = self.staging.slice(..size);
+            let (read, slice) = match &self.staging {
+                Some(staging) => {
+                    let size = (bytes - offset).min(self.step);
+                    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+                    encoder.copy_buffer_to_buffer(&buffer.raw, offset, staging, 0, size);
+                    gpu.queue.submit([encoder.finish()]);
+                    (staging, staging.slice(..size))
+                }
+                None => (&buffer.raw, buffer.raw.slice(..bytes)),
+            };
             slice.map_async(wgpu::MapMode::Read, |_| {});
             gpu.wait()?;
             let view = slice.get_mapped_range().map_err(|e| gpu.error(format!("reading back failed: {e}")))?;
             piece(offset, &view);
+            offset += view.len() as u64;
             drop(view);
-            self.staging.unmap();
-            offset += size;
+            read.unmap();
         }
         Ok(())
     }

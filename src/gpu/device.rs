@@ -102,6 +102,9 @@ const OPTIONAL_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
     .union(wgpu::Features::SUBGROUP)
     .union(wgpu::Features::FLOAT32_BLENDABLE);
 
+/// Of an adapter whose memory is the host's the host reads buffers where they lie; a card's would then have them in slow memory.
+const SOFTWARE_FEATURES: wgpu::Features = wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
+
 /// What to do about a missing adapter.
 pub const INSTALL_HINT: &str = "install a Vulkan driver (on Debian or Ubuntu without a GPU: \
     apt-get install mesa-vulkan-drivers libvulkan1) or render with --backend reference";
@@ -154,9 +157,10 @@ impl Gpu {
             }));
         };
         let limits = handle.limits();
+        let software = if adapter.kind == "software" { SOFTWARE_FEATURES } else { wgpu::Features::empty() };
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("epsplat"),
-            required_features: handle.features() & OPTIONAL_FEATURES,
+            required_features: handle.features() & (OPTIONAL_FEATURES | software),
             required_limits: limits.clone(),
             // Few large buffers: no pooling, so that a scene costs what its buffers cost.
             memory_hints: wgpu::MemoryHints::MemoryUsage,

@@ -119,8 +119,8 @@ impl ImageBuffer {
     /// Room for `pixels`.
     pub fn new(gpu: &Gpu, variant: &Variant, pixels: u64) -> Result<Self> {
         let record = u64::from(variant.pixel.image_words);
-        let image = Buffer::storage(gpu, "image", pixels * record)?;
-        let readback = Readback::new(gpu, pixels * record * 4, record * 4);
+        let image = Buffer::readable(gpu, "image", pixels * record)?;
+        let readback = Readback::new(gpu, &image, pixels * record * 4, record * 4);
         Ok(Self { image, readback })
     }
 
@@ -169,7 +169,7 @@ pub fn read_back(recorder: &Recorder<'_>, rows: &Rows, buffer: &ImageBuffer, fra
     let layout = recorder.variant.pixel;
     let record = layout.image_words as usize * 4;
     let start = rows.first as usize * frame.width as usize;
-    buffer.readback.visit(recorder.gpu, &buffer.image, rows.pixels * record as u64 / 4, |offset, bytes| {
+    buffer.readback.visit(recorder.gpu, &buffer.image, rows.pixels * record as u64, |offset, bytes| {
         let first = start + offset as usize / record;
         let pixels = bytes.len() / record;
         // Word `word` of each pixel on, in a map of N values a pixel.

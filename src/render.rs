@@ -13,7 +13,7 @@ use pixels::{PixelBuffers, Sums, rows_per_band};
 
 use crate::error::{Error, Result};
 use crate::frame::Frame;
-use crate::gpu::buffers::page_len;
+use crate::gpu::buffers::{counts, page_len};
 use crate::gpu::layout::{BATCH, Splat, View};
 use crate::gpu::timing::Timing;
 use crate::gpu::{Gpu, Sources};
@@ -114,6 +114,8 @@ pub struct Renderer<'a> {
     tiles: Option<Tiles>,
     /// There were too many splats for tiles to gather.
     crowded: bool,
+    /// The last frame had no large splats, so that the next does not stop to look for them.
+    none_large: bool,
     held: DeviceBytes,
 }
 
@@ -144,6 +146,7 @@ impl<'a> Renderer<'a> {
             pixels: None,
             tiles: None,
             crowded: false,
+            none_large: false,
             held: DeviceBytes::default(),
         })
     }
@@ -218,6 +221,7 @@ impl<'a> Renderer<'a> {
             other => {
                 // The old ones make room first.
                 drop((other, self.tiles.take()));
+                self.none_large = false;
                 PixelBuffers::new(gpu, self, camera, &variant)?
             }
         };
@@ -225,7 +229,7 @@ impl<'a> Renderer<'a> {
             Some(tiles) => Some(tiles.of_variant(variant.compile_tiles(gpu, sources)?)),
             None => None,
         };
-        let fresh = tiles.is_none();
+        let fresh = tiles.is_none() && (needs.gather || !self.none_large);
         progress.begin("rendering rows", camera.height.into());
         let start = Instant::now();
         pixels.view.set(gpu, &self.view(camera));
@@ -253,7 +257,7 @@ impl<'a> Renderer<'a> {
                         visibility::occlude(&mut recorder, part, rows, nearest)?;
                     }
                 }
-                if fresh && rows.first == 0 && (needs.gather || needs.tiles && splats.most_large(gpu)? > 0) {
+                if fresh && rows.first == 0 && (needs.gather || needs.tiles && splats.has_large(gpu)?) {
                     let kernels = variant.compile_tiles(gpu, sources)?;
                     let mut new = Tiles::new(gpu, (kernels, &needs), (camera.width, &pixels.bands))?;
                     let room = new.make_room(&mut recorder, Listed::Large, &splats, &pixels.bands, nearest)?;
@@ -301,15 +305,21 @@ impl<'a> Renderer<'a> {
         }
         progress.end();
         let total_ms = start.elapsed().as_secs_f64() * 1e3;
-        let overflows = match &pixels.sums {
-            Sums::Storage(_, sums) => sums.overflows(gpu)?,
-            Sums::Gathered(_) | Sums::Targets(..) => 0,
+        let wrapped = match &pixels.sums {
+            Sums::Storage(_, sums) => Some(sums.counter()),
+            Sums::Gathered(_) | Sums::Targets(..) => None,
         };
-        let held = match &tiles {
-            Some(tiles) => tiles.held(gpu)?,
-            None => true,
-        };
-        if !(held && (!needs.cull || splats.held(gpu)?)) {
+        let of_tiles = tiles.iter().flat_map(Tiles::counters);
+        let counters: Vec<_> = splats.counters().chain(of_tiles).chain(wrapped).collect();
+        let mut counted = counts(gpu, &counters)?.into_iter();
+        let tally = splats.tally(&mut counted);
+        let listed = tiles.as_ref().is_none_or(|tiles| tiles.held(&mut counted));
+        let overflows: u64 = counted.next().map_or(0, |[wrapped, _]| wrapped.into());
+        self.none_large = tally.most_large == 0;
+        if !listed || needs.cull && !tally.held {
+            if !tally.held {
+                splats.forget_room();
+            }
             // The next try measures the room that it needs.
             (self.splats, self.pixels) = (Some(splats), Some(pixels));
             let (frame, report) = self.on_gpu(gpu, sources, camera, progress)?;
@@ -332,7 +342,7 @@ impl<'a> Renderer<'a> {
             accumulator: needs.raster.map_or(variant.accumulator.name, |raster| raster.format.name()),
             overflows: 0,
             surfels: self.scene.surfels.len() as u64,
-            splats_drawn: splats.drawn(gpu)?,
+            splats_drawn: tally.drawn,
             width: camera.width,
             height: camera.height,
             passes: passes.into_iter().map(|(stage, ms)| (format!("{stage}_ms"), ms)).collect(),

@@ -206,6 +206,17 @@ impl Readback {
     }
 }
 
+/// The first two words of each of `buffers`, which have as many, by one trip to the device.
+pub(crate) fn counts(gpu: &Gpu, buffers: &[&Buffer<u32>]) -> Result<Vec<[u32; 2]>> {
+    let all = Buffer::<[u32; 2]>::readable(gpu, "counts", buffers.len() as u64)?;
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    for (place, buffer) in (0..).zip(buffers) {
+        encoder.copy_buffer_to_buffer(&buffer.raw, 0, &all.raw, 8 * place, 8);
+    }
+    gpu.queue.submit([encoder.finish()]);
+    all.read(gpu, buffers.len() as u64)
+}
+
 /// How many elements of `stride` bytes fit a page, for the largest of the strides that are paged together.
 pub fn page_len(gpu: &Gpu, stride: usize) -> u64 {
     let invocations =

@@ -316,7 +316,7 @@ impl AttributeBuffer {
         let words = pixels * u64::from(variant.sum_words());
         Ok(Self {
             sums: Buffer::storage(gpu, "weighted sums", words)?,
-            overflows: Buffer::storage(gpu, "overflow count", 1)?,
+            overflows: Buffer::storage(gpu, "overflow count", 2)?,
         })
     }
 
@@ -325,9 +325,9 @@ impl AttributeBuffer {
         self.sums.bytes() + self.overflows.bytes()
     }
 
-    /// How often a sum wrapped: the image is wrong unless this is 0.
-    pub fn overflows(&self, gpu: &Gpu) -> Result<u64> {
-        Ok(self.overflows.read(gpu, 1)?.first().copied().unwrap_or(0).into())
+    /// What says, in its first word, how often a sum wrapped: the image is wrong unless that is 0.
+    pub(crate) fn counter(&self) -> &Buffer<u32> {
+        &self.overflows
     }
 }
 

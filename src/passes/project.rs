@@ -12,7 +12,7 @@ use super::lowpass::{self, Design, Filter};
 use super::upload::SurfelBuffer;
 use super::{Recorder, Rows};
 use crate::error::Result;
-use crate::gpu::buffers::Buffer;
+use crate::gpu::buffers::{Buffer, counts};
 use crate::gpu::kernel::{Bound, Grid, grid};
 use crate::gpu::{Gpu, layout};
 use crate::scene::{Camera, LowPass, RenderOptions, Scene, Surfel};
@@ -118,6 +118,17 @@ pub struct SplatPage {
     filters: Option<Buffer<layout::Filter>>,
 }
 
+/// How many splats a frame has.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tally {
+    /// Those that may touch a pixel of the image, and are not known to be hidden.
+    pub(crate) drawn: u64,
+    /// The most large ones of a page.
+    pub(crate) most_large: u32,
+    /// There was room for all of them, if batches are left out.
+    pub(crate) held: bool,
+}
+
 /// Records the projection of `part` of every page; where batches are left out, after [`cull::record`](super::cull::record) has
 /// listed them.
 pub fn record(recorder: &mut Recorder<'_>, buffer: &SplatBuffer, part: Part) -> Result<()> {
@@ -215,30 +226,54 @@ impl SplatBuffer {
         self.surfels.pages.iter().zip(&mut self.pages).try_for_each(|(of, page)| page.grow(gpu, of.surfels.len))
     }
 
-    /// Makes room for the splats of the batches that are listed, and, once those of `part` are all, an eighth more for the
-    /// next view. Waits for the device; does nothing where it has been done for an earlier view.
+    /// Makes room for the splats of the batches that are listed, and an eighth more for the next view. Waits for the device; does
+    /// nothing where it has been done for an earlier view.
     pub fn make_room(&mut self, gpu: &Gpu, part: Part) -> Result<()> {
-        if !self.measured {
-            for (of, page) in self.surfels.pages.iter().zip(&mut self.pages) {
-                let slots = page.batches.slots(gpu)?;
-                if slots > page.splats.len {
-                    // Whole batches: the last one may be listed anywhere.
-                    let [slots, all] =
-                        [slots + slots / 8, of.surfels.len].map(|n| n.next_multiple_of(layout::BATCH.into()));
-                    page.grow(gpu, slots.min(all))?;
-                }
-            }
-            self.measured = part == Part::Far;
+        if self.measured {
+            return Ok(());
         }
+        let lists: Vec<_> = self.pages.iter().map(|page| page.batches.counter()).collect();
+        let listed = counts(gpu, &lists)?;
+        for ((of, page), [_, batches]) in self.surfels.pages.iter().zip(&mut self.pages).zip(listed) {
+            let slots = u64::from(batches) * u64::from(layout::BATCH);
+            if slots > page.splats.len {
+                // Whole batches: the last one may be listed anywhere.
+                let [slots, all] =
+                    [slots + slots / 8, of.surfels.len].map(|n| n.next_multiple_of(layout::BATCH.into()));
+                page.grow(gpu, slots.min(all))?;
+            }
+        }
+        self.measured = part == Part::Far;
         Ok(())
     }
 
-    /// Whether there was room for all that was listed; if not, the next view is measured again. Waits for the device.
-    pub fn held(&mut self, gpu: &Gpu) -> Result<bool> {
-        for page in &self.pages {
-            self.measured &= page.batches.slots(gpu)? <= page.splats.len;
+    /// What says how many splats there are: two counters a page.
+    pub(crate) fn counters(&self) -> impl Iterator<Item = &Buffer<u32>> {
+        self.pages.iter().flat_map(|page| [&page.queue, page.batches.counter()])
+    }
+
+    /// What they say after a frame, the first of `counted`.
+    pub(crate) fn tally(&self, counted: &mut impl Iterator<Item = [u32; 2]>) -> Tally {
+        let mut tally = Tally { drawn: 0, most_large: 0, held: true };
+        for (of, page) in self.surfels.pages.iter().zip(&self.pages) {
+            let ([large, unseen], [_, batches]) =
+                (counted.next().unwrap_or_default(), counted.next().unwrap_or_default());
+            tally.drawn += of.surfels.len.saturating_sub(unseen.into());
+            tally.most_large = tally.most_large.max(large);
+            tally.held &= u64::from(batches) * u64::from(layout::BATCH) <= page.splats.len;
         }
-        Ok(self.measured)
+        tally
+    }
+
+    /// Whether there are large splats. Waits for the projection.
+    pub(crate) fn has_large(&self, gpu: &Gpu) -> Result<bool> {
+        let queues: Vec<_> = self.pages.iter().map(|page| &page.queue).collect();
+        Ok(counts(gpu, &queues)?.iter().any(|[large, _]| *large > 0))
+    }
+
+    /// The room is measured again.
+    pub(crate) fn forget_room(&mut self) {
+        self.measured = false;
     }
 
     /// Device memory that the splats and their surfels take, bytes.
@@ -248,25 +283,6 @@ impl SplatBuffer {
             page.splats.bytes() + lists + page.filters.as_ref().map_or(0, Buffer::bytes)
         };
         self.surfels.bytes() + self.pages.iter().map(of_page).sum::<u64>()
-    }
-
-    /// Splats that may touch a pixel of the image, and are not known to be hidden. Waits for the projection.
-    pub fn drawn(&self, gpu: &Gpu) -> Result<u64> {
-        let mut drawn = 0;
-        for (of, page) in self.surfels.pages.iter().zip(&self.pages) {
-            let unseen = page.queue.read(gpu, 2)?.get(1).copied().map_or(0, u64::from);
-            drawn += of.surfels.len.saturating_sub(unseen);
-        }
-        Ok(drawn)
-    }
-
-    /// The most large splats that a page has. Waits for the projection.
-    pub(crate) fn most_large(&self, gpu: &Gpu) -> Result<u64> {
-        let mut most = 0;
-        for page in &self.pages {
-            most = most.max(page.queue.read(gpu, 1)?.first().copied().map_or(0, u64::from));
-        }
-        Ok(most)
     }
 
     /// What a stage over the splats of page `index` may bind, beside its own `buffers`.

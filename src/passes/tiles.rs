@@ -24,7 +24,7 @@ use super::visibility::VisibilityBuffer;
 use super::{Recorder, Rows};
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::gpu::buffers::Buffer;
+use crate::gpu::buffers::{Buffer, counts};
 use crate::gpu::kernel::{Bound, Grid, Program, grid};
 use crate::gpu::layout::{BLOCK_SIDE, LIST_ENDS, QUEUE_LISTING, TILE_ROWS_SHARED, TILE_WIDTH};
 use crate::scene::{Camera, RenderOptions, Scene, SceneNeeds};
@@ -105,6 +105,11 @@ struct Room {
 const LONGEST: u64 = 8_000;
 
 impl Room {
+    /// What a page and band needed at most in a frame, as the first words of its lists say.
+    fn needed([entries, longest]: [u32; 2]) -> Self {
+        Self { entries: entries.into(), longest: longest.into() }
+    }
+
     /// Whether this is enough for `needed`.
     fn holds(self, needed: Self) -> bool {
         needed.entries <= self.entries && needed.longest <= self.longest
@@ -118,12 +123,6 @@ impl Lists {
         let most = bands.iter().map(cells).max().unwrap_or(0);
         let words = Buffer::storage(gpu, "lists of splats", u64::from(LIST_ENDS) + 1 + most + entries)?;
         Ok(Self { words, entries })
-    }
-
-    /// What a page and band needed at most in this frame.
-    fn needed(&self, gpu: &Gpu) -> Result<Room> {
-        let [entries, longest] = self.words.read(gpu, 2)?[..] else { return Ok(Room { entries: 0, longest: 0 }) };
-        Ok(Room { entries: entries.into(), longest: longest.into() })
     }
 }
 
@@ -152,7 +151,8 @@ impl Tiles {
                 self.bin(recorder, of, (splats, page), (rows, visible), fresh, false)?;
             }
         }
-        let needed = self.lists(of).needed(gpu)?;
+        let needed = counts(gpu, &[&self.lists(of).words])?.into_iter().next().unwrap_or_default();
+        let needed = Room::needed(needed);
         let room = Room { entries: needed.entries + needed.entries / 4, longest: needed.longest };
         // These have no entries yet: what they are long is what precedes the entries.
         let before = self.lists(of).words.len;
@@ -178,12 +178,17 @@ impl Tiles {
         self.large.words.bytes() + self.small.words.bytes()
     }
 
-    /// Whether there was room for the frame; if not, the image is wrong.
-    pub fn held(&self, gpu: &Gpu) -> Result<bool> {
-        let held = |lists: &Lists| -> Result<bool> {
-            Ok(Room { entries: lists.entries, longest: LONGEST }.holds(lists.needed(gpu)?))
-        };
-        Ok(held(&self.large)? && held(&self.small)?)
+    /// What says how much room a frame needed.
+    pub(crate) fn counters(&self) -> [&Buffer<u32>; 2] {
+        [&self.large.words, &self.small.words]
+    }
+
+    /// Whether there was room for the frame by what they say, the first of `counted`; if not, the image is wrong.
+    pub(crate) fn held(&self, counted: &mut impl Iterator<Item = [u32; 2]>) -> bool {
+        [&self.large, &self.small]
+            .into_iter()
+            .zip(counted)
+            .all(|(lists, needed)| Room { entries: lists.entries, longest: LONGEST }.holds(Room::needed(needed)))
     }
 
     fn lists(&self, of: Listed) -> &Lists {

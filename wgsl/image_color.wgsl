@@ -1,7 +1,7 @@
 // The image where it is the colour alone, which is written at once. Same interface as image_maps.wgsl.
 
-@group(0) @binding(10) var<storage, read_write> image: array<Words>;
+@group(0) @binding(10) var<storage, read_write> image: array<vec4<f32>>;
 
 fn write_color(out: u32, color: vec4<f32>) {
-    image[out / 4u] = words(bitcast<vec4<u32>>(color));
+    image[out / 4u] = color;
 }

@@ -152,7 +152,7 @@ pub fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         ("sums", Element::Plain(sums_of(accumulator).0)),
         ("added", Element::Plain(&[<[u64; 2]>::SHAPE])),
         ("overflows", Element::Plain(WORD)),
-        ("image", Element::Plain(&[f32::SHAPE, <[u32; 4]>::SHAPE, <[u64; 2]>::SHAPE])),
+        ("image", Element::Plain(&[f32::SHAPE, <[f32; 4]>::SHAPE])),
         ("colors", Element::Plain(&[u32::SHAPE, <[u32; 4]>::SHAPE, <[u64; 2]>::SHAPE])),
         ("texels", Element::Plain(WORD)),
         ("srgb_to_linear", Element::Plain(&[<[f32; 256]>::SHAPE])),

@@ -1,6 +1,6 @@
 // The splats of a tile's list, eight at a time, for software adapters, which would read each word again for every invocation:
-// the eight invocations of a tile fetch one each, and hand them around. Subgroups have at least eight, with consecutive
-// local indices.
+// the eight invocations of a tile fetch one each, and hand them around. Subgroups have at least eight (src/gpu/device.rs), with
+// consecutive local indices.
 
 const FETCHED: u32 = 8u;
 

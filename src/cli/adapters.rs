@@ -37,6 +37,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let has = |on: bool, name: &'static str| on.then_some(name);
         let features = [
             has(adapter.timestamps, "timestamps"),
+            has(adapter.integers_u64, "u64"),
             has(adapter.atomics_u64, "u64 atomics"),
             has(adapter.atomics_f32, "f32 atomics"),
             has(adapter.subgroups, "subgroups"),

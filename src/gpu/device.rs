@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use serde::Serialize;
 
 use super::kernel::Programs;
-use super::layout::{TILE, WORKGROUP};
+use super::layout::{TILE, TILE_WIDTH, WORKGROUP};
 use crate::error::{Error, Result};
 
 /// What an adapter is and what of it matters here.
@@ -37,7 +37,7 @@ pub struct AdapterDescription {
     pub atomics_f32: bool,
     /// Blending into targets of 32-bit floats.
     pub blends_f32: bool,
-    /// Subgroup operations.
+    /// Operations of subgroups that have at least [`TILE_WIDTH`] invocations each.
     pub subgroups: bool,
     /// It has all that rendering needs.
     pub usable: bool,
@@ -68,7 +68,7 @@ impl AdapterDescription {
             integers_u64: features.contains(wgpu::Features::SHADER_INT64),
             atomics_f32: features.contains(wgpu::Features::SHADER_FLOAT32_ATOMIC),
             blends_f32: features.contains(wgpu::Features::FLOAT32_BLENDABLE),
-            subgroups: features.contains(wgpu::Features::SUBGROUP),
+            subgroups: features.contains(wgpu::Features::SUBGROUP) && info.subgroup_min_size >= TILE_WIDTH,
             usable: compute
                 && limits.max_storage_buffers_per_shader_stage >= STORAGE_BUFFERS
                 && limits.max_compute_invocations_per_workgroup >= WORKGROUP.max(TILE * TILE)

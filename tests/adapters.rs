@@ -1,15 +1,19 @@
-//! A second Vulkan driver, which shares no code with Mesa's: SwiftShader, which Chromium brings along. Its subgroups have four
-//! invocations and it has no 64-bit integers, as Windows' WARP.
+//! Other adapters than the one that the tests run on: a second driver, and what is done on a card alone.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod common;
 
+use common::bits;
 use common::command::{DATA, Folder, succeeds, text};
+use common::scenes::{crowded, sphere, sphere_camera};
+use epsplat::render::{Backend, Renderer};
+use epsplat::scene::{Organisation, Projection, RenderOptions};
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// Where Debian's and Ubuntu's packages have it.
+/// SwiftShader shares no code with Mesa, and Chromium brings it along. Its subgroups have four invocations and it has no 64-bit
+/// integers, as Windows' WARP. Where Debian's and Ubuntu's packages have it.
 const DRIVERS: [&str; 2] =
     ["/usr/lib/chromium/vk_swiftshader_icd.json", "/usr/lib/chromium-browser/vk_swiftshader_icd.json"];
 
@@ -50,5 +54,41 @@ fn another_driver_draws_the_same_picture() {
         let error = |key: &str| comparison[key].as_f64().unwrap();
         // Some pixels of a rim may be decided otherwise, by less than a hundredth.
         assert!(error("percentile_99_9") < 1e-5 && error("coverage_mismatch") < 1e-3, "{scene:?}: {comparison}");
+    }
+}
+
+/// A card reads its own clock, shares nothing by subgroups, and has its large splats alone drawn by tiles.
+#[test]
+fn a_card_is_timed_by_its_own_clock_and_draws_the_same() {
+    let (Some(software), Some(mut card)) = (common::gpu(), common::gpu()) else { return };
+    if !software.adapter.timestamps {
+        eprintln!("skipped: no timestamps");
+        return;
+    }
+    card.adapter.kind = "discrete";
+    let small_pages = common::gpu().map(|gpu| {
+        let mut gpu = gpu.with_buffer_limit(70_000);
+        gpu.adapter.kind = "discrete";
+        gpu
+    });
+    let [software, card, small_pages] = [Some(software), Some(card), small_pages].map(|gpu| Backend::gpu(gpu.unwrap()));
+    let mut scenes = crowded();
+    scenes.push((sphere(3000, 1.8), sphere_camera(90, Projection::Pinhole)));
+    for (scene, camera) in &scenes {
+        for organisation in [Organisation::Auto, Organisation::Scatter, Organisation::Tile] {
+            let options = RenderOptions { organisation, ..RenderOptions::default() };
+            let frames = [&software, &card, &small_pages].map(|backend| {
+                let mut renderer = Renderer::new(scene, &options, backend).unwrap();
+                renderer.frame(camera, &()).unwrap();
+                renderer.frame(camera, &()).unwrap()
+            });
+            let [(expected, wall), (own, timed), (paged, pages)] = &frames;
+            assert!(bits(own) == bits(expected) && bits(paged) == bits(expected), "{organisation:?}");
+            assert_eq!((wall.clock, timed.clock, pages.clock), ("wall", "timestamps", "timestamps"));
+            assert!(timed.passes.values().all(|ms| ms.is_finite()), "{:?}", timed.passes);
+            assert!(
+                ["project_ms", "visibility_ms", "accumulate_ms"].iter().all(|pass| timed.passes.contains_key(*pass))
+            );
+        }
     }
 }

@@ -40,20 +40,20 @@ fn another_driver_draws_the_same_picture() {
     // Culled and scattered; large splats; disks of a mesh through a low-pass.
     let scenes: [&[&str]; 3] = [&[text(&many), "--shading", "unlit"], &[text(&few)], &[&bunny, "--lowpass", "ewa"]];
     for scene in scenes {
-        let render = |out: &Path, backend: &str| {
-            let rest = ["--size", "96x96", "--aov", "depth,weight,count", "--json", "-", "--backend", backend, "-o"];
-            [&["render"], scene, &rest, &[text(out)]].concat().iter().map(|&s| s.to_owned()).collect::<Vec<_>>()
+        let render = |out: &Path, backend: &str, maps: &str| {
+            let rest = ["--size", "96x96", "--aov", maps, "--json", "-", "--backend", backend, "-o", text(out)];
+            on_swiftshader(driver, &[&["render"], scene, &rest].concat())
         };
-        let run =
-            |arguments: Vec<String>| on_swiftshader(driver, &arguments.iter().map(String::as_str).collect::<Vec<_>>());
-        let report: serde_json::Value = serde_json::from_slice(&run(render(&theirs, "gpu")).stdout).unwrap();
+        let output = render(&theirs, "gpu", "depth,weight,count");
+        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
         assert!(report["adapter"].as_str().unwrap().contains("SwiftShader"), "{report}");
-        run(render(&ours, "reference"));
+        render(&ours, "reference", "depth,weight,count,decision");
         let output = succeeds(&["compare", text(&theirs), text(&ours), "--json", "-"]);
         let comparison: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-        let error = |key: &str| comparison[key].as_f64().unwrap();
-        // Some pixels of a rim may be decided otherwise, by less than a hundredth.
-        assert!(error("percentile_99_9") < 1e-5 && error("coverage_mismatch") < 1e-3, "{scene:?}: {comparison}");
+        // The studies' own limit, over the pixels in which no fragment is within rounding of a decision: one lost fragment of one
+        // of them is a thousand times as much.
+        assert!(comparison["rmse_decided"].as_f64().unwrap() < 1e-6, "{scene:?}: {comparison}");
+        assert!(comparison["excused"].as_f64().unwrap() < 0.01, "{scene:?}: {comparison}");
     }
 }
 

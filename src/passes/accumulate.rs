@@ -16,9 +16,9 @@
 //!   `n / (2 sum W)`; rounding the weights moves it by as much again, times the spread of the attributes, which is at most
 //!   1: `n / (F w)`. A sum is read as an f32 with an error of 1.5 u: its upper word, below 2^24, is exact, the rounding of
 //!   the lower one is at most u / 2 of a sum that has an upper one, and only then does adding the two round again. Two
-//!   such sums, dividing, and the product that maps back: `6 u` with the term's own. A sum carries once for each full weight, which is
-//!   rarer than fragments (on a software adapter carries are a fifth of the pass); and the rim of the paper's kernel,
-//!   exp(-6), keeps 23 bits. Where weights may be smaller still, or alphas differ
+//!   such sums, dividing, and the product that maps back: `6 u` with the term's own. A sum carries once for each full
+//!   weight, which is rarer than fragments (on a software adapter carries are a fifth of the pass); and the rim of the
+//!   paper's kernel, exp(-6), keeps 23 bits. Where weights may be smaller still, or alphas differ
 //!   ([`SceneNeeds::wide_sums`](crate::scene::SceneNeeds::wide_sums)), terms are those of `fixed64` in two words, which
 //!   takes two additions for most. An adapter with 64-bit atomics makes the same sums in half the additions.
 //! - **fixed32**: the same in one word. B fraction bits, `32 - bits(min(surfels, 255))`, are at least 24 and let 255 full

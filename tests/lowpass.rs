@@ -85,8 +85,14 @@ fn depth_is_continuous_where_the_filter_takes_over() {
             Surfel::disk(Vec3::new(0.0, 0.75 * (z - 1.0), z), normal, 0.08)
         })
         .collect();
-    let scene =
-        Scene { origin: DVec3::ZERO, surfels: disks, colors: Colors::Constant([1.0; 4]), oriented: true, up: Up::Y };
+    let scene = Scene {
+        origin: DVec3::ZERO,
+        surfels: disks,
+        low: vec![],
+        colors: Colors::Constant([1.0; 4]),
+        oriented: true,
+        up: Up::Y,
+    };
     let camera = Camera::look_at(
         (8, 200),
         Lens::Intrinsics([120.0, 240.0, 4.0, 6.0]),

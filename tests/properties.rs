@@ -46,7 +46,7 @@ fn scene() -> impl Strategy<Value = Scene> {
         } else {
             colors
         };
-        Scene { origin: DVec3::new(5e5, -3e6, 80.0), surfels, colors, oriented, up: Up::Z }
+        Scene { origin: DVec3::new(5e5, -3e6, 80.0), surfels, low: vec![], colors, oriented, up: Up::Z }
     })
 }
 
@@ -104,7 +104,8 @@ fn dealt(scene: &Scene) -> Scene {
         Colors::Linear(colors) => Colors::Linear(order.iter().map(|&i| colors[i]).collect()),
         constant => constant.clone(),
     };
-    Scene { surfels: order.iter().map(|&i| scene.surfels[i]).collect(), colors, ..scene.clone() }
+    let low = order.iter().filter_map(|&i| scene.low.get(i).copied()).collect();
+    Scene { surfels: order.iter().map(|&i| scene.surfels[i]).collect(), low, colors, ..scene.clone() }
 }
 
 /// What the light makes of an unlit frame, in f64; and the bound on what f32 makes of it. The ray is normalised from

@@ -258,10 +258,10 @@ fn ray(x: u32, y: u32) -> vec3<f32> {
     return normalize(image.x * held.rotation[0].xyz + image.y * held.rotation[1].xyz + held.rotation[2].xyz);
 }
 
-// The point at a depth on that ray, relative to the scene's origin, device units.
-fn point_at(x: u32, y: u32, depth: f32) -> vec3<f32> {
+// The point at a depth on that ray, relative to the eye, device units.
+fn seen_at(x: u32, y: u32, depth: f32) -> vec3<f32> {
     let image = (vec2<f32>(f32(x), f32(y)) + 0.5 - held.intrinsics.zw) / held.intrinsics.xy * depth;
-    return held.eye.xyz + image.x * held.rotation[0].xyz + image.y * held.rotation[1].xyz + depth * held.rotation[2].xyz;
+    return image.x * held.rotation[0].xyz + image.y * held.rotation[1].xyz + depth * held.rotation[2].xyz;
 }
 
 // The third row of the matrix that takes an image point to (u, v, 1), up to a factor.

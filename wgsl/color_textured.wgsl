@@ -1,5 +1,5 @@
 // A surfel's colour where its texture is not looked up: the texture's mean over its disk, as in color_linear.wgsl. The surfel's place
-// in the texture follows it, in three more (texture.wgsl).
+// in the texture follows it, in three more (texture.wgsl), each of which has three numbers and a coordinate of what the surfel's centre leaves out.
 
 @group(0) @binding(11) var<storage, read> colors: array<Words>;
 

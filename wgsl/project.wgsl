@@ -51,15 +51,10 @@ const RARE: u32 = 2u;
 fn project_into(slot: u32, every: bool) -> u32 {
     let index = surfel_for(slot);
     let surfel = surfel_at(index);
-    var relative: array<Double, 3>;
-    for (var i = 0u; i < 3u; i++) {
-        let d = two_sum(surfel.center[i] * held.unit, -held.eye[i]);
-        relative[i] = quick_two_sum(d.high, d.low - held.eye_low[i]);
-    }
     // f32 serves for the half-axes of most splats; thin ones come back for more (rows.wgsl).
     let s_world = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * held.unit;
     let t_world = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]) * held.unit;
-    let center = rotate(relative);
+    let center = rotate(relative_center(index, surfel));
     let s = rotate_plain(s_world);
     let t = rotate_plain(t_world);
     var h = homography(center, s, t, s_world, t_world, every);

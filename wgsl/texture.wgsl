@@ -12,7 +12,7 @@ struct Place {
     center: vec2<f32>,
     // Mapped to [0, 1] from its own range.
     reach_2: f32,
-    // The centre itself, device units.
+    // The centre itself, relative to the eye, device units.
     position: vec3<f32>,
     // What the coordinates gain for a world unit along each axis.
     u_slope: vec3<f32>,
@@ -22,17 +22,16 @@ struct Place {
 fn place_of(index: u32) -> Place {
     let center = surfel_at(index).center;
     let at = color_part(index, 1u);
-    return Place(
-        at.xy,
-        at.z,
-        vec3<f32>(center[0], center[1], center[2]) * held.unit,
-        color_part(index, 2u).xyz,
-        color_part(index, 3u).xyz,
-    );
+    let u_slope = color_part(index, 2u);
+    let v_slope = color_part(index, 3u);
+    // What the f32 centre leaves out comes last in each.
+    let low = vec3<f32>(at.w, u_slope.w, v_slope.w);
+    let position = (vec3<f32>(center[0], center[1], center[2]) * held.unit - held.eye.xyz) + (low * held.unit - held.eye_low.xyz);
+    return Place(at.xy, at.z, position, u_slope.xyz, v_slope.xyz);
 }
 
 fn accumulate_place(pixel: u32, weight: Term, place: Place, depth: f32) {
-    let point = point_at(pixel % held.width, pixel / held.width + held_band.first_row, depth);
+    let point = seen_at(pixel % held.width, pixel / held.width + held_band.first_row, depth);
     let step = (point - place.position) * held.world;
     let at = place.center + vec2<f32>(dot(step, place.u_slope), dot(step, place.v_slope));
     let offset = at - 0.5;

@@ -164,7 +164,7 @@ fn cameras([width, height]: [u32; 2], entry: &SceneEntry, scene: &Scene) -> Resu
         None => Lens::Fov(entry.fov.unwrap_or(DEFAULT_FOV)),
     };
     let (size, near) = ((width, height), Camera::default_near(scene));
-    let center = scene.origin + scene.bounds().center();
+    let center = scene.origin + scene.body().0.center();
     let target = entry.target.map_or(center, DVec3::from);
     let mut first = match entry.eye {
         Some(eye) => Camera::look_at(size, lens, eye.into(), target, entry.up.map(DVec3::from), scene.up, near)?,
@@ -190,8 +190,8 @@ fn footprint(scene: &Scene, cameras: &[Camera]) -> f64 {
     let (mut sum, mut seen) = (0.0, 0u64);
     for camera in cameras {
         let focal = (camera.fx * camera.fy).sqrt();
-        for surfel in &scene.surfels {
-            let center = camera.to_camera(scene.origin + glam::Vec3::from_array(surfel.center).as_dvec3());
+        for (index, surfel) in scene.surfels.iter().enumerate() {
+            let center = camera.to_camera(scene.origin + scene.center(index));
             if center.z < camera.near {
                 continue;
             }

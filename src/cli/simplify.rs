@@ -8,7 +8,6 @@ use epsplat::scene::{Colors, Scene, Surfel};
 use epsplat::surfels;
 use epsplat::surfels::simplify::{Options, Report, SplatShape, Tolerance, simplify};
 use epsplat::{Error, Result};
-use glam::Vec3;
 
 use super::progress::Bars;
 use super::{note, print, write_json};
@@ -81,10 +80,7 @@ fn points(scene: &Scene, shape: SplatShape) -> Points {
     let surfels = &scene.surfels;
     let normal = |surfel: &Surfel| surfel.normal().normalize_or_zero().to_array();
     Points {
-        positions: surfels
-            .iter()
-            .map(|surfel| (scene.origin + Vec3::from_array(surfel.center).as_dvec3()).to_array())
-            .collect(),
+        positions: (0..surfels.len()).map(|index| (scene.origin + scene.center(index)).to_array()).collect(),
         normals: (shape == SplatShape::Disk).then(|| surfels.iter().map(normal).collect()),
         radii: (shape == SplatShape::Disk).then(|| surfels.iter().map(|surfel| surfel.radius()).collect()),
         axes: (shape == SplatShape::Ellipse).then(|| surfels.iter().map(|surfel| [surfel.s, surfel.t]).collect()),

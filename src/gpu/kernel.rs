@@ -41,6 +41,8 @@ pub const FILES: &[(&str, &str)] = wgsl![
     "count.wgsl",
     "covered.wgsl",
     "count_absent.wgsl",
+    "center.wgsl",
+    "center_doubled.wgsl",
     "cull.wgsl",
     "cull_absent.wgsl",
     "depth.wgsl",

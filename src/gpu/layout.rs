@@ -177,22 +177,27 @@ fn split_all<const N: usize>(values: [f64; N]) -> ([f32; 4], [f32; 4]) {
     (high, low)
 }
 
-/// The power of two that brings the scene's extent and its distance from the camera to at most one.
-pub fn device_unit(bounds: &Bounds, eye: DVec3) -> f64 {
-    let reach = [bounds.min, bounds.max]
-        .into_iter()
-        .flat_map(|corner| [corner.abs().max_element(), (corner - eye).abs().max_element()])
-        .fold(0.0, f64::max);
+/// The largest coordinate of a stray surfel in device units: squares of lengths stay finite.
+const FARTHEST_STRAY: f64 = (1u64 << 60) as f64;
+
+/// The power of two that brings the extent of the scene's `body` and its distance from the camera to at most one, and all of
+/// its `bounds` to at most 2^60.
+pub fn device_unit(body: &Bounds, bounds: &Bounds, eye: DVec3) -> f64 {
+    let reach = |bounds: &Bounds| {
+        let corners = [bounds.min, bounds.max].into_iter();
+        corners.flat_map(|corner| [corner.abs().max_element(), (corner - eye).abs().max_element()]).fold(0.0, f64::max)
+    };
+    let reach = reach(body).max(reach(bounds) / FARTHEST_STRAY);
     if reach > 0.0 && reach.is_finite() { (-reach.log2().ceil()).clamp(-126.0, 126.0).exp2() } else { 1.0 }
 }
 
 impl View {
     /// The view of `scene`, whose values lie in `ranges`, by `camera`.
     pub fn new(scene: &Scene, ranges: &Ranges, camera: &Camera, options: &RenderOptions) -> Self {
-        let Ranges { bounds, core, color: (low, high), largest_radius } = ranges;
+        let Ranges { bounds, body, core, color: (low, high), largest_radius } = ranges;
         let largest_radius = f64::from(*largest_radius);
         let eye_relative = camera.eye - scene.origin;
-        let unit = device_unit(bounds, eye_relative);
+        let unit = device_unit(body, bounds, eye_relative);
         let (eye, eye_low) = split_all((eye_relative * unit).to_array());
         let (mut rotation, mut rotation_low) = ([[0.0; 4]; 3], [[0.0; 4]; 3]);
         for row in 0..3 {

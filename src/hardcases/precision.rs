@@ -66,7 +66,7 @@ impl Precision {
         let surfel = &scene.surfels[splat.surfel as usize];
         let turned = |v: [f32; 3]| camera.rotation * Vec3::from_array(v).as_dvec3();
         let (s, t) = (turned(surfel.s), turned(surfel.t));
-        let p = camera.rotation * (Vec3::from_array(surfel.center).as_dvec3() - (camera.eye - scene.origin));
+        let p = camera.rotation * (scene.center(splat.surfel as usize) - (camera.eye - scene.origin));
         let normal = s.cross(t);
         let principal = DVec2::new(camera.cx, camera.cy);
         let focal = DVec2::new(camera.fx, camera.fy);

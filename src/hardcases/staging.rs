@@ -231,6 +231,7 @@ pub fn build(entries: &[Entry]) -> Result<Vec<HardCase>> {
                 scene: Scene {
                     origin: stage.origin,
                     surfels: filling.surfels,
+                    low: vec![],
                     colors: Colors::Linear(colors),
                     oriented: true,
                     up: Up::Z,

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::Sorted;
 use crate::error::Result;
 use crate::io::Mesh;
-use crate::scene::{Scene, Surfel};
+use crate::scene::Scene;
 use crate::surfels::sampling::{Method, sample};
 use crate::truth::{DiskTree, TriangleTree};
 
@@ -71,14 +71,15 @@ impl SurfaceDistances {
     /// As [`sample`] for a mesh that has no area.
     pub fn of(scene: &Scene, mesh: &Mesh, triangles: &TriangleTree) -> Result<Self> {
         let world = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
-        let center = |surfel: &Surfel| scene.origin + world(surfel.center);
-        let rim = |surfel: &Surfel, k: u32| {
+        let center = |index: usize| scene.origin + scene.center(index);
+        let rim = |index: usize, k: u32| {
+            let surfel = &scene.surfels[index];
             let (sin, cos) = (TAU * f64::from(k) / f64::from(RIM_POINTS)).sin_cos();
-            center(surfel) + world(surfel.s) * cos + world(surfel.t) * sin
+            center(index) + world(surfel.s) * cos + world(surfel.t) * sin
         };
-        let surfels = scene.surfels.par_iter();
+        let surfels = (0..scene.surfels.len()).into_par_iter();
         let centers = surfels.clone().map(center).map(|point| triangles.distance(point));
-        let rims = surfels.flat_map_iter(|surfel| (0..RIM_POINTS).map(move |k| triangles.distance(rim(surfel, k))));
+        let rims = surfels.flat_map_iter(|index| (0..RIM_POINTS).map(move |k| triangles.distance(rim(index, k))));
         let disks = DiskTree::new(scene);
         let (on_mesh, _) = sample(mesh, MESH_POINTS, &Method::Uniform, SEED, &())?;
         let points = on_mesh.positions.par_iter().map(|point| DVec3::from_array(*point));

@@ -30,8 +30,6 @@
 //! - **float**, **cas**: f32 sums, by atomic add or by compare and exchange. A sum of n terms in any order errs by at most
 //!   `(n - 1) u` of itself, and so does the weight's: `2 n u + 4 u`. The order shows.
 
-use glam::Vec3;
-
 use super::cull::Part;
 use super::footprint::footprint;
 use super::project::{Splat, SplatBuffer};
@@ -250,7 +248,7 @@ pub fn reference<'a>(
         let [r, g, b, alpha] = scene.colors.linear(splat.surfel as usize).map(f64::from);
         let color = [r * alpha, g * alpha, b * alpha, alpha];
         let surfel = &scene.surfels[splat.surfel as usize];
-        let center = scene.origin + Vec3::from_array(surfel.center).as_dvec3();
+        let center = scene.origin + scene.center(splat.surfel as usize);
         let radius = f64::from(surfel.radius());
         let epsilon = absolute + of_radius * radius;
         let normal = if splat.away && !scene.oriented { -splat.normal } else { splat.normal };

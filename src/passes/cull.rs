@@ -39,15 +39,14 @@ pub enum Part {
     Far,
 }
 
-/// A ball around disks: centre x, y, z and radius, world units relative to the scene's origin.
-pub(crate) fn ball<'a>(surfels: impl Iterator<Item = &'a Surfel> + Clone) -> [f32; 4] {
-    let center = |surfel: &Surfel| Vec3::from_array(surfel.center).as_dvec3();
+/// A ball around disks, each with its centre: centre x, y, z and radius, world units relative to the scene's origin.
+pub(crate) fn ball<'a>(surfels: impl Iterator<Item = (DVec3, &'a Surfel)> + Clone) -> [f32; 4] {
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for surfel in surfels.clone() {
-        (low, high) = (low.min(center(surfel)), high.max(center(surfel)));
+    for (center, _) in surfels.clone() {
+        (low, high) = (low.min(center), high.max(center));
     }
     let middle = (low + (high - low) * 0.5).as_vec3();
-    let radius = surfels.map(|surfel| center(surfel).distance(middle.as_dvec3()) + reach(surfel)).fold(0.0, f64::max);
+    let radius = surfels.map(|(center, surfel)| center.distance(middle.as_dvec3()) + reach(surfel)).fold(0.0, f64::max);
     // Up to the next f32 and past the rounding of these lengths.
     middle.extend((radius * (1.0 + 1e-6)) as f32).to_array()
 }
@@ -202,7 +201,7 @@ mod tests {
                     t: (Vec3::from_slice(&v[6..]) * *size).to_array(),
                 })
                 .collect();
-            let [x, y, z, radius] = ball(surfels.iter()).map(f64::from);
+            let [x, y, z, radius] = ball(surfels.iter().map(|surfel| (Vec3::from_array(surfel.center).as_dvec3(), surfel))).map(f64::from);
             let design = Design::of(&RenderOptions { low_pass, ..RenderOptions::default() });
             if let Some(pixels) = reference(DVec3::new(x, y, z), radius, &camera, filter_reach(&design)) {
                 for surfel in &surfels {

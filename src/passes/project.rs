@@ -42,7 +42,8 @@ pub struct Splat {
     pub filter: Option<Filter>,
 }
 
-/// The twin of `wgsl/project.wgsl` for one surfel; `None` if no pixel can be touched.
+/// The twin of `wgsl/project.wgsl` for one surfel, whose centre is relative to `origin` (world coordinates); `None` if no pixel can
+/// be touched.
 pub fn reference(index: u32, surfel: &Surfel, origin: DVec3, camera: &Camera, design: &Design) -> Option<Splat> {
     let vector = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
     let relative = vector(surfel.center) - (camera.eye - origin);
@@ -90,7 +91,10 @@ pub fn reference(index: u32, surfel: &Surfel, origin: DVec3, camera: &Camera, de
 pub fn reference_all(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Splat> {
     let design = Design::of(options);
     let surfels = scene.surfels.par_iter().enumerate();
-    surfels.filter_map(|(index, surfel)| reference(index as u32, surfel, scene.origin, camera, &design)).collect()
+    let project = |(index, surfel): (usize, &Surfel)| {
+        reference(index as u32, surfel, scene.origin + scene.low_of(index), camera, &design)
+    };
+    surfels.filter_map(project).collect()
 }
 
 /// Splats in device memory, page for page as the surfels, whose attributes later stages still read.
@@ -155,6 +159,7 @@ pub fn record(recorder: &mut Recorder<'_>, buffer: &SplatBuffer, part: Part) -> 
                     ("rare", page.rare.bound()),
                     ("listed", page.rare.bound()),
                 ];
+                buffers.extend(surfels.low.as_ref().map(|low| ("centers_low", low.bound())));
                 buffers.extend(page.filters.as_ref().map(|filters| ("filters", filters.bound())));
                 buffers.extend(drawn);
                 program.dispatch(gpu, pass, "project", &buffers, slots)?;

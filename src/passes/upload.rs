@@ -31,6 +31,8 @@ pub struct SurfelBuffer {
 pub struct SurfelPage {
     /// The disks.
     pub surfels: Buffer<Surfel>,
+    /// What their centres leave out, if it matters.
+    pub(crate) low: Option<Buffer<[f32; 3]>>,
     /// The bounding balls of their batches.
     pub(crate) balls: Buffer<[f32; 4]>,
     pub(crate) colors: Option<wgpu::Buffer>,
@@ -57,13 +59,21 @@ impl SurfelBuffer {
         for indices in order.chunks(len) {
             let surfels = Buffer::storage(gpu, "surfels", indices.len() as u64)?;
             surfels.write(gpu, indices.len(), |range| taken(&scene.surfels, &indices[range]), progress)?;
+            let low = match needs.doubled {
+                true => {
+                    let low = Buffer::storage(gpu, "trailing parts of centres", indices.len() as u64)?;
+                    low.write(gpu, indices.len(), |range| taken(&scene.low, &indices[range]), &())?;
+                    Some(low)
+                }
+                false => None,
+            };
             let colors = match (needs.color, &scene.colors) {
                 (ColorNeed::Srgb8, Colors::Srgb8(codes)) => Some(upload(gpu, codes, indices)?),
                 (ColorNeed::Linear, Colors::Linear(colors)) => Some(upload(gpu, colors, indices)?),
                 (ColorNeed::Textured, Colors::Textured(textured)) => {
                     let buffer = Buffer::storage(gpu, "colours", indices.len() as u64)?;
                     let all = |&index: &u32| {
-                        let [center, u_slope, v_slope] = textured.mapped(index as usize);
+                        let [center, u_slope, v_slope] = textured.mapped(index as usize, scene.low.get(index as usize));
                         [textured.colors()[index as usize], center, u_slope, v_slope]
                     };
                     let values = |range: Range<usize>| indices[range].par_iter().map(all).collect::<Vec<_>>().into();
@@ -74,11 +84,11 @@ impl SurfelBuffer {
             };
             let batches: Vec<_> = indices
                 .par_chunks(BATCH as usize)
-                .map(|batch| ball(batch.iter().map(|&i| &scene.surfels[i as usize])))
+                .map(|batch| ball(batch.iter().map(|&i| (scene.center(i as usize), &scene.surfels[i as usize]))))
                 .collect();
             let balls = Buffer::storage(gpu, "batches", batches.len() as u64)?;
             balls.write(gpu, batches.len(), |range| batches[range].into(), &())?;
-            pages.push(SurfelPage { surfels, balls, colors });
+            pages.push(SurfelPage { surfels, low, balls, colors });
         }
         let srgb_to_linear = match needs.color {
             ColorNeed::Srgb8 | ColorNeed::Textured => {
@@ -109,7 +119,8 @@ impl SurfelBuffer {
     /// Device memory that it takes, bytes.
     pub fn bytes(&self) -> u64 {
         let of_page = |page: &SurfelPage| {
-            page.surfels.bytes() + page.balls.bytes() + page.colors.as_ref().map_or(0, wgpu::Buffer::size)
+            let low = page.low.as_ref().map_or(0, Buffer::bytes);
+            page.surfels.bytes() + low + page.balls.bytes() + page.colors.as_ref().map_or(0, wgpu::Buffer::size)
         };
         let of_colors =
             self.srgb_to_linear.as_ref().map_or(0, Buffer::bytes) + self.texels.as_ref().map_or(0, Buffer::bytes);

@@ -107,6 +107,7 @@ fn files(needs: &SceneNeeds) -> Vec<&'static str> {
             Projection::Pinhole => "camera_pinhole.wgsl",
             Projection::Orthographic => "camera_orthographic.wgsl",
         },
+        pick(needs.doubled, "center_doubled.wgsl", "center.wgsl"),
         "project.wgsl",
         pick(needs.cull, "cull.wgsl", "cull_absent.wgsl"),
         "footprint.wgsl",

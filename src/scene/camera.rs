@@ -175,7 +175,7 @@ impl Camera {
 
     /// The depth below which nothing is drawn when none is given: a millionth of the scene.
     pub fn default_near(scene: &Scene) -> f64 {
-        let size = scene.bounds().extent().length().max(2.0 * f64::from(scene.largest_radius()));
+        let size = scene.body().0.extent().length().max(2.0 * f64::from(scene.largest_radius()));
         (size * 1e-6).clamp(1.0 / LARGEST, LARGEST)
     }
 

@@ -109,6 +109,7 @@ mod tests {
             let scene = Scene {
                 origin: DVec3::new(4e5, 5e6, 0.0),
                 surfels: surfels.clone(),
+                low: vec![],
                 colors: colors.clone(),
                 oriented: true,
                 up,
@@ -137,8 +138,14 @@ mod tests {
     #[test]
     fn one_point_is_framed_by_its_radius() {
         let surfels = vec![Surfel::disk(glam::Vec3::ONE, glam::Vec3::Z, 0.5)];
-        let scene =
-            Scene { origin: DVec3::ZERO, surfels, colors: Colors::Constant([1.0; 4]), oriented: true, up: Up::Y };
+        let scene = Scene {
+            origin: DVec3::ZERO,
+            surfels,
+            low: vec![],
+            colors: Colors::Constant([1.0; 4]),
+            oriented: true,
+            up: Up::Y,
+        };
         let camera = Camera::framing((64, 64), Lens::Fov(45.0), &scene, 1e-6).unwrap();
         let p = camera.to_camera(DVec3::ONE);
         assert!(p.truncate().length() < 1e-9 && (p.z - 1.5).abs() < 1e-6, "{p}");

@@ -1,5 +1,6 @@
 //! What is rendered: surfels, camera, lights, options. Knows no GPU and no file.
 
+mod body;
 pub mod camera;
 pub mod color;
 pub mod framing;
@@ -14,6 +15,7 @@ pub mod scene;
 pub mod surfel;
 pub mod texture;
 
+pub(crate) use body::body;
 pub use camera::{Camera, Lens, Projection};
 pub use color::Colors;
 pub use light::Light;

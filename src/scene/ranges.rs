@@ -7,6 +7,8 @@ use super::{Bounds, Scene};
 pub struct Ranges {
     /// [`Scene::bounds`].
     pub bounds: Bounds,
+    /// The box of [`Scene::body`].
+    pub body: Bounds,
     /// [`Scene::core`].
     pub core: Bounds,
     /// [`Scene::color_range`].
@@ -20,6 +22,7 @@ impl Ranges {
     pub fn of(scene: &Scene) -> Self {
         Self {
             bounds: scene.bounds(),
+            body: scene.body().0,
             core: scene.core(),
             color: scene.color_range(),
             largest_radius: scene.largest_radius(),

@@ -34,14 +34,17 @@ impl Up {
 
 /// What is rendered, as every reader and generator delivers it.
 ///
-/// A surfel lies at `origin + surfel.center`. Splitting a world coordinate into an f64 origin and an f32 offset keeps
-/// georeferenced clouds free of jitter: offsets are as small as the scene, however far away its map origin is.
+/// Surfel i lies at `origin + surfels[i].center + low[i]`. Splitting a world coordinate into an f64 origin and an f32 offset
+/// keeps georeferenced clouds free of jitter: offsets are as small as the scene, however far away its map origin is. Where they
+/// are not small, as in a scene of two distant clusters, `low` has the digits that an f32 has no room for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// World coordinates of the point that surfel centres are relative to.
     pub origin: DVec3,
     /// The surfels, in world units relative to [`Scene::origin`].
     pub surfels: Vec<Surfel>,
+    /// What the f32 centres leave out, world units: one for each surfel, or none at all where it is less than anybody sees.
+    pub low: Vec<[f32; 3]>,
     /// One colour for all, or one for each surfel in the same order.
     pub colors: Colors,
     /// Normals were given, so they tell the two sides of a surface apart; estimated ones do not.
@@ -96,6 +99,22 @@ impl Bounds {
 }
 
 impl Scene {
+    /// The centre of surfel `index`, world units relative to [`Scene::origin`], with all its digits.
+    pub fn center(&self, index: usize) -> DVec3 {
+        DVec3::from_array(self.surfels[index].center.map(f64::from)) + self.low_of(index)
+    }
+
+    /// What the f32 centre of surfel `index` leaves out, world units.
+    pub fn low_of(&self, index: usize) -> DVec3 {
+        self.low.get(index).map_or(DVec3::ZERO, |low| DVec3::from_array(low.map(f64::from)))
+    }
+
+    /// The box of the surfel centres without those few that stray, world units relative to [`Scene::origin`], and how many
+    /// do: a point strays that lies farther from the box of nearly all than sixteen times its longest edge.
+    pub fn body(&self) -> (Bounds, u64) {
+        super::body(self.surfels.len(), |index| DVec3::from_array(self.surfels[index].center.map(f64::from)))
+    }
+
     /// The box of the finite surfel centres, world units relative to [`Scene::origin`]; disks reach past it by up to
     /// [`Scene::largest_radius`].
     pub fn bounds(&self) -> Bounds {
@@ -172,6 +191,25 @@ impl Scene {
     }
 }
 
+/// A centre whose rounding to f32 is less than this part of its disk's shorter half-axis is as good as any.
+const LEAST_PART: f64 = 1.0 / 256.0;
+
+/// Whether a centre's `error`, world units, may show at the size of its disk.
+pub(crate) fn shows(surfel: &Surfel, error: f64) -> bool {
+    let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)).length());
+    error > LEAST_PART * s.min(t)
+}
+
+/// [`Scene::low`] of `surfels`, whose centres are `center` with all their digits: nothing where f32 serves for all of them. An
+/// f32 serves for a scene 5,000,000 times as wide as its smallest disks.
+pub(crate) fn low_parts(surfels: &[Surfel], center: impl Fn(usize) -> DVec3 + Sync) -> Vec<[f32; 3]> {
+    let low_of = |index: usize| center(index) - DVec3::from_array(surfels[index].center.map(f64::from));
+    if !(0..surfels.len()).into_par_iter().any(|index| shows(&surfels[index], low_of(index).abs().max_element())) {
+        return Vec::new();
+    }
+    (0..surfels.len()).into_par_iter().map(|index| low_of(index).as_vec3().to_array()).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
@@ -182,7 +220,7 @@ mod tests {
         let surfels = (0..1000)
             .map(|i| Surfel::disk(Vec3::new(i as f32, -(i as f32), 0.5), Vec3::Z, 0.25 + (i == 700) as u8 as f32))
             .collect();
-        Scene { origin: DVec3::new(6e6, 0.0, 0.0), surfels, colors, oriented: true, up: Up::Z }
+        Scene { origin: DVec3::new(6e6, 0.0, 0.0), surfels, low: vec![], colors, oriented: true, up: Up::Z }
     }
 
     #[test]

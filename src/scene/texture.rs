@@ -207,13 +207,14 @@ impl Textured {
     }
 
     /// What the device has of surfel `index`: the coordinates of its centre and its squared reach, each mapped to [0, 1]; and the
-    /// slopes of u and of v in units of the span.
-    pub(crate) fn mapped(&self, index: usize) -> [[f32; 4]; 3] {
+    /// slopes of u and of v in units of the span. A coordinate of what the surfel's centre leaves out, `low`, comes last in each.
+    pub(crate) fn mapped(&self, index: usize, low: Option<&[f32; 3]>) -> [[f32; 4]; 3] {
         let [u, v, _, reach_2] = self.terms(index, DVec3::ZERO);
         let slope = |k: usize| self.places[index].slopes[k].map(|gain| f64::from(gain) / f64::from(self.range.span));
         let [[ux, uy, uz], [vx, vy, vz]] = [0, 1].map(slope);
-        let center = [u + 0.5, v + 0.5, reach_2 / f64::from(self.range.most_reach_2), 0.0];
-        [center, [ux, uy, uz, 0.0], [vx, vy, vz, 0.0]].map(|values| values.map(|value| value as f32))
+        let [x, y, z] = low.map_or([0.0; 3], |low| low.map(f64::from));
+        let center = [u + 0.5, v + 0.5, reach_2 / f64::from(self.range.most_reach_2), x];
+        [center, [ux, uy, uz, y], [vx, vy, vz, z]].map(|values| values.map(|value| value as f32))
     }
 
     /// The premultiplied colour of a pixel from the means of [`Self::terms`] and the blended premultiplied colour: by the texture

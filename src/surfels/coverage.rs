@@ -32,7 +32,8 @@ pub struct Coverage {
 ///
 /// [`Error::Usage`](crate::Error::Usage) for more than 2^32 - 1 surfels.
 pub fn coverage(scene: &Scene, progress: &dyn Progress) -> Result<Option<Coverage>> {
-    let centers: Vec<[f64; 3]> = scene.surfels.par_iter().map(|surfel| surfel.center.map(f64::from)).collect();
+    let center = |index: usize| scene.center(index).to_array();
+    let centers: Vec<[f64; 3]> = (0..scene.surfels.len()).into_par_iter().map(center).collect();
     let distinct = DistinctPositions::new(&centers, &scene.bounds(), DVec3::ZERO)?;
     let graph = NeighbourGraph::new(&distinct, NEIGHBOURS, progress);
     let spacing = |index| Some(offsets(&distinct, &graph, index, 1).next()?.length() / distinct.scale());

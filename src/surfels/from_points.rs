@@ -13,6 +13,7 @@ use super::sheets;
 use super::sizes::{Size, bsp_radii, ellipse_at, knn_radii, local_limits, offsets};
 use super::{Preparation, bounds_of, guess_up, origin_for, unit, usable_axes};
 use crate::io::Points;
+use crate::scene::body;
 use crate::{Error, Progress, Result};
 
 /// How surfels are made of points.
@@ -92,8 +93,9 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
         (gathered.normals, gathered.axes) = (None, None);
     }
     let bounds = bounds_of(&gathered.positions);
-    let up = gathered.up.unwrap_or_else(|| guess_up(&bounds)).axis();
-    let origin = origin_for(&bounds);
+    let (body, strays) = body(gathered.positions.len(), |index| DVec3::from_array(gathered.positions[index]));
+    let up = gathered.up.unwrap_or_else(|| guess_up(&body)).axis();
+    let origin = origin_for(&body);
     progress.begin("sorting points", 0);
     let mut distinct = DistinctPositions::new(&gathered.positions, &bounds, origin)?;
     progress.end();
@@ -116,6 +118,7 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
         estimated_normals: given.as_ref().map_or(count, |all| all.iter().filter(|n| n.is_none()).count()) as u64,
         estimated_radii: count as u64,
         distinct_positions: Some(distinct.len() as u64),
+        strays,
         median_spacing: median_spacing(&distinct, &graph),
         ..gathered.preparation.clone()
     };

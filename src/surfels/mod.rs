@@ -33,7 +33,8 @@ use self::estimate::{Estimate, Estimates, RADIUS_RANGE};
 use self::gather::Gathered;
 use self::positions::{DistinctPositions, exponent, power_of_two};
 use crate::io::Points;
-use crate::scene::{Bounds, Colors, Scene, Surfel, Texture, Up};
+use crate::scene::scene::{low_parts, shows};
+use crate::scene::{Bounds, Colors, Scene, Surfel, Texture, Up, body};
 use crate::{Error, Progress, Result};
 
 /// The largest absolute coordinate of a point, world units (in metres, a hundred light years). Larger ones are treated
@@ -62,6 +63,11 @@ pub struct Preparation {
     pub replaced_places: u64,
     /// Different positions among the surfels; None if nothing had to be estimated, so nobody looked.
     pub distinct_positions: Option<u64>,
+    /// Points that stray: they lie so far from nearly all others that the default view leaves them out ([`Scene::body`]).
+    pub strays: u64,
+    /// The largest error of a centre's coordinate, world units, where it may show: it is more than 1/256 of the surfel's shorter
+    /// half-axis, although coordinates are kept in twice the digits of f32.
+    pub rounding: Option<f64>,
     /// Median distance between an estimated position and the nearest other one, world units; None if nothing had to be
     /// estimated or there is only one position.
     pub median_spacing: Option<f64>,
@@ -76,7 +82,14 @@ impl Preparation {
             counted(self.replaced_colors, "had a colour that is not finite and became grey"),
             counted(self.replaced_places, "had texture coordinates that are not finite or too large and became 0"),
         ];
-        notes.into_iter().flatten().collect()
+        let strays = counted(
+            self.strays,
+            "stray: they lie far away from nearly all others, and the default view leaves them out",
+        );
+        let rounding = self.rounding.map(|error| {
+            format!("the smallest surfels lie so far from others that their coordinates err by up to {error:.2e} world units")
+        });
+        notes.into_iter().chain([strays, rounding]).flatten().collect()
     }
 }
 
@@ -111,8 +124,7 @@ pub fn build_textured(inputs: Vec<Points>, texture: Texture, progress: &dyn Prog
         gathered.preparation.replaced_places += 1;
     }
     let (mut scene, preparation) = built(gathered, progress)?;
-    let bounds = scene.bounds();
-    scene.colors = Colors::Textured(texture::painted(&scene.surfels, &bounds, texture.into(), &places, progress)?);
+    scene.colors = Colors::Textured(texture::painted(&scene, texture.into(), &places, progress)?);
     Ok((scene, preparation))
 }
 
@@ -120,8 +132,10 @@ fn built(gathered: Gathered, progress: &dyn Progress) -> Result<(Scene, Preparat
     let Gathered { positions, normals, radii, axes, colors, up, mut preparation, .. } = gathered;
     let colors = colors::folded(colors);
     let bounds = bounds_of(&positions);
-    let origin = origin_for(&bounds);
-    let up = up.unwrap_or_else(|| guess_up(&bounds));
+    let (body, strays) = body(positions.len(), |index| DVec3::from_array(positions[index]));
+    preparation.strays = strays;
+    let origin = origin_for(&body);
+    let up = up.unwrap_or_else(|| guess_up(&body));
 
     let given_axes = |i: usize| axes.as_ref().and_then(|all| usable_axes(*all.get(i)?));
     let given_normal = |i: usize| normals.as_ref().and_then(|all| unit(*all.get(i)?));
@@ -158,7 +172,7 @@ fn built(gathered: Gathered, progress: &dyn Progress) -> Result<(Scene, Preparat
             .and_then(|(distinct, of_position)| of_position.get(*distinct.of_point().get(i)? as usize).copied())
             .unwrap_or_default()
     };
-    let surfels = positions
+    let surfels: Vec<Surfel> = positions
         .par_iter()
         .enumerate()
         .map(|(i, position)| {
@@ -172,8 +186,22 @@ fn built(gathered: Gathered, progress: &dyn Progress) -> Result<(Scene, Preparat
             Surfel::disk(center, normal, radius)
         })
         .collect();
+    let relative = |index: usize| DVec3::from_array(positions[index]) - origin;
+    let low = low_parts(&surfels, relative);
+    preparation.rounding = rounding(&surfels, &low, relative);
     let oriented = preparation.estimated_normals == 0;
-    Ok((Scene { origin, surfels, colors, oriented, up }, preparation))
+    Ok((Scene { origin, surfels, low, colors, oriented, up }, preparation))
+}
+
+/// The largest error of a centre, `center` with all its digits, where it shows at its disk's size.
+fn rounding(surfels: &[Surfel], low: &[[f32; 3]], center: impl Fn(usize) -> DVec3 + Sync) -> Option<f64> {
+    let error = |(index, low): (usize, &[f32; 3])| {
+        let surfel = &surfels[index];
+        let kept = DVec3::from_array(surfel.center.map(f64::from)) + DVec3::from_array(low.map(f64::from));
+        let error = (center(index) - kept).abs().max_element();
+        shows(surfel, error).then_some(error)
+    };
+    low.par_iter().enumerate().filter_map(error).reduce_with(f64::max)
 }
 
 /// The normal with unit length, or None if it has no direction.

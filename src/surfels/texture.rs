@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::neighbours::{Neighbour, NeighbourSearch};
 use super::positions::DistinctPositions;
-use crate::scene::{Bounds, Place, Surfel, Texture, Textured};
+use crate::scene::{Place, Scene, Surfel, Texture, Textured};
 use crate::{Progress, Result};
 
 /// Neighbours that tell how fast coordinates change: the first two rings of a square grid.
@@ -23,15 +23,14 @@ const STRETCH: f64 = 3.0;
 /// Least squares with a smaller ratio of determinant to squared trace say nothing of one direction.
 const LEAST_SPREAD: f64 = 1e-3;
 
-/// Paints `surfels` with `texture` at the coordinates `centers`, one for each.
+/// Paints the surfels of `scene` with `texture` at the coordinates `centers`, one for each.
 pub(super) fn painted(
-    surfels: &[Surfel],
-    bounds: &Bounds,
+    scene: &Scene,
     texture: Arc<Texture>,
     centers: &[[f32; 2]],
     progress: &dyn Progress,
 ) -> Result<Textured> {
-    let places = places(surfels, bounds, centers, progress)?;
+    let places = places(scene, centers, progress)?;
     // Disks overlap: half of one at each side is about the surfel's own part of the surface.
     let color = |place: &Place| texture.mean_about(place.center.map(f64::from), 0.5 * f64::from(place.reach));
     let colors = places.par_iter().map(color).collect();
@@ -40,9 +39,11 @@ pub(super) fn painted(
 
 /// The change of coordinates over each disk, by least squares over those neighbours that no jump lies before. The reach is that of
 /// the typical change over the radius.
-fn places(surfels: &[Surfel], bounds: &Bounds, centers: &[[f32; 2]], progress: &dyn Progress) -> Result<Vec<Place>> {
-    let positions: Vec<[f64; 3]> = surfels.par_iter().map(|surfel| surfel.center.map(f64::from)).collect();
-    let distinct = DistinctPositions::new(&positions, bounds, DVec3::ZERO)?;
+fn places(scene: &Scene, centers: &[[f32; 2]], progress: &dyn Progress) -> Result<Vec<Place>> {
+    let surfels = &scene.surfels;
+    let positions: Vec<[f64; 3]> =
+        (0..surfels.len()).into_par_iter().map(|index| scene.center(index).to_array()).collect();
+    let distinct = DistinctPositions::new(&positions, &scene.bounds(), DVec3::ZERO)?;
     // Of surfels at one position, which may lie on both sides of a seam, the smallest coordinates: any order gives the same.
     let mut of_position = vec![[f32::INFINITY; 2]; distinct.len()];
     for (center, &position) in centers.iter().zip(distinct.of_point()) {
@@ -102,19 +103,20 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use glam::Vec3;
 
+    use crate::scene::{Colors, Up};
+
     use super::*;
 
     #[test]
     fn slopes_and_reach_know_no_jump() {
         let at = |k: usize| Vec3::new((k % 12) as f32, (k / 12) as f32, 0.0);
         let surfels: Vec<Surfel> = (0..144).map(|k| Surfel::disk(at(k), Vec3::Z, 1.5)).collect();
-        let bounds = surfels
-            .iter()
-            .fold(Bounds::EMPTY, |bounds, surfel| bounds.with_point(Vec3::from_array(surfel.center).as_dvec3()));
+        let colors = Colors::Constant([1.0; 4]);
+        let scene = Scene { origin: DVec3::ZERO, surfels, low: vec![], colors, oriented: true, up: Up::Y };
         let of = |jump: f32| {
             let centers: Vec<_> =
                 (0..144).map(|k| [0.01 * at(k).x + if at(k).x > 5.5 { jump } else { 0.0 }, 0.02 * at(k).y]).collect();
-            places(&surfels, &bounds, &centers, &()).unwrap()
+            places(&scene, &centers, &()).unwrap()
         };
         for (k, place) in of(0.4).iter().enumerate() {
             let [u, v] = place.slopes.map(Vec3::from_array);

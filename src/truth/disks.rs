@@ -42,6 +42,20 @@ struct Disk {
     half: [f64; 2],
 }
 
+/// A surfel and its centre with all digits.
+struct Placed<'a> {
+    center: DVec3,
+    surfel: &'a Surfel,
+}
+
+impl Placed<'_> {
+    /// What tells it from others.
+    fn bits(&self) -> ([u64; 3], [[u32; 3]; 2]) {
+        let axes = [self.surfel.s, self.surfel.t].map(|axis| axis.map(f32::to_bits));
+        (self.center.to_array().map(f64::to_bits), axes)
+    }
+}
+
 impl DiskTree {
     /// Builds the tree. Surfels that are not finite or have no size are left out, and those that are the same are one.
     pub fn new(scene: &Scene) -> Self {
@@ -51,23 +65,25 @@ impl DiskTree {
             let numbers = [surfel.center, surfel.s, surfel.t];
             numbers.as_flattened().iter().all(|c| c.is_finite()) && surfel.radius() > 0.0
         };
-        let mut surfels: Vec<&Surfel> = scene.surfels.iter().filter(sized).collect();
+        let placed = |index: usize| Placed { center: scene.center(index), surfel: &scene.surfels[index] };
+        let all = (0..scene.surfels.len()).map(placed);
+        let mut surfels: Vec<Placed<'_>> = all.filter(|placed| sized(&placed.surfel)).collect();
         // Boxes tell nothing apart that is in one place: of thousands that are, each would be looked at for each point.
-        let bits = |surfel: &&Surfel| [surfel.center, surfel.s, surfel.t].map(|v| v.map(f32::to_bits));
-        surfels.par_sort_unstable_by_key(bits);
-        surfels.dedup_by_key(|surfel| bits(surfel));
+        surfels.par_sort_unstable_by_key(Placed::bits);
+        surfels.dedup_by_key(|placed| placed.bits());
         let bounds = surfels.par_iter().fold(
             || Bounds::EMPTY,
-            |bounds, surfel| {
-                let (center, reach) = (world(surfel.center), extent(surfel));
+            |bounds, Placed { center, surfel }| {
+                let (center, reach) = (*center, extent(surfel));
                 bounds.with_point(center - reach).with_point(center + reach)
             },
         );
         let bounds = bounds.reduce(|| Bounds::EMPTY, Bounds::union);
         let (center, extent) = (bounds.center(), bounds.extent().length());
         let radius = if extent > 0.0 { 0.5 * extent } else { 1.0 };
-        let disk = |surfel: &&Surfel| {
-            Disk::new((world(surfel.center) - center) / radius, world(surfel.s) / radius, world(surfel.t) / radius)
+        let disk = |placed: &Placed<'_>| {
+            let [s, t] = [placed.surfel.s, placed.surfel.t].map(world);
+            Disk::new((placed.center - center) / radius, s / radius, t / radius)
         };
         let disks: Vec<Disk> = surfels.par_iter().map(disk).collect();
         let boxes: Vec<Aabb> = disks.iter().map(Disk::padded_box).collect();
@@ -216,7 +232,7 @@ mod tests {
         surfels[7].center[0] = f32::NAN;
         (surfels[8].s, surfels[8].t) = ([0.0; 3], [0.0; 3]);
         let origin = DVec3::new(6e5, 5e6, 0.0);
-        Scene { origin, surfels, colors: Colors::Constant([1.0; 4]), oriented: true, up: Up::Y }
+        Scene { origin, surfels, low: vec![], colors: Colors::Constant([1.0; 4]), oriented: true, up: Up::Y }
     }
 
     #[test]

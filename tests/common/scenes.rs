@@ -120,7 +120,7 @@ fn scene(kinds: &[(Kind, usize)], camera: &Camera, origin: DVec3, length: f64, n
     let mut channel = |low, high| random.between(low, high) as f32;
     let colors =
         surfels.iter().map(|_| [channel(-0.5, 3.0), channel(0.0, 1.0), channel(0.2, 0.9), channel(0.1, 1.0)]).collect();
-    Scene { origin, surfels, colors: Colors::Linear(colors), oriented: seed.is_multiple_of(2), up: Up::Z }
+    Scene { origin, surfels, low: vec![], colors: Colors::Linear(colors), oriented: seed.is_multiple_of(2), up: Up::Z }
 }
 
 const MIXED: &[(Kind, usize)] = &[
@@ -172,6 +172,7 @@ pub fn sphere(count: usize, radius: f64) -> Scene {
     Scene {
         origin: DVec3::ZERO,
         surfels: points.iter().map(|p| Surfel::disk(p.as_vec3(), p.as_vec3(), (radius * spacing) as f32)).collect(),
+        low: vec![],
         colors: Colors::Srgb8(points.iter().map(|p| [code(p.x), code(p.y), code(p.z), 255]).collect()),
         oriented: true,
         up: Up::Y,
@@ -204,7 +205,8 @@ pub fn shuffled(scene: &Scene, seed: u64) -> Scene {
         Colors::Linear(colors) => Colors::Linear(order.iter().map(|&k| colors[k]).collect()),
         Colors::Textured(textured) => Colors::Textured(textured.taken(&order)),
     };
-    Scene { surfels: order.iter().map(|&k| scene.surfels[k]).collect(), colors, ..scene.clone() }
+    let low = order.iter().filter_map(|&k| scene.low.get(k).copied()).collect();
+    Scene { surfels: order.iter().map(|&k| scene.surfels[k]).collect(), low, colors, ..scene.clone() }
 }
 
 /// Scenes with many fragments on a pixel, in both kinds of colour.
@@ -230,7 +232,8 @@ pub fn stack(count: usize, value: f32) -> (Scene, Camera) {
         surfels.push(Surfel::disk(Vec3::new(0.0, 0.0, 90.0), Vec3::NEG_Z, 1.0));
         colors.push([end, end, end, 1.0]);
     }
-    let scene = Scene { origin: DVec3::ZERO, surfels, colors: Colors::Linear(colors), oriented: true, up: Up::Y };
+    let scene =
+        Scene { origin: DVec3::ZERO, surfels, low: vec![], colors: Colors::Linear(colors), oriented: true, up: Up::Y };
     (scene, front(4))
 }
 

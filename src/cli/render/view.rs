@@ -97,7 +97,7 @@ impl View {
         match &self.place {
             Place::Framed => Camera::framing(self.size, self.lens, scene, near),
             Place::Eye(eye, up) => {
-                let center = scene.origin + scene.bounds().center();
+                let center = scene.origin + scene.body().0.center();
                 self.posed(&Pose::LookAt(*eye, center, *up), scene.up, near)
             }
             Place::Pose(pose) => self.posed(pose, scene.up, near),

@@ -8,6 +8,7 @@ use super::candidates::Candidates;
 use super::cells::Cells;
 use super::samples::Samples;
 use crate::scene::color::linear_to_srgb;
+use crate::scene::scene::low_parts;
 use crate::scene::{Colors, Scene, Surfel};
 
 /// A half-axis is written longer than it grew by at most this part of itself,
@@ -76,6 +77,7 @@ pub(super) fn scene(
     tolerance: f64,
 ) -> (Scene, Deviations) {
     struct Chosen {
+        center: DVec3,
         surfel: Surfel,
         color: [f32; 4],
         /// Area times deviation, and area.
@@ -108,7 +110,7 @@ pub(super) fn scene(
         let [r, g, b, alpha] = color;
         let opaque = if alpha > 0.0 { alpha } else { f64::INFINITY };
         let color = [r / opaque, g / opaque, b / opaque, alpha / sums[1]].map(|c| c as f32);
-        Chosen { surfel: Surfel { center: world(center), s, t }, color, sums, largest }
+        Chosen { center: center / scale, surfel: Surfel { center: world(center), s, t }, color, sums, largest }
     };
     let chosen: Vec<Chosen> = selected.par_iter().map(choose).collect();
     let colors = match scene.colors {
@@ -119,8 +121,9 @@ pub(super) fn scene(
     let [moment, area] = chosen.iter().fold([0.0; 2], |sum, chosen| [sum[0] + chosen.sums[0], sum[1] + chosen.sums[1]]);
     let max = chosen.iter().map(|chosen| chosen.largest).fold(0.0, f64::max);
     let deviations = Deviations { max, mean: moment / area };
-    let surfels = chosen.into_iter().map(|chosen| chosen.surfel).collect();
-    (Scene { origin: scene.origin, surfels, colors, oriented: scene.oriented, up: scene.up }, deviations)
+    let surfels: Vec<_> = chosen.iter().map(|chosen| chosen.surfel).collect();
+    let low = low_parts(&surfels, |index| chosen[index].center);
+    (Scene { origin: scene.origin, surfels, low, colors, oriented: scene.oriented, up: scene.up }, deviations)
 }
 
 /// The nearest 8-bit codes: a file that came with such colours keeps them.

@@ -23,7 +23,8 @@ pub(super) struct Samples {
 
 impl Samples {
     pub fn new(scene: &Scene) -> Result<Self> {
-        let centers: Vec<[f64; 3]> = scene.surfels.par_iter().map(|surfel| surfel.center.map(f64::from)).collect();
+        let center = |index: usize| scene.center(index).to_array();
+        let centers: Vec<[f64; 3]> = (0..scene.surfels.len()).into_par_iter().map(center).collect();
         let positions = DistinctPositions::new(&centers, &scene.bounds(), DVec3::ZERO)?;
         let count = positions.len();
         // The surfels of each position together; within one in an order of their own content, so that sums come out the

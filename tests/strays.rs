@@ -1,0 +1,168 @@
+//! Map coordinates do not jitter: strays, distant clusters, offsets of 1e12 and cameras far from the core leave the picture that
+//! the scene has alone, near zero.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use common::bits;
+use common::scenes::shuffled;
+use epsplat::io::Points;
+use epsplat::metrics::{Comparison, compare};
+use epsplat::render::{Backend, render};
+use epsplat::scene::{Camera, Lens, LowPass, Maps, Organisation, RenderOptions, Scene, Texture, Up};
+use epsplat::surfels::analytic::{Shape, generate};
+use epsplat::surfels::{Preparation, build, build_textured};
+use glam::DVec3;
+
+/// A corner of the world in UTM.
+const MAP: DVec3 = DVec3::new(7e5, 6.26e6, 120.0);
+
+/// Spheres of radius 10 around `centers`, on a lattice of 2^-16 so that coordinates of up to 2^36 hold its points, and points at
+/// `strays`.
+fn points(centers: &[DVec3], strays: &[DVec3]) -> Points {
+    let samples: Vec<_> = generate(Shape::Sphere, 4000).collect();
+    let on_lattice = |x: f64| (x * 65536.0).round() / 65536.0;
+    let mut points = Points { normals: Some(vec![]), radii: Some(vec![]), texture: Some(vec![]), ..Points::default() };
+    for center in centers {
+        for sample in &samples {
+            let place = DVec3::from_array(sample.position.map(|x| on_lattice(10.0 * x)));
+            points.positions.push((*center + place).to_array());
+            points.normals.as_mut().unwrap().push(sample.normal);
+            points.radii.as_mut().unwrap().push(sample.radius * 10.0);
+            points.texture.as_mut().unwrap().push([0.05 * place.x as f32, 0.05 * place.y as f32]);
+        }
+    }
+    for stray in strays {
+        points.positions.push(stray.to_array());
+        points.normals.as_mut().unwrap().push([0.0, 0.0, 1.0]);
+        points.radii.as_mut().unwrap().push(0.5);
+        points.texture.as_mut().unwrap().push([0.0, 0.0]);
+    }
+    points
+}
+
+fn scene(centers: &[DVec3], strays: &[DVec3]) -> (Scene, Preparation) {
+    build(vec![points(centers, strays)], &()).unwrap()
+}
+
+/// From 30 units away, or through a longer lens from `away` times as far.
+fn camera(target: DVec3, away: f64) -> Camera {
+    let eye = target + DVec3::new(4.0, 3.0, 29.0) * away;
+    let fov = 2.0 * (0.4f64 / away).atan().to_degrees();
+    Camera::look_at((128, 112), Lens::Fov(fov), eye, target, Some(DVec3::Y), Up::Y, 1.0).unwrap()
+}
+
+/// The kernels' picture of `scene` against the f64 reference of the sphere alone around zero, which has no digits to lose.
+fn against_alone(scene: &Scene, center: DVec3, away: f64, options: &RenderOptions) -> Option<Comparison> {
+    let gpu = common::gpu()?;
+    let maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
+    let options = RenderOptions { maps, ..options.clone() };
+    let decided = RenderOptions { maps: Maps { decision: true, ..maps }, ..options.clone() };
+    let (alone, _) = self::scene(&[DVec3::ZERO], &[]);
+    let (expected, _) = render(&alone, &camera(DVec3::ZERO, away), &decided, &Backend::Reference, &()).unwrap();
+    let (frame, _) = render(scene, &camera(center, away), &options, &Backend::gpu(gpu), &()).unwrap();
+    let comparison = compare(&frame, &expected).unwrap();
+    eprintln!("{:?}", comparison);
+    Some(comparison)
+}
+
+fn is_the_same(name: &str, scene: &Scene, center: DVec3, away: f64) {
+    for low_pass in [LowPass::None, LowPass::Ewa] {
+        let options = RenderOptions { low_pass, ..RenderOptions::default() };
+        let Some(comparison) = against_alone(scene, center, away, &options) else { return };
+        assert!(comparison.rmse_decided.unwrap() < 1e-6, "{name}: {comparison:?}");
+        assert!(comparison.excused.unwrap() < 0.02, "{name}: {comparison:?}");
+    }
+}
+
+#[test]
+fn a_stray_leaves_the_scene_as_it_is() {
+    for strays in
+        [vec![DVec3::ZERO], vec![DVec3::ZERO; 2], vec![DVec3::splat(1e12), DVec3::ZERO], vec![DVec3::splat(1e18)]]
+    {
+        let (scene, preparation) = scene(&[MAP], &strays);
+        assert_eq!(preparation.strays, strays.len() as u64);
+        assert!(preparation.notes().iter().any(|note| note.contains("stray")), "{:?}", preparation.notes());
+        is_the_same(&format!("{strays:?}"), &scene, MAP, 1.0);
+        // Where the origin goes by all points it is somewhere in between.
+        assert!((scene.origin - MAP).length() < 20.0, "{}", scene.origin);
+    }
+}
+
+#[test]
+fn distant_clusters_are_each_as_they_are() {
+    for apart in [DVec3::new(3e5, -2e5, 1e3), DVec3::new(1e8, 1e8, -1e8)] {
+        let other = MAP + apart.round();
+        let (scene, preparation) = scene(&[MAP, other], &[]);
+        assert_eq!((preparation.strays, preparation.rounding), (0, None));
+        for center in [MAP, other] {
+            is_the_same(&format!("{apart}"), &scene, center, 1.0);
+        }
+        // The control: f32 centres alone.
+        let single = Scene { low: vec![], ..scene };
+        if let Some(comparison) = against_alone(&single, other, 1.0, &RenderOptions::default()) {
+            assert!(comparison.rmse_decided.unwrap() > 1e-3, "{apart}: {comparison:?}");
+        }
+    }
+}
+
+#[test]
+fn offsets_of_1e12_and_cameras_far_away_change_nothing() {
+    // 2^36, which holds the lattice's points, and 1e12, where an f64 has 2^-13 left.
+    let far = DVec3::new(2f64.powi(36), -(2f64.powi(36)), 2f64.powi(35));
+    is_the_same("2^36", &scene(&[far], &[]).0, far, 1.0);
+    let (rounded, _) = scene(&[DVec3::splat(1e12)], &[]);
+    assert!(rounded.low.is_empty() && rounded.origin.distance(DVec3::splat(1e12)) < 20.0);
+    for (away, center) in [(1e4, MAP), (1e6, DVec3::ZERO)] {
+        is_the_same(&format!("from {away:e}"), &scene(&[center], &[]).0, center, away);
+    }
+}
+
+#[test]
+fn what_no_digits_are_left_for_is_told() {
+    let (_, preparation) = scene(&[DVec3::ZERO, DVec3::new(3e15, 3.3e15, 1e15)], &[]);
+    let error = preparation.rounding.unwrap();
+    assert!(error > 0.1 && error < 40.0, "{error}");
+    assert!(preparation.notes().iter().any(|note| note.contains("err by up to")), "{:?}", preparation.notes());
+}
+
+#[test]
+fn doubled_centres_have_the_same_bits_in_any_order_and_organisation() {
+    let Some(gpu) = common::gpu() else { return };
+    let backend = Backend::gpu(gpu);
+    let other = MAP + DVec3::new(3e5, -2e5, 1e3);
+    let (scene, _) = scene(&[MAP, other], &[DVec3::ZERO]);
+    assert_eq!(scene.low.len(), scene.surfels.len());
+    let frame = |scene: &Scene, organisation| {
+        let options = RenderOptions { organisation, ..RenderOptions::default() };
+        bits(&render(scene, &camera(other, 1.0), &options, &backend, &()).unwrap().0)
+    };
+    let expected = frame(&scene, Organisation::Auto);
+    for organisation in [Organisation::Scatter, Organisation::Tile] {
+        assert!(frame(&shuffled(&scene, 5), organisation) == expected, "{organisation:?}");
+    }
+}
+
+#[test]
+fn a_texture_far_away_is_where_it_is_near_zero() {
+    let Some(gpu) = common::gpu() else { return };
+    let backend = Backend::gpu(gpu);
+    let texels = (0..64 * 64).map(|k: u32| [(k % 64 * 4) as u8, (k / 64 * 4) as u8, 128, 255]).collect();
+    let texture = Texture::new(64, 64, texels).unwrap();
+    let painted = |centers: &[DVec3]| build_textured(vec![points(centers, &[])], texture.clone(), &()).unwrap().0;
+    let options = RenderOptions { maps: Maps { decision: true, ..Maps::default() }, ..RenderOptions::default() };
+    let expected =
+        render(&painted(&[DVec3::ZERO]), &camera(DVec3::ZERO, 1.0), &options, &Backend::Reference, &()).unwrap().0;
+    let other = MAP + DVec3::new(3e5, -2e5, 1e3);
+    let far = painted(&[MAP, other]);
+    assert!(!far.low.is_empty());
+    let options = RenderOptions::default();
+    let error = |scene: &Scene| {
+        let frame = render(scene, &camera(other, 1.0), &options, &backend, &()).unwrap().0;
+        compare(&frame, &expected).unwrap().rmse_decided.unwrap()
+    };
+    let near_one = error(&far);
+    assert!(near_one < 1e-5, "{near_one}");
+    assert!(error(&Scene { low: vec![], ..far }) > 1e-3);
+}

@@ -1,0 +1,11 @@
+// A surfel's centre as a camera sees it. Its f32 centre is all there is of it. Same interface as center_doubled.wgsl.
+
+// Relative to the eye, device units.
+fn relative_center(index: u32, surfel: Surfel) -> array<Double, 3> {
+    var relative: array<Double, 3>;
+    for (var i = 0u; i < 3u; i++) {
+        let d = two_sum(surfel.center[i] * held.unit, -held.eye[i]);
+        relative[i] = quick_two_sum(d.high, d.low - held.eye_low[i]);
+    }
+    return relative;
+}

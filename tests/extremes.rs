@@ -73,3 +73,37 @@ fn an_epsilon_that_accepts_everything_is_exact() {
         check(&format!("{epsilon:?}"), &scene, &view(1.0, DVec3::ZERO), epsilon);
     }
 }
+
+#[test]
+fn radii_of_all_sizes_are_right_and_none_is_larger_than_a_plane() {
+    let mut points = Points { normals: Some(vec![]), radii: Some(vec![]), ..Points::default() };
+    for (k, sample) in generate(Shape::Sphere, 3000).enumerate() {
+        points.positions.push(sample.position);
+        points.normals.as_mut().unwrap().push(sample.normal);
+        // From 1e-9 to 1e9 in steps of 100, ten of each but of the sphere's own.
+        let exponent = -9 + 2 * (k as i32 % 30);
+        let odd = k % 30 < 10 && k / 30 % 10 == 0;
+        points.radii.as_mut().unwrap().push(if odd { 10f32.powi(exponent) } else { sample.radius });
+    }
+    let (scene, preparation) = build(vec![points], &()).unwrap();
+    assert_eq!(preparation.limited_radii, 20);
+    assert!(preparation.notes().iter().any(|note| note.contains("20 points had a radius")));
+    assert!(!scene.low.is_empty(), "disks of 1e-9 need more digits than f32 has");
+    check("radii", &scene, &view(1.0, DVec3::ZERO), Epsilon::Relative(0.01));
+    // Nearer than a millionth of the scene nothing is drawn, however large a disk is.
+    assert!(Camera::default_near(&scene) < 1e-5);
+}
+
+#[test]
+fn scenes_too_small_for_f32_are_refused() {
+    let of = |scale: f64| {
+        let positions = generate(Shape::Sphere, 100).map(|sample| sample.position.map(|x| x * scale)).collect();
+        build(vec![Points { positions, ..Points::default() }], &()).map_err(|error| error.to_string())
+    };
+    assert!(of(1e-14).is_ok());
+    for scale in [1e-16, 1e-20, 1e-40, 1e-300] {
+        let why = of(scale).unwrap_err();
+        assert!(why.contains("1e-15 to 1e18") && why.contains("scale it"), "{why}");
+    }
+    check("1e-14", &sphere(1e-14, DVec3::ZERO, &[]), &view(1e-14, DVec3::ZERO), Epsilon::Relative(0.01));
+}

@@ -110,7 +110,7 @@ fn a_broken_kernel_fails_a_hard_case() {
         ),
         ("terms.wgsl", "= FIXED_ONE;", "= 1048576.0;", "intersecting sheets"),
         ("terms_wide.wgsl", "= 1099511627776.0;", "= 16777216.0;", "only the kernel's tail, smooth"),
-        ("accumulator_fixed_wide.wgsl", "select(0u, 1u, before + low < before)", "0u", "alpha of 1/255"),
+        ("accumulator_fixed_wide.wgsl", "select(0u, 1u, before + term.x < before)", "0u", "alpha of 1/255"),
         ("accumulator_fixed_pairs.wgsl", "from_low + from_high", "from_low", "a million disks on a pixel"),
         ("double.wgsl", "bitcast<f32>(bitcast<u32>(x) ^ held.zero)", "x", "1/100 pixel"),
         ("rows.wgsl", "(a - rows.a) + vec3<f32>(", "(a - a) + 0.0 * vec3<f32>(", "anisotropy 1000:1"),

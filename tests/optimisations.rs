@@ -51,6 +51,7 @@ fn no_optimisation_shows() {
             for optimisation in without {
                 match optimisation {
                     Optimisation::Culling => assert!(left_out("cull")),
+                    Optimisation::Copies => assert!(left_out("copies")),
                     Optimisation::Pairs => assert!(left_out("atomics-u64")),
                     Optimisation::LongWords => assert!(left_out("long-words")),
                     Optimisation::Gathering | Optimisation::Sharing => assert!(left_out("gather")),

@@ -246,7 +246,12 @@ fn absent_parts_have_their_partners_signatures() {
     };
     let alike = |prefix: &str, functions: &[&str]| alike_in(prefix, starting(prefix), functions);
     alike("accumulator_", &["add", "add_pair", "settle", "show", "sum_at", "weight_at"]);
-    let apart = ["accumulator_fixed.wgsl", "accumulator_fixed_pairs.wgsl", "accumulator_fixed_wide.wgsl"];
+    let apart = [
+        "accumulator_fixed.wgsl",
+        "accumulator_fixed_copies.wgsl",
+        "accumulator_fixed_pairs.wgsl",
+        "accumulator_fixed_wide.wgsl",
+    ];
     let with_terms =
         [starting("accumulator_"), starting("terms")].concat().into_iter().filter(|name| !apart.contains(name));
     alike_in("terms", with_terms.collect(), &["quantise", "term"]);
@@ -259,7 +264,7 @@ fn absent_parts_have_their_partners_signatures() {
     alike("tile_small", &["small_list", "small_entry"]);
     alike("kernel_", &["kernel_weight"]);
     alike("epsilon", &["radius_of", "deepest_accepted", "farthest_accepted"]);
-    let shared = ["homography", "intersect", "ray", "point_at"];
+    let shared = ["homography", "intersect", "ray", "seen_at"];
     let (pinhole, orthographic) =
         (signatures(text_of("camera_pinhole.wgsl")), signatures(text_of("camera_orthographic.wgsl")));
     for function in shared {

@@ -7,11 +7,9 @@ override CHANNELS: u32;
 
 fn add(pixel: u32, channel: u32, value: Term) {
     let word = 2u * (pixel * CHANNELS + channel);
-    // Exact: both parts are whole bits of one f32, but for what lies below the unit.
-    let whole = floor(value / WORD);
-    let low = u32(value - whole * WORD);
-    let before = atomicAdd(&sums[word], low);
-    let high = u32(whole) + select(0u, 1u, before + low < before);
+    let term = term_words(value);
+    let before = atomicAdd(&sums[word], term.x);
+    let high = term.y + select(0u, 1u, before + term.x < before);
     if (high > 0u) {
         atomicAdd(&sums[word + 1u], high);
     }

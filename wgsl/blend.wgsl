@@ -16,6 +16,7 @@ struct Attributes {
 }
 
 fn attributes_of(index: u32, splat: Splat) -> Attributes {
+    hold_copies(index);
     return Attributes(color_of(index), normal_of(index, splat), radius_of(index), place_of(index));
 }
 

@@ -93,9 +93,9 @@ fn project_into(slot: u32, every: bool) -> u32 {
 }
 
 // Most splats are in view, so those that are not are counted.
-fn count_unseen(local: u32, unseen: bool) {
+fn count_unseen(local: u32, slot: u32, unseen: bool) {
     if (unseen) {
-        atomicAdd(&group_unseen, 1u);
+        atomicAdd(&group_unseen, copies_of(surfel_for(slot)));
     }
     workgroupBarrier();
     if (local == 0u) {
@@ -118,7 +118,7 @@ fn project(
     if (fate == RARE) {
         atomicStore(&rare[QUEUE_START + atomicAdd(&rare[0], 1u)], slot);
     }
-    count_unseen(local, fate == OUT_OF_VIEW);
+    count_unseen(local, slot, fate == OUT_OF_VIEW);
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -129,11 +129,13 @@ fn project_rare(
 ) {
     hold_view();
     let place = linear_index(workgroup, workgroups, local);
+    var slot = 0u;
     var fate = IN_VIEW;
     if (place < listed[0]) {
-        fate = project_into(listed[QUEUE_START + place], true);
+        slot = listed[QUEUE_START + place];
+        fate = project_into(slot, true);
     }
-    count_unseen(local, fate == OUT_OF_VIEW);
+    count_unseen(local, slot, fate == OUT_OF_VIEW);
 }
 
 // Between the two: a workgroup for WORKGROUP of the rare ones, in rows that no adapter finds too long.

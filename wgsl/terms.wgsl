@@ -10,6 +10,11 @@ fn quantise(weight: f32) -> Term {
     return u32(round(weight * ONE));
 }
 
+// A term's low and high word.
+fn term_words(value: Term) -> vec2<u32> {
+    return vec2<u32>(value, 0u);
+}
+
 // weight * value for a value in [0, 1]. The weight came from an f32, so it has at most 24 significant bits and is exact
 // as f32.
 fn term(weight: Term, value: f32) -> Term {

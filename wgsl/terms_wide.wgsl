@@ -14,6 +14,12 @@ fn quantise(weight: f32) -> Term {
     return weight * ONE;
 }
 
+// A term's low and high word. Exact: both are whole bits of one f32, but for what lies below the unit.
+fn term_words(value: Term) -> vec2<u32> {
+    let whole = floor(value / WORD);
+    return vec2<u32>(u32(value - whole * WORD), u32(whole));
+}
+
 fn term(weight: Term, value: f32) -> Term {
     return weight * clamp(value, 0.0, 1.0);
 }

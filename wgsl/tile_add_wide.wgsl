@@ -4,6 +4,6 @@
 @group(0) @binding(8) var<storage, read_write> sums: array<u32>;
 
 fn add(pixel: u32, channel: u32, value: Term) {
-    let whole = floor(value / WORD);
-    add_words(pixel, channel, u32(value - whole * WORD), u32(whole));
+    let term = term_words(value);
+    add_words(pixel, channel, term.x, term.y);
 }

@@ -168,7 +168,7 @@ fn cameras([width, height]: [u32; 2], entry: &SceneEntry, scene: &Scene) -> Resu
     let target = entry.target.map_or(center, DVec3::from);
     let mut first = match entry.eye {
         Some(eye) => Camera::look_at(size, lens, eye.into(), target, entry.up.map(DVec3::from), scene.up, near)?,
-        None => Camera::framing(size, lens, scene, near)?,
+        None => Camera::framing_centers(size, lens, scene, near)?,
     };
     let fill = entry.fill.unwrap_or(1.0);
     match first.projection {

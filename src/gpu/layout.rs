@@ -194,7 +194,7 @@ pub fn device_unit(body: &Bounds, bounds: &Bounds, eye: DVec3) -> f64 {
 impl View {
     /// The view of `scene`, whose values lie in `ranges`, by `camera`.
     pub fn new(scene: &Scene, ranges: &Ranges, camera: &Camera, options: &RenderOptions) -> Self {
-        let Ranges { bounds, body, core, color: (low, high), largest_radius } = ranges;
+        let Ranges { bounds, body, core, color: (low, high), largest_radius, .. } = ranges;
         let largest_radius = f64::from(*largest_radius);
         let eye_relative = camera.eye - scene.origin;
         let unit = device_unit(body, bounds, eye_relative);

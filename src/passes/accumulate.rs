@@ -76,8 +76,12 @@ pub enum Features {
 const U: f64 = 1.0 / 16_777_216.0;
 
 /// The file that keeps the sums of `fixed`, by whether terms may be small ([`SceneNeeds::wide_sums`]) and whether the adapter
-/// adds 64 bits at once ([`SceneNeeds::atomics_u64`]): the sums are the same with it, in half the additions.
+/// adds 64 bits at once ([`SceneNeeds::atomics_u64`]): the sums are the same with it, in half the additions. They are the same too
+/// where one surfel stands for its copies ([`SceneNeeds::copies`]).
 fn fixed_file(needs: &SceneNeeds) -> &'static str {
+    if needs.copies {
+        return "accumulator_fixed_copies.wgsl";
+    }
     match (needs.wide_sums, needs.atomics_u64) {
         (false, false) => "accumulator_fixed.wgsl",
         (false, true) => "accumulator_fixed_pairs.wgsl",
@@ -251,6 +255,7 @@ pub fn reference<'a>(
         let center = scene.origin + scene.center(splat.surfel as usize);
         let radius = f64::from(surfel.radius());
         let epsilon = absolute + of_radius * radius;
+        let times = f64::from(splat.copies);
         let normal = if splat.away && !scene.oriented { -splat.normal } else { splat.normal };
         for y in splat.first[1].max(first_row)..=splat.last[1].min(first_row + rows - 1) {
             let row = (y - first_row) as usize * width;
@@ -265,7 +270,7 @@ pub fn reference<'a>(
                 if !(at.hit(camera) && at.depth <= back) {
                     continue;
                 }
-                let weight = (gain * options.kernel.weight(at.rho2)).max(LEAST_FILTERED_WEIGHT);
+                let weight = times * (gain * options.kernel.weight(at.rho2)).max(LEAST_FILTERED_WEIGHT);
                 sum.weight += weight;
                 for (total, value) in sum.color.iter_mut().zip(color) {
                     *total += weight * value;
@@ -282,7 +287,7 @@ pub fn reference<'a>(
                     *total += weight * value;
                 }
                 sum.depth += weight * at.depth;
-                sum.count += 1;
+                sum.count += splat.copies;
             }
         }
     }

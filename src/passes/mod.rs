@@ -13,6 +13,8 @@
 //! | [`covered`] | nearest depths | the tiles that have anything |
 //! | [`resolve`] | sums | [`Frame`](crate::frame::Frame) |
 //!
+//! [`unseen`] says why none of them shows where none does.
+//!
 //! [`footprint`] is evaluated inside visibility and accumulate, with the [`homography`] and the [`lowpass`] that [`project`] prepared;
 //! [`variant`] says which kernels a render is made of.
 
@@ -27,6 +29,7 @@ pub mod project;
 pub mod raster;
 pub mod resolve;
 pub mod tiles;
+pub mod unseen;
 pub mod upload;
 pub mod variant;
 pub mod visibility;

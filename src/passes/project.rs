@@ -15,7 +15,7 @@ use crate::error::Result;
 use crate::gpu::buffers::{Buffer, counts};
 use crate::gpu::kernel::{Bound, Grid, grid};
 use crate::gpu::{Gpu, layout};
-use crate::scene::{Camera, LowPass, RenderOptions, Scene, Surfel};
+use crate::scene::{Camera, LowPass, Optimisation, RenderOptions, Scene, Surfel, copies, has_copies};
 
 /// A projected surfel in f64: the twin of [`layout::Splat`], in world units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,17 +40,41 @@ pub struct Splat {
     pub normal: DVec3,
     /// The low-pass, if there is one.
     pub filter: Option<Filter>,
+    /// Surfels that it stands for.
+    pub copies: u32,
 }
 
 /// The twin of `wgsl/project.wgsl` for one surfel, whose centre is relative to `origin` (world coordinates); `None` if no pixel can
 /// be touched.
 pub fn reference(index: u32, surfel: &Surfel, origin: DVec3, camera: &Camera, design: &Design) -> Option<Splat> {
+    projected(index, surfel, origin, camera, design).ok()
+}
+
+/// Why a surfel touches no pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Missed {
+    /// It lies behind the camera, or nearer than the near depth.
+    Behind,
+    /// It lies beside the image.
+    Outside,
+    /// It lies between the centres of pixels: it is small, or seen edge-on.
+    Between,
+}
+
+/// The same, or why there is none.
+pub(super) fn projected(
+    index: u32,
+    surfel: &Surfel,
+    origin: DVec3,
+    camera: &Camera,
+    design: &Design,
+) -> Result<Splat, Missed> {
     let vector = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
     let relative = vector(surfel.center) - (camera.eye - origin);
     let (s_world, t_world) = (vector(surfel.s), vector(surfel.t));
     let (p, s, t) = (camera.rotation * relative, camera.rotation * s_world, camera.rotation * t_world);
     if p.z + slope(s, t) < camera.near {
-        return None;
+        return Err(Missed::Behind);
     }
     let mut projected = homography::projected(camera, p, s, t);
     let near = (p.z - slope(s, t)).max(camera.near);
@@ -69,11 +93,12 @@ pub fn reference(index: u32, surfel: &Surfel, origin: DVec3, camera: &Camera, de
     let first = (projected.low - margin - 0.5).ceil().max(DVec2::ZERO);
     let last = (projected.high + margin - 0.5).floor().min(size - 1.0);
     if !(first.x <= last.x && first.y <= last.y) {
-        return None;
+        let in_image = projected.low.cmplt(size).all() && projected.high.cmpgt(DVec2::ZERO).all();
+        return Err(if in_image { Missed::Between } else { Missed::Outside });
     }
     let normal = s_world.cross(t_world);
     let normal = (normal / normal.abs().max_element()).normalize();
-    Some(Splat {
+    Ok(Splat {
         surfel: index,
         anchor: projected.anchor,
         first: [first.x as u32, first.y as u32],
@@ -84,15 +109,20 @@ pub fn reference(index: u32, surfel: &Surfel, origin: DVec3, camera: &Camera, de
         away: projected.away,
         normal,
         filter,
+        copies: 1,
     })
 }
 
-/// All splats of a scene that may touch a pixel, in the order of the surfels.
+/// All splats of a scene that may touch a pixel, in the order of the surfels; one for all that are the same where one has many
+/// copies.
 pub fn reference_all(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Splat> {
     let design = Design::of(options);
     let surfels = scene.surfels.par_iter().enumerate();
+    let copies = (has_copies(scene) && options.has(Optimisation::Copies)).then(|| copies(scene));
     let project = |(index, surfel): (usize, &Surfel)| {
-        reference(index as u32, surfel, scene.origin + scene.low_of(index), camera, &design)
+        let copies = copies.as_ref().map_or(1, |copies| copies[index]);
+        let splat = || reference(index as u32, surfel, scene.origin + scene.low_of(index), camera, &design);
+        (copies > 0).then(splat).flatten().map(|splat| Splat { copies, ..splat })
     };
     surfels.filter_map(project).collect()
 }
@@ -160,6 +190,7 @@ pub fn record(recorder: &mut Recorder<'_>, buffer: &SplatBuffer, part: Part) -> 
                     ("listed", page.rare.bound()),
                 ];
                 buffers.extend(surfels.low.as_ref().map(|low| ("centers_low", low.bound())));
+                buffers.extend(surfels.copies.as_ref().map(|copies| ("copies", copies.bound())));
                 buffers.extend(page.filters.as_ref().map(|filters| ("filters", filters.bound())));
                 buffers.extend(drawn);
                 program.dispatch(gpu, pass, "project", &buffers, slots)?;
@@ -263,7 +294,7 @@ impl SplatBuffer {
         for (of, page) in self.surfels.pages.iter().zip(&self.pages) {
             let ([large, unseen], [_, batches]) =
                 (counted.next().unwrap_or_default(), counted.next().unwrap_or_default());
-            tally.drawn += of.surfels.len.saturating_sub(unseen.into());
+            tally.drawn += of.count.saturating_sub(unseen.into());
             tally.most_large = tally.most_large.max(large);
             tally.held &= u64::from(batches) * u64::from(layout::BATCH) <= page.splats.len;
         }
@@ -300,6 +331,7 @@ impl SplatBuffer {
         ];
         bound.extend_from_slice(buffers);
         bound.extend(page.filters.as_ref().map(|filters| ("projected_filters", filters.bound())));
+        bound.extend(surfels.copies.as_ref().map(|copies| ("copies", copies.bound())));
         bound.extend(surfels.colors.as_ref().map(|colors| ("colors", colors.as_entire_binding())));
         bound.extend(self.surfels.srgb_to_linear.as_ref().map(|table| ("srgb_to_linear", table.bound())));
         bound

@@ -15,7 +15,7 @@ use crate::gpu::kernel::Bound;
 use crate::gpu::layout::{BATCH, MOST_GROUPS, Splat};
 use crate::progress::Progress;
 use crate::scene::color::SRGB8_TO_LINEAR;
-use crate::scene::{Bounds, ColorNeed, Colors, Scene, SceneNeeds, Surfel};
+use crate::scene::{Bounds, ColorNeed, Colors, Scene, SceneNeeds, Surfel, copies};
 
 /// Surfels and, if they differ in it, their colour.
 pub struct SurfelBuffer {
@@ -33,6 +33,10 @@ pub struct SurfelPage {
     pub surfels: Buffer<Surfel>,
     /// What their centres leave out, if it matters.
     pub(crate) low: Option<Buffer<[f32; 3]>>,
+    /// How many each stands for, if any for more than itself.
+    pub(crate) copies: Option<Buffer<u32>>,
+    /// Surfels that they stand for together.
+    pub count: u64,
     /// The bounding balls of their batches.
     pub(crate) balls: Buffer<[f32; 4]>,
     pub(crate) colors: Option<wgpu::Buffer>,
@@ -55,7 +59,11 @@ impl SurfelBuffer {
         progress.begin("uploading surfels", scene.surfels.len() as u64);
         let mut pages = Vec::new();
         let given = || (0..scene.surfels.len() as u32).collect();
-        let order = core.map_or_else(given, |core| order(&scene.surfels, core));
+        let mut order = core.map_or_else(given, |core| order(&scene.surfels, core));
+        let copies = needs.copies.then(|| copies(scene));
+        if let Some(copies) = &copies {
+            order.retain(|&index| copies[index as usize] > 0);
+        }
         for indices in order.chunks(len) {
             let surfels = Buffer::storage(gpu, "surfels", indices.len() as u64)?;
             surfels.write(gpu, indices.len(), |range| taken(&scene.surfels, &indices[range]), progress)?;
@@ -67,6 +75,10 @@ impl SurfelBuffer {
                 }
                 false => None,
             };
+            let stand_for = copies.as_ref().map(|copies| stand_for(gpu, copies, indices)).transpose()?;
+            let count = copies.as_ref().map_or(indices.len() as u64, |copies| {
+                indices.iter().map(|&index| u64::from(copies[index as usize])).sum()
+            });
             let colors = match (needs.color, &scene.colors) {
                 (ColorNeed::Srgb8, Colors::Srgb8(codes)) => Some(upload(gpu, codes, indices)?),
                 (ColorNeed::Linear, Colors::Linear(colors)) => Some(upload(gpu, colors, indices)?),
@@ -88,7 +100,7 @@ impl SurfelBuffer {
                 .collect();
             let balls = Buffer::storage(gpu, "batches", batches.len() as u64)?;
             balls.write(gpu, batches.len(), |range| batches[range].into(), &())?;
-            pages.push(SurfelPage { surfels, low, balls, colors });
+            pages.push(SurfelPage { surfels, low, copies: stand_for, count, balls, colors });
         }
         let srgb_to_linear = match needs.color {
             ColorNeed::Srgb8 | ColorNeed::Textured => {
@@ -119,13 +131,19 @@ impl SurfelBuffer {
     /// Device memory that it takes, bytes.
     pub fn bytes(&self) -> u64 {
         let of_page = |page: &SurfelPage| {
-            let low = page.low.as_ref().map_or(0, Buffer::bytes);
+            let low = page.low.as_ref().map_or(0, Buffer::bytes) + page.copies.as_ref().map_or(0, Buffer::bytes);
             page.surfels.bytes() + low + page.balls.bytes() + page.colors.as_ref().map_or(0, wgpu::Buffer::size)
         };
         let of_colors =
             self.srgb_to_linear.as_ref().map_or(0, Buffer::bytes) + self.texels.as_ref().map_or(0, Buffer::bytes);
         self.pages.iter().map(of_page).sum::<u64>() + of_colors
     }
+}
+
+fn stand_for(gpu: &Gpu, copies: &[u32], indices: &[u32]) -> Result<Buffer<u32>> {
+    let buffer = Buffer::storage(gpu, "numbers of copies", indices.len() as u64)?;
+    buffer.write(gpu, indices.len(), |range| taken(copies, &indices[range]), &())?;
+    Ok(buffer)
 }
 
 fn upload<T: Pod + Send + Sync>(gpu: &Gpu, values: &[T], indices: &[u32]) -> Result<wgpu::Buffer> {

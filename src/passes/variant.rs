@@ -108,6 +108,7 @@ fn files(needs: &SceneNeeds) -> Vec<&'static str> {
             Projection::Orthographic => "camera_orthographic.wgsl",
         },
         pick(needs.doubled, "center_doubled.wgsl", "center.wgsl"),
+        pick(needs.copies, "copies.wgsl", "copies_absent.wgsl"),
         "project.wgsl",
         pick(needs.cull, "cull.wgsl", "cull_absent.wgsl"),
         "footprint.wgsl",

@@ -72,7 +72,7 @@ pub(super) fn frame(
         accumulator: "f64",
         overflows: 0,
         surfels: scene.surfels.len() as u64,
-        splats_drawn: splats.len() as u64,
+        splats_drawn: splats.iter().map(|splat| u64::from(splat.copies)).sum(),
         width: camera.width,
         height: camera.height,
         passes,

@@ -20,6 +20,9 @@ const FEWEST: usize = 16;
 /// A position strays if it lies farther past a side of the core than so many times the core's longest edge.
 const FAR: f64 = 16.0;
 
+/// The narrowest scene, world units, whose half-axes and depths have products that an f32 holds to the last digit.
+pub(crate) const SMALLEST_SCENE: f64 = 1e-15;
+
 /// The box of `count` positions without those that stray, and how many do. It depends on the set of positions alone, on no order:
 /// the core, which holds all but one in 64 beyond each side, is that of a sample chosen by the coordinates' own bits. Positions
 /// that are not finite are in no box.
@@ -27,9 +30,10 @@ pub(crate) fn body(count: usize, position: impl Fn(usize) -> DVec3 + Sync) -> (B
     let all = box_of(count, &position, |_| true).0;
     let Some(core) = core(count, &position) else { return (all, 0) };
     let far = FAR * core.extent().max_element();
+    // Nearly all at one place is no core to go by.
     let (low, high) = (core.min - far, core.max + far);
     let holds = |p: DVec3| p.cmpge(low).all() && p.cmple(high).all();
-    if far == 0.0 || all.is_empty() || holds(all.min) && holds(all.max) {
+    if far < FAR * SMALLEST_SCENE || all.is_empty() || holds(all.min) && holds(all.max) {
         return (all, 0);
     }
     box_of(count, &position, holds)

@@ -175,7 +175,8 @@ impl Camera {
 
     /// The depth below which nothing is drawn when none is given: a millionth of the scene.
     pub fn default_near(scene: &Scene) -> f64 {
-        let size = scene.body().0.extent().length().max(2.0 * f64::from(scene.largest_radius()));
+        let extent = scene.body().0.extent().length();
+        let size = if extent > 0.0 { extent } else { 2.0 * f64::from(scene.largest_radius()) };
         (size * 1e-6).clamp(1.0 / LARGEST, LARGEST)
     }
 

@@ -4,73 +4,183 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::camera::check_size;
-use super::{Camera, Lens, Projection, Scene, Up};
+use super::{Bounds, Camera, Lens, Projection, Scene, Surfel, Up};
 use crate::error::Result;
 
-/// Part of the way from the principal point to the image's edge that the scene fills.
+/// Part of the way from the image's middle to its edge that surfels' centres fill.
 const FILL: f64 = 0.95;
+
+/// The same of disks, where they would else be cut.
+const FILL_OF_DISKS: f64 = 0.98;
 
 /// Rounds of centring; each leaves about the square of the share of depth in the distance.
 const ROUNDS: usize = 4;
 
 impl Camera {
-    /// A camera that shows all surfel centres of `scene` as large as the image holds them, with a margin of 5 %, and
-    /// centred: from the front, a little from the right and above (z-up scenes, which tend to be terrain, from steeper).
+    /// A camera that shows the surfels of the scene's body as large as the image holds them, and centred: from the front, a little
+    /// from the right and above (z-up scenes, which tend to be terrain, from steeper). Their centres leave a margin of 5 %, and no
+    /// disk is cut by the border: larger disks take the camera farther away.
     ///
     /// An orthographic lens keeps its scale, so it may show less.
-    pub fn framing((width, height): (u32, u32), lens: Lens, scene: &Scene, near: f64) -> Result<Self> {
+    pub fn framing(size: (u32, u32), lens: Lens, scene: &Scene, near: f64) -> Result<Self> {
+        Self::framed(size, lens, scene, near, Of::Disks)
+    }
+
+    /// The same by surfels' centres alone: for studies, in which the view must not depend on the radius.
+    pub(crate) fn framing_centers(size: (u32, u32), lens: Lens, scene: &Scene, near: f64) -> Result<Self> {
+        Self::framed(size, lens, scene, near, Of::Centers)
+    }
+
+    fn framed((width, height): (u32, u32), lens: Lens, scene: &Scene, near: f64, of: Of) -> Result<Self> {
         check_size(width, height)?;
         let (projection, [fx, fy, cx, cy]) = lens.intrinsics(width, height)?;
+        // The image's middle and half its width, as X/Z (pinhole) or X (orthographic), and so for its height.
+        let interval = |size: u32, principal: f64, f: f64| {
+            let size = f64::from(size);
+            [(0.5 * size - principal) / f, 0.5 * size / f]
+        };
+        let image = [interval(width, cx, fx), interval(height, cy, fy)];
+        let framing = Framing::new(scene, projection == Projection::Pinhole, image);
+        let mut eye = framing.eye(FILL, Of::Centers);
+        if of == Of::Disks && framing.cuts(eye) {
+            eye = framing.eye(FILL_OF_DISKS, Of::Disks);
+        }
+        let [right, down, forward] = framing.axes;
+        let world = scene.origin + framing.center + right * eye.x + down * eye.y + forward * eye.z;
+        Self::look_at((width, height), lens, world, world + forward * framing.radius, None, scene.up, near)
+    }
+}
+
+/// What of a surfel is to be seen.
+#[derive(Clone, Copy, PartialEq)]
+enum Of {
+    Centers,
+    Disks,
+}
+
+/// The scene as the camera's axes see it.
+struct Framing<'a> {
+    scene: &'a Scene,
+    pinhole: bool,
+    /// Middle and half of the image's width and height.
+    image: [[f64; 2]; 2],
+    /// Right, down, forward.
+    axes: [DVec3; 3],
+    /// What is framed: centres in this box.
+    body: Bounds,
+    center: DVec3,
+    /// Of the scene.
+    radius: f64,
+    /// The least depth of a centre.
+    clearance: f64,
+}
+
+/// A disk in the camera's axes, relative to the scene's centre.
+#[derive(Clone, Copy)]
+struct Disk {
+    p: DVec3,
+    s: DVec3,
+    t: DVec3,
+}
+
+impl Disk {
+    /// Its farthest point in a direction.
+    fn farthest(self, along: DVec3) -> DVec3 {
+        let (s, t) = (self.s.dot(along), self.t.dot(along));
+        let length = s.hypot(t);
+        if length > 0.0 { self.p + (self.s * s + self.t * t) / length } else { self.p }
+    }
+
+    /// The largest value of the coordinate along `axis` over depth, for a disk before the camera (Dinkelbach 1967: where the
+    /// largest x - k z is zero, k is the largest x / z).
+    fn largest_ratio(self, axis: DVec3) -> f64 {
+        let rounds = if self.s == self.t { 0 } else { 3 };
+        (0..rounds).fold(self.p.dot(axis) / self.p.z, |k, _| {
+            let q = self.farthest(axis - DVec3::Z * k);
+            q.dot(axis) / q.z
+        })
+    }
+}
+
+impl<'a> Framing<'a> {
+    fn new(scene: &'a Scene, pinhole: bool, image: [[f64; 2]; 2]) -> Self {
         let forward = forward(scene.up);
         let right = forward.cross(scene.up.axis()).normalize();
-        let down = forward.cross(right);
-        let bounds = scene.bounds();
-        let center = bounds.center();
+        let (body, _) = scene.body();
         // A scene of one place has no extent but its surfels'.
-        let half = 0.5 * bounds.extent().length();
+        let half = 0.5 * body.extent().length();
         let (radius, clearance) = if half > 0.0 {
             (half, 0.05 * half)
         } else {
             let radius = f64::from(scene.largest_radius());
             (radius, 3.0 * radius)
         };
-        let local = |p: DVec3| DVec3::new((p - center).dot(right), (p - center).dot(down), (p - center).dot(forward));
-        // The image's middle and half its width, as X/Z (pinhole) or X (orthographic), and so for its height.
-        let interval = |size: u32, principal: f64, f: f64| {
-            let size = f64::from(size);
-            ((0.5 * size - principal) / f, FILL * 0.5 * size / f)
+        let axes = [right, forward.cross(right), forward];
+        Self { scene, pinhole, image, axes, body, center: body.center(), radius, clearance }
+    }
+
+    /// The largest of each of some functions over what is framed: whatever its order, the same. A disk that is much larger than
+    /// the scene, as one of a stray point may be, counts by its centre.
+    fn largest<const N: usize>(&self, of: Of, f: impl Fn(Disk) -> [f64; N] + Sync) -> [f64; N] {
+        let local = |v: DVec3| DVec3::from_array(self.axes.map(|axis| v.dot(axis)));
+        let value = |surfel: &Surfel| {
+            let [p, s, t] = [surfel.center, surfel.s, surfel.t].map(|v| DVec3::from_array(v.map(f64::from)));
+            let inside = p.cmpge(self.body.min).all() && p.cmple(self.body.max).all();
+            let whole = of == Of::Disks && s.length().max(t.length()) <= 2.0 * self.radius;
+            let [s, t] = if whole { [local(s), local(t)] } else { [DVec3::ZERO; 2] };
+            inside.then(|| f(Disk { p: local(p - self.center), s, t }))
         };
-        let ((mid_x, half_x), (mid_y, half_y)) = (interval(width, cx, fx), interval(height, cy, fy));
-        let pinhole = projection == Projection::Pinhole;
-        let mut eye = DVec3::new(0.0, 0.0, -2.0 * radius);
-        if pinhole {
+        let join = |a: [f64; N], b: [f64; N]| std::array::from_fn(|k| a[k].max(b[k]));
+        let none = || [f64::NEG_INFINITY; N];
+        self.scene.surfels.par_iter().map(|surfel| value(surfel).unwrap_or_else(none)).reduce(none, join)
+    }
+
+    /// Where what is framed ends toward the right, left, bottom and top, as X/Z or X, seen from `eye`.
+    fn reach(&self, eye: DVec3, of: Of) -> [f64; 4] {
+        let sides = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y];
+        self.largest(of, |disk| {
+            let disk = Disk { p: disk.p - eye, ..disk };
+            sides.map(|side| if self.pinhole { disk.largest_ratio(side) } else { disk.farthest(side).dot(side) })
+        })
+    }
+
+    /// The eye from which the image is filled to the part `fill`, in the camera's axes relative to the scene's centre.
+    fn eye(&self, fill: f64, of: Of) -> DVec3 {
+        let [[mid_x, half_x], [mid_y, half_y]] = self.image.map(|[middle, half]| [middle, fill * half]);
+        let mut eye = DVec3::new(0.0, 0.0, -2.0 * self.radius);
+        if self.pinhole {
             // The eye must keep every point between four planes, X - x <= (mid + half) (Z - z) and so on: the foremost
             // such eye between the pair of planes that leaves it less room.
-            let [left, right, above, below, front] = largest(scene, |p| {
-                let p = local(p);
-                [
-                    p.x - (mid_x + half_x) * p.z,
-                    (mid_x - half_x) * p.z - p.x,
-                    p.y - (mid_y + half_y) * p.z,
-                    (mid_y - half_y) * p.z - p.y,
-                    -p.z,
-                ]
-            });
-            let z = -((left + right) / (2.0 * half_x)).max((above + below) / (2.0 * half_y)).max(front + clearance);
+            let planes = [
+                DVec3::new(1.0, 0.0, -(mid_x + half_x)),
+                DVec3::new(-1.0, 0.0, mid_x - half_x),
+                DVec3::new(0.0, 1.0, -(mid_y + half_y)),
+                DVec3::new(0.0, -1.0, mid_y - half_y),
+                DVec3::NEG_Z,
+            ];
+            let [left, right, above, below, front] =
+                self.largest(of, |disk| planes.map(|plane| disk.farthest(plane).dot(plane)));
+            let behind = front + self.clearance;
+            let z = -((left + right) / (2.0 * half_x)).max((above + below) / (2.0 * half_y)).max(behind);
             eye = DVec3::new(0.5 * (left - right) + mid_x * z, 0.5 * (above - below) + mid_y * z, z);
         }
         for _ in 0..ROUNDS {
-            let reach = largest(scene, |p| {
-                let d = local(p) - eye;
-                let depth = if pinhole { d.z } else { 1.0 };
-                [d.x / depth, -d.x / depth, d.y / depth, -d.y / depth]
-            });
-            let depth = if pinhole { -eye.z } else { 1.0 };
+            let reach = self.reach(eye, of);
+            let depth = if self.pinhole { -eye.z } else { 1.0 };
             eye.x += (0.5 * (reach[0] - reach[1]) - mid_x) * depth;
             eye.y += (0.5 * (reach[2] - reach[3]) - mid_y) * depth;
         }
-        let world = scene.origin + center + right * eye.x + down * eye.y + forward * eye.z;
-        Self::look_at((width, height), lens, world, world + forward * radius, None, scene.up, near)
+        eye
+    }
+
+    /// Whether the image's border cuts a disk, seen from `eye`.
+    fn cuts(&self, eye: DVec3) -> bool {
+        let [[mid_x, half_x], [mid_y, half_y]] = self.image;
+        let [front] = self.largest(Of::Disks, |disk| [eye.z - disk.farthest(DVec3::NEG_Z).z]);
+        let [right, left, bottom, top] = self.reach(eye, Of::Disks);
+        let beyond =
+            (right > mid_x + half_x || -left < mid_x - half_x) || (bottom > mid_y + half_y || -top < mid_y - half_y);
+        self.pinhole && (front >= 0.0 || beyond)
     }
 }
 
@@ -81,13 +191,6 @@ fn forward(up: Up) -> DVec3 {
         Up::Z => DVec3::new(-0.15, 1.0, -1.2),
     }
     .normalize()
-}
-
-/// The largest of each of some functions over the surfel centres: whatever their order, the same.
-fn largest<const N: usize>(scene: &Scene, f: impl Fn(DVec3) -> [f64; N] + Sync) -> [f64; N] {
-    let join = |a: [f64; N], b: [f64; N]| std::array::from_fn(|k| a[k].max(b[k]));
-    let values = scene.surfels.par_iter().map(|s| f(glam::Vec3::from_array(s.center).as_dvec3()));
-    values.reduce(|| [f64::NEG_INFINITY; N], join)
 }
 
 #[cfg(test)]
@@ -102,7 +205,7 @@ mod tests {
         for corner in 0..8u32 {
             let pick = |bit: u32, low: f32, high: f32| if corner >> bit & 1 == 0 { low } else { high };
             let center = glam::Vec3::new(pick(0, -3.0, 9.0), pick(1, 2.0, 4.0), pick(2, 1.0, 1.5));
-            surfels.push(Surfel::disk(center, glam::Vec3::Z, 0.1));
+            surfels.push(Surfel::disk(center, glam::Vec3::Z, 0.01));
         }
         let colors = Colors::Constant([1.0; 4]);
         for (up, size) in [(Up::Y, (640, 480)), (Up::Z, (100, 900)), (Up::Z, (1024, 64))] {
@@ -132,6 +235,41 @@ mod tests {
                 let off = ((low + high) * 0.5 / size - 0.5).abs();
                 assert!(off.max_element() < 0.03, "{off}");
             }
+        }
+    }
+
+    #[test]
+    fn no_disk_is_cut_by_the_border_and_no_stray_counts() {
+        let normals = [glam::Vec3::Z, glam::Vec3::X, glam::Vec3::new(1.0, 1.0, -1.0)];
+        let mut surfels: Vec<_> = (0..60)
+            .map(|k| {
+                let at = glam::Vec3::new((k % 5) as f32, (k / 5 % 4) as f32, (k / 20) as f32);
+                Surfel::disk(at, normals[k % 3], 0.2 + 0.3 * (k % 4) as f32)
+            })
+            .collect();
+        let largest = 1e9;
+        surfels.push(Surfel::disk(glam::Vec3::ONE, glam::Vec3::Z, largest));
+        surfels.push(Surfel::disk(glam::Vec3::splat(1e6), glam::Vec3::Z, 1.0));
+        let colors = Colors::Constant([1.0; 4]);
+        let scene = Scene { origin: DVec3::ZERO, surfels, low: vec![], colors, oriented: true, up: Up::Y };
+        for size in [(640, 480), (100, 900)] {
+            let camera = Camera::framing(size, Lens::Fov(45.0), &scene, 1e-3).unwrap();
+            let (mut low, mut high) = (glam::DVec2::INFINITY, glam::DVec2::NEG_INFINITY);
+            for surfel in &scene.surfels[..60] {
+                let [p, s, t] = [surfel.center, surfel.s, surfel.t].map(|v| glam::Vec3::from_array(v).as_dvec3());
+                for step in 0..256 {
+                    let (sin, cos) = (f64::from(step) / 256.0 * std::f64::consts::TAU).sin_cos();
+                    let rim = camera.to_camera(p + s * cos + t * sin);
+                    assert!(rim.z > camera.near);
+                    let image =
+                        glam::DVec2::new(camera.fx * rim.x / rim.z + camera.cx, camera.fy * rim.y / rim.z + camera.cy);
+                    (low, high) = (low.min(image), high.max(image));
+                }
+            }
+            let size = glam::DVec2::new(f64::from(size.0), f64::from(size.1));
+            assert!(low.min_element() > 0.0 && (size - high).min_element() > 0.0, "{low} {high}");
+            let filled = (high - low) / size;
+            assert!(filled.max_element() > 0.97, "{filled}");
         }
     }
 

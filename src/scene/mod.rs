@@ -3,6 +3,7 @@
 mod body;
 pub mod camera;
 pub mod color;
+mod copies;
 pub mod framing;
 pub mod light;
 pub mod needs;
@@ -15,9 +16,10 @@ pub mod scene;
 pub mod surfel;
 pub mod texture;
 
-pub(crate) use body::body;
+pub(crate) use body::{SMALLEST_SCENE, body};
 pub use camera::{Camera, Lens, Projection};
 pub use color::Colors;
+pub(crate) use copies::{copies, has_copies};
 pub use light::Light;
 pub use needs::{ColorNeed, SceneNeeds};
 pub use optimisation::Optimisation;

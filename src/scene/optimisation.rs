@@ -13,6 +13,8 @@ pub enum Optimisation {
     Order,
     /// Splats that lie behind all nearest depths of their pixels add nothing and are left out (`wgsl/occlusion.wgsl`).
     Hiding,
+    /// Surfels that are the same are drawn once (`scene/copies.rs`).
+    Copies,
     /// Two sums share a 64-bit word, which one atomic addition serves (`wgsl/accumulator_fixed_pairs.wgsl`).
     Pairs,
     /// Records are read and written 64 bits at a time (`wgsl/words_long.wgsl`).
@@ -27,10 +29,11 @@ pub enum Optimisation {
 
 impl Optimisation {
     /// Every one and its name.
-    pub const ALL: [(Self, &'static str); 8] = [
+    pub const ALL: [(Self, &'static str); 9] = [
         (Self::Culling, "culling"),
         (Self::Order, "order"),
         (Self::Hiding, "hiding"),
+        (Self::Copies, "copies"),
         (Self::Pairs, "pairs"),
         (Self::LongWords, "long-words"),
         (Self::Gathering, "gathering"),

@@ -1,6 +1,6 @@
 //! What a renderer must know of all surfels together, looked up once and not for each frame.
 
-use super::{Bounds, Scene};
+use super::{Bounds, Scene, has_copies};
 
 /// The ranges that a scene's values lie in.
 #[derive(Clone, Copy, Debug)]
@@ -15,6 +15,8 @@ pub struct Ranges {
     pub color: ([f32; 4], [f32; 4]),
     /// [`Scene::largest_radius`].
     pub largest_radius: f32,
+    /// One surfel has many copies, which are drawn as one.
+    pub copies: bool,
 }
 
 impl Ranges {
@@ -26,6 +28,7 @@ impl Ranges {
             core: scene.core(),
             color: scene.color_range(),
             largest_radius: scene.largest_radius(),
+            copies: has_copies(scene),
         }
     }
 }

@@ -34,12 +34,16 @@ use self::gather::Gathered;
 use self::positions::{DistinctPositions, exponent, power_of_two};
 use crate::io::Points;
 use crate::scene::scene::{low_parts, shows};
-use crate::scene::{Bounds, Colors, Scene, Surfel, Texture, Up, body};
+use crate::scene::{Bounds, Colors, SMALLEST_SCENE, Scene, Surfel, Texture, Up, body};
 use crate::{Error, Progress, Result};
 
 /// The largest absolute coordinate of a point, world units (in metres, a hundred light years). Larger ones are treated
 /// like ones that are not finite, because products of f32 lengths would overflow on the way to the image.
 pub const LARGEST_COORDINATE: f64 = 1e18;
+
+/// The largest radius of a disk, in extents of the scene: from anywhere near the scene it is a plane without an end, and depths
+/// on it are as exact as others.
+const LARGEST_IN_EXTENTS: f64 = 1e6;
 
 /// The largest absolute texture coordinate: f32 ones beyond have no digits after the point that a texture could use.
 const LARGEST_PLACE: f32 = 1e4;
@@ -65,6 +69,8 @@ pub struct Preparation {
     pub distinct_positions: Option<u64>,
     /// Points that stray: they lie so far from nearly all others that the default view leaves them out ([`Scene::body`]).
     pub strays: u64,
+    /// Surfels larger than a million times the scene, which were made that large.
+    pub limited_radii: u64,
     /// The largest error of a centre's coordinate, world units, where it may show: it is more than 1/256 of the surfel's shorter
     /// half-axis, although coordinates are kept in twice the digits of f32.
     pub rounding: Option<f64>,
@@ -86,10 +92,12 @@ impl Preparation {
             self.strays,
             "stray: they lie far away from nearly all others, and the default view leaves them out",
         );
+        let limited =
+            counted(self.limited_radii, "had a radius of more than a million times the scene and became that large");
         let rounding = self.rounding.map(|error| {
             format!("the smallest surfels lie so far from others that their coordinates err by up to {error:.2e} world units")
         });
-        notes.into_iter().chain([strays, rounding]).flatten().collect()
+        notes.into_iter().chain([strays, limited, rounding]).flatten().collect()
     }
 }
 
@@ -172,7 +180,7 @@ fn built(gathered: Gathered, progress: &dyn Progress) -> Result<(Scene, Preparat
             .and_then(|(distinct, of_position)| of_position.get(*distinct.of_point().get(i)? as usize).copied())
             .unwrap_or_default()
     };
-    let surfels: Vec<Surfel> = positions
+    let mut surfels: Vec<Surfel> = positions
         .par_iter()
         .enumerate()
         .map(|(i, position)| {
@@ -186,11 +194,40 @@ fn built(gathered: Gathered, progress: &dyn Progress) -> Result<(Scene, Preparat
             Surfel::disk(center, normal, radius)
         })
         .collect();
+    preparation.limited_radii = limit_radii(&mut surfels, body.extent().max_element())?;
     let relative = |index: usize| DVec3::from_array(positions[index]) - origin;
     let low = low_parts(&surfels, relative);
     preparation.rounding = rounding(&surfels, &low, relative);
     let oriented = preparation.estimated_normals == 0;
     Ok((Scene { origin, surfels, low, colors, oriented, up }, preparation))
+}
+
+/// Limits disks to [`LARGEST_IN_EXTENTS`] and says how many were larger.
+///
+/// # Errors
+///
+/// [`Error::EmptyScene`] if the scene is too small for f32 arithmetic.
+fn limit_radii(surfels: &mut [Surfel], extent: f64) -> Result<u64> {
+    let largest = surfels.par_iter().map(Surfel::radius).reduce(|| 0.0, f32::max);
+    let size = if extent > 0.0 { extent } else { 2.0 * f64::from(largest) };
+    if size < SMALLEST_SCENE {
+        return Err(Error::EmptyScene(format!(
+            "the scene is {size:.1e} world units wide, and scenes of {SMALLEST_SCENE:e} to {LARGEST_COORDINATE:e} are drawn: scale it"
+        )));
+    }
+    let most = LARGEST_IN_EXTENTS * size;
+    if f64::from(largest) <= most {
+        return Ok(0);
+    }
+    let limit = |surfel: &mut Surfel| {
+        let factor = (most / f64::from(surfel.radius())) as f32;
+        let larger = factor < 1.0;
+        if larger {
+            (surfel.s, surfel.t) = (surfel.s.map(|c| c * factor), surfel.t.map(|c| c * factor));
+        }
+        u64::from(larger)
+    };
+    Ok(surfels.par_iter_mut().map(limit).sum())
 }
 
 /// The largest error of a centre, `center` with all its digits, where it shows at its disk's size.

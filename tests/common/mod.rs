@@ -71,6 +71,11 @@ pub fn all_needs() -> Vec<SceneNeeds> {
                         for (wide_sums, atomics_u64) in [(true, false), (false, true), (true, true)] {
                             let next = base[next];
                             all.push(SceneNeeds { wide_sums, atomics_u64, kernel, epsilon_radius, low_pass, ..next });
+                            if next.color != ColorNeed::Textured {
+                                let next =
+                                    SceneNeeds { copies: true, tiles: false, gather: false, cull: false, ..next };
+                                all.push(SceneNeeds { wide_sums, kernel, epsilon_radius, low_pass, ..next });
+                            }
                         }
                     }
                 }
@@ -124,6 +129,7 @@ fn base_needs() -> Vec<SceneNeeds> {
                 wide_sums: false,
                 atomics_u64: false,
                 long_words: bits.count_ones() % 4 < 2,
+                doubled: bits.count_ones() % 5 < 2,
                 tiles: bits * 37 / 8 % 4 == 0 && color != ColorNeed::Textured,
                 gather: bits * 37 / 8 % 8 == 0 && color != ColorNeed::Textured,
                 // Both, of each of the others.

@@ -136,6 +136,8 @@ pub fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         ("projected", Element::Words("Splat")),
         ("filters", Element::Words("Filter")),
         ("projected_filters", Element::Words("Filter")),
+        ("centers_low", Element::Plain(&[f32::SHAPE])),
+        ("copies", Element::Plain(WORD)),
         ("queue", Element::Plain(WORD)),
         ("queued", Element::Plain(WORD)),
         ("rare", Element::Plain(WORD)),

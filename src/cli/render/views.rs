@@ -1,11 +1,13 @@
 //! Many pictures of one scene, a camera each: while one is rendered, those before it are encoded and written.
 
+use std::cell::RefCell;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use epsplat::io::cameras;
 use epsplat::io::write_behind::write_behind;
+use epsplat::passes::unseen::Unseen;
 use epsplat::render::{Renderer, Report};
 use epsplat::scene::{Camera, Maps};
 use epsplat::{Error, Progress, Result};
@@ -64,8 +66,13 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
     let mut renderer = Renderer::new(&scene, &options, &backend)?;
     let start = Instant::now();
     bars.begin("rendering views", views.len() as u64);
+    let blank = RefCell::new(Vec::new());
     let frames = views.iter().map(|(file, view)| {
-        let frame = view.camera(&scene, near).and_then(|camera| renderer.frame(&camera, &()));
+        let frame = view.camera(&scene, near).and_then(|camera| {
+            let frame = renderer.frame(&camera, &())?;
+            blank.borrow_mut().extend(Unseen::of(&frame.0, &scene, &camera, &options).map(|unseen| (file, unseen)));
+            Ok(frame)
+        });
         frame.map(|(frame, report)| (file, frame, report)).map_err(|error| error.of_view(file))
     });
     let pictures = write_behind(writers, frames, |(file, frame, report)| {
@@ -78,7 +85,12 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
         Ok(Picture { file: file.clone(), report, write_ms: start.elapsed().as_secs_f64() * 1e3 })
     });
     bars.end();
-    let views = pictures?;
+    let pictures = pictures?;
+    if let [(first, unseen), rest @ ..] = &blank.into_inner()[..] {
+        let (first, sentence) = (first.display(), unseen.sentence());
+        note(&format!("{sentence} ({first}, the first of {} empty pictures)", rest.len() + 1));
+    }
+    let views = pictures;
     views.iter().for_each(|view| note_overflows(&view.report));
     let reports = Reports {
         writers: writers.get(),

@@ -1,0 +1,85 @@
+//! Why nothing shows in a picture: a user who sees none of a scene needs to know where it is.
+
+use rayon::prelude::*;
+
+use super::lowpass::Design;
+use super::project::{Missed, projected};
+use crate::frame::Frame;
+use crate::scene::{Camera, RenderOptions, Scene, Surfel};
+
+/// The surfels of a scene in a view that shows none of them, by the reason.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Unseen {
+    /// Behind the camera, or nearer than its near depth.
+    pub behind: u64,
+    /// Beside the image.
+    pub outside: u64,
+    /// In the image, but over no pixel's centre: too small, or seen edge-on.
+    pub between: u64,
+}
+
+impl Unseen {
+    /// Those of `scene` in the view of `camera`; None if `frame`, the picture, shows anything but the background.
+    pub fn of(frame: &Frame, scene: &Scene, camera: &Camera, options: &RenderOptions) -> Option<Self> {
+        if frame.color.par_iter().any(|color| *color != options.background) {
+            return None;
+        }
+        let design = Design::of(options);
+        let look = |(index, surfel): (usize, &Surfel)| {
+            let seen = projected(0, surfel, scene.origin + scene.low_of(index), camera, &design);
+            // What may touch a pixel touched none.
+            let why = seen.err().unwrap_or(Missed::Between);
+            [Missed::Behind, Missed::Outside, Missed::Between].map(|reason| u64::from(why == reason))
+        };
+        let add = |a: [u64; 3], b: [u64; 3]| std::array::from_fn(|k| a[k] + b[k]);
+        let [behind, outside, between] = scene.surfels.par_iter().enumerate().map(look).reduce(|| [0; 3], add);
+        Some(Self { behind, outside, between })
+    }
+
+    /// One sentence for people.
+    pub fn sentence(&self) -> String {
+        let total = self.behind + self.outside + self.between;
+        let reasons = [
+            (self.behind, "behind the camera or nearer than --near"),
+            (self.outside, "outside the image"),
+            (self.between, "between the centres of its pixels, small or edge-on (--lowpass max shows them)"),
+        ];
+        let count = |count: u64| if count == total { "all".to_owned() } else { count.to_string() };
+        let given = reasons.into_iter().filter(|(surfels, _)| *surfels > 0);
+        let parts: Vec<String> = given.map(|(surfels, where_)| format!("{} lie {where_}", count(surfels))).collect();
+        format!("warning: nothing shows: of {total} surfels {}", parts.join(", "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use glam::{DVec3, Vec3};
+
+    use super::*;
+    use crate::scene::{Colors, Lens, Up};
+
+    #[test]
+    fn each_surfel_has_its_reason() {
+        let at = [
+            (Vec3::new(0.0, 0.0, -3.0), 0.1),
+            (Vec3::new(9.0, 0.0, 3.0), 0.1),
+            (Vec3::new(9.0, 1.0, 3.0), 0.1),
+            (Vec3::new(0.001, 0.001, 3.0), 1e-6),
+            (Vec3::new(0.001, 0.001, 4.0), 1e-6),
+            (Vec3::new(0.001, 0.002, 3.0), 1e-6),
+        ];
+        let surfels: Vec<Surfel> = at.iter().map(|(center, radius)| Surfel::disk(*center, Vec3::Z, *radius)).collect();
+        let colors = Colors::Constant([1.0; 4]);
+        let scene = Scene { origin: DVec3::ZERO, surfels, low: vec![], colors, oriented: true, up: Up::Y };
+        let camera = Camera::look_at((32, 32), Lens::Fov(45.0), DVec3::ZERO, DVec3::Z, None, Up::Y, 0.1).unwrap();
+        let options = RenderOptions::default();
+        let mut frame = Frame::new(&camera, &options.maps);
+        let unseen = Unseen::of(&frame, &scene, &camera, &options).unwrap();
+        assert_eq!(unseen, Unseen { behind: 1, outside: 2, between: 3 });
+        assert!(unseen.sentence().contains("of 6 surfels 1 lie behind the camera"), "{}", unseen.sentence());
+        assert!(Unseen { behind: 0, outside: 0, between: 6 }.sentence().contains("all lie between"));
+        frame.color[7] = [0.5, 0.5, 0.5, 1.0];
+        assert_eq!(Unseen::of(&frame, &scene, &camera, &options), None);
+    }
+}

@@ -1,0 +1,89 @@
+//! Surfels that are the same are drawn once: not a bit of the image tells, nor does any count.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use common::bits;
+use common::scenes::{shuffled, sphere, sphere_camera};
+use epsplat::frame::Frame;
+use epsplat::gpu::Sources;
+use epsplat::metrics::compare;
+use epsplat::render::{Backend, Report, render};
+use epsplat::scene::{Colors, LowPass, Maps, Optimisation, Projection, RenderOptions, Scene, Shading, Surfel};
+use glam::Vec3;
+
+/// A sphere of disks in all colours, with many copies of two disks, one of them in two colours, before it.
+fn scene() -> Scene {
+    let mut scene = sphere(800, 1.7);
+    let Colors::Srgb8(codes) = &mut scene.colors else { unreachable!() };
+    for (center, radius, code, copies) in [
+        ([0.5, 0.2, 1.0], 0.4, [200, 30, 40, 255], 3000),
+        ([0.5, 0.2, 1.0], 0.4, [9, 9, 9, 128], 1),
+        ([0.0; 3], 1.4, [20, 90, 160, 200], 1500),
+    ] {
+        let surfel = Surfel::disk(Vec3::from_array(center), Vec3::new(0.3, 0.1, 1.0), radius);
+        scene.surfels.extend(vec![surfel; copies]);
+        codes.extend(vec![code; copies]);
+    }
+    scene
+}
+
+fn options(low_pass: LowPass, without: &[Optimisation]) -> RenderOptions {
+    let maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
+    RenderOptions { maps, low_pass, shading: Shading::Phong, without: without.to_vec(), ..RenderOptions::default() }
+}
+
+fn frame(scene: &Scene, options: &RenderOptions, backend: &Backend) -> (Frame, Report) {
+    render(scene, &sphere_camera(96, Projection::Pinhole), options, backend, &()).unwrap()
+}
+
+#[test]
+fn copies_do_not_show() {
+    let Some(gpu) = common::gpu() else { return };
+    let backend = Backend::gpu(gpu);
+    let scene = scene();
+    // Without a low-pass weights fill 32 bits, with EWA's 40.
+    for low_pass in [LowPass::None, LowPass::Ewa] {
+        let (each, report) = frame(&scene, &options(low_pass, &[Optimisation::Copies]), &backend);
+        assert!(!report.needs.contains(&"copies"));
+        for order in [scene.clone(), shuffled(&scene, 3)] {
+            let (once, of_once) = frame(&order, &options(low_pass, &[]), &backend);
+            assert!(of_once.needs.contains(&"copies"));
+            assert!(bits(&once) == bits(&each), "{low_pass:?}");
+            assert_eq!((of_once.surfels, of_once.splats_drawn), (5301, report.splats_drawn));
+        }
+        assert!(each.count.as_ref().unwrap().iter().any(|count| *count > 3000.0));
+    }
+}
+
+#[test]
+fn the_reference_multiplies_too() {
+    let scene = scene();
+    let [each, once] = [vec![Optimisation::Copies], vec![]]
+        .map(|without| frame(&scene, &options(LowPass::None, &without), &Backend::Reference).0);
+    assert_eq!(each.count, once.count);
+    let comparison = compare(&once, &each).unwrap();
+    // A sum of 3,000 equal f64 terms errs by at most 3,000 roundings of 2^-53, and a frame is kept in f32.
+    for map in &comparison.maps {
+        assert!(map.max_of_range <= 1.2e-7, "{map:?}");
+    }
+}
+
+#[test]
+fn a_wrong_number_shows() {
+    for (file, from, to) in [
+        ("copies.wgsl", "times = copies[index];", "times = 1u;"),
+        ("accumulator_fixed_copies.wgsl", "a_high * b_high + (one >> 16u)", "a_high * b_high"),
+        ("accumulator_fixed_copies.wgsl", "select(0u, 1u, before + all.x < before)", "0u"),
+    ] {
+        let Some(gpu) = common::gpu() else { return };
+        let right = Backend::gpu(gpu);
+        let sources = Sources::default().replace(file, from, to).unwrap();
+        let wrong = Backend::Gpu { gpu: Box::new(common::gpu().unwrap()), sources };
+        let scene = scene();
+        let [right, wrong] =
+            [right, wrong].map(|backend| bits(&frame(&scene, &options(LowPass::None, &[]), &backend).0));
+        assert!(right != wrong, "{file}: {to}");
+    }
+}

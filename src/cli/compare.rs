@@ -8,7 +8,7 @@ use epsplat::frame::Frame;
 use epsplat::metrics::{Comparison, DECISION_MARGIN, compare};
 use epsplat::{Result, io};
 
-use super::{print, write_json};
+use super::{outputs, print, write_json};
 
 /// The error of image A against image B, over linear RGBA and every map they share.
 #[derive(Args)]
@@ -26,6 +26,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
+    outputs::check([&arguments.a, &arguments.b], &arguments.json)?;
     let comparison = compare(&read(&arguments.a)?, &read(&arguments.b)?)?;
     match &arguments.json {
         Some(path) => write_json(path, &comparison),

@@ -8,6 +8,7 @@ mod companions;
 pub mod e57;
 pub mod exr;
 mod fault;
+pub mod image;
 mod intensity;
 pub mod las;
 pub mod mesh;

@@ -39,19 +39,22 @@ struct Cell {
 const DEEPEST: u32 = 60;
 
 /// The voxels of a surface (Tien 2008, section 3.1): its box is halved across its longest side, and the halves in turn, those
-/// that no triangle meets left out. It ends after `depth` halvings, or, without, before there would be more than `most` voxels.
-pub(super) fn voxels(surface: &MeshSurface<'_>, depth: Option<u32>, most: usize) -> Vec<Voxel> {
+/// that no triangle meets left out. It ends after `depth` halvings, or before there would be more than `most` voxels. Returns
+/// them and the halvings.
+pub(super) fn voxels(surface: &MeshSurface<'_>, depth: Option<u32>, most: usize) -> (Vec<Voxel>, u32) {
     let all = (0..surface.triangles.len() as u32).collect();
     let mut cells = vec![Cell { bounds: surface.bounds, triangles: all }];
+    let mut halvings = 0;
     for _ in 0..depth.unwrap_or(DEEPEST).min(DEEPEST) {
         let halves: Vec<Cell> = cells.par_iter().flat_map_iter(|cell| halves(surface, cell)).collect();
-        if depth.is_none() && halves.len() > most.max(1) {
+        if halves.len() > most.max(1) {
             break;
         }
         cells = halves;
+        halvings += 1;
     }
     let voxels = cells.into_par_iter().map(|cell| voxel(surface, cell));
-    voxels.filter(|voxel| voxel.area > 0.0).collect()
+    (voxels.filter(|voxel| voxel.area > 0.0).collect(), halvings)
 }
 
 /// A triangle that lies in the plane between the halves belongs to the upper one.

@@ -181,3 +181,16 @@ fn points(
         ..Points::default()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halvings_that_were_left_out_are_told() {
+        let sampling = Sampling { samples: 9, halvings: 28, undone: 32, ..Sampling::default() };
+        let note = "the mesh's box was halved 28 times, not 60: there would be more than 2097152 voxels";
+        assert_eq!(sampling.notes(), [note]);
+        assert!(Sampling { undone: 0, ..sampling }.notes().is_empty());
+    }
+}

@@ -133,7 +133,9 @@ pub(super) fn fan_share(a: DVec3, b: DVec3, c: DVec3) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::io::Mesh;
 
     #[test]
     fn parts_of_a_triangle_in_boxes_are_the_triangle() {
@@ -151,5 +153,24 @@ mod tests {
             whole += share(&outline);
         }
         assert!((whole - 1.0).abs() < 1e-12, "{whole}");
+    }
+
+    #[test]
+    fn a_depth_ends_where_there_would_be_too_many_voxels() {
+        let mesh = Mesh {
+            positions: vec![[0.0; 3], [1.0, 0.1, 0.0], [0.2, 1.0, 0.3], [0.5, 0.4, 1.0]],
+            triangles: vec![[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]],
+            ..Mesh::default()
+        };
+        let surface = MeshSurface::new(&mesh).unwrap();
+        let of = |depth, most| {
+            let (voxels, halvings) = voxels(&surface, Some(depth), most);
+            (voxels.iter().map(|voxel| voxel.area).collect::<Vec<_>>(), halvings)
+        };
+        let (bounded, halvings) = of(60, 1000);
+        assert!(bounded.len() <= 1000 && bounded.len() > 300 && halvings < 20, "{} {halvings}", bounded.len());
+        // What is bounded is what the halvings that are left would make, and a bound that is not met changes nothing.
+        assert_eq!(of(halvings, usize::MAX), (bounded, halvings));
+        assert_eq!(of(7, usize::MAX), of(7, 1000));
     }
 }

@@ -189,9 +189,13 @@ fn sets_that_cannot_be_rendered_end_in_a_sentence() {
     render(&set(LENS, &[good("a.png"), good("./a.jpg")]), &[], 1, &["cameras 1 and 2", "'a'"]);
     render(&set(LENS, &[good("..")]), &[], 1, &["frame 1", "file_path"]);
     let large = frame("b", 2.0 * DMat3::IDENTITY, eye);
-    render(&set(LENS, &[good("a"), large]), &[], 2, &["views/b.png", "rigid"]);
+    render(&set(LENS, &[good("a"), large]), &[], 2, &["views/b.png", "set.json: ", "rigid"]);
     let distorted = transforms(&format!(r#"{LENS}, "k1": 0.01"#), &[good("a")]);
     let distorted = folder.file("distorted.json", distorted);
+    let wide = folder.file("wide.json", transforms(r#""camera_angle_x": 3.5"#, &[good("a")]));
+    render(&wide, &[], 1, &["wide.json", "frame 1", "camera_angle_x lies between 0 and pi"]);
+    let nested = folder.file("nested.json", transforms(LENS, &[good("x"), good("b"), good("x.png/y")]));
+    render(&nested, &[], 2, &["views/x.png/y.png would lie in", "views/x.png, which is a file"]);
     render(&distorted, &[], 1, &["distorted.json", "k1 = 0.01", "--ignore-distortion"]);
     let set = set(LENS, &[good("a")]);
     render(&set, &["--size", "9x9"], 2, &["contradicts", "64x48"]);
@@ -238,4 +242,69 @@ fn a_picture_that_cannot_be_written_is_named_and_others_stay() {
     assert_eq!(bytes(&output.join("out/04.png")), bytes(&output.join("out/00.png")));
     assert!(!output.join("out/39.png").exists());
     assert!(!folder.names().contains(&"out".to_owned()));
+}
+
+/// What is in the folder of the pictures, or was put there by others, leads nothing out of it.
+#[cfg(unix)]
+#[test]
+fn links_in_the_folder_lead_nowhere_out_of_it() {
+    use std::os::unix::fs::symlink;
+    let folder = Folder::new();
+    let cloud = folder.file("c.ply", ply("x y z nx ny nz radius", 1, "0 0 0 0 0 1 1\n"));
+    let place = |name: &str| frame(name, DMat3::IDENTITY, 3.0 * DVec3::Z);
+    let set = folder.file("set.json", transforms(LENS, &[place("first"), place("train/a"), place("../b")]));
+    let (output, outside) = (folder.path("views"), folder.path("outside"));
+    let line = ["render", text(&cloud), "-o", text(&output), "--backend", "reference", "--cameras", text(&set)];
+    std::fs::create_dir(&outside).unwrap();
+    std::fs::create_dir(&output).unwrap();
+    std::fs::write(outside.join("b.png"), "precious").unwrap();
+    for (link, target) in [("train", "../outside"), ("b.png", "../outside/b.png"), ("b.png", "../outside/new.png")] {
+        symlink(target, output.join(link)).unwrap();
+        fails(&line, 1, &[&format!("views/{link}"), "a symbolic link leads out of"]);
+        assert_eq!((std::fs::read_dir(&output).unwrap().count(), std::fs::read_dir(&outside).unwrap().count()), (1, 1));
+        assert_eq!(bytes(&outside.join("b.png")), b"precious");
+        std::fs::remove_file(output.join(link)).unwrap();
+    }
+    // Control: a link that stays inside is followed, and so is one to the folder itself.
+    std::fs::create_dir(output.join("other")).unwrap();
+    symlink("other", output.join("train")).unwrap();
+    let linked = folder.path("linked");
+    symlink("views", &linked).unwrap();
+    succeeds(&[&line[..3], &[text(&linked)], &line[4..]].concat());
+    assert_eq!(bytes(&output.join("other/a.png")), bytes(&output.join("first.png")));
+    assert!(output.join("b.png").is_file() && output.join("train").is_symlink());
+}
+
+#[test]
+fn an_error_of_a_camera_names_the_option_or_the_file_that_gave_it() {
+    let folder = Folder::new();
+    let cloud = folder.file("c.ply", ply("x y z", 3, "0 0 0\n1 0 0\n0 1 0\n"));
+    let image = folder.path("c.png");
+    let line = ["render", text(&cloud), "-o", text(&image), "--backend", "reference", "--size", "8x8"];
+    let option = |more: &[&str], words: &[&str]| fails(&[&line[..], more].concat(), 2, words);
+    for height in ["0", "-3", "nan", "inf", "1e308", "1e-308"] {
+        option(&["--ortho", height], &["--ortho: the height of an orthographic view must be positive", "is not"]);
+    }
+    for angle in ["0", "-3", "nan", "180", "1e308"] {
+        option(&["--fov", angle], &["--fov: a field of view lies between 0 and 180 degrees"]);
+    }
+    option(&["--intrinsics", "0,1,2,3"], &["--intrinsics: ", "fx = 0"]);
+    option(&["--near", "-1"], &["--near: the near depth must be positive"]);
+    let place = r#""eye": [0,0,5], "target": [0,0,0]"#;
+    for (given, said) in [
+        (r#""model": "orthographic", "height_world": 1e308"#, "the height of an orthographic view"),
+        (r#""fov": 200"#, "a field of view"),
+        (r#""near": -1"#, "the near depth"),
+        (r#""width": 0, "height": 8"#, "an image is 1 to"),
+        (r#""up": [0, 0, 1]"#, "the camera's up"),
+    ] {
+        let camera = folder.file("camera.json", format!("{{{place}, {given}}}"));
+        fails(&[&line[..6], &["--camera", text(&camera)]].concat(), 2, &["camera.json: ", said]);
+    }
+    // The option is at fault, not the file.
+    let camera = folder.file("camera.json", format!("{{{place}}}"));
+    let near = ["--camera", text(&camera), "--near", "0"];
+    fails(&[&line[..6], &near].concat(), 2, &["error: --near: the near depth"]);
+    assert!(!image.exists());
+    succeeds(&[&line[..], &["--ortho", "3"]].concat());
 }

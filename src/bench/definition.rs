@@ -331,6 +331,12 @@ impl Definition {
         self.configs.iter().any(|config| config.backend != BackendName::Reference)
     }
 
+    /// The files of all scenes.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let files = self.scenes.iter().flat_map(|scene| scene.file.iter().chain(&scene.texture));
+        files.map(|file| self.path_of(file)).collect()
+    }
+
     /// Where a scene's file is.
     pub(super) fn path_of(&self, file: &Path) -> PathBuf {
         self.folder.join(file)

@@ -8,7 +8,7 @@ use epsplat::Result;
 use epsplat::gpu::{AdapterDescription, adapters};
 use serde::Serialize;
 
-use super::{print, write_json};
+use super::{outputs, print, write_json};
 
 /// Adapters, their limits, the features that matter here, and what `auto` picks.
 #[derive(Args)]
@@ -27,6 +27,7 @@ struct List {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
+    outputs::check([""; 0], &arguments.json)?;
     let adapters = adapters();
     let auto = adapters.iter().find(|a| a.usable).map(|a| a.name.clone());
     if let Some(path) = &arguments.json {

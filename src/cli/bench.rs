@@ -6,11 +6,12 @@ use std::time::SystemTime;
 use clap::Args;
 use epsplat::bench::{self, Definition, machine, table};
 use epsplat::gpu::Gpu;
+use epsplat::io::atomic;
 use epsplat::render::Backend;
 use epsplat::{Error, Result, report};
 
 use super::progress::Bars;
-use super::{note, print};
+use super::{note, outputs, print};
 
 /// Run a benchmark study: every configuration on every scene of a definition, each speed with its error.
 ///
@@ -51,6 +52,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             "--table gives times relative to a baseline, and {} names none",
             arguments.definition.display()
         )));
+    }
+    if let Some(folder) = &arguments.out {
+        let (read, written) = (definition.files(), report::FILES.map(|name| folder.join(name)));
+        outputs::check_distinct(read.iter().chain([&arguments.definition]), &written)?;
+        atomic::try_folder(folder)?;
+        written.iter().filter(|file| file.exists()).try_for_each(|file| atomic::try_output(file))?;
     }
     let gpu = match definition.needs_gpu() {
         true => Some(Gpu::open(arguments.adapter.as_deref())?),

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use epsplat::frame::Frame;
-use epsplat::metrics::{Comparison, DECISION_MARGIN, compare};
+use epsplat::metrics::{BYTES_PER_PIXEL, Comparison, DECISION_MARGIN, compare};
 use epsplat::{Result, io};
 
-use super::{print, write_json};
+use super::{outputs, print, write_json};
 
 /// The error of image A against image B, over linear RGBA and every map they share.
 #[derive(Args)]
@@ -26,12 +26,18 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let comparison = compare(&read(&arguments.a)?, &read(&arguments.b)?)?;
+    outputs::check([&arguments.a, &arguments.b], &arguments.json)?;
+    let (a, b) = (read(&arguments.a)?, read(&arguments.b)?);
+    io::image::check_room(&arguments.b, a.color.len() as u64 * BYTES_PER_PIXEL)?;
+    let comparison = compare(&a, &b)?;
     match &arguments.json {
         Some(path) => write_json(path, &comparison),
-        None => print(&table(&comparison)),
+        None => print(&(table(&comparison) + &unshared(arguments, &comparison))),
     }
 }
+
+/// What stands for an error where a value that is not finite stands against another.
+const NOT_FINITE: &str = "not finite";
 
 fn read(path: &Path) -> Result<Frame> {
     let is_exr = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
@@ -40,11 +46,18 @@ fn read(path: &Path) -> Result<Frame> {
 
 fn table(c: &Comparison) -> String {
     let mut text = String::new();
-    let psnr = c.psnr_db.map_or("equal images".to_owned(), |db| format!("{db:.2} dB"));
+    // RGB and alpha are the first two of the maps, together all that is not of a map alone.
+    let finite = c.maps.iter().take(2).all(|map| map.not_finite == 0);
+    let measure = |value: f64| if finite { format!("{value:.3e}") } else { NOT_FINITE.to_owned() };
+    let psnr = match c.psnr_db {
+        None => "equal images".to_owned(),
+        Some(db) if finite => format!("{db:.2} dB"),
+        Some(_) => NOT_FINITE.to_owned(),
+    };
     // Writing to a string cannot fail.
-    let _ = writeln!(text, "max abs            {:.3e}", c.max_abs);
-    let _ = writeln!(text, "99.9th percentile  {:.3e}", c.percentile_99_9);
-    let _ = writeln!(text, "rmse               {:.3e}", c.rmse);
+    let _ = writeln!(text, "max abs            {}", measure(c.max_abs));
+    let _ = writeln!(text, "99.9th percentile  {}", measure(c.percentile_99_9));
+    let _ = writeln!(text, "rmse               {}", measure(c.rmse));
     let _ = writeln!(text, "psnr               {psnr}");
     let _ = writeln!(text, "coverage mismatch  {:.4} %", 100.0 * c.coverage_mismatch);
     if let Some(excused) = c.excused {
@@ -57,12 +70,25 @@ fn table(c: &Comparison) -> String {
     let decided = if c.excused.is_some() { "  not excused" } else { "" };
     let _ = writeln!(text, "\nmap        range        max abs    max / range{decided}");
     for map in &c.maps {
-        let decided = map.max_of_range_decided.map_or(String::new(), |e| format!("    {e:.3e}"));
-        let _ = writeln!(
-            text,
-            "{:<8} {:>9.4e}    {:.3e}    {:.3e}{decided}",
-            map.map, map.range, map.max_abs, map.max_of_range
-        );
+        let of_range = |error: f64| if map.range > 0.0 { format!("{error:.3e}") } else { "-".to_owned() };
+        let range = format!("{:.4e}", map.range);
+        let [max, of_range, decided] = match map.not_finite {
+            0 => [
+                format!("{:.3e}", map.max_abs),
+                of_range(map.max_of_range),
+                map.max_of_range_decided.map_or(String::new(), of_range),
+            ],
+            pixels => [NOT_FINITE.to_owned(), format!("({pixels} pixels)"), String::new()],
+        };
+        let line = format!("{:<8} {range:>11}    {max:<9}    {of_range:<9}    {decided}", map.map);
+        let _ = writeln!(text, "{}", line.trim_end());
     }
     text
+}
+
+/// The maps that could not be compared.
+fn unshared(arguments: &Arguments, c: &Comparison) -> String {
+    let sides = [(&arguments.a, &c.only_in_a), (&arguments.b, &c.only_in_b)];
+    let only = sides.into_iter().filter(|(_, maps)| !maps.is_empty());
+    only.map(|(path, maps)| format!("only {} has: {}\n", path.display(), maps.join(", "))).collect()
 }

@@ -12,7 +12,7 @@ use epsplat::{Error, Progress, Result, io};
 use serde::Serialize;
 
 use super::progress::Bars;
-use super::{note, print, write_json};
+use super::{note, outputs, print, write_json};
 
 /// Whether surfels cover the mesh that they stand for, and how far they lie from it.
 ///
@@ -53,6 +53,7 @@ struct Outcome {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
+    outputs::check(arguments.surfels.iter().chain([&arguments.mesh]), &arguments.json)?;
     let bars = Bars::new();
     let points = arguments.surfels.iter().map(|path| io::read(path, &bars)).collect::<Result<Vec<_>>>()?;
     let (scene, preparation) = build(points, &bars)?;

@@ -7,8 +7,8 @@ use epsplat::io::ply;
 use epsplat::surfels::analytic::{Shape, generate};
 use epsplat::{Progress, Result};
 
-use super::note;
 use super::progress::Bars;
+use super::{note, outputs};
 
 /// Write an analytic scene as PLY: surfels with exact normals, radii and colours.
 ///
@@ -29,6 +29,7 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> Result<()> {
     ply::check_extension(&arguments.output)?;
+    outputs::check([""; 0], [&arguments.output])?;
     let bars = Bars::new();
     bars.begin("writing surfels", arguments.count);
     let vertices = generate(arguments.shape, arguments.count).enumerate().map(|(index, sample)| {

@@ -12,7 +12,7 @@ use epsplat::{Error, Result};
 use serde::Serialize;
 
 use super::progress::Bars;
-use super::{note, print, write_json};
+use super::{note, outputs, print, write_json};
 
 /// Render scenes that renderers like to get wrong, with every accumulator, and judge each image against the f64 reference.
 ///
@@ -55,6 +55,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             return Err(Error::Usage(format!("no hard case's name contains {part:?}")));
         }
     }
+    outputs::check([""; 0], &arguments.json)?;
     let gpu = Gpu::open(arguments.adapter.as_deref()).map_err(|error| match error {
         Error::NoAdapter(why) => Error::NoAdapter(format!("hard cases judge an adapter by the reference, but {why}")),
         other => other,

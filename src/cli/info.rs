@@ -11,7 +11,7 @@ use epsplat::{Error, Result};
 use serde::Serialize;
 
 use super::progress::Bars;
-use super::{print, write_json};
+use super::{outputs, print, write_json};
 
 /// What a file holds, and what a renderer would make of it.
 #[derive(Args)]
@@ -52,6 +52,7 @@ struct Info {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
+    outputs::check([&arguments.input], &arguments.json)?;
     let bars = Bars::new();
     let points = io::read(&arguments.input, &bars)?;
     let texture = points.texture.is_some();

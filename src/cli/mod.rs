@@ -7,10 +7,12 @@ mod coverage;
 mod generate;
 mod hardcases;
 mod info;
+mod outputs;
 mod parse;
 mod progress;
 mod render;
 mod sample;
+mod signals;
 mod simplify;
 mod surfels;
 
@@ -49,6 +51,7 @@ enum Command {
 
 /// Runs the command line and says how it ended.
 pub fn run() -> ExitCode {
+    signals::watch();
     let outcome = match Arguments::parse().command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),

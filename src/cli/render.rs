@@ -20,11 +20,11 @@ use epsplat::scene::{
 use epsplat::{Error, Result, io, surfels};
 use glam::DVec3;
 
-use self::output::{Format, check_folder, check_json, note_overflows, summary};
+use self::output::{Format, note_overflows, summary};
 use self::view::View;
 use super::parse::{parse_accumulator, parse_color, parse_intrinsics, parse_scale, parse_size, parse_vector};
 use super::progress::Bars;
-use super::{note, write_json};
+use super::{note, outputs, write_json};
 
 /// Render PLY, LAS, LAZ and OBJ files to a PNG or EXR image.
 ///
@@ -189,12 +189,18 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
 }
 
+impl Arguments {
+    /// The files that are read, but those of `--cameras`.
+    fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        self.inputs.iter().chain(&self.camera).chain(&self.texture)
+    }
+}
+
 /// A single picture.
 fn one(arguments: &Arguments) -> Result<()> {
     let format = Format::of(&arguments.output)?;
     let options = options(arguments, format)?;
-    check_folder(&arguments.output)?;
-    check_json(arguments, [arguments.output.as_path()])?;
+    outputs::check(arguments.files(), [&arguments.output].into_iter().chain(&arguments.json))?;
     let view = View::of(arguments)?;
     let backend = backend(arguments)?;
 

@@ -7,8 +7,8 @@ use epsplat::io::{self, Texture};
 use epsplat::surfels::sampling::{MOST, MeshSurface, Method, Priority, sample, voxels::Voxel};
 use epsplat::{Error, Result};
 
-use super::note;
 use super::progress::Bars;
+use super::{note, outputs};
 
 /// Write surfels that cover a mesh as PLY: on its triangles, with normals, radii, and its colours and texture coordinates.
 ///
@@ -51,9 +51,8 @@ enum Placement {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    if !arguments.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("ply")) {
-        return Err(Error::Usage(format!("the output must end in .ply, {} does not", arguments.output.display())));
-    }
+    io::ply::check_extension(&arguments.output)?;
+    outputs::check([&arguments.mesh].into_iter().chain(&arguments.texture), [&arguments.output])?;
     let bars = Bars::new();
     let mut mesh = io::read_mesh(&arguments.mesh, &bars)?;
     mesh.notes.iter().for_each(|line| note(line));

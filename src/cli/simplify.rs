@@ -3,14 +3,14 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use epsplat::Result;
 use epsplat::io::{self, Points, ply};
 use epsplat::scene::{Colors, Scene, Surfel};
 use epsplat::surfels;
 use epsplat::surfels::simplify::{Options, Report, SplatShape, Tolerance, simplify};
-use epsplat::{Error, Result};
 
 use super::progress::Bars;
-use super::{note, print, write_json};
+use super::{note, outputs, print, write_json};
 
 /// Replace the surfels of a smooth surface by fewer, larger ones that lie within a tolerance of them, without holes.
 ///
@@ -50,9 +50,8 @@ enum ShapeName {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    if !arguments.output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ply")) {
-        return Err(Error::Usage(format!("the output must end in .ply, {} does not", arguments.output.display())));
-    }
+    ply::check_extension(&arguments.output)?;
+    outputs::check(&arguments.inputs, [&arguments.output].into_iter().chain(&arguments.json))?;
     let bars = Bars::new();
     let inputs = arguments.inputs.iter().map(|path| io::read(path, &bars)).collect::<Result<Vec<_>>>()?;
     let (scene, preparation) = surfels::build(inputs, &bars)?;

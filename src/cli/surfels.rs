@@ -7,9 +7,9 @@ use epsplat::io::{self, ply};
 use epsplat::surfels::{FromPoints, Orientation, Size, from_points};
 use epsplat::{Error, Result};
 
-use super::note;
 use super::parse::parse_orientation;
 use super::progress::Bars;
+use super::{note, outputs};
 
 /// Make surfels of points: normals with a side, and disks or ellipses that cover the surface, kept as PLY.
 ///
@@ -53,6 +53,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         outliers: arguments.outliers,
         largest_ratio: arguments.max_radius,
     };
+    outputs::check(&arguments.inputs, [&arguments.output])?;
     let bars = Bars::new();
     let inputs = arguments.inputs.iter().map(|path| io::read(path, &bars)).collect::<Result<_>>()?;
     let surfels = from_points(inputs, &options, &bars)?;

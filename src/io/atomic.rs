@@ -1,57 +1,264 @@
 //! Output files that appear whole or not at all.
 
 use crate::{Error, Result};
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, BufWriter, Seek, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// What a file's bytes are written to: buffered, and seekable even where the final path is not.
 pub type Output<'a> = BufWriter<&'a mut File>;
 
 /// Writes the file at `path` through `fill`, into a temporary file beside it that takes its name at the end.
 ///
-/// A reader of `path` sees the old file or the finished new one; after a failure no part of the new one is left. A path
-/// that names something other than a file (a device, a pipe) is written to and not replaced.
+/// A reader of `path` sees the old file or the finished new one; after a failure no part of the new one is left, nor after
+/// [`abandon`]. A file that is replaced keeps its mode. Symbolic links are followed: what they lead to is replaced, and they
+/// stay. A path that names something other than a file (a device, a pipe, what a program has open) is written to and not
+/// replaced.
 ///
 /// # Errors
 ///
-/// [`Error::Write`] with `path` and what the system or `fill` said.
+/// [`Error::Write`] with `path` and what the system or `fill` said; a file that is read-only is not replaced.
 pub fn write_whole(path: &Path, fill: impl FnOnce(&mut Output<'_>) -> io::Result<()>) -> Result<()> {
-    write(path, fill).map_err(|source| Error::write(path, source))
+    finish(filled(path, fill)?.into_iter().collect())
 }
 
-fn write(path: &Path, fill: impl FnOnce(&mut Output<'_>) -> io::Result<()>) -> io::Result<()> {
-    if let Ok(existing) = fs::metadata(path) {
-        if existing.is_dir() {
-            return Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a directory"));
+/// Writes several files as [`write_whole`] does, of which none takes its name before all are finished.
+///
+/// # Errors
+///
+/// As [`write_whole`].
+pub fn write_together<'a>(files: impl IntoIterator<Item = (PathBuf, &'a [u8])>) -> Result<()> {
+    let filled = files.into_iter().map(|(path, bytes)| filled(&path, |file| file.write_all(bytes)));
+    finish(filled.filter_map(Result::transpose).collect::<Result<_>>()?)
+}
+
+/// Makes sure that [`write_whole`] may write at `path`, by making a file beside it and removing that again.
+///
+/// # Errors
+///
+/// As [`write_whole`].
+pub fn try_output(path: &Path) -> Result<()> {
+    let tried = || match Target::of(path)? {
+        Target::Stream => Ok(()),
+        Target::File { end, existing } => Unfinished::begin(path, end, existing.as_ref()).map(drop),
+    };
+    tried().map_err(|source| Error::write(path, source))
+}
+
+/// Makes sure that files can be made in `folder`, or, where it is missing, in the folder that it would be made in.
+///
+/// # Errors
+///
+/// [`Error::Write`] with `folder` and what the system said.
+pub fn try_folder(folder: &Path) -> Result<()> {
+    let there = folder.ancestors().map(or_current).find(|folder| fs::symlink_metadata(folder).is_ok());
+    let there = there.unwrap_or(folder);
+    let tried = || {
+        if !fs::metadata(there)?.is_dir() {
+            return Err(io::ErrorKind::NotADirectory.into());
         }
-        if !existing.is_file() {
+        Unfinished::begin(folder, there.join("any"), None).map(drop)
+    };
+    tried().map_err(|source| Error::write(folder, source))
+}
+
+/// The file that [`write_whole`] would make or replace for `path`: past all symbolic links, with a canonical folder as far as
+/// that exists. None for what would not be replaced.
+pub fn place_of(path: &Path) -> Option<PathBuf> {
+    let end = match end_of_links(path) {
+        Ok(end) => end?,
+        Err(_) => path.to_owned(),
+    };
+    if fs::metadata(&end).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
+        return None;
+    }
+    let canonical = |folder: &Path| {
+        let rest = end.strip_prefix(folder).ok()?;
+        or_current(folder).canonicalize().ok().map(|canonical| canonical.join(rest))
+    };
+    Some(end.ancestors().find_map(canonical).unwrap_or(end))
+}
+
+/// Removes the temporary files of all that is being written, and lets nothing more begin or take its name: for a program that
+/// ends at once, whatever its other threads are doing.
+pub fn abandon() {
+    let mut unfinished = lock();
+    unfinished.drain(..).for_each(|path| drop(fs::remove_file(path)));
+    // Whoever waits for the list waits until the program is gone.
+    std::mem::forget(unfinished);
+}
+
+/// The temporary files there are. The list is locked while one is made, removed or takes its name, so that a file is never
+/// there without being listed.
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn lock() -> MutexGuard<'static, Vec<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The most symbolic links that lead from one to the next, as Linux has it.
+const MOST_LINKS: usize = 40;
+
+/// What a path of an output names.
+enum Target {
+    /// Something that is written to and not replaced.
+    Stream,
+    /// A file past all symbolic links, and what is there now.
+    File { end: PathBuf, existing: Option<Metadata> },
+}
+
+impl Target {
+    fn of(path: &Path) -> io::Result<Self> {
+        let Some(end) = end_of_links(path)? else { return Ok(Self::Stream) };
+        let existing = match fs::metadata(&end) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => None,
+            there => Some(there?),
+        };
+        match &existing {
+            Some(there) if there.is_dir() => {
+                return Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a directory"));
+            }
             // Renaming onto a device would replace the device.
+            Some(there) if !there.is_file() => return Ok(Self::Stream),
+            // Renaming needs no right to the file, but whoever took that away meant it. Root has every right.
+            Some(there) if there.permissions().readonly() => {
+                return Err(io::Error::new(io::ErrorKind::PermissionDenied, "it is read-only"));
+            }
+            Some(_) => drop(OpenOptions::new().write(true).open(&end)?),
+            None => {}
+        }
+        Ok(Self::File { end, existing })
+    }
+}
+
+/// Where a chain of symbolic links ends, be anything there or not. None for what a process has open: /proc lists it as links,
+/// which lead nowhere if it has no name.
+fn end_of_links(path: &Path) -> io::Result<Option<PathBuf>> {
+    let mut end = path.to_owned();
+    for _ in 0..MOST_LINKS {
+        let of_process = || folder_of(&end).canonicalize().is_ok_and(|folder| folder.starts_with("/proc"));
+        match fs::read_link(&end) {
+            Ok(_) if of_process() => return Ok(None),
+            Ok(target) => end = folder_of(&end).join(target),
+            Err(_) => return Ok(Some(end)),
+        }
+    }
+    Err(io::Error::other("too many symbolic links"))
+}
+
+fn folder_of(path: &Path) -> &Path {
+    or_current(path.parent().unwrap_or(path))
+}
+
+fn or_current(folder: &Path) -> &Path {
+    if folder.as_os_str().is_empty() { Path::new(".") } else { folder }
+}
+
+/// A temporary file, which goes with this unless it is finished.
+struct Unfinished {
+    file: File,
+    /// None once it has its name.
+    temporary: Option<PathBuf>,
+    /// The name that it takes.
+    end: PathBuf,
+    /// The path that was asked for.
+    asked: PathBuf,
+}
+
+impl Unfinished {
+    fn begin(asked: &Path, end: PathBuf, existing: Option<&Metadata>) -> io::Result<Self> {
+        static NUMBER: AtomicU64 = AtomicU64::new(0);
+        let mut options = OpenOptions::new();
+        options.read(true).write(true).create_new(true);
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
+            // What only its owner may read is not shown to others while it is written; the umask decides about a new file.
+            options.mode(existing.map_or(0o666, |existing| existing.mode() & 0o777));
+        }
+        let mut unfinished = lock();
+        let (file, temporary) = loop {
+            let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+            let temporary = folder_of(&end).join(format!(".epsplat-{:x}-{number:x}", std::process::id()));
+            match options.open(&temporary) {
+                Ok(file) => break (file, temporary),
+                // Of a process that had this number, and was killed.
+                Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(error),
+            }
+        };
+        unfinished.push(temporary.clone());
+        drop(unfinished);
+        let whole = Self { file, temporary: Some(temporary), end, asked: asked.to_owned() };
+        if let Some(existing) = existing {
+            whole.become_like(existing)?;
+        }
+        Ok(whole)
+    }
+
+    /// Takes over whose file it is, as far as the system allows, and who may do what with it.
+    fn become_like(&self, existing: &Metadata) -> io::Result<()> {
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::{MetadataExt, PermissionsExt, fchown};
+            let own = self.file.metadata()?;
+            if (own.uid(), own.gid()) != (existing.uid(), existing.gid()) {
+                let _ = fchown(&self.file, Some(existing.uid()), Some(existing.gid()));
+            }
+            self.file.set_permissions(fs::Permissions::from_mode(existing.mode() & 0o777))
+        }
+        #[cfg(not(unix))]
+        self.file.set_permissions(existing.permissions())
+    }
+}
+
+impl Drop for Unfinished {
+    fn drop(&mut self) {
+        if let Some(temporary) = self.temporary.take() {
+            let mut unfinished = lock();
+            // Nothing can be done about a file that cannot be removed.
+            let _ = fs::remove_file(&temporary);
+            unfinished.retain(|path| *path != temporary);
+        }
+    }
+}
+
+/// Gives finished files their names.
+fn finish(files: Vec<Unfinished>) -> Result<()> {
+    let mut files = files;
+    let mut unfinished = lock();
+    let named = files.iter_mut().try_for_each(|file| {
+        let Some(temporary) = &file.temporary else { return Ok(()) };
+        fs::rename(temporary, &file.end).map_err(|source| Error::write(&file.asked, source))?;
+        unfinished.retain(|path| path != temporary);
+        file.temporary = None;
+        Ok(())
+    });
+    // Those that failed go with `files`, which needs the list.
+    drop(unfinished);
+    named
+}
+
+/// A temporary file with all that `fill` writes; none where `path` is no file, and was written to.
+fn filled(path: &Path, fill: impl FnOnce(&mut Output<'_>) -> io::Result<()>) -> Result<Option<Unfinished>> {
+    let filled = || match Target::of(path)? {
+        Target::Stream => {
             let mut whole = tempfile::tempfile()?;
             buffered(&mut whole, fill)?;
             whole.rewind()?;
-            io::copy(&mut whole, &mut OpenOptions::new().write(true).open(path)?)?;
-            return Ok(());
+            // What is open may be a file that others write to as well.
+            io::copy(&mut whole, &mut OpenOptions::new().append(true).open(path)?)?;
+            Ok(None)
         }
-    }
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
+        Target::File { end, existing } => {
+            let mut whole = Unfinished::begin(path, end, existing.as_ref())?;
+            buffered(&mut whole.file, fill)?;
+            Ok(Some(whole))
+        }
     };
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".epsplat-");
-    #[cfg(unix)]
-    {
-        // A temporary file is private by default; this one becomes an ordinary file, so the umask decides.
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(fs::Permissions::from_mode(0o666));
-    }
-    fs::metadata(folder)?;
-    // The message would name the temporary file, which nobody asked for; its kind says what is wrong with the folder.
-    let mut whole = builder.tempfile_in(folder).map_err(|error| io::Error::from(error.kind()))?;
-    buffered(whole.as_file_mut(), fill)?;
-    whole.persist(path).map_err(|failed| failed.error)?;
-    Ok(())
+    filled().map_err(|source| Error::write(path, source))
 }
 
 fn buffered(file: &mut File, fill: impl FnOnce(&mut Output<'_>) -> io::Result<()>) -> io::Result<()> {
@@ -121,5 +328,71 @@ mod tests {
         let null = Path::new("/dev/null");
         write_whole(null, |out| out.write_all(b"gone")).unwrap();
         assert!(fs::metadata(null).unwrap().file_type().is_char_device());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_stay_and_modes_too_and_what_is_read_only_is_not_replaced() {
+        use std::os::unix::fs::{PermissionsExt, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
+        let write = |name: &str, bytes: &[u8]| write_whole(&at(name), |out| out.write_all(bytes));
+        for bits in [0o600, 0o666, 0o751] {
+            fs::write(at("old"), "old").unwrap();
+            fs::set_permissions(at("old"), fs::Permissions::from_mode(bits)).unwrap();
+            write("old", b"new").unwrap();
+            assert_eq!((mode(&at("old")), fs::read(at("old")).unwrap()), (bits, b"new".to_vec()));
+        }
+        // A chain of links, the second relative to its own folder, and one to what is not there yet.
+        fs::create_dir(at("sub")).unwrap();
+        symlink("sub/second", at("first")).unwrap();
+        symlink("../old", at("sub/second")).unwrap();
+        symlink("sub/made", at("dangling")).unwrap();
+        write("first", b"linked").unwrap();
+        write("dangling", b"made").unwrap();
+        assert_eq!(fs::read(at("old")).unwrap(), b"linked");
+        assert_eq!(fs::read(at("sub/made")).unwrap(), b"made");
+        assert!(["first", "sub/second", "dangling"].iter().all(|link| at(link).is_symlink()));
+        assert_eq!(place_of(&at("first")), Some(at("old").canonicalize().unwrap()));
+        symlink("round", at("round")).unwrap();
+        assert!(write("round", b"").unwrap_err().to_string().contains("symbolic links"));
+        // No rights but to read; root too is refused.
+        fs::set_permissions(at("old"), fs::Permissions::from_mode(0o444)).unwrap();
+        for refused in [write("old", b""), write("first", b""), try_output(&at("first"))] {
+            assert!(refused.unwrap_err().to_string().ends_with("it is read-only"));
+        }
+        assert_eq!(fs::read(at("old")).unwrap(), b"linked");
+        assert!(names(folder.path()).iter().all(|name| !name.starts_with(".epsplat-")));
+    }
+
+    #[test]
+    fn several_files_take_their_names_together_or_none_does() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let both = |a: &'static [u8], b: &'static [u8]| write_together([(at("a"), a), (at("b"), b)]);
+        both(b"1", b"2").unwrap();
+        fs::remove_file(at("b")).unwrap();
+        fs::create_dir(at("b")).unwrap();
+        assert!(both(b"3", b"4").unwrap_err().to_string().contains("is a directory"));
+        assert_eq!(fs::read(at("a")).unwrap(), b"1");
+        assert_eq!(names(folder.path()).len(), 2);
+    }
+
+    #[test]
+    fn outputs_and_folders_are_tried() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::write(at("file"), "").unwrap();
+        try_output(&at("new")).unwrap();
+        try_output(&at("file")).unwrap();
+        try_folder(&at("no/such/folder")).unwrap();
+        for refused in [try_output(folder.path()), try_output(&at("no/new")), try_output(&at("file/new"))] {
+            assert!(matches!(refused, Err(Error::Write { .. })));
+        }
+        for refused in [try_folder(&at("file")), try_folder(&at("file/new"))] {
+            assert!(matches!(refused, Err(Error::Write { .. })));
+        }
+        assert_eq!(names(folder.path()), ["file"]);
     }
 }

@@ -9,9 +9,11 @@
 
 use std::path::Path;
 
+use exr::meta::MetaData;
 use exr::prelude::*;
 
 use super::atomic::write_whole;
+use super::image::check;
 use crate::error::Error as EpsplatError;
 use crate::frame::Frame;
 
@@ -55,8 +57,14 @@ pub fn write(path: &Path, frame: &Frame) -> Outcome<()> {
 pub fn read(path: &Path) -> Outcome<Frame> {
     // exr reports a missing file as an I/O error of its own kind; asking first keeps the sentence plain.
     std::fs::File::open(path).map_err(|e| EpsplatError::read(path, e))?;
-    let image = read_all_flat_layers_from_file(path)
-        .map_err(|e| EpsplatError::malformed(path, format!("not a readable EXR: {e}")))?;
+    let unreadable = |e: Error| EpsplatError::malformed(path, format!("not a readable EXR: {e}"));
+    let metadata = MetaData::read_from_file(path, false).map_err(unreadable)?;
+    for header in &metadata.headers {
+        // Four bytes a channel as it is read, and as many in the frame.
+        let channels: u64 = metadata.headers.iter().map(|header| header.channels.list.len() as u64).sum();
+        check(path, (header.layer_size.0 as u64, header.layer_size.1 as u64), 8 * channels)?;
+    }
+    let image = read_all_flat_layers_from_file(path).map_err(unreadable)?;
     let size = image.attributes.display_window.size;
     let pixels = size.0 * size.1;
     let mut frame = Frame {

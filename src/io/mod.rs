@@ -3,10 +3,12 @@
 pub mod atomic;
 pub mod camera;
 pub mod cameras;
+mod companions;
 #[cfg(feature = "e57")]
 pub mod e57;
 pub mod exr;
 mod fault;
+pub mod image;
 mod intensity;
 pub mod las;
 pub mod mesh;
@@ -22,6 +24,7 @@ mod triangles;
 mod values;
 pub mod write_behind;
 
+pub use companions::companions;
 pub use mesh::{Material, Mesh};
 pub use points::{Points, Up};
 pub use texture::Texture;

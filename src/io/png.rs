@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use image::{ImageEncoder, ImageReader};
+use ::image::{ExtendedColorType, ImageEncoder, ImageFormat, ImageResult, codecs};
 
 use super::atomic::write_whole;
-use crate::error::{Error, Result};
+use super::image;
+use crate::error::Result;
 use crate::frame::Frame;
 use crate::scene::color::{linear_to_srgb, srgb_to_linear};
 
@@ -26,19 +27,19 @@ pub(crate) fn srgb_bytes(color: &[[f32; 4]]) -> Vec<u8> {
 }
 
 /// Encodes four bytes a pixel.
-pub(crate) fn encode(out: impl std::io::Write, width: u32, height: u32, rgba: &[u8]) -> image::ImageResult<()> {
-    image::codecs::png::PngEncoder::new(out).write_image(rgba, width, height, image::ExtendedColorType::Rgba8)
+pub(crate) fn encode(out: impl std::io::Write, width: u32, height: u32, rgba: &[u8]) -> ImageResult<()> {
+    codecs::png::PngEncoder::new(out).write_image(rgba, width, height, ExtendedColorType::Rgba8)
 }
 
 /// Reads the colour back to linear light.
+///
+/// # Errors
+///
+/// [`Error::Read`](crate::Error::Read) where the system cannot read or has no memory for it, [`Error::Malformed`](crate::Error::Malformed) for what is no PNG or has more
+/// than [`MOST_PIXELS`](super::image::MOST_PIXELS).
 pub fn read(path: &Path) -> Result<Frame> {
-    let reader = ImageReader::open(path).map_err(|e| Error::read(path, e))?;
-    let mut reader = reader;
-    reader.set_format(image::ImageFormat::Png);
-    // Our own limit is the size; the library's is less than we write.
-    reader.no_limits();
-    let picture = reader.decode().map_err(|e| Error::malformed(path, format!("not a readable PNG: {e}")))?;
-    let picture = picture.into_rgba16();
+    // Codes of 16 bits, and then the frame's colour.
+    let picture = image::decode(path, Some(ImageFormat::Png), 8 + 16)?.into_rgba16();
     let color = picture.pixels().map(|pixel| {
         let [r, g, b, a] = pixel.0.map(|v| f64::from(v) / 65535.0);
         [srgb_to_linear(r) as f32, srgb_to_linear(g) as f32, srgb_to_linear(b) as f32, a as f32]

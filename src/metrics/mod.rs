@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 pub use coverage::{Coverage, coverage};
 pub use distance::{Distances, SurfaceDistances};
-pub use numeric::{Comparison, DECISION_MARGIN, MapError, compare};
+pub use numeric::{BYTES_PER_PIXEL, Comparison, DECISION_MARGIN, MapError, compare};
 pub use reconstruction::{DepthError, NormalError, Reconstruction, reconstruction};
 
 use crate::error::{Error, Result};

@@ -11,7 +11,11 @@ use crate::frame::Frame;
 /// excused in [`Comparison::rmse_decided`] and [`Comparison::max_abs_decided`].
 pub const DECISION_MARGIN: f32 = 1e-6;
 
-/// The error of image A against image B. Colours are compared as linear RGBA.
+/// What [`compare`] takes of memory beside the images, bytes a pixel at most.
+pub const BYTES_PER_PIXEL: u64 = 48;
+
+/// The error of image A against image B. Colours are compared as linear RGBA. A value that is not finite against any other is as
+/// far from it as the largest f32; [`MapError::not_finite`] says whether there are any.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
     /// Largest absolute difference of a value.
@@ -26,6 +30,10 @@ pub struct Comparison {
     pub percentile_99_9: f64,
     /// The maps that both images have; of the colour, RGB and alpha apart.
     pub maps: Vec<MapError>,
+    /// The maps that only A has, which nothing is said of.
+    pub only_in_a: Vec<&'static str>,
+    /// The maps that only B has.
+    pub only_in_b: Vec<&'static str>,
     /// Only if A or B has a `decision` map: share of pixels that are excused because a fragment lies within
     /// [`DECISION_MARGIN`] of a decision.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -45,9 +53,11 @@ pub struct MapError {
     pub map: &'static str,
     /// Largest minus smallest finite value of B.
     pub range: f64,
+    /// Pixels in which a value that is not finite stands against another.
+    pub not_finite: u64,
     /// Largest absolute difference; of depths, over pixels that both cover.
     pub max_abs: f64,
-    /// The same as a fraction of the range.
+    /// The same as a fraction of the range; 1 for any error where B's values span none.
     pub max_of_range: f64,
     /// The same over the pixels that are not excused; only if there is a `decision` map.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -69,20 +79,19 @@ pub fn compare(a: &Frame, b: &Frame) -> Result<Comparison> {
         let kept = colors.zip(excused).filter(|(_, excused)| !**excused);
         ColorError::of(kept.map(|(pair, _)| pair))
     });
-    let rgb = |frame: &Frame| frame.color.iter().map(|c| [c[0], c[1], c[2]]).collect::<Vec<_>>();
-    let alpha = |frame: &Frame| frame.color.iter().map(|c| [c[3]]).collect::<Vec<_>>();
+    let excused = excused.as_deref();
+    let rgb = |frame: &Frame, pixel: usize| frame.color[pixel].first_chunk::<3>().copied().unwrap_or_default();
     let mut maps = vec![
-        map_error("color", &rgb(a), &rgb(b), excused.as_deref()),
-        map_error("alpha", &alpha(a), &alpha(b), excused.as_deref()),
+        map_error("color", pixels, |pixel| (rgb(a, pixel), rgb(b, pixel)), excused),
+        map_error("alpha", pixels, |pixel| ([a.color[pixel][3]], [b.color[pixel][3]]), excused),
     ];
     let scalar = |map: &'static str, a: &Option<Vec<f32>>, b: &Option<Vec<f32>>| {
-        let wrap = |values: &Vec<f32>| values.iter().map(|v| [*v]).collect::<Vec<_>>();
         let (a, b) = (a.as_ref()?, b.as_ref()?);
-        Some(map_error(map, &wrap(a), &wrap(b), excused.as_deref()))
+        Some(map_error(map, pixels, |pixel| ([a[pixel]], [b[pixel]]), excused))
     };
     maps.extend(scalar("depth", &a.depth, &b.depth));
     if let (Some(a), Some(b)) = (&a.normal, &b.normal) {
-        maps.push(map_error("normal", a, b, excused.as_deref()));
+        maps.push(map_error("normal", pixels, |pixel| (a[pixel], b[pixel]), excused));
     }
     maps.extend(scalar("weight", &a.weight, &b.weight));
     maps.extend(scalar("count", &a.count, &b.count));
@@ -93,33 +102,59 @@ pub fn compare(a: &Frame, b: &Frame) -> Result<Comparison> {
         coverage_mismatch: uncovered as f64 / pixels as f64,
         percentile_99_9: color.percentile_99_9,
         maps,
+        only_in_a: only_in(a, b),
+        only_in_b: only_in(b, a),
         excused: excused.map(|excused| excused.iter().filter(|e| **e).count() as f64 / pixels as f64),
         rmse_decided: decided.as_ref().map(|error| error.rmse),
         max_abs_decided: decided.as_ref().map(|error| error.max_abs),
     })
 }
 
-fn map_error<const N: usize>(map: &'static str, a: &[[f32; N]], b: &[[f32; N]], excused: Option<&[bool]>) -> MapError {
-    let finite = b.iter().flatten().filter(|v| v.is_finite());
-    let (low, high) = finite.fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-    let range = if high > low { f64::from(high) - f64::from(low) } else { 0.0 };
+/// The maps beside the colour that `a` has and `b` lacks.
+fn only_in(a: &Frame, b: &Frame) -> Vec<&'static str> {
+    let has = |frame: &Frame| {
+        let Frame { depth, normal, weight, count, decision, .. } = frame;
+        [depth.is_some(), normal.is_some(), weight.is_some(), count.is_some(), decision.is_some()]
+    };
+    let both = has(a).into_iter().zip(has(b)).zip(["depth", "normal", "weight", "count", "decision"]);
+    both.filter(|((a, b), _)| *a && !b).map(|(_, map)| map).collect()
+}
+
+/// The error of a map of which `at` gives the values of A and of B in each of the `pixels`.
+fn map_error<const N: usize>(
+    map: &'static str,
+    pixels: usize,
+    at: impl Fn(usize) -> ([f32; N], [f32; N]),
+    excused: Option<&[bool]>,
+) -> MapError {
+    let (mut low, mut high, mut not_finite) = (f32::INFINITY, f32::NEG_INFINITY, 0);
     let (mut max_abs, mut max_decided) = (0f64, 0f64);
-    for (pixel, (a, b)) in a.iter().zip(b).enumerate() {
+    for pixel in 0..pixels {
+        let (a, b) = at(pixel);
+        for value in b.into_iter().filter(|value| value.is_finite()) {
+            (low, high) = (low.min(value), high.max(value));
+        }
         // Infinite depth marks the background; whether the two agree on it is what the coverage says.
-        if map == "depth" && a.iter().chain(b).any(|v| *v == f32::INFINITY) {
+        if map == "depth" && a.iter().chain(&b).any(|v| *v == f32::INFINITY) {
             continue;
         }
-        let difference = largest_difference(a, b);
+        let other = |(a, b): (&f32, &f32)| a != b && !(a.is_finite() && b.is_finite());
+        not_finite += u64::from(a.iter().zip(&b).any(other));
+        let difference = largest_difference(&a, &b);
         max_abs = max_abs.max(difference);
         if excused.is_some_and(|excused| !excused[pixel]) {
             max_decided = max_decided.max(difference);
         }
     }
-    // Without a range any error is as large as can be.
-    let of_range = |error: f64| if error == 0.0 { 0.0 } else { (error / range).min(f32::MAX.into()) };
+    let range = if high > low { f64::from(high) - f64::from(low) } else { 0.0 };
+    let of_range = |error: f64| match error > 0.0 && range == 0.0 {
+        true => 1.0,
+        false => (error / range.max(f64::MIN_POSITIVE)).min(f32::MAX.into()),
+    };
     MapError {
         map,
         range,
+        not_finite,
         max_abs,
         max_of_range: of_range(max_abs),
         max_of_range_decided: excused.map(|_| of_range(max_decided)),
@@ -165,6 +200,7 @@ mod tests {
         let c = compare(&a, &b).unwrap();
         assert_eq!(c.max_abs, f64::from(f32::MAX));
         assert!(c.psnr_db.unwrap() < -700.0 && c.maps[0].max_abs > 1e38);
+        assert_eq!((c.maps[0].not_finite, c.maps[1].not_finite), (1, 0));
         b.color[1][3] = 0.0;
         assert_eq!(compare(&a, &b).unwrap().coverage_mismatch, 0.5);
         let a = frame(&[0.0, 0.5, 0.5]);
@@ -187,5 +223,19 @@ mod tests {
         assert_eq!((c.rmse_decided, c.max_abs_decided), (None, None));
         assert!(!serde_json::to_string(&c).unwrap().contains("decided"));
         assert!(compare(&a, &frame(&[0.0])).is_err());
+    }
+
+    #[test]
+    fn maps_of_one_image_are_named_and_a_map_without_range_has_a_finite_error() {
+        let (mut a, mut b) = (frame(&[0.5, 0.5]), frame(&[0.5, 0.25]));
+        (a.depth, a.weight) = (Some(vec![1.0, f32::INFINITY]), Some(vec![2.0, 2.0]));
+        (b.depth, b.count) = (Some(vec![1.5, 1.5]), Some(vec![1.0, 1.0]));
+        let c = compare(&a, &b).unwrap();
+        assert_eq!((c.only_in_a, c.only_in_b), (vec!["weight"], vec!["count"]));
+        // The background counts for the coverage, not for the depth; all depths of B are one.
+        let depth = &c.maps[2];
+        assert_eq!((depth.map, depth.range, depth.max_abs, depth.max_of_range), ("depth", 0.0, 0.5, 1.0));
+        assert!(c.maps.iter().all(|map| map.not_finite == 0 && map.max_of_range <= 1.0), "{:?}", c.maps);
+        assert_eq!(compare(&a, &a).unwrap().maps[2].max_of_range, 0.0);
     }
 }

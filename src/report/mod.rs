@@ -19,15 +19,17 @@ pub mod scaling;
 mod tables;
 mod text;
 
-use std::io::Write;
 use std::path::Path;
 
 pub use self::results::{ImageSet, Machine, Measurement, Numeric, Study, Summary};
-use crate::io::atomic::write_whole;
+use crate::io::atomic::write_together;
 use crate::{Error, Result};
 
-/// Writes `results.csv`, `results.json` and `index.html` into the folder `dir`, which is created if it is missing. Each
-/// file appears whole or not at all.
+/// The files that [`write`] writes.
+pub const FILES: [&str; 3] = ["results.csv", "results.json", "index.html"];
+
+/// Writes [`FILES`] into the folder `dir`, which is created if it is missing. Each file appears whole or not at all, and
+/// none before all are finished.
 ///
 /// # Errors
 ///
@@ -38,10 +40,6 @@ pub fn write(dir: &Path, study: &Study) -> Result<()> {
     let mut json = serde_json::to_string_pretty(&study.measurements).map_err(|e| Error::write(dir, e.into()))?;
     json.push('\n');
     std::fs::create_dir_all(dir).map_err(|e| Error::write(dir, e))?;
-    // The page is last, because it links to the others.
-    for (name, text) in [("results.csv", csv::table(&study.measurements)), ("results.json", json), ("index.html", page)]
-    {
-        write_whole(&dir.join(name), |file| file.write_all(text.as_bytes()))?;
-    }
-    Ok(())
+    let texts = [csv::table(&study.measurements), json, page];
+    write_together(FILES.iter().zip(&texts).map(|(name, text)| (dir.join(name), text.as_bytes())))
 }

@@ -60,7 +60,13 @@ pub enum Lens {
 }
 
 impl Lens {
-    pub(super) fn intrinsics(self, width: u32, height: u32) -> Result<(Projection, [f64; 4])> {
+    /// The projection, and focal lengths (pinhole: pixels; orthographic: pixels per world unit) and principal point, pixels, of
+    /// images of `width` x `height`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] for a lens whose numbers the device cannot hold, or that is none.
+    pub fn intrinsics(self, width: u32, height: u32) -> Result<(Projection, [f64; 4])> {
         let (w, h) = (f64::from(width), f64::from(height));
         let (projection, values) = match self {
             Self::Fov(degrees) => {
@@ -75,6 +81,11 @@ impl Lens {
             Self::Intrinsics(values) => (Projection::Pinhole, values),
             Self::OrthographicHeight(world) => {
                 let f = h / world;
+                if !(1.0 / LARGEST..=LARGEST).contains(&f) {
+                    return Err(Error::Usage(format!(
+                        "the height of an orthographic view must be positive and within reason, {world} is not"
+                    )));
+                }
                 (Projection::Orthographic, [f, f, 0.5 * w, 0.5 * h])
             }
             Self::OrthographicScale(values) => (Projection::Orthographic, values),
@@ -109,6 +120,14 @@ pub fn check_size(width: u32, height: u32) -> Result<()> {
         return Err(Error::Usage(format!("an image has at most {MAX_PIXELS} pixels, {width}x{height} has more")));
     }
     Ok(())
+}
+
+/// Rejects near depths that the device cannot hold.
+pub fn check_near(near: f64) -> Result<()> {
+    if (1.0 / LARGEST..=LARGEST).contains(&near) {
+        return Ok(());
+    }
+    Err(Error::Usage(format!("the near depth must be positive and within reason, {near} is not")))
 }
 
 impl Camera {
@@ -164,9 +183,7 @@ impl Camera {
                 "the camera's pose is not a rigid motion: its rotation must be orthonormal with determinant +1".into(),
             ));
         }
-        if !(1.0 / LARGEST..=LARGEST).contains(&near) {
-            return Err(Error::Usage(format!("the near depth must be positive and within reason, {near} is not")));
-        }
+        check_near(near)?;
         let forward = rotation.row(2).normalize();
         let right = rotation.row(0).reject_from_normalized(forward).normalize();
         let rotation = DMat3::from_cols(right, forward.cross(right), forward).transpose();

@@ -8,7 +8,6 @@ use epsplat::render::Report;
 use epsplat::{Error, Result, io};
 
 use super::super::note;
-use super::Arguments;
 
 /// How images are written.
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
@@ -43,31 +42,6 @@ impl Format {
             Self::Exr => io::exr::write(path, frame),
         }
     }
-}
-
-/// An output in a folder that is not there fails now rather than after the render.
-pub(super) fn check_folder(output: &Path) -> Result<()> {
-    match output.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => {
-            std::fs::metadata(folder).map(|_| ()).map_err(|e| Error::write(output, e))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// A report must not take the place of an image or of an input.
-pub(super) fn check_json<'a>(arguments: &'a Arguments, images: impl IntoIterator<Item = &'a Path>) -> Result<()> {
-    let json = match &arguments.json {
-        Some(json) if json != Path::new("-") => json,
-        _ => return Ok(()),
-    };
-    // Files that are not there yet have no canonical path; then their names must do.
-    let name = |path: &Path| std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    let inputs = arguments.inputs.iter().chain(&arguments.camera).chain(&arguments.cameras).map(|path| path.as_path());
-    if inputs.chain(images).any(|path| name(path) == name(json)) {
-        return Err(Error::Usage(format!("--json {} would overwrite an input or an image", json.display())));
-    }
-    check_folder(json)
 }
 
 /// Tells of a frame that had to be rendered twice.

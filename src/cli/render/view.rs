@@ -1,9 +1,10 @@
 //! The camera of a picture, as far as arguments and camera files decide it.
 
+use std::fmt::Display;
 use std::path::Path;
 
 use epsplat::io::camera::{self, CameraFile, Pose};
-use epsplat::scene::camera::DEFAULT_FOV;
+use epsplat::scene::camera::{DEFAULT_FOV, check_near};
 use epsplat::scene::{Camera, Lens, Scene, Up};
 use epsplat::{Error, Result};
 use glam::DVec3;
@@ -35,17 +36,20 @@ impl View {
         if let Some(path) = &arguments.camera {
             return Self::of_file(arguments, camera::read(path)?, path);
         }
-        let lens = match (arguments.intrinsics, arguments.ortho) {
-            (Some(values), _) => Lens::Intrinsics(values),
-            (None, Some(height)) => Lens::OrthographicHeight(height),
-            (None, None) => Lens::Fov(arguments.fov.unwrap_or(DEFAULT_FOV)),
+        let (lens, option) = match (arguments.intrinsics, arguments.ortho) {
+            (Some(values), _) => (Lens::Intrinsics(values), "--intrinsics"),
+            (None, Some(height)) => (Lens::OrthographicHeight(height), "--ortho"),
+            (None, None) => (Lens::Fov(arguments.fov.unwrap_or(DEFAULT_FOV)), "--fov"),
         };
+        let size = arguments.size.unwrap_or(DEFAULT_SIZE);
+        lens.intrinsics(size.0, size.1).map_err(|error| said_by(option, error))?;
+        check_near_argument(arguments)?;
         let place = match (arguments.eye, arguments.target) {
             (None, _) => Place::Framed,
             (Some(eye), None) => Place::Eye(eye, arguments.up),
             (Some(eye), Some(target)) => Place::Pose(Pose::LookAt(eye, target, arguments.up)),
         };
-        Self { size: arguments.size.unwrap_or(DEFAULT_SIZE), lens, place, near: arguments.near }.checked()
+        Self { size, lens, place, near: arguments.near }.checked()
     }
 
     /// What a camera of the file at `path` says, and the arguments that add to it.
@@ -68,10 +72,12 @@ impl View {
                 "--scale needs pictures of known size, which {path} does not give: take --size"
             )));
         }
+        check_near_argument(arguments)?;
         let file = file.scaled(arguments.scale.unwrap_or(1.0));
         let size = file.size.or(arguments.size).unwrap_or(DEFAULT_SIZE);
         let near = arguments.near.or(file.near);
-        Self { size, lens: file.lens, place: Place::Pose(file.pose), near }.checked()
+        let view = Self { size, lens: file.lens, place: Place::Pose(file.pose), near };
+        view.checked().map_err(|error| said_by(path.display(), error))
     }
 
     /// What the arguments decide is refused before minutes of reading: only the scene's centre is not known yet.
@@ -108,4 +114,13 @@ impl View {
     pub(super) fn pixels(&self) -> u64 {
         u64::from(self.size.0) * u64::from(self.size.1)
     }
+}
+
+/// An error of a value, with the option or the file that gave it.
+fn said_by(who: impl Display, error: Error) -> Error {
+    Error::Usage(format!("{who}: {error}"))
+}
+
+fn check_near_argument(arguments: &Arguments) -> Result<()> {
+    arguments.near.map_or(Ok(()), check_near).map_err(|error| said_by("--near", error))
 }

@@ -1,12 +1,13 @@
 //! Many pictures of one scene, a camera each: while one is rendered, those before it are encoded and written.
 
 use std::cell::RefCell;
+use std::collections::BTreeSet;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use epsplat::io::cameras;
 use epsplat::io::write_behind::write_behind;
+use epsplat::io::{atomic, cameras};
 use epsplat::passes::unseen::Unseen;
 use epsplat::render::{Renderer, Report};
 use epsplat::scene::{Camera, Maps};
@@ -14,8 +15,8 @@ use epsplat::{Error, Progress, Result};
 use serde::Serialize;
 
 use super::super::progress::Bars;
-use super::super::{note, write_json};
-use super::output::{Format, check_folder, check_json, note_overflows};
+use super::super::{note, outputs, write_json};
+use super::output::{Format, note_overflows};
 use super::view::{DEFAULT_SIZE, View};
 use super::{Arguments, backend, options, scene};
 
@@ -54,8 +55,7 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
     let format = arguments.format.unwrap_or(if maps { Format::Exr } else { Format::Png });
     let options = options(arguments, format)?;
     let views = views(arguments, path, format)?;
-    check_output(arguments, path)?;
-    check_json(arguments, views.iter().map(|(file, _)| file.as_path()))?;
+    check_outputs(arguments, path, &views)?;
     let backend = backend(arguments)?;
 
     let bars = Bars::new();
@@ -133,22 +133,44 @@ fn views(arguments: &Arguments, path: &Path, format: Format) -> Result<Vec<(Path
     cameras.into_iter().map(view).collect()
 }
 
+/// Refuses pictures, before anything is rendered, that would overwrite something or could not be written.
+fn check_outputs(arguments: &Arguments, cameras: &Path, views: &[(PathBuf, View)]) -> Result<()> {
+    check_folder(&arguments.output, cameras)?;
+    let read = arguments.files().map(PathBuf::as_path).chain([cameras]);
+    let of_colmap = ["cameras.txt", "images.txt"].map(|name| cameras.join(name));
+    let read = read.chain(of_colmap.iter().map(PathBuf::as_path));
+    let pictures = views.iter().map(|(file, _)| file.as_path());
+    outputs::check_distinct(read, pictures.clone().chain(arguments.json.as_deref()))?;
+    arguments.json.iter().try_for_each(|json| outputs::try_output(json))?;
+    if let Ok(root) = arguments.output.canonicalize()
+        && let Some(file) =
+            pictures.clone().find(|file| !atomic::place_of(file).is_some_and(|at| at.starts_with(&root)))
+    {
+        let what = format!("a symbolic link leads out of {}", arguments.output.display());
+        return Err(Error::write(file, std::io::Error::other(what)));
+    }
+    let folders: BTreeSet<&Path> = pictures.filter_map(Path::parent).collect();
+    folders.into_iter().try_for_each(atomic::try_folder)
+}
+
 /// The pictures must not take the place of the photographs that the cameras are named after.
-fn check_output(arguments: &Arguments, cameras: &Path) -> Result<()> {
-    let output = &arguments.output;
+fn check_folder(output: &Path, cameras: &Path) -> Result<()> {
     if output.metadata().is_ok_and(|output| !output.is_dir()) {
         return Err(Error::write(output, std::io::ErrorKind::NotADirectory.into()));
     }
+    let or_current =
+        |folder: &'_ Path| if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder.to_owned() };
     let beside = if cameras.is_dir() { cameras } else { cameras.parent().unwrap_or(Path::new("")) };
-    let beside = if beside.as_os_str().is_empty() { Path::new(".") } else { beside };
-    if let (Ok(output), Ok(beside)) = (output.canonicalize(), beside.canonicalize())
+    if let (Ok(output), Ok(beside)) = (output.canonicalize(), or_current(beside).canonicalize())
         && output == beside
     {
         return Err(Error::Usage(
             "the pictures have the names of those that the cameras belong to: choose another folder than theirs".into(),
         ));
     }
-    check_folder(output)
+    // A folder is made, but not the one that it is in.
+    let folder = or_current(output.parent().unwrap_or(Path::new("")));
+    folder.metadata().map(drop).map_err(|error| Error::write(output, error))
 }
 
 /// How many threads write frames of so many pixels.

@@ -1,5 +1,6 @@
 //! `transforms.json`: one object, with an object for each picture in `frames`.
 
+use std::f64::consts::PI;
 use std::path::Path;
 
 use glam::{DMat3, DVec3};
@@ -76,8 +77,12 @@ impl Frame<'_> {
 
     /// Focal lengths by pixels, or else by angles; square pixels unless both are given.
     fn lens(&self, width: f64, height: f64, sized: bool) -> Result<Lens, String> {
-        let of_angle =
-            |key: &str, side: f64| Ok::<_, String>(self.number(key)?.map(|angle| 0.5 * side / (0.5 * angle).tan()));
+        let of_angle = |key: &str, side: f64| match self.number(key)? {
+            Some(angle) if !(angle > 0.0 && angle < PI) => {
+                Err(format!("its {key} lies between 0 and pi, {angle} does not: it is in radians"))
+            }
+            angle => Ok(angle.map(|angle| 0.5 * side / (0.5 * angle).tan())),
+        };
         let pixels = [self.number("fl_x")?, self.number("fl_y")?, self.number("cx")?, self.number("cy")?];
         if !sized && pixels.iter().any(Option::is_some) {
             return Err("intrinsics are in pixels, so the camera needs w and h".into());
@@ -172,6 +177,9 @@ mod tests {
             (r#""w": -8, "h": 7, "fl_x": 5,"#, "", "w is not a number of pixels"),
             (r#""camera_angle_x": "wide","#, "", "camera_angle_x is not a number"),
             (r#""camera_angle_x": 1, "camera_model": "OPENCV_FISHEYE","#, "", "'OPENCV_FISHEYE'"),
+            (r#""camera_angle_x": 3.2,"#, "", "camera_angle_x lies between 0 and pi, 3.2 does not"),
+            (r#""camera_angle_x": 0,"#, "", "camera_angle_x lies between 0 and pi"),
+            (r#""camera_angle_x": 1, "camera_angle_y": -1,"#, "", "camera_angle_y lies between 0 and pi"),
             (r#""camera_angle_x": 1, "is_fisheye": true,"#, "", "fisheye"),
             (r#""camera_angle_x": 1,"#, r#""k2": [],"#, "k2 is not a number"),
         ] {

@@ -48,13 +48,34 @@ pub(super) fn read(path: &Path, libraries: &[String], names: &[String], notes: &
     names.iter().map(material).collect()
 }
 
-fn definitions(path: &Path) -> io::Result<Vec<tobj::Material>> {
+/// The `libraries` that the OBJ file at `path` names, and the images that these name.
+pub(in crate::io) fn companions(path: &Path, libraries: &[String]) -> Vec<PathBuf> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut files = Vec::new();
+    for library in libraries.iter().flat_map(|line| names_in(folder, line)) {
+        let library = beside(folder, library);
+        let text = text_of(&library).unwrap_or_default();
+        files.push(library);
+        let images = text.lines().filter_map(|line| {
+            let (keyword, image) = first_word(line.trim());
+            let map = keyword.starts_with("map_") || matches!(keyword, "bump" | "disp" | "decal" | "norm" | "refl");
+            map.then(|| beside(folder, file_of(image)))
+        });
+        files.extend(images);
+    }
+    files
+}
+
+fn text_of(path: &Path) -> io::Result<String> {
     let mut bytes = Vec::new();
     File::open(path)?.take(LONGEST).read_to_end(&mut bytes)?;
-    let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&bytes);
+    Ok(String::from_utf8_lossy(bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&bytes)).into_owned())
+}
+
+fn definitions(path: &Path) -> io::Result<Vec<tobj::Material>> {
     // At one line that it cannot read the parser gives up on all materials, so it is given no other lines than it must.
     let read = |line: &&str| matches!(line.split_whitespace().next(), Some("newmtl" | "Kd" | "d" | "map_Kd"));
-    let text: Vec<String> = String::from_utf8_lossy(bytes).lines().filter(read).map(str::to_owned).collect();
+    let text: Vec<String> = text_of(path)?.lines().filter(read).map(str::to_owned).collect();
     let (materials, _) = tobj::load_mtl_buf(&mut text.join("\n").as_bytes()).map_err(io::Error::other)?;
     Ok(materials)
 }

@@ -3,6 +3,8 @@
 mod material;
 mod source;
 
+pub(super) use material::companions;
+
 use crate::io::fault::{self, Fault};
 use crate::io::triangles::Triangles;
 use crate::io::{Mesh, Points, Up, polygon};

@@ -23,5 +23,6 @@ mod read;
 mod vertex;
 mod write;
 
+pub(super) use read::companions;
 pub use read::{read, read_mesh};
 pub use write::{Color, ColorProperties, Properties, Vertex, check_extension, write, write_points};

@@ -10,7 +10,7 @@ use crate::io::{Material, Mesh, Points, Texture};
 use crate::{Progress, Result};
 use std::fs::File;
 use std::io::BufReader;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Reads the vertices of a PLY file: ASCII, or binary of either byte order.
@@ -67,7 +67,7 @@ pub fn read_mesh(path: &Path, progress: &dyn Progress) -> Result<Mesh> {
     let texture = texture.or_else(|| points.texture.map(|texture| corners(&triangles, &texture)));
     let mut notes = Vec::new();
     let mut material = |name: String| {
-        let read = Texture::read(&path.parent().unwrap_or(Path::new("")).join(name.replace('\\', "/")));
+        let read = Texture::read(&beside(path, &name));
         let image = read.map(Arc::new).map_err(|error| notes.push(format!("a texture is left out: {error}"))).ok();
         Material { name, diffuse: [1.0; 4], texture: image }
     };
@@ -85,6 +85,17 @@ pub fn read_mesh(path: &Path, progress: &dyn Progress) -> Result<Mesh> {
         notes,
         ..Mesh::default()
     })
+}
+
+/// The textures that the PLY file at `path` names.
+pub(in crate::io) fn companions(path: &Path) -> Vec<PathBuf> {
+    let header = File::open(path).map_err(Fault::Io).and_then(|file| header::read(&mut BufReader::new(file)));
+    header.map_or(Vec::new(), |header| header.textures.iter().map(|name| beside(path, name)).collect())
+}
+
+/// A file that is named in the one at `path`, as Windows may write it.
+fn beside(path: &Path, name: &str) -> PathBuf {
+    path.parent().unwrap_or(Path::new("")).join(name.replace('\\', "/"))
 }
 
 /// What is read of a file.

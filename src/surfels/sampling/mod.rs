@@ -42,13 +42,16 @@ pub const MOST: usize = 1 << 28;
 /// more, many a voxel's share is less than one sample.
 const FOR_EACH_VOXEL: usize = 4;
 
+/// The most voxels, unless there are more samples: they take 600 bytes each.
+const MOST_VOXELS: usize = 1 << 21;
+
 /// How samples are placed.
 pub enum Method<'a> {
     /// By the priority of voxels.
     Stratified {
         /// The priority function.
         priority: &'a PriorityFunction<'a>,
-        /// How often boxes are halved; None for as many voxels as samples allow.
+        /// How often boxes are halved, but not beyond 2^21 voxels or as many as samples; None for as many voxels as samples allow.
         depth: Option<u32>,
     },
     /// Independent random points, evenly by area: a baseline. Their radii are left to [`build`](super::build).
@@ -70,6 +73,10 @@ pub struct Sampling {
     pub voxels: u64,
     /// Of these, voxels that got no sample.
     pub empty_voxels: u64,
+    /// How often boxes were halved.
+    pub halvings: u32,
+    /// How many of the halvings that were asked for were left out, as there would have been too many voxels.
+    pub undone: u32,
 }
 
 impl Sampling {
@@ -80,7 +87,15 @@ impl Sampling {
             counted(self.dropped_non_finite, "triangles were dropped: a coordinate is not finite or too large"),
             counted(self.dropped_flat, "triangles were dropped: they have no area"),
         ];
-        notes.into_iter().flatten().collect()
+        let halved = (self.undone > 0).then(|| {
+            format!(
+                "the mesh's box was halved {} times, not {}: there would be more than {} voxels",
+                self.halvings,
+                self.halvings + self.undone,
+                MOST_VOXELS.max(self.samples as usize)
+            )
+        });
+        notes.into_iter().flatten().chain(halved).collect()
     }
 }
 
@@ -120,7 +135,10 @@ pub fn sample(
         }
         Method::Stratified { priority, depth } => {
             progress.begin("dividing the mesh", 0);
-            let voxels = voxels::voxels(&surface, *depth, count / FOR_EACH_VOXEL);
+            let most = if depth.is_some() { MOST_VOXELS.max(count) } else { count / FOR_EACH_VOXEL };
+            let (voxels, halvings) = voxels::voxels(&surface, *depth, most);
+            sampling.halvings = halvings;
+            sampling.undone = depth.map_or(0, |depth| depth - halvings);
             let priorities = priority(&surface, &voxels);
             let quotas = distribute::distribute(&priorities, count);
             progress.end();
@@ -161,5 +179,18 @@ fn points(
         texture: places.map(|place| surface.texture(*place)).collect(),
         up: surface.mesh.up,
         ..Points::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halvings_that_were_left_out_are_told() {
+        let sampling = Sampling { samples: 9, halvings: 28, undone: 32, ..Sampling::default() };
+        let note = "the mesh's box was halved 28 times, not 60: there would be more than 2097152 voxels";
+        assert_eq!(sampling.notes(), [note]);
+        assert!(Sampling { undone: 0, ..sampling }.notes().is_empty());
     }
 }

@@ -39,19 +39,22 @@ struct Cell {
 const DEEPEST: u32 = 60;
 
 /// The voxels of a surface (Tien 2008, section 3.1): its box is halved across its longest side, and the halves in turn, those
-/// that no triangle meets left out. It ends after `depth` halvings, or, without, before there would be more than `most` voxels.
-pub(super) fn voxels(surface: &MeshSurface<'_>, depth: Option<u32>, most: usize) -> Vec<Voxel> {
+/// that no triangle meets left out. It ends after `depth` halvings, or before there would be more than `most` voxels. Returns
+/// them and the halvings.
+pub(super) fn voxels(surface: &MeshSurface<'_>, depth: Option<u32>, most: usize) -> (Vec<Voxel>, u32) {
     let all = (0..surface.triangles.len() as u32).collect();
     let mut cells = vec![Cell { bounds: surface.bounds, triangles: all }];
+    let mut halvings = 0;
     for _ in 0..depth.unwrap_or(DEEPEST).min(DEEPEST) {
         let halves: Vec<Cell> = cells.par_iter().flat_map_iter(|cell| halves(surface, cell)).collect();
-        if depth.is_none() && halves.len() > most.max(1) {
+        if halves.len() > most.max(1) {
             break;
         }
         cells = halves;
+        halvings += 1;
     }
     let voxels = cells.into_par_iter().map(|cell| voxel(surface, cell));
-    voxels.filter(|voxel| voxel.area > 0.0).collect()
+    (voxels.filter(|voxel| voxel.area > 0.0).collect(), halvings)
 }
 
 /// A triangle that lies in the plane between the halves belongs to the upper one.
@@ -130,7 +133,9 @@ pub(super) fn fan_share(a: DVec3, b: DVec3, c: DVec3) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::io::Mesh;
 
     #[test]
     fn parts_of_a_triangle_in_boxes_are_the_triangle() {
@@ -148,5 +153,24 @@ mod tests {
             whole += share(&outline);
         }
         assert!((whole - 1.0).abs() < 1e-12, "{whole}");
+    }
+
+    #[test]
+    fn a_depth_ends_where_there_would_be_too_many_voxels() {
+        let mesh = Mesh {
+            positions: vec![[0.0; 3], [1.0, 0.1, 0.0], [0.2, 1.0, 0.3], [0.5, 0.4, 1.0]],
+            triangles: vec![[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]],
+            ..Mesh::default()
+        };
+        let surface = MeshSurface::new(&mesh).unwrap();
+        let of = |depth, most| {
+            let (voxels, halvings) = voxels(&surface, Some(depth), most);
+            (voxels.iter().map(|voxel| voxel.area).collect::<Vec<_>>(), halvings)
+        };
+        let (bounded, halvings) = of(60, 1000);
+        assert!(bounded.len() <= 1000 && bounded.len() > 300 && halvings < 20, "{} {halvings}", bounded.len());
+        // What is bounded is what the halvings that are left would make, and a bound that is not met changes nothing.
+        assert_eq!(of(halvings, usize::MAX), (bounded, halvings));
+        assert_eq!(of(7, usize::MAX), of(7, 1000));
     }
 }

@@ -1,0 +1,151 @@
+//! Images too large are refused by their headers, and what the system has no room for ends in a sentence.
+
+use super::common::command::{Folder, fails, ply, succeeds, text};
+use epsplat::frame::Frame;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// A PNG whose header says so large, in a bit a pixel, and whose pixels are missing.
+fn png(width: u32, height: u32) -> Vec<u8> {
+    let mut file = b"\x89PNG\r\n\x1a\n".to_vec();
+    let mut chunk = |name: &[u8], data: &[u8]| {
+        let body = [name, data].concat();
+        file.extend((data.len() as u32).to_be_bytes());
+        file.extend(&body);
+        file.extend(crc32(&body).to_be_bytes());
+    };
+    let header = [&width.to_be_bytes()[..], &height.to_be_bytes(), &[1, 0, 0, 0, 0]].concat();
+    chunk(b"IHDR", &header);
+    chunk(b"IDAT", b"\x78\x9c\x03\x00\x00\x00\x00\x01");
+    chunk(b"IEND", b"");
+    file
+}
+
+/// As PNG has it.
+fn crc32(bytes: &[u8]) -> u32 {
+    let step = |crc: u32, _| if crc & 1 == 1 { 0xedb8_8320 ^ (crc >> 1) } else { crc >> 1 };
+    !bytes.iter().fold(u32::MAX, |crc, byte| (0..8).fold(crc ^ u32::from(*byte), step))
+}
+
+/// An EXR whose header says so large.
+fn exr(folder: &Folder, name: &str, width: u32, height: u32) -> PathBuf {
+    let path = folder.path(name);
+    let frame = Frame {
+        width: 3,
+        height: 2,
+        color: vec![[0.5; 4]; 6],
+        depth: None,
+        normal: None,
+        weight: None,
+        count: None,
+        decision: None,
+    };
+    epsplat::io::exr::write(&path, &frame).unwrap();
+    let mut bytes = std::fs::read(&path).unwrap();
+    for window in [&b"dataWindow\0box2i\0"[..], b"displayWindow\0box2i\0"] {
+        let at = bytes.windows(window.len()).position(|found| found == window).unwrap() + window.len() + 4;
+        let last = [0, 0, width as i32 - 1, height as i32 - 1].map(i32::to_le_bytes);
+        bytes[at..at + 16].copy_from_slice(last.as_flattened());
+    }
+    std::fs::write(&path, bytes).unwrap();
+    path
+}
+
+/// Runs with so much address space, KiB.
+fn within(kib: u64, arguments: &[&str]) -> Output {
+    let script = format!("ulimit -v {kib} && exec \"$0\" \"$@\"");
+    Command::new("sh").args(["-c", &script, env!("CARGO_BIN_EXE_epsplat")]).args(arguments).output().unwrap()
+}
+
+#[test]
+fn images_beyond_the_limit_are_refused_by_their_headers() {
+    let folder = Folder::new();
+    let cube = folder
+        .file("m.obj", "mtllib m.mtl\nusemtl x\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\n");
+    let output = folder.path("out.ply");
+    let sample = ["sample", text(&cube), "-o", text(&output), "--count", "9"];
+    for (width, height) in [(30_000, 30_000), (65_000, 65_000), (u32::MAX >> 1, 7), (16_385, 16_384)] {
+        let said = [&format!("{width}x{height}")[..], "268435456 pixels", "huge"];
+        let huge = folder.file("huge.png", png(width, height));
+        fails(&["compare", text(&huge), text(&huge)], 1, &said);
+        fails(&[&sample[..], &["--texture", text(&huge)]].concat(), 1, &said);
+        folder.file("m.mtl", "newmtl x\nKd 1 0 0\nmap_Kd huge.png\n");
+        let told = String::from_utf8(succeeds(&sample).stderr).unwrap();
+        assert!(said.iter().all(|word| told.contains(word)), "{told}");
+        // An EXR says where its last pixel is, by a number with a sign.
+        if width < 1 << 24 {
+            let huge = exr(&folder, "huge.exr", width, height);
+            fails(&["compare", text(&huge), text(&huge)], 1, &said);
+        }
+    }
+    // Control: what is as large as can be is refused for the pixels that it lacks.
+    let whole = folder.file("whole.png", png(4_000, 3));
+    fails(&["compare", text(&whole), text(&whole)], 1, &["whole.png", "not a readable PNG"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn what_the_system_has_no_room_for_is_said() {
+    let folder = Folder::new();
+    // Within the limit, but 3.7 GB as a frame.
+    let large = folder.file("large.png", png(12_000, 12_000));
+    let exr = exr(&folder, "large.exr", 12_000, 12_000);
+    let cloud = folder.file("c.ply", ply("x y z u v", 3, "0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n"));
+    let out = folder.path("out.png");
+    let textured = ["render", text(&cloud), "-o", text(&out), "--backend", "reference", "--texture", text(&large)];
+    for (kib, arguments) in [
+        (1_500_000, &["compare", text(&large), text(&large)][..]),
+        (1_500_000, &["compare", text(&exr), text(&exr)]),
+        (700_000, &textured),
+    ] {
+        let output = within(kib, arguments);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {said}");
+        assert!(said.contains("cannot read ") && said.contains("large.") && said.contains("out of memory"), "{said}");
+    }
+    // Control: a small image has room there.
+    let small = folder.path("small.png");
+    succeeds(&["render", text(&cloud), "-o", text(&small), "--backend", "reference", "--size", "16x16"]);
+    let output = within(1_500_000, &["compare", text(&small), text(&small)]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn compare_names_what_only_one_image_has_and_prints_no_largest_number() {
+    let folder = Folder::new();
+    let frame = |depth: Option<Vec<f32>>, weight: Option<Vec<f32>>, alpha: f32| Frame {
+        width: 2,
+        height: 1,
+        color: vec![[0.5, 0.5, 0.5, alpha]; 2],
+        depth,
+        normal: None,
+        weight,
+        count: None,
+        decision: None,
+    };
+    let written = |name: &str, frame: &Frame| {
+        let path = folder.path(name);
+        epsplat::io::exr::write(&path, frame).unwrap();
+        path
+    };
+    let a = written("a.exr", &frame(Some(vec![1.0, f32::INFINITY]), Some(vec![1.0, 2.0]), 1.0));
+    let b = written("b.exr", &frame(Some(vec![1.5, 1.5]), None, 0.75));
+    let c = written("c.exr", &frame(Some(vec![1.0, f32::NAN]), None, 1.0));
+    let table = |a: &Path, b: &Path| String::from_utf8(succeeds(&["compare", text(a), text(b)]).stdout).unwrap();
+    let said = table(&a, &b);
+    assert!(said.contains("a.exr has: weight\n") && !said.contains("e38") && said.lines().count() == 11, "{said}");
+    // Alpha and depth of B have no range that their errors could be a part of.
+    let row =
+        |name: &str| said.lines().find(|line| line.starts_with(name)).unwrap().split_whitespace().collect::<Vec<_>>();
+    assert_eq!(row("alpha")[2..], ["2.500e-1", "-"]);
+    assert_eq!(row("depth")[2..], ["5.000e-1", "-"]);
+    let said = table(&b, &c);
+    assert!(said.contains("not finite  (1 pixels)") || said.contains("not finite    (1 pixels)"), "{said}");
+    assert!(!said.contains("e38") && !table(&a, &a).contains("has:"), "{said}");
+    let json = succeeds(&["compare", text(&a), text(&b), "--json", "-"]).stdout;
+    let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
+    assert_eq!((&json["only_in_a"][0], &json["only_in_b"]), (&"weight".into(), &serde_json::json!([])));
+    assert_eq!(json["maps"][1]["max_of_range"], 1.0);
+    let colored = table(&a, &written("d.exr", &frame(None, None, f32::NAN)));
+    assert!(colored.contains("rmse               not finite") && !colored.contains("e38"), "{colored}");
+}

@@ -36,7 +36,7 @@ pub struct Arguments {
     #[arg(long)]
     table: bool,
     /// An API (vulkan, gl, metal, dx12) or part of an adapter's name, as `epsplat adapters` lists them
-    #[arg(long, value_name = "SUBSTRING")]
+    #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
 }
 

@@ -30,7 +30,7 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME")]
     accumulator: Option<String>,
     /// An API (vulkan, gl, metal, dx12) or part of an adapter's name, as `epsplat adapters` lists them
-    #[arg(long, value_name = "SUBSTRING")]
+    #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
     /// Only cases whose name contains this
     #[arg(long, value_name = "SUBSTRING")]

@@ -1,12 +1,13 @@
-//! Other adapters than the one that the tests run on: a second driver, and what is done on a card alone.
+//! Other adapters than the one that the tests run on: a second driver, OpenGL, and what is done on a card alone.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod common;
 
 use common::bits;
-use common::command::{DATA, Folder, succeeds, text};
+use common::command::{DATA, Folder, epsplat, succeeds, text};
 use common::scenes::{crowded, sphere, sphere_camera};
+use epsplat::gpu::AdapterDescription;
 use epsplat::render::{Backend, Renderer};
 use epsplat::scene::{Organisation, Projection, RenderOptions};
 use std::path::Path;
@@ -17,21 +18,9 @@ use std::process::{Command, Output};
 const DRIVERS: [&str; 2] =
     ["/usr/lib/chromium/vk_swiftshader_icd.json", "/usr/lib/chromium-browser/vk_swiftshader_icd.json"];
 
-/// Runs the program where SwiftShader is the only Vulkan driver.
-fn on_swiftshader(driver: &str, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_epsplat"));
-    let output =
-        command.env("VK_DRIVER_FILES", driver).env("VK_ICD_FILENAMES", driver).args(arguments).output().unwrap();
-    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-    output
-}
-
-#[test]
-fn another_driver_draws_the_same_picture() {
-    let Some(driver) = DRIVERS.into_iter().find(|driver| Path::new(driver).exists()) else {
-        eprintln!("skipped: Chromium's SwiftShader is not at {DRIVERS:?}");
-        return;
-    };
+/// Draws three scenes by `render`, which is given the program's arguments and whether an adapter is asked for, and finds them as
+/// the reference has them. The adapter's name must hold `name`.
+fn draws_the_same_picture(name: &str, render: impl Fn(&[&str], bool) -> Output) {
     let folder = Folder::new();
     let [many, few, theirs, ours] = ["many.ply", "few.ply", "theirs.exr", "ours.exr"].map(|name| folder.path(name));
     succeeds(&["generate", "sphere", "--count", "20000", "-o", text(&many)]);
@@ -42,11 +31,14 @@ fn another_driver_draws_the_same_picture() {
     for scene in scenes {
         let render = |out: &Path, backend: &str, maps: &str| {
             let rest = ["--size", "96x96", "--aov", maps, "--json", "-", "--backend", backend, "-o", text(out)];
-            on_swiftshader(driver, &[&["render"], scene, &rest].concat())
+            let arguments = [&["render"], scene, &rest].concat();
+            let output = render(&arguments, backend == "gpu");
+            assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+            output
         };
         let output = render(&theirs, "gpu", "depth,weight,count");
-        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-        assert!(report["adapter"].as_str().unwrap().contains("SwiftShader"), "{report}");
+        let told = String::from_utf8(output.stderr).unwrap();
+        assert!(told.lines().any(|line| line.starts_with("rendering on ") && line.contains(name)), "{told}");
         render(&ours, "reference", "depth,weight,count,decision");
         let output = succeeds(&["compare", text(&theirs), text(&ours), "--json", "-"]);
         let comparison: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -55,6 +47,59 @@ fn another_driver_draws_the_same_picture() {
         assert!(comparison["rmse_decided"].as_f64().unwrap() < 1e-6, "{scene:?}: {comparison}");
         assert!(comparison["excused"].as_f64().unwrap() < 0.01, "{scene:?}: {comparison}");
     }
+}
+
+#[test]
+fn another_driver_draws_the_same_picture() {
+    let Some(driver) = DRIVERS.into_iter().find(|driver| Path::new(driver).exists()) else {
+        eprintln!("skipped: Chromium's SwiftShader is not at {DRIVERS:?}");
+        return;
+    };
+    draws_the_same_picture("SwiftShader", |arguments, _| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_epsplat"));
+        command.env("VK_DRIVER_FILES", driver).env("VK_ICD_FILENAMES", driver).args(arguments).output().unwrap()
+    });
+}
+
+/// OpenGL comes last where it is not asked for; asked for it draws, whatever others there are.
+#[test]
+fn opengl_draws_the_same_picture() {
+    if common::opengl().is_none() {
+        return;
+    }
+    draws_the_same_picture("(gl,", |arguments, adapter| {
+        epsplat(&[arguments, if adapter { &["--adapter", "gl"] } else { &[] }].concat())
+    });
+}
+
+#[test]
+fn an_adapter_is_chosen_by_its_api_or_by_a_part_of_its_name() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let folder = Folder::new();
+    let (scene, image) = (folder.path("s.ply"), folder.path("s.png"));
+    succeeds(&["generate", "sphere", "--count", "10", "-o", text(&scene)]);
+    let all = epsplat::gpu::adapters();
+    let best = |chosen: &dyn Fn(&AdapterDescription) -> bool| {
+        let found = all.iter().find(|adapter| adapter.usable && chosen(adapter));
+        found.map(|adapter| format!("rendering on {} ({}, {})", adapter.name, adapter.api, adapter.kind))
+    };
+    let check = |name: &str, expected: Option<String>| {
+        let output = epsplat(&["render", text(&scene), "-o", text(&image), "--size", "8x8", "--adapter", name]);
+        let told = String::from_utf8(output.stderr).unwrap();
+        match expected {
+            Some(line) => assert!(output.status.success() && told.lines().any(|l| l == line), "{name}: {line}: {told}"),
+            None => assert!(output.status.code() == Some(1) && told.contains(&format!("{name:?}")), "{name}: {told}"),
+        }
+    };
+    for (name, api) in [("vulkan", "vulkan"), ("gl", "gl"), ("OpenGL", "gl"), ("metal", "metal"), ("DX12", "dx12")] {
+        check(name, best(&|adapter| adapter.api == api));
+    }
+    for adapter in &all {
+        check(&adapter.name.to_uppercase(), best(&|other| other.name.contains(&adapter.name)));
+    }
+    check("no such adapter", None);
 }
 
 /// A card reads its own clock, shares nothing by subgroups, and has its large splats alone drawn by tiles.

@@ -5,7 +5,7 @@
 mod common;
 
 use epsplat::frame::Frame;
-use epsplat::gpu::Sources;
+use epsplat::gpu::{Gpu, Sources};
 use epsplat::hardcases::{HardCase, Row, Truth, cases, judge};
 use epsplat::passes::accumulate::{Accumulator, Features};
 use epsplat::render::{Backend, Report, render};
@@ -60,17 +60,42 @@ fn kept(row: &Row) -> bool {
 
 #[test]
 fn exact_depths_lose_no_more_than_the_formats_bound() {
-    let Some(gpu) = common::gpu() else { return };
-    let blends_f32 = gpu.adapter.blends_f32;
-    let backend = Backend::gpu(gpu);
-    for (case, truth) in all_cases() {
-        for (format, runs) in [(BlendFormat::Rgba32Float, blends_f32), (BlendFormat::Rgba16Float, true)] {
-            if runs {
-                let row = judged(&case, &truth, format, &backend);
-                assert!(kept(&row), "{} in {}: {row:#?}", case.name, format.name());
+    let cases = all_cases();
+    for gpu in [common::gpu(), common::opengl()].into_iter().flatten() {
+        let blends_f32 = gpu.adapter.blends_f32;
+        let name = format!("{} ({})", gpu.adapter.name, gpu.adapter.api);
+        let backend = Backend::gpu(gpu);
+        for (case, truth) in &cases {
+            for (format, runs) in [(BlendFormat::Rgba32Float, blends_f32), (BlendFormat::Rgba16Float, true)] {
+                if runs {
+                    let row = judged(case, truth, format, &backend);
+                    assert!(kept(&row), "{} in {} on {name}: {row:#?}", case.name, format.name());
+                }
             }
         }
     }
+}
+
+/// What an adapter cannot draw it refuses, in a sentence that says what to take instead.
+#[test]
+fn what_an_adapter_cannot_draw_is_refused() {
+    let (case, _) = all_cases().into_iter().find(|(case, _)| case.name == "intersecting sheets").unwrap();
+    let refused = |gpu: Gpu, format, depth, words: &str| {
+        let backend = Backend::gpu(gpu);
+        let options = options(&case, format, depth);
+        let error = render(&case.scene, &case.camera, &options, &backend, &()).unwrap_err().to_string();
+        assert!(error.contains(words), "{words}: {error}");
+    };
+    for depth in [RasterDepth::Offset, RasterDepth::Ray] {
+        let Some(gpu) = common::opengl() else { break };
+        refused(gpu, BlendFormat::Rgba16Float, depth, "take --raster-depth exact");
+    }
+    let Some(mut gpu) = common::gpu() else { return };
+    gpu.adapter.blends_f32 = false;
+    refused(gpu, BlendFormat::Rgba32Float, RasterDepth::Exact, "take --blend-format rgba16float");
+    let Some(mut gpu) = common::gpu() else { return };
+    gpu.adapter.vertex_storage = false;
+    refused(gpu, BlendFormat::Rgba16Float, RasterDepth::Exact, "take --backend gpu");
 }
 
 #[test]

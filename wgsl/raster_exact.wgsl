@@ -1,7 +1,7 @@
 // Depths are written and compared in the fragment shader, bit for bit as the compute path does: the rasteriser keeps the
-// nearest depth, the attribute pass reads it.
+// nearest depth, the attribute pass reads it. Not as a `texture_depth_2d`: GLSL can only compare with those.
 
-@group(0) @binding(19) var nearest_depth: texture_depth_2d;
+@group(0) @binding(19) var nearest_depth: texture_2d<f32>;
 
 fn corner_depth(splat: Splat, image: vec2<f32>, index: u32) -> f32 {
     return 0.0;
@@ -19,7 +19,7 @@ fn raster_visibility(corner: Corner) -> @builtin(frag_depth) f32 {
 
 fn front_at(pixel: u32) -> f32 {
     let place = vec2<u32>(pixel % held.width, pixel / held.width + held_band.first_row);
-    let depth = textureLoad(nearest_depth, place, 0);
+    let depth = textureLoad(nearest_depth, place, 0).x;
     return select(depth / depth_scale(), bitcast<f32>(NOTHING ^ held.zero), depth == 1.0);
 }
 

@@ -36,8 +36,8 @@ pub struct Arguments {
     /// Print Markdown instead: time as a multiple of the baseline's, errors, same bits, which adapters
     #[arg(long)]
     table: bool,
-    /// Part of the adapter's name, as `epsplat adapters` lists them
-    #[arg(long, value_name = "SUBSTRING")]
+    /// An API (vulkan, gl, metal, dx12) or part of an adapter's name, as `epsplat adapters` lists them
+    #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
 }
 

@@ -29,8 +29,8 @@ pub struct Arguments {
     /// Only this accumulator; else all that the adapter has
     #[arg(long, value_name = "NAME")]
     accumulator: Option<String>,
-    /// Part of the adapter's name, as `epsplat adapters` lists them
-    #[arg(long, value_name = "SUBSTRING")]
+    /// An API (vulkan, gl, metal, dx12) or part of an adapter's name, as `epsplat adapters` lists them
+    #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
     /// Only cases whose name contains this
     #[arg(long, value_name = "SUBSTRING")]

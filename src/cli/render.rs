@@ -54,7 +54,7 @@ pub struct Arguments {
     /// Who renders
     #[arg(long, value_enum, default_value_t = BackendName::Auto)]
     backend: BackendName,
-    /// Part of the adapter's name, as `epsplat adapters` lists them
+    /// An API (vulkan, gl, metal, dx12) or part of an adapter's name, as `epsplat adapters` lists them
     #[arg(long)]
     adapter: Option<String>,
     /// Camera position, world coordinates

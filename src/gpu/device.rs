@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 pub struct AdapterDescription {
     /// Its name, as `--adapter` matches it.
     pub name: String,
-    /// vulkan, gl, metal, dx12.
+    /// vulkan, gl, metal, dx12, as `--adapter` matches it too.
     pub api: String,
     /// discrete, integrated, virtual, software or other.
     pub kind: &'static str,
@@ -39,6 +39,8 @@ pub struct AdapterDescription {
     pub blends_f32: bool,
     /// Operations of subgroups that have at least [`TILE_WIDTH`] invocations each.
     pub subgroups: bool,
+    /// Vertex shaders read storage buffers, as the rasteriser's do.
+    pub vertex_storage: bool,
     /// It has all that rendering needs.
     pub usable: bool,
 }
@@ -53,7 +55,7 @@ impl AdapterDescription {
             wgpu::DeviceType::Cpu => "software",
             wgpu::DeviceType::Other => "other",
         };
-        let compute = adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS);
+        let able = adapter.get_downlevel_capabilities().flags;
         Self {
             name: info.name,
             api: info.backend.to_str().to_owned(),
@@ -69,7 +71,8 @@ impl AdapterDescription {
             atomics_f32: features.contains(wgpu::Features::SHADER_FLOAT32_ATOMIC),
             blends_f32: features.contains(wgpu::Features::FLOAT32_BLENDABLE),
             subgroups: features.contains(wgpu::Features::SUBGROUP) && info.subgroup_min_size >= TILE_WIDTH,
-            usable: compute
+            vertex_storage: able.contains(wgpu::DownlevelFlags::VERTEX_STORAGE),
+            usable: able.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
                 && limits.max_storage_buffers_per_shader_stage >= STORAGE_BUFFERS
                 && limits.max_compute_invocations_per_workgroup >= WORKGROUP.max(TILE * TILE)
                 && limits.max_compute_workgroup_size_x >= WORKGROUP.max(TILE)
@@ -87,6 +90,17 @@ impl AdapterDescription {
             _ => 4,
         };
         kind + if self.api == "gl" { 10 } else { 0 } + if self.usable { 0 } else { 100 }
+    }
+
+    /// Whether `--adapter name` means this one: an API's name is all adapters of that API and no others, so that `gl` is not
+    /// found in the middle of a word; any other name is a part of the adapter's own.
+    fn is_meant_by(&self, name: &str) -> bool {
+        let name = name.to_lowercase();
+        match name.as_str() {
+            "vulkan" | "gl" | "metal" | "dx12" => self.api == name,
+            "opengl" => self.api == "gl",
+            _ => self.name.to_lowercase().contains(&name),
+        }
     }
 }
 
@@ -138,11 +152,10 @@ pub struct Gpu {
 }
 
 impl Gpu {
-    /// Opens the best adapter, or the best whose name contains `name` (case-insensitive).
+    /// Opens the best adapter; or the best of the API that is called `name` (vulkan, gl or opengl, metal, dx12); or, if none
+    /// is, the best whose own name contains `name`. Case does not matter.
     pub fn open(name: Option<&str>) -> Result<Self> {
-        let wanted = |d: &AdapterDescription| {
-            d.usable && name.is_none_or(|name| d.name.to_lowercase().contains(&name.to_lowercase()))
-        };
+        let wanted = |d: &AdapterDescription| d.usable && name.is_none_or(|name| d.is_meant_by(name));
         // GL is asked last and only if it must be: its libraries complain on stderr where there is no display.
         let mut all = enumerate(wgpu::Backends::all() - wgpu::Backends::GL);
         if !all.iter().any(|(d, _)| wanted(d)) {
@@ -152,7 +165,9 @@ impl Gpu {
         let Some((adapter, handle)) = all.into_iter().find(|(d, _)| wanted(d)) else {
             return Err(Error::NoAdapter(match (name, known.is_empty()) {
                 (_, true) => format!("no graphics adapter was found: {INSTALL_HINT}"),
-                (Some(name), false) => format!("no usable adapter is called {name:?}; there are: {known}"),
+                (Some(name), false) => {
+                    format!("no usable adapter has the API or the name {name:?}; there are: {known}")
+                }
                 (None, false) => format!("no adapter can run compute kernels ({known}): {INSTALL_HINT}"),
             }));
         };
@@ -224,5 +239,48 @@ impl Gpu {
     /// Bytes that one buffer and one binding of it may have.
     pub fn buffer_limit(&self) -> u64 {
         self.limits.max_storage_buffer_binding_size.min(self.limits.max_buffer_size)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_api_is_no_part_of_a_name() {
+        let adapter = |name: &str, api: &str| AdapterDescription {
+            name: name.to_owned(),
+            api: api.to_owned(),
+            kind: "software",
+            driver: String::new(),
+            max_storage_buffer_binding_size: 0,
+            max_buffer_size: 0,
+            max_compute_workgroups_per_dimension: 0,
+            max_storage_buffers_per_shader_stage: 0,
+            timestamps: false,
+            atomics_u64: false,
+            integers_u64: false,
+            atomics_f32: false,
+            blends_f32: false,
+            subgroups: false,
+            vertex_storage: false,
+            usable: true,
+        };
+        let all =
+            [adapter("Google SwiftShader", "vulkan"), adapter("Mesa OpenGL on Vulkan", "gl"), adapter("M4", "metal")];
+        let meant = |name: &str| all.each_ref().map(|adapter| adapter.is_meant_by(name));
+        for (name, expected) in [
+            ("gl", [false, true, false]),
+            ("OpenGL", [false, true, false]),
+            ("Vulkan", [true, false, false]),
+            ("METAL", [false, false, true]),
+            ("dx12", [false, false, false]),
+            ("swift", [true, false, false]),
+            ("ogl", [true, false, false]),
+            ("on vulkan", [false, true, false]),
+            ("s", [true, true, false]),
+        ] {
+            assert_eq!(meant(name), expected, "{name}");
+        }
     }
 }

@@ -9,7 +9,8 @@
 //!   It accepts the very fragments that compute accepts.
 //! - **offset**, **ray**: the quads lie in the disks' planes, the rasteriser interpolates and compares. Depths err by its
 //!   interpolation (a fragment within about 2^-20 of epsilon may be decided otherwise), absolute tolerances are applied at
-//!   the quads' corners, and a plane that passes the eye within its quad is bent.
+//!   the quads' corners, and a plane that passes the eye within its quad is bent. OpenGL has no such depths: it takes them
+//!   from -1 to 1, of which those far from the eye, all near the end that is 0 elsewhere, keep no digits.
 //!
 //! **Error.** A sum of n terms in a format of unit roundoff r, in the rasteriser's order, errs by at most `n r` of itself
 //! if the format is floating (r = 2^-11 or 2^-24), so a mean by `2 n r + 4 u`; in 8 bits each of the n sums errs by half a
@@ -131,6 +132,14 @@ pub fn check(gpu: &Gpu, raster: Raster, needs: &SceneNeeds, camera: &Camera) -> 
         return Err(Error::Usage(
             "the rasteriser blends no texture coordinates: leave the texture out, or render by compute".into(),
         ));
+    }
+    if !gpu.adapter.vertex_storage {
+        return Err(gpu.error("vertex shaders cannot read the splats here: take --backend gpu, or another --adapter"));
+    }
+    if raster.depth != RasterDepth::Exact && gpu.adapter.api == "gl" {
+        return Err(
+            gpu.error("OpenGL interpolates depths too coarsely: take --raster-depth exact, or another --adapter")
+        );
     }
     if raster.format == BlendFormat::Rgba32Float && !gpu.adapter.blends_f32 {
         return Err(gpu.error("this adapter does not blend into 32-bit floats: take --blend-format rgba16float"));

@@ -21,13 +21,20 @@ pub const UNIT: f64 = 1.0 / ONE as f64;
 
 /// The adapter, or `None` with a line on stderr where there is none and none is required.
 pub fn gpu() -> Option<Gpu> {
-    match Gpu::open(std::env::var("EPSPLAT_TEST_ADAPTER").ok().as_deref()) {
+    open(std::env::var("EPSPLAT_TEST_ADAPTER").ok().as_deref(), "EPSPLAT_REQUIRE_ADAPTER")
+}
+
+/// An adapter that is reached through OpenGL, whatever others there are; `None` as of [`gpu`].
+pub fn opengl() -> Option<Gpu> {
+    open(Some("gl"), "EPSPLAT_REQUIRE_OPENGL")
+}
+
+fn open(name: Option<&str>, required: &str) -> Option<Gpu> {
+    match Gpu::open(name) {
         Ok(gpu) => Some(gpu),
-        Err(error) if std::env::var("EPSPLAT_REQUIRE_ADAPTER").is_ok_and(|v| v == "1") => {
-            panic!("EPSPLAT_REQUIRE_ADAPTER=1, but {error}")
-        }
+        Err(error) if std::env::var(required).is_ok_and(|v| v == "1") => panic!("{required}=1, but {error}"),
         Err(_) => {
-            eprintln!("skipped: no adapter");
+            eprintln!("skipped: no adapter{}", name.map_or_else(String::new, |name| format!(" called {name}")));
             None
         }
     }

@@ -9,6 +9,7 @@ mod hardcases;
 mod info;
 mod parse;
 mod progress;
+mod reading;
 mod render;
 mod sample;
 mod simplify;

@@ -9,6 +9,7 @@ use epsplat::{Error, Result};
 
 use super::note;
 use super::progress::Bars;
+use super::reading::InputFormat;
 
 /// Write surfels that cover a mesh as PLY: on its triangles, with normals, radii, and its colours and texture coordinates.
 ///
@@ -17,8 +18,10 @@ use super::progress::Bars;
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat sample bunny.obj -o surfels.ply --count 60000")]
 pub struct Arguments {
-    /// The mesh: .obj or .ply
+    /// The mesh: .obj or .ply; - is standard input
     mesh: PathBuf,
+    #[command(flatten)]
+    input: InputFormat,
     /// The file: .ply
     #[arg(short, long)]
     output: PathBuf,
@@ -55,7 +58,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         return Err(Error::Usage(format!("the output must end in .ply, {} does not", arguments.output.display())));
     }
     let bars = Bars::new();
-    let mut mesh = io::read_mesh(&arguments.mesh, &bars)?;
+    let mut mesh = arguments.input.mesh(&arguments.mesh, &bars)?;
     mesh.notes.iter().for_each(|line| note(line));
     if let Some(path) = &arguments.texture {
         if mesh.texture.is_none() {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use epsplat::io::{self, Points, ply};
+use epsplat::io::{Points, ply};
 use epsplat::scene::{Colors, Scene, Surfel};
 use epsplat::surfels;
 use epsplat::surfels::simplify::{Options, Report, SplatShape, Tolerance, simplify};
@@ -11,6 +11,7 @@ use epsplat::{Error, Result};
 use glam::Vec3;
 
 use super::progress::Bars;
+use super::reading::{Reading, help_of};
 use super::{note, print, write_json};
 
 /// Replace the surfels of a smooth surface by fewer, larger ones that lie within a tolerance of them, without holes.
@@ -22,9 +23,10 @@ use super::{note, print, write_json};
     after_help = "Example:\n  epsplat simplify scan.ply -o small.ply --tolerance rel:0.0005 --shape ellipse --relax 3"
 )]
 pub struct Arguments {
-    /// Point clouds or meshes, of which the vertices are taken: .ply, .las, .laz, .obj
-    #[arg(required = true)]
+    #[arg(required = true, help = help_of("Point clouds or meshes, of which the vertices are taken"))]
     inputs: Vec<PathBuf>,
+    #[command(flatten)]
+    reading: Reading,
     /// The file: .ply
     #[arg(short, long)]
     output: PathBuf,
@@ -55,7 +57,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         return Err(Error::Usage(format!("the output must end in .ply, {} does not", arguments.output.display())));
     }
     let bars = Bars::new();
-    let inputs = arguments.inputs.iter().map(|path| io::read(path, &bars)).collect::<Result<Vec<_>>>()?;
+    let inputs = arguments.reading.all(&arguments.inputs, &bars)?;
     let (scene, preparation) = surfels::build(inputs, &bars)?;
     preparation.notes().iter().for_each(|line| note(line));
     if preparation.estimated_normals > 0 {

@@ -339,6 +339,7 @@ fn points_with(attributes: u32) -> Points {
         },
         texture: on(6).then(|| all.map(|i| [real(i, 6), real(i, 7)]).collect()),
         up: None,
+        withheld: 0,
     }
 }
 

@@ -1,10 +1,11 @@
 //! MTL: what the triangles of an OBJ file are made of.
 
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::encoding;
 use crate::io::values::{BYTE_ORDER_MARK, finite, one_line};
 use crate::io::{Material, Texture};
 
@@ -50,7 +51,8 @@ pub(super) fn read(path: &Path, libraries: &[String], names: &[String], notes: &
 
 fn definitions(path: &Path) -> io::Result<Vec<tobj::Material>> {
     let mut bytes = Vec::new();
-    File::open(path)?.take(LONGEST).read_to_end(&mut bytes)?;
+    let (reader, _) = encoding::decoded(BufReader::new(File::open(path)?), LONGEST)?;
+    reader.take(LONGEST).read_to_end(&mut bytes)?;
     let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&bytes);
     // At one line that it cannot read the parser gives up on all materials, so it is given no other lines than it must.
     let read = |line: &&str| matches!(line.split_whitespace().next(), Some("newmtl" | "Kd" | "d" | "map_Kd"));

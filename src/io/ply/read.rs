@@ -6,9 +6,8 @@ use super::{ascii, binary};
 use crate::io::fault::{self, Fault};
 use crate::io::triangles;
 use crate::io::values::shown;
-use crate::io::{Material, Mesh, Points, Texture};
+use crate::io::{Input, Material, Mesh, Points, Texture};
 use crate::{Progress, Result};
-use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 use std::sync::Arc;
@@ -35,8 +34,8 @@ use std::sync::Arc;
 /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where
 /// the header is not PLY's, `x`, `y` or `z` is missing, the file ends before the vertices or faces that its header
 /// promises, a number in text is none, a list has a negative length, or a face names a vertex that does not exist.
-pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
-    let (mut points, faces, _) = contents(path, false, progress)?;
+pub fn read(input: Input, progress: &dyn Progress) -> Result<Points> {
+    let (mut points, faces, _) = contents(input, false, progress)?;
     if faces.triangles.is_empty() {
         return Ok(points);
     }
@@ -58,8 +57,9 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
 /// # Errors
 ///
 /// As [`read`].
-pub fn read_mesh(path: &Path, progress: &dyn Progress) -> Result<Mesh> {
-    let (points, faces, textures) = contents(path, true, progress)?;
+pub fn read_mesh(input: Input, progress: &dyn Progress) -> Result<Mesh> {
+    let folder = input.path.parent().unwrap_or(Path::new("")).to_owned();
+    let (points, faces, textures) = contents(input, true, progress)?;
     let Triangles { triangles, texture, texture_numbers } = faces;
     fn corners<T: Copy>(triangles: &[[u32; 3]], of_vertices: &[T]) -> Vec<[T; 3]> {
         triangles.iter().map(|corners| corners.map(|vertex| of_vertices[vertex as usize])).collect()
@@ -67,7 +67,7 @@ pub fn read_mesh(path: &Path, progress: &dyn Progress) -> Result<Mesh> {
     let texture = texture.or_else(|| points.texture.map(|texture| corners(&triangles, &texture)));
     let mut notes = Vec::new();
     let mut material = |name: String| {
-        let read = Texture::read(&path.parent().unwrap_or(Path::new("")).join(name.replace('\\', "/")));
+        let read = Texture::read(&folder.join(name.replace('\\', "/")));
         let image = read.map(Arc::new).map_err(|error| notes.push(format!("a texture is left out: {error}"))).ok();
         Material { name, diffuse: [1.0; 4], texture: image }
     };
@@ -95,16 +95,15 @@ pub(super) struct Contents {
 
 /// The vertices, the triangles, which name vertices that exist, and the names of textures. With `surface`, faces may have texture
 /// coordinates.
-fn contents(path: &Path, surface: bool, progress: &dyn Progress) -> Result<(Points, Triangles, Vec<String>)> {
-    let in_file = |fault: Fault| fault.of(path);
-    let file = File::open(path).map_err(Fault::Io).map_err(in_file)?;
-    let length = file.metadata().map_err(Fault::Io).map_err(in_file)?.len();
+fn contents(input: Input, surface: bool, progress: &dyn Progress) -> Result<(Points, Triangles, Vec<String>)> {
+    let Input { file, length, path, .. } = input;
+    let in_file = |fault: Fault| fault.of(&path);
     let mut reader = BufReader::with_capacity(1 << 16, file);
     let header = header::read(&mut reader).map_err(in_file)?;
     let Some(vertex) = header.elements.iter().find(|element| element.name == "vertex") else {
         return Err(in_file(Fault::Malformed("its header has no element 'vertex'".into())));
     };
-    progress.begin(&format!("reading {}", fault::name(path)), vertex.count);
+    progress.begin(&format!("reading {}", fault::name(&path)), vertex.count);
     let contents = match header.encoding {
         Encoding::Ascii => ascii::read(reader, &header, length, Faces::new(surface), progress),
         Encoding::LittleEndian => binary::read::<false>(reader, &header, length, Faces::new(surface), progress),

@@ -12,6 +12,9 @@ use std::io::{BufReader, Read, Seek, SeekFrom};
 /// A decoded chunk larger than this is decoded by one thread, which needs no buffer for it.
 const CHUNK_LIMIT: u64 = 1 << 28;
 
+/// No byte is more points than this: at its cheapest a point is a symbol of 64 whose probability is 1 - 63 / 2^15, 0.0028 bits.
+const MOST_A_BYTE: u64 = 1 << 12;
+
 /// Where a LASzip record has the points per chunk.
 const CHUNK_SIZE: usize = 12;
 
@@ -73,6 +76,11 @@ pub(super) fn check(file: &mut BufReader<Shown>, header: &Header, length: u64) -
         if start.saturating_add(record) > length {
             return malformed(format!("{} the first of them", early(promised, length)));
         }
+        if promised / MOST_A_BYTE > length {
+            return malformed(format!(
+                "the header promises {promised} points, more than a file of {length} bytes can hold"
+            ));
+        }
         // One run of all points has no use for a chunk size, but the decoder takes none at all for a table of chunks.
         file.get_mut().show(at + CHUNK_SIZE as u64, &u32::to_le_bytes(1));
         return Ok(Decoding::Sequential);
@@ -96,7 +104,9 @@ fn laszip_record(file: &mut (impl Read + Seek), header: &Header) -> Result<Optio
         let Ok(record) = Vlr::read_from(&mut *file, false) else {
             return malformed("it ends inside its variable-length records");
         };
-        if record.record_id == 22204 && record.user_id.starts_with(b"laszip encoded") {
+        // The very record that the decoder takes: any other could have another follow that nobody checked.
+        let name = record.user_id.split(|byte| *byte == 0).next();
+        if record.record_id == 22204 && name == Some(b"laszip encoded") {
             return Ok(Some((file.stream_position()? - record.data.len() as u64, record.data)));
         }
     }

@@ -148,7 +148,7 @@ fn withheld(block: &PointData) -> impl Iterator<Item = bool> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
+    #![allow(clippy::unwrap_used, clippy::panic)]
     use super::*;
     use las::point::Format;
     use las::{Builder, Writer};
@@ -177,5 +177,35 @@ mod tests {
         std::fs::write(&path, &bytes).unwrap();
         let points = read(Input::open(&path, None).unwrap(), false, &()).unwrap();
         assert_eq!((points.positions.len(), points.up), (0, Some(Up::Z)));
+    }
+
+    /// Panics of a decoder are not printed, on whatever thread of its pool; others are. Seen from outside, in a process of its own.
+    #[test]
+    fn a_decoders_panic_is_not_printed() {
+        const WHOSE: &str = "EPSPLAT_TEST_PANIC";
+        fn panics() -> Result<(), Fault> {
+            rayon::join(|| -> () { panic!("on this thread") }, || -> () { panic!("on another, or this one") });
+            Ok(())
+        }
+        if let Ok(whose) = std::env::var(WHOSE) {
+            assert!(matches!(deep(panics), Err(Fault::Malformed(_))));
+            if whose == "ours" {
+                assert!(std::panic::catch_unwind(|| panic!("of our own")).is_err());
+            }
+            return;
+        }
+        let printed = |whose: &str| {
+            let mut command = std::process::Command::new(std::env::current_exe().unwrap());
+            command
+                .args(["--exact", "io::las::tests::a_decoders_panic_is_not_printed", "--nocapture"])
+                .env(WHOSE, whose);
+            let output = command.output().unwrap();
+            assert!(output.status.success(), "{output:?}");
+            let stderr = String::from_utf8(output.stderr).unwrap();
+            (stderr.matches("panicked at").count(), stderr)
+        };
+        assert_eq!(printed("a decoder's"), (0, String::new()));
+        let (count, stderr) = printed("ours");
+        assert!(count == 1 && stderr.contains("of our own"), "{stderr}");
     }
 }

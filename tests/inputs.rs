@@ -143,14 +143,17 @@ fn deleted_points_are_left_out_and_told_or_kept_by_every_command() {
         let told = |more: &[&str]| {
             let Output { stdout, stderr, .. } = succeeds(&[command, more].concat());
             let said = [stdout, stderr].map(|bytes| String::from_utf8(bytes).unwrap()).concat();
-            (said.lines().filter(|line| line.contains("withheld")).map(str::to_owned).collect::<Vec<_>>(), said)
+            (said.lines().filter(|line| line.contains("are marked")).map(str::to_owned).collect::<Vec<_>>(), said)
         };
         let expected =
             "100 points were left out: they are marked as withheld, which is deleted (--keep-withheld keeps them)";
         let (lines, said) = told(&[]);
         assert_eq!(lines, [expected], "{command:?}");
         let (lines, kept) = told(&["--keep-withheld"]);
-        assert!(lines.is_empty() && kept.contains("300") && !said.contains("300"), "{command:?}: {said}{kept}");
+        assert!(
+            lines.is_empty() && kept.contains("300 surfels") && !said.contains("300 surfels"),
+            "{command:?}: {said}{kept}"
+        );
     }
     let of = |more: &[&str]| info(epsplat(&[&["info", cloud, "--json", "-"], more].concat()));
     let (left_out, kept) = (of(&[]), of(&["--keep-withheld"]));

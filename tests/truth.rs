@@ -293,7 +293,7 @@ fn obj_files_keep_their_normals_and_colors() {
 fn the_bunny_of_surfels_is_the_bunny_of_triangles() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/bunny.obj");
     let points = epsplat::io::read(&path, &()).unwrap();
-    let mut mesh = epsplat::io::obj::read_mesh(&path, &()).unwrap();
+    let mut mesh = epsplat::io::read_mesh(&path, &()).unwrap();
     assert_eq!((mesh.positions.len(), mesh.triangles.len()), (1839, 3674));
     let (scene, _) = epsplat::surfels::build(vec![points.clone()], &()).unwrap();
     let camera = Camera::framing((200, 200), Lens::Fov(45.0), &scene, Camera::default_near(&scene)).unwrap();

@@ -12,6 +12,7 @@ use epsplat::{Error, Progress, Result, io};
 use serde::Serialize;
 
 use super::progress::Bars;
+use super::reading::{Reading, help_of};
 use super::{note, outputs, print, write_json};
 
 /// Whether surfels cover the mesh that they stand for, and how far they lie from it.
@@ -22,9 +23,10 @@ use super::{note, outputs, print, write_json};
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat coverage surfels.ply --mesh bunny.obj --json -")]
 pub struct Arguments {
-    /// Files of surfels, or of points, whose radii are estimated
-    #[arg(required = true)]
+    #[arg(required = true, help = help_of("Files of surfels, or of points, whose radii are estimated"))]
     surfels: Vec<PathBuf>,
+    #[command(flatten)]
+    reading: Reading,
     /// The mesh that they stand for: .obj or .ply
     #[arg(long)]
     mesh: PathBuf,
@@ -55,7 +57,7 @@ struct Outcome {
 pub fn run(arguments: &Arguments) -> Result<()> {
     outputs::check(arguments.surfels.iter().chain([&arguments.mesh]), &arguments.json)?;
     let bars = Bars::new();
-    let points = arguments.surfels.iter().map(|path| io::read(path, &bars)).collect::<Result<Vec<_>>>()?;
+    let points = arguments.reading.all(&arguments.surfels, &bars)?;
     let (scene, preparation) = build(points, &bars)?;
     preparation.notes().iter().for_each(|line| note(line));
     if preparation.estimated_radii > 0 {

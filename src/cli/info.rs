@@ -4,21 +4,24 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use epsplat::io::{self, Points};
+use epsplat::io::Points;
 use epsplat::scene::Colors;
 use epsplat::surfels::{self, Coverage, Preparation};
 use epsplat::{Error, Result};
 use serde::Serialize;
 
 use super::progress::Bars;
+use super::reading::{Reading, help_of};
 use super::{outputs, print, write_json};
 
 /// What a file holds, and what a renderer would make of it.
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat info scan.laz")]
 pub struct Arguments {
-    /// A point cloud or mesh
+    #[arg(help = help_of("A point cloud or mesh"))]
     input: PathBuf,
+    #[command(flatten)]
+    reading: Reading,
     /// The same as JSON, to a file or - for stdout
     #[arg(long, value_name = "FILE|-")]
     json: Option<PathBuf>,
@@ -54,7 +57,7 @@ struct Info {
 pub fn run(arguments: &Arguments) -> Result<()> {
     outputs::check([&arguments.input], &arguments.json)?;
     let bars = Bars::new();
-    let points = io::read(&arguments.input, &bars)?;
+    let points = arguments.reading.points(&arguments.input, &bars)?;
     let texture = points.texture.is_some();
     let held = (points.positions.len() as u64, points.normals.is_some(), points.radii.is_some(), colors(&points));
     let (scene, preparation) = surfels::build(vec![points], &bars)
@@ -68,10 +71,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         (coverage.is_some_and(|coverage| coverage.covered < COVERED), "surfels that close the surface"),
     ];
     let mut lacks: Vec<_> = lacking.into_iter().filter(|(lacks, _)| *lacks).map(|(_, what)| what).collect();
-    let supplied_by = (!lacks.is_empty()).then(|| {
-        let input = arguments.input.display();
-        format!("epsplat surfels {input} -o {}", arguments.input.with_extension("surfels.ply").display())
-    });
+    let supplied_by = (!lacks.is_empty()).then(|| supplied_by(arguments));
     lacks.extend((held.3 == "none").then_some("colours"));
     let info = Info {
         points: held.0,
@@ -96,6 +96,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Some(path) => write_json(path, &info),
         None => print(&table(&arguments.input, &info)),
     }
+}
+
+/// The command that makes surfels of the input.
+fn supplied_by(arguments: &Arguments) -> String {
+    let Arguments { input, reading, .. } = arguments;
+    // Beside a pipe is no place for a file.
+    let output = if input.is_file() { input.with_extension("surfels.ply") } else { PathBuf::from("surfels.ply") };
+    format!("epsplat surfels {}{} -o {}", input.display(), reading.arguments(), output.display())
 }
 
 fn colors(points: &Points) -> &'static str {

@@ -10,6 +10,7 @@ mod info;
 mod outputs;
 mod parse;
 mod progress;
+mod reading;
 mod render;
 mod sample;
 mod signals;

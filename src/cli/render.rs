@@ -17,16 +17,17 @@ use epsplat::scene::{
     BlendFormat, Camera, Epsilon, Kernel, Light, LowPass, Maps, Organisation, Raster, RasterDepth, RenderOptions,
     Scene, Shading,
 };
-use epsplat::{Error, Result, io, surfels};
+use epsplat::{Error, Result, surfels};
 use glam::DVec3;
 
 use self::output::{Format, note_overflows, summary};
 use self::view::View;
 use super::parse::{parse_accumulator, parse_color, parse_intrinsics, parse_scale, parse_size, parse_vector};
 use super::progress::Bars;
+use super::reading::{Reading, help_of};
 use super::{note, outputs, write_json};
 
-/// Render PLY, LAS, LAZ and OBJ files to a PNG or EXR image.
+/// Render point clouds and meshes to a PNG or EXR image.
 ///
 /// Without a camera the scene is framed from its bounds. Several inputs make one scene. With --cameras there is a picture for each
 /// camera of a file, in a folder; those that are written stay if a later one fails.
@@ -42,9 +43,10 @@ use super::{note, outputs, write_json};
     epsplat render scan.laz -o views --cameras transforms.json"
 )]
 pub struct Arguments {
-    /// Point clouds or meshes: .ply, .las, .laz, .obj
-    #[arg(required = true)]
+    #[arg(required = true, help = help_of("Point clouds or meshes"))]
     inputs: Vec<PathBuf>,
+    #[command(flatten)]
+    reading: Reading,
     /// The image: .png (8-bit sRGB) or .exr (linear f32, every map a layer); with --cameras the folder of the images
     #[arg(short, long)]
     output: PathBuf,
@@ -225,7 +227,7 @@ fn one(arguments: &Arguments) -> Result<()> {
 /// What all inputs hold, as one scene.
 fn scene(arguments: &Arguments, bars: &Bars) -> Result<Scene> {
     let texture = arguments.texture.as_deref().map(Texture::read).transpose()?;
-    let inputs = arguments.inputs.iter().map(|path| io::read(path, bars)).collect::<Result<Vec<_>>>()?;
+    let inputs = arguments.reading.all(&arguments.inputs, bars)?;
     let (scene, preparation) = match texture {
         None => surfels::build(inputs, bars)?,
         Some(texture) => {

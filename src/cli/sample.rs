@@ -8,6 +8,7 @@ use epsplat::surfels::sampling::{MOST, MeshSurface, Method, Priority, sample, vo
 use epsplat::{Error, Result};
 
 use super::progress::Bars;
+use super::reading::InputFormat;
 use super::{note, outputs};
 
 /// Write surfels that cover a mesh as PLY: on its triangles, with normals, radii, and its colours and texture coordinates.
@@ -17,8 +18,10 @@ use super::{note, outputs};
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat sample bunny.obj -o surfels.ply --count 60000")]
 pub struct Arguments {
-    /// The mesh: .obj or .ply
+    /// The mesh: .obj or .ply; - is standard input
     mesh: PathBuf,
+    #[command(flatten)]
+    input: InputFormat,
     /// The file: .ply
     #[arg(short, long)]
     output: PathBuf,
@@ -54,7 +57,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     io::ply::check_extension(&arguments.output)?;
     outputs::check([&arguments.mesh].into_iter().chain(&arguments.texture), [&arguments.output])?;
     let bars = Bars::new();
-    let mut mesh = io::read_mesh(&arguments.mesh, &bars)?;
+    let mut mesh = arguments.input.mesh(&arguments.mesh, &bars)?;
     mesh.notes.iter().for_each(|line| note(line));
     if let Some(path) = &arguments.texture {
         if mesh.texture.is_none() {

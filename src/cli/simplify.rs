@@ -4,12 +4,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 use epsplat::Result;
-use epsplat::io::{self, Points, ply};
+use epsplat::io::{Points, ply};
 use epsplat::scene::{Colors, Scene, Surfel};
 use epsplat::surfels;
 use epsplat::surfels::simplify::{Options, Report, SplatShape, Tolerance, simplify};
 
 use super::progress::Bars;
+use super::reading::{Reading, help_of};
 use super::{note, outputs, print, write_json};
 
 /// Replace the surfels of a smooth surface by fewer, larger ones that lie within a tolerance of them, without holes.
@@ -21,9 +22,10 @@ use super::{note, outputs, print, write_json};
     after_help = "Example:\n  epsplat simplify scan.ply -o small.ply --tolerance rel:0.0005 --shape ellipse --relax 3"
 )]
 pub struct Arguments {
-    /// Point clouds or meshes, of which the vertices are taken: .ply, .las, .laz, .obj
-    #[arg(required = true)]
+    #[arg(required = true, help = help_of("Point clouds or meshes, of which the vertices are taken"))]
     inputs: Vec<PathBuf>,
+    #[command(flatten)]
+    reading: Reading,
     /// The file: .ply
     #[arg(short, long)]
     output: PathBuf,
@@ -53,7 +55,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     ply::check_extension(&arguments.output)?;
     outputs::check(&arguments.inputs, [&arguments.output].into_iter().chain(&arguments.json))?;
     let bars = Bars::new();
-    let inputs = arguments.inputs.iter().map(|path| io::read(path, &bars)).collect::<Result<Vec<_>>>()?;
+    let inputs = arguments.reading.all(&arguments.inputs, &bars)?;
     let (scene, preparation) = surfels::build(inputs, &bars)?;
     preparation.notes().iter().for_each(|line| note(line));
     if preparation.estimated_normals > 0 {

@@ -3,12 +3,13 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use epsplat::io::{self, ply};
+use epsplat::io::ply;
 use epsplat::surfels::{FromPoints, Orientation, Size, from_points};
 use epsplat::{Error, Result};
 
 use super::parse::parse_orientation;
 use super::progress::Bars;
+use super::reading::{Reading, help_of};
 use super::{note, outputs};
 
 /// Make surfels of points: normals with a side, and disks or ellipses that cover the surface, kept as PLY.
@@ -18,9 +19,10 @@ use super::{note, outputs};
 #[command(after_help = "Examples:\n  epsplat surfels scan.laz -o scan.ply\n  \
     epsplat surfels left.ply right.ply -o room.ply --size ellipse --outliers 3 --orient 0,0,1.6 --orient 4.1,0,1.6")]
 pub struct Arguments {
-    /// Point clouds: PLY, LAS, LAZ, or the vertices of OBJ
-    #[arg(required = true)]
+    #[arg(required = true, help = help_of("Point clouds, or meshes, of which the vertices are taken"))]
     inputs: Vec<PathBuf>,
+    #[command(flatten)]
+    reading: Reading,
     /// The file: .ply
     #[arg(short, long)]
     output: PathBuf,
@@ -55,7 +57,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     outputs::check(&arguments.inputs, [&arguments.output])?;
     let bars = Bars::new();
-    let inputs = arguments.inputs.iter().map(|path| io::read(path, &bars)).collect::<Result<_>>()?;
+    let inputs = arguments.reading.all(&arguments.inputs, &bars)?;
     let surfels = from_points(inputs, &options, &bars)?;
     ply::write_points(&arguments.output, &surfels.points, &bars)?;
     for line in surfels.notes() {

@@ -2,14 +2,13 @@
 
 use std::fs::File;
 use std::io::{self, BufReader};
-use std::path::Path;
 
 use ::e57::{E57Reader, PointCloud, Record, RecordDataType, RecordName, RecordValue};
 use glam::{DQuat, DVec3};
 
 use crate::io::fault::{self, Fault, reserve, surviving};
 use crate::io::values::one_line;
-use crate::io::{Points, Up, intensity};
+use crate::io::{Input, Points, Up, intensity};
 use crate::scene::Colors;
 use crate::scene::color::{DEFAULT_COLOR, linear_to_srgb, srgb_to_linear};
 use crate::{Progress, Result};
@@ -27,10 +26,9 @@ const MOST_ATTRIBUTES: usize = 64;
 ///
 /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where the file
 /// is not E57, ends early, fails its checksums or cannot be decoded.
-pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
+pub fn read(input: Input, progress: &dyn Progress) -> Result<Points> {
+    let Input { file, length, path, .. } = input;
     let opened = surviving(|| {
-        let file = File::open(path)?;
-        let length = file.metadata()?.len();
         let reader = E57Reader::new(BufReader::with_capacity(1 << 18, file)).map_err(of_e57)?;
         let scans = reader.pointclouds();
         let (mut promised, mut left) = (0u64, length.saturating_mul(8));
@@ -40,8 +38,8 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
         }
         Ok((reader, scans, promised))
     });
-    let (mut reader, scans, promised) = opened.map_err(|fault| fault.of(path))?;
-    progress.begin(&format!("reading {}", fault::name(path)), promised);
+    let (mut reader, scans, promised) = opened.map_err(|fault| fault.of(&path))?;
+    progress.begin(&format!("reading {}", fault::name(&path)), promised);
     let points = surviving(|| {
         let any_normals = scans.iter().any(|scan| normal(scan).is_some());
         let mut reading = Reading { normals: any_normals.then(Vec::new), ..Reading::default() };
@@ -49,7 +47,7 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
         Ok(reading.into_points())
     });
     progress.end();
-    points.map_err(|fault| fault.of(path))
+    points.map_err(|fault| fault.of(&path))
 }
 
 /// The crate's failures that are the file's fault, told from the system's.

@@ -8,7 +8,9 @@ mod companions;
 pub mod e57;
 pub mod exr;
 mod fault;
+mod format;
 pub mod image;
+mod input;
 mod intensity;
 pub mod las;
 pub mod mesh;
@@ -25,17 +27,25 @@ mod values;
 pub mod write_behind;
 
 pub use companions::companions;
+pub use format::Format;
+pub use input::Input;
 pub use mesh::{Material, Mesh};
 pub use points::{Points, Up};
 pub use texture::Texture;
 
 use crate::{Error, Progress, Result};
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
-/// Reads any supported file: PLY, LAS, LAZ (COPC too), OBJ, and with the features of those names E57 and PCD, by its extension in
-/// either case, or else by its first bytes.
+/// How files are read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ReadOptions {
+    /// The format, whatever the file's name and first bytes say.
+    pub format: Option<Format>,
+    /// Points that a LAS file marks as withheld, which is deleted, are read like all others.
+    pub keep_withheld: bool,
+}
+
+/// Reads any supported file: PLY, LAS, LAZ (COPC too), OBJ, and with the features of those names E57 and PCD; see [`Input::open`].
 ///
 /// Points come in the file's own order and coordinates. A file with no points is no error here.
 ///
@@ -44,20 +54,22 @@ use std::path::Path;
 /// [`Error::Read`] for a missing file or a directory, [`Error::Malformed`] for a file that is none of these formats or
 /// is not what its format says.
 pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
-    let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
-    match extension.as_deref() {
-        Some("ply") => ply::read(path, progress),
-        Some("las" | "laz") => las::read(path, progress),
-        Some("obj") => obj::read(path, progress),
-        Some("e57") => read_e57(path, progress),
-        Some("pcd") => read_pcd(path, progress),
-        _ => match &magic(path).map_err(|error| Error::read(path, error))? {
-            b"ply\n" | b"ply\r" => ply::read(path, progress),
-            b"LASF" => las::read(path, progress),
-            b"ASTM" => read_e57(path, progress),
-            b"# .P" => read_pcd(path, progress),
-            _ => Err(Error::malformed(path, "its format is not known; PLY, LAS, LAZ, OBJ, E57 and PCD files are read")),
-        },
+    read_with(path, ReadOptions::default(), progress)
+}
+
+/// The same by `options`.
+///
+/// # Errors
+///
+/// As [`read`].
+pub fn read_with(path: &Path, options: ReadOptions, progress: &dyn Progress) -> Result<Points> {
+    let input = Input::open(path, options.format)?;
+    match input.format {
+        Format::Ply => ply::read(input, progress),
+        Format::Las => las::read(input, options.keep_withheld, progress),
+        Format::Obj => obj::read(input, progress),
+        Format::E57 => read_e57(input, progress),
+        Format::Pcd => read_pcd(input, progress),
     }
 }
 
@@ -67,13 +79,13 @@ use e57::read as read_e57;
 use pcd::read as read_pcd;
 
 #[cfg(not(feature = "e57"))]
-fn read_e57(path: &Path, _: &dyn Progress) -> Result<Points> {
-    Err(without(path, "e57"))
+fn read_e57(input: Input, _: &dyn Progress) -> Result<Points> {
+    Err(without(&input.path, "e57"))
 }
 
 #[cfg(not(feature = "pcd"))]
-fn read_pcd(path: &Path, _: &dyn Progress) -> Result<Points> {
-    Err(without(path, "pcd"))
+fn read_pcd(input: Input, _: &dyn Progress) -> Result<Points> {
+    Err(without(&input.path, "pcd"))
 }
 
 /// A file of a format whose reader was left out.
@@ -83,24 +95,25 @@ fn without(path: &Path, feature: &str) -> Error {
     Error::malformed(path, format!("this build does not read {format} files: build with '--features {feature}'"))
 }
 
-/// Reads the triangles of a mesh: OBJ or PLY, by its extension in either case.
+/// Reads the triangles of a mesh: OBJ or PLY; see [`Input::open`].
 ///
 /// # Errors
 ///
 /// As [`read`].
 pub fn read_mesh(path: &Path, progress: &dyn Progress) -> Result<Mesh> {
-    let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
-    match extension.as_deref() {
-        Some("obj") => obj::read_mesh(path, progress),
-        Some("ply") => ply::read_mesh(path, progress),
-        _ => Err(Error::malformed(path, "only OBJ and PLY files are read as meshes; convert it to one")),
-    }
+    read_mesh_with(path, ReadOptions::default(), progress)
 }
 
-/// The first four bytes, zeros where the file is shorter.
-fn magic(path: &Path) -> std::io::Result<[u8; 4]> {
-    let mut bytes = Vec::with_capacity(4);
-    File::open(path)?.take(4).read_to_end(&mut bytes)?;
-    bytes.resize(4, 0);
-    Ok(bytes.first_chunk().copied().unwrap_or_default())
+/// The same by `options`.
+///
+/// # Errors
+///
+/// As [`read`].
+pub fn read_mesh_with(path: &Path, options: ReadOptions, progress: &dyn Progress) -> Result<Mesh> {
+    let input = Input::open(path, options.format)?;
+    match input.format {
+        Format::Obj => obj::read_mesh(input, progress),
+        Format::Ply => ply::read_mesh(input, progress),
+        _ => Err(Error::malformed(&input.path, "only OBJ and PLY files are read as meshes; convert it to one")),
+    }
 }

@@ -5,7 +5,7 @@ pub use crate::scene::Up;
 
 /// Points as a file gives them: f64 world coordinates and whatever attributes exist.
 ///
-/// A reader reports what it found and repairs nothing: a non-finite coordinate, a zero normal or a radius that is
+/// A reader reports what it found and, but for deleted points, all of it, and repairs nothing: a non-finite coordinate, a zero normal or a radius that is
 /// not positive stay as they are, and [`crate::surfels::build`] drops or estimates them, and counts them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Points {
@@ -24,4 +24,6 @@ pub struct Points {
     pub texture: Option<Vec<[f32; 2]>>,
     /// The direction that the format, by convention, calls up.
     pub up: Option<Up>,
+    /// Points that the file holds and that were left out, as it marks them as withheld, which is deleted.
+    pub withheld: u64,
 }

@@ -1,6 +1,7 @@
 //! Conversions that several formats share: numbers in text, 16-bit colour codes, colours kept finite.
 
 use crate::scene::color::srgb_to_linear;
+use std::io::{self, BufRead};
 use std::sync::LazyLock;
 
 /// What some editors begin UTF-8 text with; it belongs to no word.
@@ -9,6 +10,16 @@ pub(super) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 /// Linear light for each 16-bit sRGB code.
 pub(super) static SRGB16_TO_LINEAR: LazyLock<Vec<f32>> =
     LazyLock::new(|| (0..=u16::MAX).map(|code| srgb_to_linear(f64::from(code) / 65535.0) as f32).collect());
+
+/// What the lines of a text end with, by the first of them: a line feed, perhaps after a carriage return, or a carriage return
+/// alone, as on old Macintoshes.
+pub(super) fn line_end(reader: &mut impl BufRead) -> io::Result<u8> {
+    let start = reader.fill_buf()?;
+    let first = start.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
+    // Where nothing follows, either would do.
+    let alone = first.is_some_and(|at| start[at] == b'\r' && start.get(at + 1).is_some_and(|next| *next != b'\n'));
+    Ok(if alone { b'\r' } else { b'\n' })
+}
 
 /// A number in text, as C's `printf` writes it: `nan`, `inf` and Microsoft's `-nan(ind)`, `1.#QNAN` and `1.#INF` too.
 pub(super) fn parse_number(token: &[u8]) -> Option<f64> {
@@ -63,6 +74,13 @@ mod tests {
         }
         for other in ["", "x", "1,5", "0x10", "--1"] {
             assert_eq!(parse_number(other.as_bytes()), None, "{other}");
+        }
+    }
+
+    #[test]
+    fn lines_end_as_the_first_one_does() {
+        for (text, end) in [("", b'\n'), ("a", b'\n'), ("a\nb\rc", b'\n'), ("a\r\nb", b'\n'), ("a\rb\nc", b'\r')] {
+            assert_eq!(line_end(&mut text.as_bytes()).ok(), Some(end), "{text:?}");
         }
     }
 

@@ -199,8 +199,8 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
     };
     progress.end();
     let Gathered { positions, colors, texture, up, .. } = gathered;
-    let points =
-        Points { positions, normals: Some(point_normals), radii: Some(point_radii), axes, colors, texture, up };
+    let (normals, radii) = (Some(point_normals), Some(point_radii));
+    let points = Points { positions, normals, radii, axes, colors, texture, up, withheld: 0 };
     Ok(Surfels { points, preparation, dropped_outliers, limited, parts, collinear })
 }
 

@@ -37,6 +37,7 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
     for mut input in inputs {
         let read = input.positions.len();
         preparation.points += read as u64;
+        preparation.withheld += input.withheld;
         let keep: Vec<bool> = input.positions.iter().map(is_usable).collect();
         let kept = keep.iter().filter(|&&keep| keep).count();
         if kept < read {
@@ -66,6 +67,11 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
     }
     if positions.is_empty() {
         let what = match (input_count, preparation.points) {
+            (_, 0) if preparation.withheld > 0 => format!(
+                "all of the {} points read are marked as withheld, which is deleted, so there is nothing to draw: \
+                 --keep-withheld keeps them",
+                preparation.withheld
+            ),
             (0, _) => "no input was given, so there is nothing to draw".to_owned(),
             (_, 0) => "the input holds no points, so there is nothing to draw".to_owned(),
             (_, points) => format!(

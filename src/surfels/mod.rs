@@ -53,6 +53,8 @@ const LARGEST_PLACE: f32 = 1e4;
 pub struct Preparation {
     /// Points in all inputs.
     pub points: u64,
+    /// Points that are in the files but not among `points`: they are marked as withheld, which is deleted.
+    pub withheld: u64,
     /// Points left out because a coordinate is not finite or exceeds [`LARGEST_COORDINATE`].
     pub dropped_non_finite: u64,
     /// Surfels in the scene: `points - dropped_non_finite`.
@@ -84,6 +86,10 @@ impl Preparation {
     pub fn notes(&self) -> Vec<String> {
         let counted = |count: u64, what: &str| (count > 0).then(|| format!("{count} points {what}"));
         let notes = [
+            counted(
+                self.withheld,
+                "were left out: they are marked as withheld, which is deleted (--keep-withheld keeps them)",
+            ),
             counted(self.dropped_non_finite, "were dropped: a coordinate is not finite or too large"),
             counted(self.replaced_colors, "had a colour that is not finite and became grey"),
             counted(self.replaced_places, "had texture coordinates that are not finite or too large and became 0"),

@@ -1,11 +1,15 @@
 //! LAS and LAZ files of random version, point format and size, and a cloud-optimised one.
 
+use super::las_forms::{of_las_1_5, pointwise};
 use super::mutate::Grammar;
 use super::random::{Place, Random};
-use super::{Target, render};
+use super::session::sentence;
+use super::{Outcome, Target, render};
+use epsplat::io::{self, ReadOptions};
 use las::point::Format;
 use las::{Builder, Color, Point, Transform, Vector, Version, Vlr, Writer};
 use std::io::Cursor;
+use std::path::Path;
 
 pub const TARGET: Target = Target {
     name: "las",
@@ -17,8 +21,25 @@ pub const TARGET: Target = Target {
         text: 1 << 10,
         numbers,
     },
-    execute: render::points,
+    execute,
 };
+
+/// Reads and draws the points, and reads them with those that are deleted: so many more as were counted.
+fn execute(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
+    let outcome = render::points(path, valid)?;
+    let all = io::read_with(path, ReadOptions { keep_withheld: true, ..ReadOptions::default() }, &());
+    match (io::read(path, &()), all) {
+        (Ok(points), Ok(all)) => {
+            let (kept, withheld, all) = (points.positions.len() as u64, points.withheld, all.positions.len() as u64);
+            if kept + withheld != all {
+                return Err(format!("{kept} points are kept and {withheld} withheld, but there are {all}"));
+            }
+        }
+        (Err(error), Err(_)) => sentence(&error, Some(path))?,
+        (points, all) => return Err(format!("withheld points make a difference: {:?}, {:?}", points.err(), all.err())),
+    }
+    Ok(outcome)
+}
 
 /// Numbers of the public header block: places and sizes.
 const HEADER: [(usize, usize); 30] = [
@@ -115,6 +136,9 @@ fn generate(random: &mut Random) -> (Vec<u8>, usize) {
                 return_number: 1,
                 number_of_returns: 1,
                 is_withheld,
+                is_synthetic: random.one_in(16),
+                is_key_point: random.one_in(16),
+                is_overlap: random.one_in(16),
                 gps_time: format.has_gps_time.then_some(random.between(0.0, 1e5)),
                 color: format.has_color.then_some(color),
                 nir: format.has_nir.then_some(random.bits() as u16),
@@ -123,5 +147,12 @@ fn generate(random: &mut Random) -> (Vec<u8>, usize) {
             })
             .unwrap();
     }
-    (writer.into_inner().unwrap().into_inner(), kept)
+    let bytes = writer.into_inner().unwrap().into_inner();
+    let chunk_size = [0, u32::MAX, 50_000][random.below(3)];
+    let bytes = match (minor, format.is_compressed && !format.is_extended && points > 0) {
+        (_, true) if random.one_in(4) => pointwise(&bytes, chunk_size),
+        (4, false) if random.one_in(4) => of_las_1_5(&bytes),
+        _ => bytes,
+    };
+    (bytes, kept)
 }

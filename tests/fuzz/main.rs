@@ -16,6 +16,8 @@ mod e57;
 #[path = "../common/e57_page.rs"]
 mod e57_page;
 mod las;
+#[path = "../common/las_forms.rs"]
+mod las_forms;
 mod memory;
 mod mutate;
 mod obj;

@@ -94,5 +94,12 @@ fn generate(random: &mut Random) -> (Vec<u8>, usize) {
         }
         out.push('\n');
     }
-    (out.into_bytes(), vertices)
+    let in_utf_16 = |bytes: fn(u16) -> [u8; 2]| format!("\u{feff}{out}").encode_utf16().flat_map(bytes).collect();
+    let bytes = match random.below(16) {
+        0 => in_utf_16(u16::to_le_bytes),
+        1 => in_utf_16(u16::to_be_bytes),
+        2 => out.replace("\r\n", "\n").replace('\n', "\r").into_bytes(),
+        _ => out.into_bytes(),
+    };
+    (bytes, vertices)
 }

@@ -136,7 +136,13 @@ fn generate(random: &mut Random) -> (Vec<u8>, usize) {
     let fields = fields(random);
     let points = random.count(60);
     let data = random.pick(&["ascii", "binary", "binary_compressed"]);
-    let mut out = header(random, &fields, points, data).into_bytes();
+    let mut out = match (header(random, &fields, points, data), random.below(6)) {
+        (header, 0) => header.to_ascii_uppercase(),
+        (header, 1) => header.to_ascii_lowercase(),
+        (header, 2) if *data != *"ascii" => header.replace('\n', "\r"),
+        (header, _) => header,
+    }
+    .into_bytes();
     let place = Place::any(random);
     let rows: Vec<Vec<Vec<f64>>> = (0..points).map(|_| row(random, place, &fields)).collect();
     let of_field = |row: &[Vec<f64>], index: usize| -> Vec<u8> {

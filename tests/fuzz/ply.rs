@@ -43,6 +43,7 @@ pub const TARGET: Target = Target {
             "\nend_header\n",
             "comment",
             "\r\n",
+            "\r",
             "\u{7}",
             "\u{fffd}",
         ],
@@ -131,7 +132,7 @@ fn generate(random: &mut Random) -> (Vec<u8>, usize) {
     let (encoding, name) =
         [(Encoding::Ascii, "ascii"), (Encoding::Little, "binary_little_endian"), (Encoding::Big, "binary_big_endian")]
             [random.below(3)];
-    let line = random.pick(&["\n", "\n", "\r\n"]);
+    let line = random.pick(&["\n", "\n", "\r\n", "\r"]);
     let points = random.count(60);
     let faces: Vec<Property> = vec![(Some("uchar"), "int", "vertex_indices"), (None, "float", "flags")];
     let mut elements = vec![("vertex", points, vertex_properties(random))];

@@ -1,7 +1,8 @@
 //! LAS and LAZ files that must be read.
 
+use super::las_forms::{laszip_record, of_las_1_5, pointwise};
 use super::{Folder, data};
-use epsplat::io::{self, Up};
+use epsplat::io::{self, ReadOptions, Up};
 use epsplat::scene::Colors;
 use epsplat::scene::color::srgb_to_linear;
 use las::point::Format;
@@ -138,19 +139,87 @@ fn intensities_stand_in_for_colours_where_a_format_has_none() {
 }
 
 #[test]
-fn withheld_points_are_left_out_and_synthetic_ones_are_not() {
+fn withheld_points_are_left_out_and_counted_and_all_others_are_kept() {
     let folder = Folder::new();
+    let keep_withheld = ReadOptions { keep_withheld: true, ..ReadOptions::default() };
     for (minor, format, compressed) in KINDS {
         let points = (0..100).map(|i| Point {
             is_withheld: i % 2 == 1,
             is_synthetic: i % 3 == 0,
             is_key_point: i % 5 == 0,
+            // In the formats before 6 this is class 12.
+            is_overlap: i % 7 == 0,
             ..point(i, Some([i as u16, 0, 255]))
         });
-        let points = folder.read("a.las", &file(minor, format, compressed, points)).unwrap();
+        let bytes = file(minor, format, compressed, points);
+        let points = folder.read("a.las", &bytes).unwrap();
+        assert_eq!(points.withheld, 50);
         assert_positions(&points.positions, (0..50).map(|i| 2 * i).collect::<Vec<_>>().into_iter());
         if let Some(Colors::Srgb8(codes)) = points.colors {
             assert_eq!((codes.len(), codes[49]), (50, [98, 0, 255, 255]));
+        }
+        let all = io::read_with(&folder.path("a.las"), keep_withheld, &()).unwrap();
+        assert_eq!(all.withheld, 0);
+        assert_positions(&all.positions, 0..100);
+        if let Some(Colors::Srgb8(codes)) = all.colors {
+            assert_eq!((codes.len(), codes[99]), (100, [99, 0, 255, 255]));
+        }
+    }
+    let (_, preparation) =
+        epsplat::surfels::build(vec![folder.read("a.las", &whole_and_deleted()).unwrap()], &()).unwrap();
+    assert_eq!((preparation.points, preparation.withheld, preparation.surfels), (10, 895, 10));
+    assert!(preparation.notes()[0].starts_with("895 points were left out: they are marked as withheld"));
+}
+
+/// Ten points, and 895 that are deleted.
+fn whole_and_deleted() -> Vec<u8> {
+    file(2, 1, false, (0..905).map(|i| Point { is_withheld: i >= 10, ..point(i, None) }))
+}
+
+#[test]
+fn points_without_chunks_are_read_whatever_the_size_of_chunks() {
+    let folder = Folder::new();
+    for (minor, format, compressed) in KINDS.into_iter().filter(|kind| kind.1 < 6 && kind.2).chain([(4, 3, true)]) {
+        let bytes = file(minor, format, compressed, (0..1000).map(|i| point(i, Some([i as u16, 2, 3]))));
+        let chunked = folder.read("a.laz", &bytes).unwrap();
+        for chunk_size in [0, u32::MAX, 50_000, 10] {
+            assert_eq!(folder.read("a.laz", &pointwise(&bytes, chunk_size)).unwrap(), chunked, "{format} {chunk_size}");
+        }
+        // Without one whole point there is nothing that could be read.
+        let pointwise = pointwise(&bytes, 0);
+        let start = u32::from_le_bytes(*bytes[96..].first_chunk().unwrap()) as usize;
+        let message = folder.refusal("a.laz", &pointwise[..start + 5]);
+        assert!(message.starts_with("the header promises 1000 points, but the file ends at byte"), "{message}");
+        assert!(folder.refusal("a.laz", &pointwise[..start + 500]).contains("decoding fails after"));
+    }
+}
+
+#[test]
+fn chunks_of_no_size_are_of_any() {
+    let bytes = std::fs::read(data("simple.copc.laz")).unwrap();
+    let at = laszip_record(&bytes) + 12;
+    assert_eq!(bytes[at..at + 4], [0xff; 4]);
+    let mut unsaid = bytes.clone();
+    unsaid[at..at + 4].fill(0);
+    let folder = Folder::new();
+    assert_eq!(folder.read("a.laz", &unsaid).unwrap(), folder.read("b.laz", &bytes).unwrap());
+}
+
+#[test]
+fn las_1_5_is_read_and_what_is_newer_is_named() {
+    let folder = Folder::new();
+    for (_, format, compressed) in KINDS.into_iter().filter(|kind| kind.1 >= 6) {
+        let points = (0..1000).map(|i| Point { is_withheld: i % 10 == 0, ..point(i, Some([i as u16, 2, 3])) });
+        let bytes = file(4, format, compressed, points);
+        let older = folder.read("a.laz", &bytes).unwrap();
+        let newer = of_las_1_5(&bytes);
+        assert_eq!(folder.read("a.laz", &newer).unwrap(), older, "{format} {compressed}");
+        assert_eq!((older.positions.len(), older.withheld), (900, 100));
+        for version in [[1, 6], [2, 0], [0, 0]] {
+            let mut other = newer.clone();
+            other[24..26].copy_from_slice(&version);
+            let said = format!("it is LAS {}.{}, of which only 1.0 to 1.5 are read", version[0], version[1]);
+            assert!(folder.refusal("a.laz", &other).starts_with(&said));
         }
     }
 }

@@ -1,6 +1,7 @@
 //! LAS and LAZ files that cannot be read.
 
 use super::las::{KINDS, file, point};
+use super::las_forms::{pointwise, with_another_record};
 use super::{Folder, Random, data, sentence};
 
 /// Where a header has the number of its points: the legacy field, and that of LAS 1.4.
@@ -58,6 +59,36 @@ fn a_survey_cut_short_is_refused() {
     assert_eq!(message, "the header promises 110000 points, but the file ends at byte 300000, before its chunk table");
 }
 
+/// A count of 2^60 in a file of a kilobyte, and one that might be true: points are taken as long as there are bytes, and no room is
+/// made for what is promised.
+#[test]
+fn promises_of_files_without_chunks_are_not_allocated() {
+    let folder = Folder::new();
+    let mut bytes = pointwise(&sample((4, 3, true)), 0);
+    bytes[COUNT..COUNT + 4].fill(0);
+    bytes[LARGE_COUNT..LARGE_COUNT + 8].copy_from_slice(&(1u64 << 60).to_le_bytes());
+    let message = folder.refusal("a.laz", &bytes);
+    let said = format!("the header promises {} points, more than a file of {} bytes can hold", 1u64 << 60, bytes.len());
+    assert_eq!(message, said);
+    bytes[LARGE_COUNT..LARGE_COUNT + 8].copy_from_slice(&100_000u64.to_le_bytes());
+    let message = folder.refusal("a.laz", &bytes);
+    assert!(message.starts_with("the header promises 100000 points, but decoding fails after 0"), "{message}");
+}
+
+/// A cut file holds fewer points, unless it ends in bytes that tell nothing.
+#[test]
+fn a_file_without_chunks_that_is_cut_is_refused() {
+    let folder = Folder::new();
+    let whole = pointwise(&sample((2, 3, true)), u32::MAX);
+    let points = folder.read("a.laz", &whole).unwrap();
+    for length in 0..whole.len() {
+        match folder.read("a.laz", &whole[..length]) {
+            Ok(cut) => assert!(cut == points && length + 4 > whole.len(), "{length} of {}", whole.len()),
+            Err(error) => assert!(!sentence(&error, &folder.path("a.laz")).contains("damaged"), "{length}: {error}"),
+        }
+    }
+}
+
 #[test]
 fn what_is_not_las_is_refused() {
     let folder = Folder::new();
@@ -70,8 +101,8 @@ fn flipped_bytes_never_panic() {
     let folder = Folder::new();
     let mut random = Random(0x1a2);
     let path = folder.path("a.laz");
-    for kind in KINDS {
-        let sample = sample(kind);
+    let without_chunks = pointwise(&sample((2, 3, true)), 0);
+    for sample in KINDS.into_iter().map(sample).chain([without_chunks]) {
         for _ in 0..200 {
             let mut bytes = sample.clone();
             for _ in 0..=random.below(3) {
@@ -90,7 +121,7 @@ fn lengths_in_damaged_files_are_not_allocated() {
     let folder = Folder::new();
     // Each 32-bit word of a compressed file in turn, set to what would be gigabytes of points, layers, chunks or records.
     let copc = std::fs::read(data("simple.copc.laz")).unwrap();
-    for sample in [sample((2, 3, true)), sample((4, 7, true)), copc] {
+    for sample in [sample((2, 3, true)), sample((4, 7, true)), pointwise(&sample((4, 3, true)), 0), copc] {
         for at in (90..sample.len() - 4).step_by(if sample.len() > 10_000 { 97 } else { 2 }) {
             let mut bytes = sample.clone();
             bytes[at..at + 4].copy_from_slice(&0x7fff_ff00u32.to_le_bytes());
@@ -121,5 +152,12 @@ fn a_deep_recursion_of_the_decoder_is_survived() {
 #[test]
 fn layers_outside_chunks_of_layers_are_refused() {
     let message = Folder::new().refusal("layers.laz", include_bytes!("layers_outside_chunks.laz"));
+    assert_eq!(message, "its LASzip record does not describe its points");
+}
+
+/// The record that is checked is the one that the decoder takes: it once took another, which has no items, and panicked.
+#[test]
+fn a_record_after_one_of_nearly_its_name_is_checked() {
+    let message = Folder::new().refusal("a.laz", &with_another_record(&sample((2, 3, true))));
     assert_eq!(message, "its LASzip record does not describe its points");
 }

@@ -8,6 +8,8 @@ mod e57;
 mod e57_page;
 mod las;
 mod las_damage;
+#[path = "../common/las_forms.rs"]
+mod las_forms;
 mod mesh;
 mod obj;
 #[cfg(feature = "pcd")]
@@ -15,7 +17,7 @@ mod pcd;
 mod ply;
 mod ply_damage;
 
-use epsplat::io::{self, Points};
+use epsplat::io::{self, Format, Points, ReadOptions};
 use epsplat::{Error, Progress};
 use std::path::Path;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
@@ -128,7 +130,26 @@ fn files_are_known_by_extension_or_by_their_first_bytes() {
     assert_eq!(folder.read("a.Obj", b"v 1 2 3").unwrap().positions.len(), 1);
     for unknown in [&b""[..], b"pl", b"plyx", b"v 1 2 3"] {
         let said = folder.refusal("a.xyz", unknown);
-        assert_eq!(said, "its format is not known; PLY, LAS, LAZ, OBJ, E57 and PCD files are read");
+        let (e57, pcd) = (cfg!(feature = "e57"), cfg!(feature = "pcd"));
+        let formats = match (e57, pcd) {
+            (false, false) => "PLY, LAS, LAZ and OBJ",
+            (true, false) => "PLY, LAS, LAZ, OBJ and E57",
+            (false, true) => "PLY, LAS, LAZ, OBJ and PCD",
+            (true, true) => "PLY, LAS, LAZ, OBJ, E57 and PCD",
+        };
+        let expected =
+            format!("its format is not known: {formats} files are read; if it is one, --input-format says which");
+        assert_eq!(said, expected);
+    }
+    let obj = ReadOptions { format: Some(Format::Obj), ..ReadOptions::default() };
+    assert_eq!(io::read_with(&folder.path("a.xyz"), obj, &()).unwrap().positions, [[1.0, 2.0, 3.0]]);
+    // What is said goes before the name.
+    folder.read("a.laz", &laz).unwrap();
+    assert!(io::read_with(&folder.path("a.laz"), ReadOptions { format: Some(Format::Ply), ..obj }, &()).is_err());
+    for start in [&b"# .PCD v.7"[..], b"#.pcd v0.7", b"VERSION .7", b"fields x y z", b"\xef\xbb\xbf# .PCD"] {
+        std::fs::write(folder.path("scan"), start).unwrap();
+        let said = io::read(&folder.path("scan"), &()).unwrap_err().to_string();
+        assert!(said.contains("PCD"), "{start:?}: {said}");
     }
 }
 

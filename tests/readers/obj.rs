@@ -174,3 +174,44 @@ fn the_bunny_is_covered_and_faces_outwards() {
     });
     assert!(outwards.count() > 1500);
 }
+
+/// UTF-16 of either byte order, with the byte order mark that says so.
+fn in_utf_16(text: &str) -> [Vec<u8>; 2] {
+    let with_mark = || {
+        text.encode_utf16().fold(vec![0xfeff], |mut codes, code| {
+            codes.push(code);
+            codes
+        })
+    };
+    [u16::to_le_bytes, u16::to_be_bytes].map(|bytes| with_mark().into_iter().flat_map(bytes).collect())
+}
+
+#[test]
+fn text_may_be_in_utf_16() {
+    let folder = Folder::new();
+    let text =
+        "# \u{fc}ber \u{1f430}\r\nmtllib m\u{e4}rz.mtl\r\nv 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nusemtl rot\r\nf 1 2 3\r\n";
+    let library = "newmtl rot\nKd 1 0 0\n";
+    let expected = folder.read("a.obj", text.as_bytes()).unwrap();
+    for (bytes, library) in in_utf_16(text).into_iter().zip(in_utf_16(library)) {
+        assert_eq!(folder.read("a.obj", &bytes).unwrap(), expected);
+        std::fs::write(folder.path("m\u{e4}rz.mtl"), library).unwrap();
+        let mesh = io::read_mesh(&folder.path("a.obj"), &()).unwrap();
+        assert_eq!((mesh.triangles.len(), mesh.materials[0].diffuse, mesh.notes), (1, [1.0, 0.0, 0.0, 1.0], vec![]));
+        // Half a code at the end, and one that is no character.
+        let mut damaged = bytes.clone();
+        damaged.extend([0xd8, 0xd8, 0xd8]);
+        assert_eq!(folder.read("a.obj", &damaged).unwrap(), expected);
+    }
+    let said = folder.refusal("a.obj", &in_utf_16("v 0 0 0\nv 0 zw\u{f6}lf 0\n")[1]);
+    assert_eq!(said, "line 2: 'zw\u{f6}lf' is not a number");
+}
+
+#[test]
+fn lines_may_end_in_carriage_returns() {
+    let text = "# old\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 \\\n3\n";
+    let folder = Folder::new();
+    let expected = folder.read("a.obj", text.as_bytes()).unwrap();
+    assert_eq!(folder.read("a.obj", text.replace('\n', "\r").as_bytes()).unwrap(), expected);
+    assert_eq!(expected.radii.unwrap().len(), 3);
+}

@@ -282,3 +282,25 @@ fn cut_and_flipped_files_are_refused_or_read() {
         }
     }
 }
+
+/// Words in capitals or in lower case, and lines that end in carriage returns.
+#[test]
+fn headers_are_read_in_either_case() {
+    let folder = Folder::new();
+    let rows: [&[f64]; 2] = [&[1.0, 2.0, 3.0], &[4.0, 5.0, 6.0]];
+    for data in DATA {
+        let bytes = file(&XYZ, &rows, data);
+        let expected = folder.read("a.pcd", &bytes).unwrap();
+        let length = if data == "ascii" { bytes.len() } else { header(&XYZ, 2, data).len() };
+        for change in [str::to_ascii_uppercase, str::to_ascii_lowercase, |text: &str| text.replace('\n', "\r")] {
+            let changed = change(str::from_utf8(&bytes[..length]).unwrap());
+            let changed = [changed.as_bytes(), &bytes[length..]].concat();
+            assert_eq!(folder.read("a.pcd", &changed).unwrap(), expected, "{data}");
+            assert_eq!(folder.read("a", &changed).unwrap(), expected, "{data}");
+        }
+    }
+    // Of two names that differ in case alone, the usual one is meant.
+    let fields = [("X", 4, 'F', 1), XYZ[0], XYZ[1], XYZ[2]];
+    let points = folder.read("a.pcd", &file(&fields, &[&[9.0, 1.0, 2.0, 3.0]], "ascii")).unwrap();
+    assert_eq!(points.positions, [[1.0, 2.0, 3.0]]);
+}

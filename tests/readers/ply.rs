@@ -67,6 +67,35 @@ pub fn file(encoding: &str, elements: &[Element]) -> Vec<u8> {
     bytes
 }
 
+/// Lines end as they may on any system; the first byte of a binary file is a line feed, which belongs to no line.
+#[test]
+fn lines_may_end_in_carriage_returns() {
+    let folder = Folder::new();
+    let properties = [("uchar", "x"), ("uchar", "y"), ("float", "z")];
+    let rows: [&[f64]; 2] = [&[10.0, 13.0, 3.0], &[13.0, 10.0, 0.0]];
+    for encoding in ENCODINGS {
+        let bytes = file(encoding, &[("vertex", &properties, &rows)]);
+        let header = bytes.windows(11).position(|window| window == b"end_header\n").unwrap() + 11;
+        for end in [&b"\r"[..], b"\r\n"] {
+            let lines = if encoding == "ascii" { bytes.len() } else { header };
+            let mut other: Vec<u8> = bytes[..lines]
+                .iter()
+                .flat_map(|byte| if *byte == b'\n' { end } else { std::slice::from_ref(byte) })
+                .copied()
+                .collect();
+            other.extend(&bytes[lines..]);
+            for name in ["a.ply", "a"] {
+                let points = folder.read(name, &other).unwrap();
+                assert_eq!(points.positions, [[10.0, 13.0, 3.0], [13.0, 10.0, 0.0]], "{encoding} {end:?}");
+            }
+        }
+    }
+    let text =
+        "ply\rformat ascii 1.0\relement vertex 1\rproperty float x\rproperty float y\rproperty float z\rend_header\r";
+    let said = folder.refusal("a.ply", format!("{text}1\r2\rthree\r").as_bytes());
+    assert_eq!(said, "line 10: 'three' is not a number");
+}
+
 #[test]
 fn coordinates_of_every_type_in_every_encoding() {
     let folder = Folder::new();
@@ -339,6 +368,7 @@ fn points_with(attributes: u32) -> Points {
         },
         texture: on(6).then(|| all.map(|i| [real(i, 6), real(i, 7)]).collect()),
         up: None,
+        withheld: 0,
     }
 }
 

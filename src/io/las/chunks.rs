@@ -4,12 +4,19 @@
 //! allocate gigabytes, which no error handling survives, so each of these lengths is looked at here first.
 
 use super::arithmetic::Integers;
+use super::shown::Shown;
 use crate::io::fault::Fault;
 use las::raw::{Header, Vlr};
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{BufReader, Read, Seek, SeekFrom};
 
 /// A decoded chunk larger than this is decoded by one thread, which needs no buffer for it.
 const CHUNK_LIMIT: u64 = 1 << 28;
+
+/// No byte is more points than this: at its cheapest a point is a symbol of 64 whose probability is 1 - 63 / 2^15, 0.0028 bits.
+const MOST_A_BYTE: u64 = 1 << 12;
+
+/// Where a LASzip record has the points per chunk.
+const CHUNK_SIZE: usize = 12;
 
 /// How a file's points are decoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,7 +40,7 @@ pub(super) fn promised(header: &Header) -> u64 {
 }
 
 /// Checks that every length in the file lies within its `length` bytes, and says how its points can be decoded.
-pub(super) fn check(file: &mut (impl Read + Seek), header: &Header, length: u64) -> Result<Decoding, Fault> {
+pub(super) fn check(file: &mut BufReader<Shown>, header: &Header, length: u64) -> Result<Decoding, Fault> {
     let start = u64::from(header.offset_to_point_data);
     let record = u64::from(header.point_data_record_length);
     let promised = promised(header);
@@ -55,14 +62,27 @@ pub(super) fn check(file: &mut (impl Read + Seek), header: &Header, length: u64)
         }
         return Ok(Decoding::Sequential);
     }
-    let Some(laszip) = laszip_record(file, header)? else {
+    let Some((at, laszip)) = laszip_record(file, header)? else {
         return malformed("it is compressed, but has no LASzip record");
     };
     let scheme = Scheme::parse(&laszip).filter(|scheme| scheme.record == record && record > 0);
     let Some(scheme) = scheme else {
         return malformed("its LASzip record does not describe its points");
     };
-    if promised == 0 || scheme.compressor == 1 {
+    if promised == 0 {
+        return Ok(Decoding::Sequential);
+    }
+    if scheme.compressor == 1 {
+        if start.saturating_add(record) > length {
+            return malformed(format!("{} the first of them", early(promised, length)));
+        }
+        if promised / MOST_A_BYTE > length {
+            return malformed(format!(
+                "the header promises {promised} points, more than a file of {length} bytes can hold"
+            ));
+        }
+        // One run of all points has no use for a chunk size, but the decoder takes none at all for a table of chunks.
+        file.get_mut().show(at + CHUNK_SIZE as u64, &u32::to_le_bytes(1));
         return Ok(Decoding::Sequential);
     }
     let mut chunks = chunk_table(file, start, length, &scheme, promised)?;
@@ -77,15 +97,17 @@ pub(super) fn check(file: &mut (impl Read + Seek), header: &Header, length: u64)
     Ok(if largest.saturating_mul(record) > CHUNK_LIMIT { Decoding::Sequential } else { Decoding::Parallel })
 }
 
-/// The data of the record that says how the points are compressed.
-fn laszip_record(file: &mut (impl Read + Seek), header: &Header) -> Result<Option<Vec<u8>>, Fault> {
+/// The data of the record that says how the points are compressed, and where it lies.
+fn laszip_record(file: &mut (impl Read + Seek), header: &Header) -> Result<Option<(u64, Vec<u8>)>, Fault> {
     file.seek(SeekFrom::Start(u64::from(header.header_size)))?;
     for _ in 0..header.number_of_variable_length_records {
         let Ok(record) = Vlr::read_from(&mut *file, false) else {
             return malformed("it ends inside its variable-length records");
         };
-        if record.record_id == 22204 && record.user_id.starts_with(b"laszip encoded") {
-            return Ok(Some(record.data));
+        // The very record that the decoder takes: any other could have another follow that nobody checked.
+        let name = record.user_id.split(|byte| *byte == 0).next();
+        if record.record_id == 22204 && name == Some(b"laszip encoded") {
+            return Ok(Some((file.stream_position()? - record.data.len() as u64, record.data)));
         }
     }
     Ok(None)
@@ -94,7 +116,7 @@ fn laszip_record(file: &mut (impl Read + Seek), header: &Header) -> Result<Optio
 /// How the points are compressed.
 #[derive(Debug)]
 struct Scheme {
-    /// 1: one chunk; 2: chunks; 3: chunks in layers.
+    /// 1: one run of points, without chunks; 2: chunks; 3: chunks in layers.
     compressor: u16,
     /// Points per chunk; `None` where the chunk table gives them.
     chunk: Option<u32>,
@@ -107,7 +129,7 @@ struct Scheme {
 impl Scheme {
     fn parse(data: &[u8]) -> Option<Self> {
         let u16_at = |at: usize| data.get(at..)?.first_chunk().copied().map(u16::from_le_bytes);
-        let chunk = u32::from_le_bytes(data.get(12..)?.first_chunk().copied()?);
+        let chunk = u32::from_le_bytes(data.get(CHUNK_SIZE..)?.first_chunk().copied()?);
         let (compressor, items) = (u16_at(0)?, u16_at(32)?);
         let (mut record, mut layers) = (0, 0);
         for item in 0..usize::from(items) {
@@ -145,6 +167,10 @@ struct Chunk {
     bytes: u64,
 }
 
+fn early(promised: u64, length: u64) -> String {
+    format!("the header promises {promised} points, but the file ends at byte {length}, before")
+}
+
 fn chunk_table(
     file: &mut (impl Read + Seek),
     start: u64,
@@ -152,7 +178,7 @@ fn chunk_table(
     scheme: &Scheme,
     promised: u64,
 ) -> Result<Vec<Chunk>, Fault> {
-    let early = format!("the header promises {promised} points, but the file ends at byte {length}, before");
+    let early = early(promised, length);
     if start.saturating_add(8) > length {
         return malformed(format!("{early} the first of them"));
     }

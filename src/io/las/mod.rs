@@ -1,24 +1,26 @@
-//! LAS and LAZ 1.0 to 1.4, through the `las` crate.
+//! LAS and LAZ 1.0 to 1.5, through the `las` crate.
 
 mod arithmetic;
 mod chunks;
 mod color;
+mod shown;
 
 use crate::io::fault::{self, Fault, reserve, surviving};
 use crate::io::intensity;
 use crate::io::values::one_line;
-use crate::io::{Points, Up};
+use crate::io::{Input, Points, Up};
 use crate::{Progress, Result};
 use las::reader::{LazParallelism, ReaderOptions};
 use las::{PointData, PointDataBuilder, Reader, raw};
-use std::fs::File;
+use shown::Shown;
 use std::io::{self, BufReader, Seek};
-use std::path::Path;
 
 /// Bytes of records that are decoded together.
 const BLOCK: u64 = 1 << 25;
 
-/// Reads the points of a LAS or LAZ file, COPC included: all but those marked as withheld, which are deleted points.
+/// Reads the points of a LAS or LAZ file, COPC included: all but those marked as withheld, which are deleted points and are counted
+/// in [`Points::withheld`], or with `keep_withheld` these too. Synthetic, key and overlap points (legacy class 12 too) are points like
+/// any other, as they are to PDAL.
 ///
 /// Coordinates are scaled and offset in f64, in the file's own system; up is z. Colours come from the format's RGB:
 /// where the 16-bit codes of the whole file are widened 8-bit values, or no code is above 255, they are 8-bit sRGB; else
@@ -29,21 +31,23 @@ const BLOCK: u64 = 1 << 25;
 ///
 /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where
 /// the file is not LAS, ends early, or cannot be decoded.
-pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
+pub fn read(input: Input, keep_withheld: bool, progress: &dyn Progress) -> Result<Points> {
+    let Input { file, length, path, .. } = input;
     let opened = surviving(|| {
-        let (mut file, header, length) = open(path)?;
+        let mut file = BufReader::with_capacity(1 << 20, Shown::new(file)?);
+        let header = raw::Header::read_from(&mut file).map_err(of_las)?;
         let decoding = chunks::check(&mut file, &header, length).map_err(early)?;
-        Ok((file, decoding, chunks::promised(&header), length))
+        Ok((file, decoding, chunks::promised(&header)))
     });
-    let (file, decoding, promised, length) = opened.map_err(|fault| fault.of(path))?;
+    let (file, decoding, promised) = opened.map_err(|fault| fault.of(&path))?;
     if promised == 0 {
         // The decoder would still take the length of a chunk table for true, which nothing here vouches for.
         return Ok(Points { up: Some(Up::Z), ..Points::default() });
     }
-    progress.begin(&format!("reading {}", fault::name(path)), promised);
-    let points = deep(|| surviving(|| decode(file, decoding, promised.min(length), progress)));
+    progress.begin(&format!("reading {}", fault::name(&path)), promised);
+    let points = deep(|| decode(file, decoding, promised.min(length), keep_withheld, progress));
     progress.end();
-    points.map_err(|fault| fault.of(path))
+    points.map_err(|fault| fault.of(&path))
 }
 
 /// Stack of the threads that decode, bytes; memory is taken only as far as it is used. The decoder calls itself for each
@@ -51,18 +55,12 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
 /// call takes 64 bytes of stack, so this is room for four million; in the usual 2 MiB the program would be aborted.
 const DECODER_STACK: usize = 1 << 28;
 
-/// Runs `decode` on threads whose stacks are deep enough for damaged files.
+/// Runs `decode`, which may panic, on threads whose stacks are deep enough for damaged files.
 fn deep<T: Send>(decode: impl FnOnce() -> Result<T, Fault> + Send) -> Result<T, Fault> {
-    let pool = rayon::ThreadPoolBuilder::new().stack_size(DECODER_STACK).build();
-    pool.map_err(|error| Fault::Io(io::Error::other(error)))?.install(decode)
-}
-
-fn open(path: &Path) -> Result<(BufReader<File>, raw::Header, u64), Fault> {
-    let file = File::open(path)?;
-    let length = file.metadata()?.len();
-    let mut file = BufReader::with_capacity(1 << 20, file);
-    let header = raw::Header::read_from(&mut file).map_err(of_las)?;
-    Ok((file, header, length))
+    // The decoder's panics come up on all of them.
+    let pool =
+        rayon::ThreadPoolBuilder::new().stack_size(DECODER_STACK).start_handler(|_| fault::hush_thread()).build();
+    pool.map_err(|error| Fault::Io(io::Error::other(error)))?.install(|| surviving(decode))
 }
 
 /// The decoder's failures that are the file's fault, told from the system's.
@@ -89,9 +87,10 @@ fn early(fault: Fault) -> Fault {
 }
 
 fn decode(
-    mut file: BufReader<File>,
+    mut file: BufReader<Shown>,
     decoding: chunks::Decoding,
     capacity: u64,
+    keep_withheld: bool,
     progress: &dyn Progress,
 ) -> Result<Points, Fault> {
     file.rewind()?;
@@ -110,7 +109,7 @@ fn decode(
     reserve(&mut positions, capacity)?;
     let mut codes: Vec<[u16; 3]> = Vec::new();
     let mut intensities = Vec::new();
-    let mut read = 0;
+    let (mut read, mut left_out) = (0, 0);
     while read < promised {
         let count = reader.fill_points(block_points, &mut block).map_err(|error| match early(of_las(error)) {
             Fault::Malformed(what) => Fault::Malformed(format!(
@@ -122,7 +121,8 @@ fn decode(
             return Err(Fault::Malformed(format!("the header promises {promised} points, the file ends after {read}")));
         }
         read += count;
-        let kept = || withheld(&block).map(|withheld| !withheld);
+        let kept = || withheld(&block).map(|withheld| keep_withheld || !withheld);
+        left_out += kept().filter(|kept| !kept).count() as u64;
         let coordinates = block.x().zip(block.y()).zip(block.z()).map(|((x, y), z)| [x, y, z]);
         positions.extend(coordinates.zip(kept()).filter_map(|(position, kept)| kept.then_some(position)));
         if let Some(rgb) = block.rgb() {
@@ -133,7 +133,7 @@ fn decode(
         progress.advance(count);
     }
     let colors = if format.has_color { color::from_rgb(codes) } else { intensity::grey(&intensities) };
-    Ok(Points { positions, colors, up: Some(Up::Z), ..Points::default() })
+    Ok(Points { positions, colors, up: Some(Up::Z), withheld: left_out, ..Points::default() })
 }
 
 /// Whether each point of a block is marked as deleted: bit 7 of the classification byte, in the extended formats bit 2
@@ -148,7 +148,7 @@ fn withheld(block: &PointData) -> impl Iterator<Item = bool> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
+    #![allow(clippy::unwrap_used, clippy::panic)]
     use super::*;
     use las::point::Format;
     use las::{Builder, Writer};
@@ -175,7 +175,37 @@ mod tests {
         bytes.extend([0xff; 4]);
         bytes.extend([0x7f; 64]);
         std::fs::write(&path, &bytes).unwrap();
-        let points = read(&path, &()).unwrap();
+        let points = read(Input::open(&path, None).unwrap(), false, &()).unwrap();
         assert_eq!((points.positions.len(), points.up), (0, Some(Up::Z)));
+    }
+
+    /// Panics of a decoder are not printed, on whatever thread of its pool; others are. Seen from outside, in a process of its own.
+    #[test]
+    fn a_decoders_panic_is_not_printed() {
+        const WHOSE: &str = "EPSPLAT_TEST_PANIC";
+        fn panics() -> Result<(), Fault> {
+            rayon::join(|| -> () { panic!("on this thread") }, || -> () { panic!("on another, or this one") });
+            Ok(())
+        }
+        if let Ok(whose) = std::env::var(WHOSE) {
+            assert!(matches!(deep(panics), Err(Fault::Malformed(_))));
+            if whose == "ours" {
+                assert!(std::panic::catch_unwind(|| panic!("of our own")).is_err());
+            }
+            return;
+        }
+        let printed = |whose: &str| {
+            let mut command = std::process::Command::new(std::env::current_exe().unwrap());
+            command
+                .args(["--exact", "io::las::tests::a_decoders_panic_is_not_printed", "--nocapture"])
+                .env(WHOSE, whose);
+            let output = command.output().unwrap();
+            assert!(output.status.success(), "{output:?}");
+            let stderr = String::from_utf8(output.stderr).unwrap();
+            (stderr.matches("panicked at").count(), stderr)
+        };
+        assert_eq!(printed("a decoder's"), (0, String::new()));
+        let (count, stderr) = printed("ours");
+        assert!(count == 1 && stderr.contains("of our own"), "{stderr}");
     }
 }

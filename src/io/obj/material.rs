@@ -1,10 +1,11 @@
 //! MTL: what the triangles of an OBJ file are made of.
 
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::encoding;
 use crate::io::values::{BYTE_ORDER_MARK, finite, one_line};
 use crate::io::{Material, Texture};
 
@@ -68,7 +69,8 @@ pub(in crate::io) fn companions(path: &Path, libraries: &[String]) -> Vec<PathBu
 
 fn text_of(path: &Path) -> io::Result<String> {
     let mut bytes = Vec::new();
-    File::open(path)?.take(LONGEST).read_to_end(&mut bytes)?;
+    let (reader, _) = encoding::decoded(BufReader::new(File::open(path)?), LONGEST)?;
+    reader.take(LONGEST).read_to_end(&mut bytes)?;
     Ok(String::from_utf8_lossy(bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&bytes)).into_owned())
 }
 

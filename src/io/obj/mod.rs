@@ -1,5 +1,6 @@
 //! Wavefront OBJ: the vertices of a mesh as points, with normals and radii from its faces; or its triangles as they are.
 
+mod encoding;
 mod material;
 mod source;
 
@@ -7,13 +8,11 @@ pub(super) use material::companions;
 
 use crate::io::fault::{self, Fault};
 use crate::io::triangles::Triangles;
-use crate::io::{Mesh, Points, Up, polygon};
+use crate::io::{Input, Mesh, Points, Up, polygon};
 use crate::{Progress, Result};
 use glam::DVec3;
 use source::{Lines, Source};
-use std::fs::File;
 use std::io::{self, BufReader};
-use std::path::Path;
 
 /// Reads the vertices of an OBJ file, one point for each `v` line and in their order, whatever groups and materials
 /// the faces are in.
@@ -26,14 +25,14 @@ use std::path::Path;
 /// - Colours: the three numbers after a vertex's coordinates, sRGB-coded in [0, 1], or where any is 2 or more in [0, 255], become
 ///   linear light; a fourth is alpha.
 ///
-/// Up is y. Lines, points, curves and materials are passed over, so a missing MTL file is no error.
+/// Text may be in UTF-16, of either byte order, if a byte order mark says so. Up is y. Lines, points, curves and materials are passed over, so a missing MTL file is no error.
 ///
 /// # Errors
 ///
 /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where
 /// a number is none or a face names a vertex or normal that does not exist.
-pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
-    read_with(path, false, progress, points)
+pub fn read(input: Input, progress: &dyn Progress) -> Result<Points> {
+    read_with(input, false, progress, points)
 }
 
 /// Reads the triangles of an OBJ file, those of all groups and materials as one mesh, with every `v` line a vertex.
@@ -48,24 +47,26 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
 /// # Errors
 ///
 /// As [`read`], and where a face names texture coordinates that do not exist.
-pub fn read_mesh(path: &Path, progress: &dyn Progress) -> Result<Mesh> {
-    let (mut mesh, libraries, names) = read_with(path, true, progress, mesh)?;
-    mesh.materials = material::read(path, &libraries, &names, &mut mesh.notes);
+pub fn read_mesh(input: Input, progress: &dyn Progress) -> Result<Mesh> {
+    let path = input.path.clone();
+    let (mut mesh, libraries, names) = read_with(input, true, progress, mesh)?;
+    mesh.materials = material::read(&path, &libraries, &names, &mut mesh.notes);
     Ok(mesh)
 }
 
 /// Opens the file and makes of its lines and faces what is asked for.
 fn read_with<T>(
-    path: &Path,
+    input: Input,
     surface: bool,
     progress: &dyn Progress,
     make: impl Fn(Lines, &[tobj::Model]) -> T,
 ) -> Result<T> {
-    let in_file = |fault: Fault| fault.of(path);
-    let file = File::open(path).map_err(Fault::Io).map_err(in_file)?;
-    let length = file.metadata().map_err(Fault::Io).map_err(in_file)?.len();
-    progress.begin(&format!("reading {}", fault::name(path)), length);
-    let parsed = parse(Source::new(BufReader::with_capacity(1 << 18, file), surface, progress));
+    let Input { file, length, path, .. } = input;
+    let in_file = |fault: Fault| fault.of(&path);
+    let (reader, length) =
+        encoding::decoded(BufReader::with_capacity(1 << 18, file), length).map_err(Fault::Io).map_err(in_file)?;
+    progress.begin(&format!("reading {}", fault::name(&path)), length);
+    let parsed = parse(Source::new(reader, surface, progress));
     let made = parsed.map(|(lines, models)| make(lines, &models));
     progress.end();
     made.map_err(in_file)

@@ -2,7 +2,7 @@
 
 use crate::Progress;
 use crate::io::fault::Fault;
-use crate::io::values::{BYTE_ORDER_MARK, finite, parse_number, shown};
+use crate::io::values::{BYTE_ORDER_MARK, finite, line_end, parse_number, shown};
 use crate::scene::Colors;
 use crate::scene::color::{DEFAULT_COLOR, srgb_to_linear};
 use std::io::{self, BufRead, Read};
@@ -42,6 +42,8 @@ pub(super) struct Source<'a, R> {
     unreported: u64,
     lines: Lines,
     line: Vec<u8>,
+    /// What lines end with.
+    line_end: u8,
     /// What the parser is given of the current line, and how much of it has been taken.
     passed: Vec<u8>,
     taken: usize,
@@ -52,7 +54,7 @@ impl<'a, R: BufRead> Source<'a, R> {
     pub(super) fn new(reader: R, surface: bool, progress: &'a dyn Progress) -> Self {
         let lines = Lines { every_corner_has_a_normal: true, every_corner_has_texture: surface, ..Lines::default() };
         let (line, passed) = (Vec::new(), Vec::new());
-        Self { reader, surface, progress, unreported: 0, lines, line, passed, taken: 0, fault: None }
+        Self { reader, surface, progress, unreported: 0, lines, line, line_end: b'\n', passed, taken: 0, fault: None }
     }
 
     /// What was read, unless reading is why the parser stopped.
@@ -67,9 +69,12 @@ impl<'a, R: BufRead> Source<'a, R> {
     /// Takes the next line, with those that continue it; `false` at the end of the file.
     fn next_line(&mut self) -> Result<bool, Fault> {
         self.line.clear();
+        if self.lines.count == 0 {
+            self.line_end = line_end(&mut self.reader)?;
+        }
         loop {
             let room = LINE_LIMIT.saturating_sub(self.line.len());
-            let bytes = self.reader.by_ref().take(room as u64).read_until(b'\n', &mut self.line)?;
+            let bytes = self.reader.by_ref().take(room as u64).read_until(self.line_end, &mut self.line)?;
             if room == 0 {
                 let line = self.lines.count;
                 return Err(Fault::Malformed(format!("line {line} is longer than {LINE_LIMIT} bytes")));
@@ -91,7 +96,7 @@ impl<'a, R: BufRead> Source<'a, R> {
                     self.line.truncate(length);
                     self.line.push(b' ');
                 }
-                None if self.line.len() < LINE_LIMIT || self.line.ends_with(b"\n") => return Ok(true),
+                None if self.line.len() < LINE_LIMIT || self.line.last() == Some(&self.line_end) => return Ok(true),
                 None => {}
             }
         }

@@ -37,7 +37,7 @@ pub(super) fn ascii(
     while reading.len() < header.points {
         line.clear();
         number += 1;
-        let bytes = reader.by_ref().take(LINE_LIMIT).read_until(b'\n', &mut line)?;
+        let bytes = reader.by_ref().take(LINE_LIMIT).read_until(header.line_end, &mut line)?;
         if bytes == 0 {
             return Err(ends_early(header, reading.len()));
         }

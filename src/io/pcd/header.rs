@@ -4,7 +4,7 @@ use std::io::{BufRead, Read};
 use std::str::{FromStr, SplitAsciiWhitespace};
 
 use crate::io::fault::Fault;
-use crate::io::values::shown;
+use crate::io::values::{line_end, shown};
 
 /// No header line is longer.
 const LINE_LIMIT: u64 = 1 << 16;
@@ -45,20 +45,25 @@ pub(super) struct Header {
     /// Lines and bytes of the header.
     pub(super) lines: u64,
     pub(super) bytes: u64,
+    /// What lines end with.
+    pub(super) line_end: u8,
 }
 
 /// Reads up to and including the line `DATA`.
 pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
+    let line_end = line_end(reader)?;
     let mut raw = Raw::default();
     let (mut line, mut bytes) = (Vec::new(), 0);
     for number in 1.. {
         line.clear();
-        bytes += reader.take(LINE_LIMIT).read_until(b'\n', &mut line)? as u64;
-        let complete = line.last() == Some(&b'\n');
+        bytes += reader.take(LINE_LIMIT).read_until(line_end, &mut line)? as u64;
+        let complete = line.last() == Some(&line_end);
         let text = String::from_utf8_lossy(&line);
         let mut words = text.split_ascii_whitespace();
-        let keyword = words.next();
-        // The last line of a file without points may lack its line feed.
+        // Some programs write words in capitals, some in lower case.
+        let keyword = words.next().map(str::to_ascii_uppercase);
+        let keyword = keyword.as_deref();
+        // The last line of a file without points may lack its end.
         if !complete && keyword != Some("DATA") {
             return Err(Fault::Malformed(if line.len() as u64 == LINE_LIMIT {
                 format!("line {number} of the PCD header is longer than {LINE_LIMIT} bytes")
@@ -75,7 +80,7 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
             let sizes = fields.iter().map(|field| field.size.checked_mul(field.count));
             let row = sizes.reduce(|a, b| a?.checked_add(b?)).flatten();
             let row = row.ok_or_else(|| Fault::Malformed("its points would be longer than any file".into()))?;
-            return Ok(Header { fields, points, data, row, lines: number, bytes });
+            return Ok(Header { fields, points, data, row, lines: number, bytes, line_end });
         }
     }
     Err(Fault::Malformed("the PCD header has no end".into()))
@@ -107,9 +112,9 @@ impl Raw {
             Some("SIZE") => self.sizes = numbers(words)?,
             Some("TYPE") => {
                 let scalar = |word| match word {
-                    "I" => Ok(Scalar::Signed),
-                    "U" => Ok(Scalar::Unsigned),
-                    "F" => Ok(Scalar::Float),
+                    "I" | "i" => Ok(Scalar::Signed),
+                    "U" | "u" => Ok(Scalar::Unsigned),
+                    "F" | "f" => Ok(Scalar::Float),
                     _ => Err("a type is I, U or F"),
                 };
                 self.scalars = words.map(scalar).collect::<Result<_, _>>()?;
@@ -119,7 +124,8 @@ impl Raw {
             Some("HEIGHT") => self.height = Some(one(words)?),
             Some("POINTS") => self.points = Some(one(words)?),
             Some("DATA") => {
-                return match words.collect::<Vec<_>>()[..] {
+                let words: Vec<_> = words.map(str::to_ascii_lowercase).collect();
+                return match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
                     ["ascii"] => Ok(Some(Data::Ascii)),
                     ["binary"] => Ok(Some(Data::Binary)),
                     ["binary_compressed"] => Ok(Some(Data::Compressed)),

@@ -5,12 +5,10 @@ mod header;
 mod lzf;
 mod points;
 
-use std::fs::File;
 use std::io::BufReader;
-use std::path::Path;
 
-use crate::io::Points;
 use crate::io::fault::{self, Fault};
+use crate::io::{Input, Points};
 use crate::{Progress, Result};
 use header::Data;
 
@@ -30,14 +28,13 @@ use header::Data;
 /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where the
 /// header is not PCD's, `x`, `y` or `z` is missing, the file ends before the points that its header promises, a number in text
 /// is none, or compressed data cannot be decoded.
-pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
-    let in_file = |fault: Fault| fault.of(path);
-    let file = File::open(path).map_err(Fault::Io).map_err(in_file)?;
-    let length = file.metadata().map_err(Fault::Io).map_err(in_file)?.len();
+pub fn read(input: Input, progress: &dyn Progress) -> Result<Points> {
+    let Input { file, length, path, .. } = input;
+    let in_file = |fault: Fault| fault.of(&path);
     let mut reader = BufReader::with_capacity(1 << 18, file);
     let header = header::read(&mut reader).map_err(in_file)?;
     let left = length.saturating_sub(header.bytes);
-    progress.begin(&format!("reading {}", fault::name(path)), header.points);
+    progress.begin(&format!("reading {}", fault::name(&path)), header.points);
     let points = match header.data {
         Data::Ascii => body::ascii(reader, &header, left, progress),
         Data::Binary => body::binary(reader, &header, left, progress),

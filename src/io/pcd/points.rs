@@ -18,7 +18,11 @@ pub(super) struct Columns {
 
 impl Columns {
     pub(super) fn of(header: &Header) -> Result<Self, Fault> {
-        let named = |name: &str| header.fields.iter().position(|field| field.name == name && field.count > 0);
+        // In either case; a name that is written as here comes first.
+        let first =
+            |is: &dyn Fn(&str) -> bool| header.fields.iter().position(|field| is(&field.name) && field.count > 0);
+        let named =
+            |name: &str| first(&|given| given == name).or_else(|| first(&|given| given.eq_ignore_ascii_case(name)));
         let triple = |names: [&str; 3]| Some([named(names[0])?, named(names[1])?, named(names[2])?]);
         let Some(position) = triple(["x", "y", "z"]) else {
             let missing: Vec<&str> = ["x", "y", "z"].into_iter().filter(|name| named(name).is_none()).collect();

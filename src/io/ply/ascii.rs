@@ -21,7 +21,7 @@ pub(super) fn read(
     faces: Faces,
     progress: &dyn Progress,
 ) -> Result<Contents, Fault> {
-    let mut tokens = Tokens { reader, line: header.lines + 1, token: Vec::new() };
+    let mut tokens = Tokens { reader, line: header.lines + 1, line_end: header.line_end, token: Vec::new() };
     let mut contents = Contents { faces, points: Points::default() };
     for element in header.needed() {
         if element.name == "vertex" {
@@ -102,6 +102,7 @@ fn vertices(
 struct Tokens<R> {
     reader: R,
     line: u64,
+    line_end: u8,
     token: Vec<u8>,
 }
 
@@ -121,7 +122,7 @@ impl<R: BufRead> Tokens<R> {
             let mut start = 0;
             if self.token.is_empty() {
                 start = buffer.iter().position(|byte| !byte.is_ascii_whitespace()).unwrap_or(buffer.len());
-                self.line += buffer[..start].iter().filter(|&&byte| byte == b'\n').count() as u64;
+                self.line += buffer[..start].iter().filter(|&&byte| byte == self.line_end).count() as u64;
             }
             let word = &buffer[start..];
             let length = word.iter().position(u8::is_ascii_whitespace);

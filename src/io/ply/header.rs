@@ -2,7 +2,7 @@
 
 use super::faces::Faces;
 use crate::io::fault::Fault;
-use crate::io::values::{BYTE_ORDER_MARK, shown};
+use crate::io::values::{BYTE_ORDER_MARK, line_end, shown};
 use std::io::{BufRead, Read};
 
 /// No header line is longer; a comment may hold a processing history.
@@ -91,6 +91,8 @@ pub(super) struct Header {
     pub(super) textures: Vec<String>,
     /// Lines, `end_header` included: the first value of an ASCII file is on the next.
     pub(super) lines: u64,
+    /// What lines end with.
+    pub(super) line_end: u8,
 }
 
 impl Header {
@@ -103,24 +105,25 @@ impl Header {
 
 /// Reads up to and including the line `end_header`.
 pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
+    let line_end = line_end(reader)?;
     let mut line = Vec::new();
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
     let mut textures = Vec::new();
     for number in 1.. {
         line.clear();
-        reader.take(LINE_LIMIT).read_until(b'\n', &mut line)?;
+        reader.take(LINE_LIMIT).read_until(line_end, &mut line)?;
         if number == 1 {
             if line.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&line).trim_ascii_end() != b"ply" {
                 return Err(Fault::Malformed("it is not a PLY file: its first line is not 'ply'".into()));
             }
             continue;
         }
-        let complete = line.last() == Some(&b'\n');
+        let complete = line.last() == Some(&line_end);
         let text = String::from_utf8_lossy(&line);
         let mut words = text.split_ascii_whitespace();
         let keyword = words.next();
-        // The last line of a file without values may lack its line feed.
+        // The last line of a file without values may lack its end.
         if !complete && keyword != Some("end_header") {
             return Err(Fault::Malformed(if line.len() as u64 == LINE_LIMIT {
                 format!("line {number} of the PLY header is longer than {LINE_LIMIT} bytes")
@@ -166,7 +169,7 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
             }
             Some("end_header") => {
                 let encoding = encoding.ok_or_else(|| malformed("the PLY header has no format line"))?;
-                return Ok(Header { encoding, elements, textures, lines: number });
+                return Ok(Header { encoding, elements, textures, lines: number, line_end });
             }
             Some(_) => return Err(malformed("not a PLY header line")),
         }

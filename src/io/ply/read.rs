@@ -6,7 +6,7 @@ use super::{ascii, binary};
 use crate::io::fault::{self, Fault};
 use crate::io::triangles;
 use crate::io::values::shown;
-use crate::io::{Material, Mesh, Points, Texture};
+use crate::io::{Input, Material, Mesh, Points, Texture};
 use crate::{Progress, Result};
 use std::fs::File;
 use std::io::BufReader;
@@ -35,8 +35,8 @@ use std::sync::Arc;
 /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where
 /// the header is not PLY's, `x`, `y` or `z` is missing, the file ends before the vertices or faces that its header
 /// promises, a number in text is none, a list has a negative length, or a face names a vertex that does not exist.
-pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
-    let (mut points, faces, _) = contents(path, false, progress)?;
+pub fn read(input: Input, progress: &dyn Progress) -> Result<Points> {
+    let (mut points, faces, _) = contents(input, false, progress)?;
     if faces.triangles.is_empty() {
         return Ok(points);
     }
@@ -58,8 +58,9 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
 /// # Errors
 ///
 /// As [`read`].
-pub fn read_mesh(path: &Path, progress: &dyn Progress) -> Result<Mesh> {
-    let (points, faces, textures) = contents(path, true, progress)?;
+pub fn read_mesh(input: Input, progress: &dyn Progress) -> Result<Mesh> {
+    let folder = input.path.parent().unwrap_or(Path::new("")).to_owned();
+    let (points, faces, textures) = contents(input, true, progress)?;
     let Triangles { triangles, texture, texture_numbers } = faces;
     fn corners<T: Copy>(triangles: &[[u32; 3]], of_vertices: &[T]) -> Vec<[T; 3]> {
         triangles.iter().map(|corners| corners.map(|vertex| of_vertices[vertex as usize])).collect()
@@ -67,7 +68,7 @@ pub fn read_mesh(path: &Path, progress: &dyn Progress) -> Result<Mesh> {
     let texture = texture.or_else(|| points.texture.map(|texture| corners(&triangles, &texture)));
     let mut notes = Vec::new();
     let mut material = |name: String| {
-        let read = Texture::read(&beside(path, &name));
+        let read = Texture::read(&beside(&folder, &name));
         let image = read.map(Arc::new).map_err(|error| notes.push(format!("a texture is left out: {error}"))).ok();
         Material { name, diffuse: [1.0; 4], texture: image }
     };
@@ -90,12 +91,13 @@ pub fn read_mesh(path: &Path, progress: &dyn Progress) -> Result<Mesh> {
 /// The textures that the PLY file at `path` names.
 pub(in crate::io) fn companions(path: &Path) -> Vec<PathBuf> {
     let header = File::open(path).map_err(Fault::Io).and_then(|file| header::read(&mut BufReader::new(file)));
-    header.map_or(Vec::new(), |header| header.textures.iter().map(|name| beside(path, name)).collect())
+    let folder = path.parent().unwrap_or(Path::new(""));
+    header.map_or(Vec::new(), |header| header.textures.iter().map(|name| beside(folder, name)).collect())
 }
 
 /// A file that is named in the one at `path`, as Windows may write it.
-fn beside(path: &Path, name: &str) -> PathBuf {
-    path.parent().unwrap_or(Path::new("")).join(name.replace('\\', "/"))
+fn beside(folder: &Path, name: &str) -> PathBuf {
+    folder.join(name.replace('\\', "/"))
 }
 
 /// What is read of a file.
@@ -106,16 +108,15 @@ pub(super) struct Contents {
 
 /// The vertices, the triangles, which name vertices that exist, and the names of textures. With `surface`, faces may have texture
 /// coordinates.
-fn contents(path: &Path, surface: bool, progress: &dyn Progress) -> Result<(Points, Triangles, Vec<String>)> {
-    let in_file = |fault: Fault| fault.of(path);
-    let file = File::open(path).map_err(Fault::Io).map_err(in_file)?;
-    let length = file.metadata().map_err(Fault::Io).map_err(in_file)?.len();
+fn contents(input: Input, surface: bool, progress: &dyn Progress) -> Result<(Points, Triangles, Vec<String>)> {
+    let Input { file, length, path, .. } = input;
+    let in_file = |fault: Fault| fault.of(&path);
     let mut reader = BufReader::with_capacity(1 << 16, file);
     let header = header::read(&mut reader).map_err(in_file)?;
     let Some(vertex) = header.elements.iter().find(|element| element.name == "vertex") else {
         return Err(in_file(Fault::Malformed("its header has no element 'vertex'".into())));
     };
-    progress.begin(&format!("reading {}", fault::name(path)), vertex.count);
+    progress.begin(&format!("reading {}", fault::name(&path)), vertex.count);
     let contents = match header.encoding {
         Encoding::Ascii => ascii::read(reader, &header, length, Faces::new(surface), progress),
         Encoding::LittleEndian => binary::read::<false>(reader, &header, length, Faces::new(surface), progress),

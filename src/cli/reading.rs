@@ -1,0 +1,74 @@
+//! How commands read their inputs, and what their help says of them.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use epsplat::io::{self, Format, Mesh, Points, ReadOptions};
+use epsplat::{Error, Result};
+
+use super::progress::Bars;
+
+/// What inputs are, whatever they are called.
+#[derive(Args)]
+pub(super) struct InputFormat {
+    /// The format of the inputs [default: what their names say, or else their first bytes]
+    #[arg(long = "input-format", value_name = "FORMAT", value_parser = formats())]
+    format: Option<Format>,
+}
+
+/// How point clouds are read.
+#[derive(Args)]
+pub(super) struct Reading {
+    #[command(flatten)]
+    input: InputFormat,
+    /// Keep the points that a LAS file marks as withheld, which is deleted; else they are left out and counted
+    #[arg(long)]
+    keep_withheld: bool,
+}
+
+/// The formats of this build.
+fn formats() -> impl TypedValueParser<Value = Format> {
+    let names = Format::READ.iter().map(|(name, _)| *name);
+    PossibleValuesParser::new(names).try_map(|name| name.parse::<Format>())
+}
+
+/// The help of inputs that are `what`.
+pub(super) fn help_of(what: &str) -> String {
+    let extensions: Vec<_> = Format::READ.iter().map(|(name, _)| format!(".{name}")).collect();
+    format!("{what}: {}; - is standard input", extensions.join(", "))
+}
+
+impl InputFormat {
+    /// The triangles of a mesh.
+    pub(super) fn mesh(&self, path: &Path, bars: &Bars) -> Result<Mesh> {
+        let Self { format } = *self;
+        if format.is_some_and(|format| format != Format::Obj && format != Format::Ply) {
+            return Err(Error::Usage(
+                "only obj and ply files are read as meshes: choose one of them for --input-format".into(),
+            ));
+        }
+        io::read_mesh_with(path, ReadOptions { format, ..ReadOptions::default() }, bars)
+    }
+}
+
+impl Reading {
+    /// The points of a file.
+    pub(super) fn points(&self, path: &Path, bars: &Bars) -> Result<Points> {
+        let options = ReadOptions { format: self.input.format, keep_withheld: self.keep_withheld };
+        io::read_with(path, options, bars)
+    }
+
+    /// The points of each of several files.
+    pub(super) fn all(&self, paths: &[PathBuf], bars: &Bars) -> Result<Vec<Points>> {
+        paths.iter().map(|path| self.points(path, bars)).collect()
+    }
+
+    /// These options as arguments, for a command that reads the same file.
+    pub(super) fn arguments(&self) -> String {
+        let format = self.input.format.and_then(|format| Format::READ.iter().find(|(_, known)| *known == format));
+        let format = format.map_or(String::new(), |(name, _)| format!(" --input-format {name}"));
+        let withheld = if self.keep_withheld { " --keep-withheld" } else { "" };
+        format + withheld
+    }
+}

@@ -1,0 +1,79 @@
+//! The formats that are read, and how files are told to be of one.
+
+use std::path::Path;
+use std::str::FromStr;
+
+use super::values::BYTE_ORDER_MARK;
+
+/// A format of points or meshes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Polygon file format (Turk 1994).
+    Ply,
+    /// LAS, or LAZ, its compressed form.
+    Las,
+    /// Wavefront OBJ.
+    Obj,
+    /// ASTM E2807; read by builds with the feature `e57`.
+    E57,
+    /// Point Cloud Library; read by builds with the feature `pcd`.
+    Pcd,
+}
+
+impl Format {
+    /// The formats that this build reads, by the extensions of their files.
+    pub const READ: &[(&str, Self)] = &[
+        ("ply", Self::Ply),
+        ("las", Self::Las),
+        ("laz", Self::Las),
+        ("obj", Self::Obj),
+        #[cfg(feature = "e57")]
+        ("e57", Self::E57),
+        #[cfg(feature = "pcd")]
+        ("pcd", Self::Pcd),
+    ];
+
+    /// Those as a part of a sentence: `PLY, LAS, LAZ and OBJ`.
+    pub fn sentence() -> String {
+        let names: Vec<_> = Self::READ.iter().map(|(name, _)| name.to_ascii_uppercase()).collect();
+        match names.split_last() {
+            Some((last, others)) if !others.is_empty() => format!("{} and {last}", others.join(", ")),
+            _ => names.concat(),
+        }
+    }
+
+    /// What a file's extension says, in either case; of formats that this build does not read too.
+    pub(super) fn of_name(path: &Path) -> Option<Self> {
+        match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
+            "e57" => Some(Self::E57),
+            "pcd" => Some(Self::Pcd),
+            other => other.parse().ok(),
+        }
+    }
+
+    /// What a file's first bytes say. OBJ files begin with anything.
+    pub(super) fn of_start(start: &[u8]) -> Option<Self> {
+        if start.starts_with(b"LASF") {
+            return Some(Self::Las);
+        }
+        if start.starts_with(b"ASTM") {
+            return Some(Self::E57);
+        }
+        let text = start.strip_prefix(BYTE_ORDER_MARK).unwrap_or(start);
+        if text.strip_prefix(b"ply").is_some_and(|rest| rest.first().is_some_and(u8::is_ascii_whitespace)) {
+            return Some(Self::Ply);
+        }
+        let comment = text.strip_prefix(b"#").unwrap_or_default().trim_ascii_start();
+        let begins = |text: &[u8], word: &[u8]| text.get(..word.len()).is_some_and(|t| t.eq_ignore_ascii_case(word));
+        (begins(comment, b".PCD") || begins(text, b"VERSION ") || begins(text, b"FIELDS ")).then_some(Self::Pcd)
+    }
+}
+
+impl FromStr for Format {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let known = Self::READ.iter().find(|(name, _)| *name == text);
+        known.map(|(_, format)| *format).ok_or_else(|| format!("{} files are read, not `{text}`", Self::sentence()))
+    }
+}

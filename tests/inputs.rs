@@ -1,0 +1,217 @@
+//! Inputs as the command line is given them: through pipes, with formats that are named, with deleted points, and damaged.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+#[path = "common/las_forms.rs"]
+mod las_forms;
+
+use common::command::{DATA, Folder, epsplat, fails, ply, succeeds, text};
+use las::{Builder, Point, Writer};
+use serde_json::Value;
+use std::io::{Cursor, Write};
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+/// Runs the program with `bytes` on standard input.
+fn piped(arguments: &[&str], bytes: &[u8]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_epsplat"));
+    command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    let mut stdin = child.stdin.take().unwrap();
+    std::thread::scope(|scope| {
+        scope.spawn(move || drop(stdin.write_all(bytes)));
+        child.wait_with_output().unwrap()
+    })
+}
+
+/// The one line that a failed run says.
+fn only_line(output: &Output, code: i32) -> String {
+    let stderr = String::from_utf8(output.stderr.clone()).unwrap();
+    assert_eq!((output.status.code(), stderr.lines().count()), (Some(code), 1), "{stderr}");
+    stderr.trim_end().strip_prefix("error: ").expect(&stderr).to_owned()
+}
+
+/// What `info` says of a file, but for where it is.
+fn info(output: Output) -> Value {
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let mut info: Value = serde_json::from_slice(&output.stdout).unwrap();
+    info.as_object_mut().unwrap().remove("supplied_by");
+    info
+}
+
+/// Points of a LAS file, of which every third one is deleted.
+fn third_withheld(count: u32) -> Vec<u8> {
+    let mut writer = Writer::new(Cursor::new(Vec::new()), Builder::from((1, 2)).into_header().unwrap()).unwrap();
+    for i in 0..count {
+        let (x, y) = (f64::from(i % 20), f64::from(i / 20));
+        writer.write_point(Point { x, y, is_withheld: i % 3 == 0, ..Point::default() }).unwrap();
+    }
+    writer.into_inner().unwrap().into_inner()
+}
+
+/// A file of each format, and the argument without which a pipe does not tell what it is.
+fn one_of_each(folder: &Folder) -> Vec<(std::path::PathBuf, &'static [&'static str])> {
+    let rows: String = (0..60).map(|i| format!("{} {} 0\n", i % 6, i / 6)).collect();
+    let mut files = vec![
+        (folder.file("a.ply", ply("x y z", 60, &rows)), &[][..]),
+        (folder.file("a.las", third_withheld(90)), &[]),
+        (Path::new(DATA).join("simple.copc.laz"), &[]),
+        (Path::new(DATA).join("bunny.obj"), &["--input-format", "obj"]),
+    ];
+    if cfg!(feature = "pcd") {
+        let header = "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 60\nDATA ascii\n";
+        files.push((folder.file("a.pcd", format!("{header}{rows}")), &[]));
+    }
+    files
+}
+
+#[test]
+fn what_comes_through_a_pipe_is_what_the_file_holds() {
+    let folder = Folder::new();
+    for (path, format) in one_of_each(&folder) {
+        let bytes = std::fs::read(&path).unwrap();
+        let from_file = info(epsplat(&["info", text(&path), "--json", "-"]));
+        let mut names = vec!["-"];
+        if cfg!(unix) {
+            names.push("/dev/stdin");
+        }
+        for name in names {
+            let from_pipe = info(piped(&[&["info", name, "--json", "-"], format].concat(), &bytes));
+            assert_eq!(from_pipe, from_file, "{name} {}", path.display());
+        }
+        // A named pipe, as `<(...)` makes one.
+        #[cfg(unix)]
+        {
+            let line = r#""$0" info "$2" $3 --json - & cat "$1" > "$2"; wait $!"#;
+            let named = folder.path("pipe");
+            assert!(Command::new("mkfifo").arg(&named).status().unwrap().success());
+            let mut command = Command::new("sh");
+            command.args(["-c", line, env!("CARGO_BIN_EXE_epsplat"), text(&path), text(&named), &format.join(" ")]);
+            assert_eq!(info(command.output().unwrap()), from_file, "{}", path.display());
+            std::fs::remove_file(&named).unwrap();
+        }
+    }
+    // A mesh too, and several inputs of which one is a pipe.
+    let bunny = std::fs::read(Path::new(DATA).join("bunny.obj")).unwrap();
+    let (made, file) = (folder.path("made.ply"), folder.path("a.ply"));
+    let sample = ["sample", "-", "--input-format", "obj", "--count", "100", "-o", text(&made)];
+    assert!(piped(&sample, &bunny).status.success());
+    let surfels = std::fs::read(&made).unwrap();
+    let both = piped(&["surfels", text(&file), "-", "-o", text(&folder.path("both.ply"))], &surfels);
+    assert!(String::from_utf8_lossy(&both.stderr).contains("both.ply: 160 surfels"), "{both:?}");
+}
+
+#[test]
+fn a_pipe_that_ends_early_or_holds_no_cloud_is_one_sentence() {
+    let folder = Folder::new();
+    for (path, format) in one_of_each(&folder) {
+        let bytes = std::fs::read(&path).unwrap();
+        for share in [0, 1, 40, 70] {
+            let output = piped(&[&["info", "-"], format].concat(), &bytes[..bytes.len() * share / 100]);
+            // A part of an OBJ file is one too, if it ends between two lines, and if it has any vertex.
+            if !(format.len() == 2 && output.status.success()) {
+                only_line(&output, 1);
+            }
+        }
+    }
+    let said = only_line(&piped(&["info", "-"], b"v 1 2 3\n"), 1);
+    assert!(said.starts_with("standard input: its format is not known") && said.contains("--input-format"), "{said}");
+    let said = only_line(&piped(&["info", "-", "--input-format", "ply"], b"v 1 2 3\n"), 1);
+    assert_eq!(said, "standard input: it is not a PLY file: its first line is not 'ply'");
+    // What has no end is told from its start.
+    #[cfg(target_os = "linux")]
+    only_line(&epsplat(&["info", "/dev/zero"]), 1);
+    fails(&["info", "a.ply", "--input-format", "png"], 2, &["--input-format", "ply"]);
+    fails(&["sample", "a.obj", "--input-format", "las", "--count", "1", "-o", "a.ply"], 2, &["obj and ply"]);
+}
+
+#[test]
+fn deleted_points_are_left_out_and_told_or_kept_by_every_command() {
+    let folder = Folder::new();
+    let cloud = folder.file("a.las", third_withheld(300));
+    let plane = folder.file("m.obj", "v 0 0 0\nv 19 0 0\nv 0 14 0\nf 1 2 3\n");
+    let (cloud, image, made) = (text(&cloud), folder.path("a.png"), folder.path("a.ply"));
+    let commands: [&[&str]; 5] = [
+        &["info", cloud],
+        &["render", cloud, "-o", text(&image), "--backend", "reference", "--size", "16x16"],
+        &["surfels", cloud, "-o", text(&made)],
+        &["simplify", cloud, "-o", text(&made)],
+        &["coverage", cloud, "--mesh", text(&plane), "--views", "4", "--side", "16"],
+    ];
+    for command in commands {
+        let told = |more: &[&str]| {
+            let Output { stdout, stderr, .. } = succeeds(&[command, more].concat());
+            let said = [stdout, stderr].map(|bytes| String::from_utf8(bytes).unwrap()).concat();
+            (said.lines().filter(|line| line.contains("are marked")).map(str::to_owned).collect::<Vec<_>>(), said)
+        };
+        let expected =
+            "100 points were left out: they are marked as withheld, which is deleted (--keep-withheld keeps them)";
+        let (lines, said) = told(&[]);
+        assert_eq!(lines, [expected], "{command:?}");
+        let (lines, kept) = told(&["--keep-withheld"]);
+        assert!(
+            lines.is_empty() && kept.contains("300 surfels") && !said.contains("300 surfels"),
+            "{command:?}: {said}{kept}"
+        );
+    }
+    let of = |more: &[&str]| info(epsplat(&[&["info", cloud, "--json", "-"], more].concat()));
+    let (left_out, kept) = (of(&[]), of(&["--keep-withheld"]));
+    assert_eq!((&left_out["points"], &left_out["preparation"]["withheld"]), (&200.into(), &100.into()));
+    assert_eq!((&kept["points"], &kept["preparation"]["withheld"]), (&300.into(), &0.into()));
+    // The command that `info` recommends reads the same.
+    let table =
+        String::from_utf8(succeeds(&["info", cloud, "--keep-withheld", "--input-format", "las"]).stdout).unwrap();
+    assert!(table.contains(&format!("epsplat surfels {cloud} --input-format las --keep-withheld -o")), "{table}");
+    let mut all = third_withheld(1);
+    let said = only_line(&piped(&["info", "-"], &all), 1);
+    assert!(
+        said.contains("all of the 1 points read are marked as withheld") && said.contains("--keep-withheld"),
+        "{said}"
+    );
+    all.truncate(230);
+    assert!(only_line(&piped(&["info", "-"], &all), 1).contains("the file ends after 0"));
+}
+
+/// The help names the formats of this build, and no others.
+#[test]
+fn the_help_names_the_formats_that_are_read() {
+    for command in ["info", "render", "surfels", "simplify", "coverage"] {
+        let help = String::from_utf8(succeeds(&[command, "--help"]).stdout).unwrap();
+        let formats = [("ply", true), ("las", true), ("laz", true), ("obj", true)];
+        let optional = [("e57", cfg!(feature = "e57")), ("pcd", cfg!(feature = "pcd"))];
+        for (format, is_read) in formats.into_iter().chain(optional) {
+            let words = help.split(|c: char| c.is_whitespace() || ",;]".contains(c));
+            let named = words.filter(|word| *word == format || word.strip_prefix('.') == Some(format)).count();
+            assert_eq!(named >= 2, is_read, "{command} {format}: {help}");
+            assert!(is_read || named == 0, "{command} {format}: {help}");
+        }
+        assert!(help.contains("--keep-withheld") && help.contains("--input-format"), "{help}");
+    }
+}
+
+/// LAZ files at which the decoder once panicked, and printed so before the sentence.
+#[test]
+fn damaged_files_are_one_sentence() {
+    let folder = Folder::new();
+    let mut builder = Builder::from((1, 2));
+    builder.point_format.is_compressed = true;
+    let mut writer = Writer::new(Cursor::new(Vec::new()), builder.into_header().unwrap()).unwrap();
+    (0..200).for_each(|i| writer.write_point(Point { x: f64::from(i), ..Point::default() }).unwrap());
+    let whole = writer.into_inner().unwrap().into_inner();
+    let without_chunks = las_forms::pointwise(&whole, 0);
+    let twice = las_forms::with_another_record(&whole);
+    let deep = include_bytes!("readers/deep_gps_time.laz").to_vec();
+    let layers = include_bytes!("readers/layers_outside_chunks.laz").to_vec();
+    for (name, bytes, said) in [
+        ("short.laz", without_chunks[..without_chunks.len() - 60].to_vec(), "decoding fails after"),
+        ("twice.laz", twice, "its LASzip record does not describe its points"),
+        ("deep.laz", deep, "decoding fails after 0"),
+        ("layers.laz", layers, "its LASzip record does not describe its points"),
+    ] {
+        let path = folder.file(name, bytes);
+        let line = only_line(&epsplat(&["info", text(&path)]), 1);
+        assert!(line.starts_with(text(&path)) && line.contains(said), "{line}");
+    }
+    assert_eq!(info(piped(&["info", "-", "--json", "-"], &without_chunks))["points"], 200);
+}

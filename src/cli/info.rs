@@ -58,11 +58,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     outputs::check([&arguments.input], &arguments.json)?;
     let bars = Bars::new();
     let points = arguments.reading.points(&arguments.input, &bars)?;
+    let bounds = surfels::bounds(&points);
     let texture = points.texture.is_some();
     let held = (points.positions.len() as u64, points.normals.is_some(), points.radii.is_some(), colors(&points));
     let (scene, preparation) = surfels::build(vec![points], &bars)
         .map_err(|e| if let Error::EmptyScene(what) = e { Error::malformed(&arguments.input, what) } else { e })?;
-    let bounds = scene.bounds();
     let coverage = surfels::coverage(&scene, &bars)?;
     let lacking = [
         (preparation.estimated_normals > 0, "normals"),
@@ -83,8 +83,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             epsplat::scene::Up::Y => "y",
             epsplat::scene::Up::Z => "z",
         },
-        min: (bounds.min + scene.origin).to_array(),
-        max: (bounds.max + scene.origin).to_array(),
+        min: bounds.min.to_array(),
+        max: bounds.max.to_array(),
         origin: scene.origin.to_array(),
         largest_radius: scene.largest_radius().into(),
         coverage,

@@ -228,6 +228,15 @@ fn one(arguments: &Arguments) -> Result<()> {
 fn scene(arguments: &Arguments, bars: &Bars) -> Result<Scene> {
     let texture = arguments.texture.as_deref().map(Texture::read).transpose()?;
     let inputs = arguments.reading.all(&arguments.inputs, bars)?;
+    for (path, points) in arguments.inputs.iter().zip(&inputs) {
+        if let Some(share) = surfels::coarse(points) {
+            let (path, vertices, percent) = (path.display(), points.positions.len(), 100.0 * share);
+            note(&format!(
+                "the {vertices} vertices of the mesh {path} become disks of {percent:.0} % of its size, which show as such: `epsplat \
+                 sample {path} -o surfels.ply --count 100000` covers its triangles with small ones"
+            ));
+        }
+    }
     let (scene, preparation) = match texture {
         None => surfels::build(inputs, bars)?,
         Some(texture) => {

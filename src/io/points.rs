@@ -24,6 +24,8 @@ pub struct Points {
     pub texture: Option<Vec<[f32; 2]>>,
     /// The direction that the format, by convention, calls up.
     pub up: Option<Up>,
+    /// Radii are those with which disks at the vertices cover the triangles of a mesh.
+    pub of_mesh: bool,
     /// Points that the file holds and that were left out, as it marks them as withheld, which is deleted.
     pub withheld: u64,
 }

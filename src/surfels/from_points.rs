@@ -200,7 +200,7 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
     progress.end();
     let Gathered { positions, colors, texture, up, .. } = gathered;
     let (normals, radii) = (Some(point_normals), Some(point_radii));
-    let points = Points { positions, normals, radii, axes, colors, texture, up, withheld: 0 };
+    let points = Points { positions, normals, radii, axes, colors, texture, up, ..Points::default() };
     Ok(Surfels { points, preparation, dropped_outliers, limited, parts, collinear })
 }
 

@@ -101,7 +101,7 @@ impl Gathered {
     }
 }
 
-fn is_usable(position: &[f64; 3]) -> bool {
+pub(crate) fn is_usable(position: &[f64; 3]) -> bool {
     position.iter().all(|c| c.abs() <= LARGEST_COORDINATE)
 }
 

@@ -1,6 +1,7 @@
 //! From points and meshes to surfels.
 
 pub mod analytic;
+mod coarse;
 mod colors;
 mod coverage;
 mod eigen;
@@ -24,6 +25,7 @@ mod texture;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+pub use self::coarse::coarse;
 pub use self::coverage::{Coverage, coverage};
 pub use self::from_points::{FromPoints, Surfels, from_points};
 pub use self::orient::Orientation;
@@ -272,6 +274,15 @@ fn usable_axes(axes: [[f32; 3]; 2]) -> Option<[Vec3; 2]> {
     let shortest = s.cross(t).length() / (1.5 * longer);
     let sound = longer <= largest / 1.5 && shortest >= smallest.max(PARALLEL * shorter);
     sound.then(|| axes.map(Vec3::from_array))
+}
+
+/// The box of the points whose coordinates are usable, world coordinates as they were read.
+pub fn bounds(points: &Points) -> Bounds {
+    let usable = points.positions.par_iter().filter(|position| gather::is_usable(position));
+    usable
+        // Adding +0 makes -0 the same coordinate as 0.
+        .fold(|| Bounds::EMPTY, |bounds, p| bounds.with_point(DVec3::from_array(*p) + DVec3::ZERO))
+        .reduce(|| Bounds::EMPTY, Bounds::union)
 }
 
 /// The box of the positions, world units.

@@ -367,8 +367,7 @@ fn points_with(attributes: u32) -> Points {
             _ => Some(Colors::Linear(all.clone().map(|i| [real(i, 5), 1e6, 0.0, 0.5]).collect())),
         },
         texture: on(6).then(|| all.map(|i| [real(i, 6), real(i, 7)]).collect()),
-        up: None,
-        withheld: 0,
+        ..Points::default()
     }
 }
 

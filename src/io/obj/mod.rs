@@ -154,6 +154,7 @@ fn points(lines: Lines, models: &[tobj::Model]) -> Points {
         positions: lines.positions,
         normals,
         radii: has_faces.then_some(radii),
+        of_mesh: has_faces,
         colors,
         up: Some(Up::Y),
         ..Points::default()

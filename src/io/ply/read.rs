@@ -44,6 +44,7 @@ pub fn read(input: Input, progress: &dyn Progress) -> Result<Points> {
     faces.triangles.iter().for_each(|corners| triangles.add(corners.map(|corner| corner as usize), None));
     let (normals, radii) = triangles.finish();
     points.normals.get_or_insert(normals);
+    points.of_mesh = points.radii.is_none() && points.axes.is_none();
     points.radii.get_or_insert(radii);
     Ok(points)
 }

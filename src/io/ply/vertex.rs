@@ -219,7 +219,7 @@ impl<'a> Vertices<'a> {
             colors,
             texture: layout.texture.map(|_| self.texture),
             up: None,
-            withheld: 0,
+            ..Points::default()
         }
     }
 }

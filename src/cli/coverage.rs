@@ -12,7 +12,7 @@ use epsplat::{Error, Progress, Result, io};
 use serde::Serialize;
 
 use super::progress::Bars;
-use super::reading::{Reading, help_of};
+use super::reading::{Reading, help_of, named};
 use super::{note, outputs, print, write_json};
 
 /// Whether surfels cover the mesh that they stand for, and how far they lie from it.
@@ -57,23 +57,23 @@ struct Outcome {
 pub fn run(arguments: &Arguments) -> Result<()> {
     outputs::check(arguments.surfels.iter().chain([&arguments.mesh]), &arguments.json)?;
     let bars = Bars::new();
+    let mesh = io::read_mesh(&arguments.mesh, &bars)?;
+    let triangles = TriangleTree::new(&mesh)?;
+    if triangles.is_empty() {
+        return Err(Error::malformed(&arguments.mesh, "it has no triangle with an area, so there is nothing to cover"));
+    }
     let points = arguments.reading.all(&arguments.surfels, &bars)?;
-    let (scene, preparation) = build(points, &bars)?;
+    let (scene, preparation) = build(points, &bars).map_err(|error| named(error, &arguments.surfels))?;
     preparation.notes().iter().for_each(|line| note(line));
     if preparation.estimated_radii > 0 {
         note(&format!("{} surfels had no radius: theirs are estimated from neighbours", preparation.estimated_radii));
     }
-    let mesh = io::read_mesh(&arguments.mesh, &bars)?;
     mesh.notes.iter().for_each(|line| note(line));
-    let triangles = TriangleTree::new(&mesh)?;
     let dropped = mesh.triangles.len() - triangles.len();
     if dropped > 0 {
         note(&format!(
             "{dropped} triangles were dropped: they have no area, or a coordinate is not finite or too large"
         ));
-    }
-    if triangles.is_empty() {
-        return Err(Error::malformed(&arguments.mesh, "it has no triangle with an area, so there is nothing to cover"));
     }
     let coverage = coverage(&triangles, &scene, arguments.views, arguments.side, &bars)?;
     bars.begin("measuring distances", 0);

@@ -4,14 +4,14 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
+use epsplat::Result;
 use epsplat::io::Points;
 use epsplat::scene::Colors;
 use epsplat::surfels::{self, Coverage, Preparation};
-use epsplat::{Error, Result};
 use serde::Serialize;
 
 use super::progress::Bars;
-use super::reading::{Reading, help_of};
+use super::reading::{Reading, help_of, named};
 use super::{outputs, print, write_json};
 
 /// What a file holds, and what a renderer would make of it.
@@ -61,8 +61,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let bounds = surfels::bounds(&points);
     let texture = points.texture.is_some();
     let held = (points.positions.len() as u64, points.normals.is_some(), points.radii.is_some(), colors(&points));
-    let (scene, preparation) = surfels::build(vec![points], &bars)
-        .map_err(|e| if let Error::EmptyScene(what) = e { Error::malformed(&arguments.input, what) } else { e })?;
+    let (scene, preparation) =
+        surfels::build(vec![points], &bars).map_err(|error| named(error, std::slice::from_ref(&arguments.input)))?;
     let coverage = surfels::coverage(&scene, &bars)?;
     let lacking = [
         (preparation.estimated_normals > 0, "normals"),

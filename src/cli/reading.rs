@@ -39,6 +39,14 @@ pub(super) fn help_of(what: &str) -> String {
     format!("{what}: {}; - is standard input", extensions.join(", "))
 }
 
+/// What is wrong with a scene, with the name of its file if there is one.
+pub(super) fn named(error: Error, inputs: &[PathBuf]) -> Error {
+    match (error, inputs) {
+        (Error::EmptyScene(what), [input]) => Error::malformed(input, what),
+        (error, _) => error,
+    }
+}
+
 impl InputFormat {
     /// The triangles of a mesh.
     pub(super) fn mesh(&self, path: &Path, bars: &Bars) -> Result<Mesh> {

@@ -24,7 +24,7 @@ use self::output::{Format, note_overflows, summary};
 use self::view::View;
 use super::parse::{parse_accumulator, parse_color, parse_intrinsics, parse_scale, parse_size, parse_vector};
 use super::progress::Bars;
-use super::reading::{Reading, help_of};
+use super::reading::{Reading, help_of, named};
 use super::{note, outputs, write_json};
 
 /// Render point clouds and meshes to a PNG or EXR image.
@@ -237,8 +237,8 @@ fn scene(arguments: &Arguments, bars: &Bars) -> Result<Scene> {
             ));
         }
     }
-    let (scene, preparation) = match texture {
-        None => surfels::build(inputs, bars)?,
+    let built = match texture {
+        None => surfels::build(inputs, bars),
         Some(texture) => {
             let mut read = arguments.inputs.iter().zip(&inputs);
             if let Some((path, _)) = read.find(|(_, points)| points.texture.is_none()) {
@@ -246,9 +246,10 @@ fn scene(arguments: &Arguments, bars: &Bars) -> Result<Scene> {
                             a mesh some";
                 return Err(Error::malformed(path, what));
             }
-            surfels::build_textured(inputs, texture, bars)?
+            surfels::build_textured(inputs, texture, bars)
         }
     };
+    let (scene, preparation) = built.map_err(|error| named(error, &arguments.inputs))?;
     for line in preparation.notes() {
         note(&line);
     }

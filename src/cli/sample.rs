@@ -8,7 +8,7 @@ use epsplat::surfels::sampling::{MOST, MeshSurface, Method, Priority, sample, vo
 use epsplat::{Error, Result};
 
 use super::progress::Bars;
-use super::reading::InputFormat;
+use super::reading::{InputFormat, named};
 use super::{note, outputs};
 
 /// Write surfels that cover a mesh as PLY: on its triangles, with normals, radii, and its colours and texture coordinates.
@@ -71,7 +71,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Placement::Uniform => Method::Uniform,
     };
     let (points, sampling) = sample(&mesh, arguments.count as usize, &method, arguments.seed, &bars)
-        .map_err(|e| if let Error::EmptyScene(what) = e { Error::malformed(&arguments.mesh, what) } else { e })?;
+        .map_err(|error| named(error, std::slice::from_ref(&arguments.mesh)))?;
     sampling.notes().iter().for_each(|line| note(line));
     io::ply::write_points(&arguments.output, &points, &bars)?;
     let voxels = if sampling.voxels > 0 { format!(" in {} voxels", sampling.voxels) } else { String::new() };

@@ -10,7 +10,7 @@ use epsplat::surfels;
 use epsplat::surfels::simplify::{Options, Report, SplatShape, Tolerance, simplify};
 
 use super::progress::Bars;
-use super::reading::{Reading, help_of};
+use super::reading::{Reading, help_of, named};
 use super::{note, outputs, print, write_json};
 
 /// Replace the surfels of a smooth surface by fewer, larger ones that lie within a tolerance of them, without holes.
@@ -56,7 +56,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     outputs::check(&arguments.inputs, [&arguments.output].into_iter().chain(&arguments.json))?;
     let bars = Bars::new();
     let inputs = arguments.reading.all(&arguments.inputs, &bars)?;
-    let (scene, preparation) = surfels::build(inputs, &bars)?;
+    let (scene, preparation) = surfels::build(inputs, &bars).map_err(|error| named(error, &arguments.inputs))?;
     preparation.notes().iter().for_each(|line| note(line));
     if preparation.estimated_normals > 0 {
         note(&format!(

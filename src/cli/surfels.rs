@@ -9,7 +9,7 @@ use epsplat::{Error, Result};
 
 use super::parse::parse_orientation;
 use super::progress::Bars;
-use super::reading::{Reading, help_of};
+use super::reading::{Reading, help_of, named};
 use super::{note, outputs};
 
 /// Make surfels of points: normals with a side, and disks or ellipses that cover the surface, kept as PLY.
@@ -58,7 +58,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     outputs::check(&arguments.inputs, [&arguments.output])?;
     let bars = Bars::new();
     let inputs = arguments.reading.all(&arguments.inputs, &bars)?;
-    let surfels = from_points(inputs, &options, &bars)?;
+    let surfels = from_points(inputs, &options, &bars).map_err(|error| named(error, &arguments.inputs))?;
     ply::write_points(&arguments.output, &surfels.points, &bars)?;
     for line in surfels.notes() {
         note(&line);

@@ -183,14 +183,17 @@ mod tests {
     #[test]
     fn a_decoders_panic_is_not_printed() {
         const WHOSE: &str = "EPSPLAT_TEST_PANIC";
-        fn panics() -> Result<(), Fault> {
-            rayon::join(|| -> () { panic!("on this thread") }, || -> () { panic!("on another, or this one") });
-            Ok(())
+        fn panic_with(what: &str) {
+            panic!("{what}");
         }
+        let decoding = || -> Result<(), Fault> {
+            rayon::join(|| panic_with("on a thread"), || panic_with("on another, or the same"));
+            Ok(())
+        };
         if let Ok(whose) = std::env::var(WHOSE) {
-            assert!(matches!(deep(panics), Err(Fault::Malformed(_))));
+            assert!(matches!(deep(decoding), Err(Fault::Malformed(_))));
             if whose == "ours" {
-                assert!(std::panic::catch_unwind(|| panic!("of our own")).is_err());
+                assert!(std::panic::catch_unwind(|| panic_with("of our own")).is_err());
             }
             return;
         }

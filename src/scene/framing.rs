@@ -37,7 +37,9 @@ impl Camera {
         // The image's middle and half its width, as X/Z (pinhole) or X (orthographic), and so for its height.
         let interval = |size: u32, principal: f64, f: f64| {
             let size = f64::from(size);
-            [(0.5 * size - principal) / f, 0.5 * size / f]
+            // What ends a pixel before the border leaves the border's own pixels free.
+            let free = (0.5 * size - 1.0).max(0.25 * size);
+            [(0.5 * size - principal) / f, 0.5 * size / f, free / f]
         };
         let image = [interval(width, cx, fx), interval(height, cy, fy)];
         let framing = Framing::new(scene, projection == Projection::Pinhole, image);
@@ -62,8 +64,8 @@ enum Of {
 struct Framing<'a> {
     scene: &'a Scene,
     pinhole: bool,
-    /// Middle and half of the image's width and height.
-    image: [[f64; 2]; 2],
+    /// Of the image's width and height: the middle, half, and that less a pixel.
+    image: [[f64; 3]; 2],
     /// Right, down, forward.
     axes: [DVec3; 3],
     /// What is framed: centres in this box.
@@ -103,7 +105,7 @@ impl Disk {
 }
 
 impl<'a> Framing<'a> {
-    fn new(scene: &'a Scene, pinhole: bool, image: [[f64; 2]; 2]) -> Self {
+    fn new(scene: &'a Scene, pinhole: bool, image: [[f64; 3]; 2]) -> Self {
         let forward = forward(scene.up);
         let right = forward.cross(scene.up.axis()).normalize();
         let (body, _) = scene.body();
@@ -146,7 +148,8 @@ impl<'a> Framing<'a> {
 
     /// The eye from which the image is filled to the part `fill`, in the camera's axes relative to the scene's centre.
     fn eye(&self, fill: f64, of: Of) -> DVec3 {
-        let [[mid_x, half_x], [mid_y, half_y]] = self.image.map(|[middle, half]| [middle, fill * half]);
+        let filled = |half: f64, free: f64| if of == Of::Disks { free.min(fill * half) } else { fill * half };
+        let [[mid_x, half_x], [mid_y, half_y]] = self.image.map(|[middle, half, free]| [middle, filled(half, free)]);
         let mut eye = DVec3::new(0.0, 0.0, -2.0 * self.radius);
         if self.pinhole {
             // The eye must keep every point between four planes, X - x <= (mid + half) (Z - z) and so on: the foremost
@@ -175,7 +178,7 @@ impl<'a> Framing<'a> {
 
     /// Whether the image's border cuts a disk, seen from `eye`.
     fn cuts(&self, eye: DVec3) -> bool {
-        let [[mid_x, half_x], [mid_y, half_y]] = self.image;
+        let [[mid_x, _, half_x], [mid_y, _, half_y]] = self.image;
         let [front] = self.largest(Of::Disks, |disk| [eye.z - disk.farthest(DVec3::NEG_Z).z]);
         let [right, left, bottom, top] = self.reach(eye, Of::Disks);
         let beyond =

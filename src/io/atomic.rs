@@ -76,7 +76,9 @@ pub fn place_of(path: &Path) -> Option<PathBuf> {
     }
     let canonical = |folder: &Path| {
         let rest = end.strip_prefix(folder).ok()?;
-        or_current(folder).canonicalize().ok().map(|canonical| canonical.join(rest))
+        let canonical = or_current(folder).canonicalize().ok()?;
+        // Nothing joined to the path of a file would make it that of a folder.
+        Some(if rest.as_os_str().is_empty() { canonical } else { canonical.join(rest) })
     };
     Some(end.ancestors().find_map(canonical).unwrap_or(end))
 }

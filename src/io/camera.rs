@@ -81,8 +81,8 @@ impl CameraFile {
     /// keeps all.
     pub fn scaled(self, scale: f64) -> Self {
         let Some((width, height)) = self.size else { return self };
-        // At least one pixel; what is too many saturates and is refused where sizes are.
-        let scaled = |side: u32| (f64::from(side) * scale).round().max(1.0) as u32;
+        // At least one pixel of some; what is too many saturates and is refused where sizes are, as none is.
+        let scaled = |side: u32| if side == 0 { 0 } else { (f64::from(side) * scale).round().max(1.0) as u32 };
         let size = (scaled(width), scaled(height));
         let (x, y) = (f64::from(size.0) / f64::from(width), f64::from(size.1) / f64::from(height));
         let pixels = |[fx, fy, cx, cy]: [f64; 4]| [fx * x, fy * y, cx * x, cy * y];

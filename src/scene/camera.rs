@@ -72,7 +72,7 @@ impl Lens {
             Self::Fov(degrees) => {
                 if !(degrees > 0.0 && degrees < 180.0) {
                     return Err(Error::Usage(format!(
-                        "a field of view lies between 0 and 180 degrees, {degrees} does not"
+                        "a field of view lies between 0 and 180 degrees, {degrees:?} does not"
                     )));
                 }
                 let f = 0.5 * h / (0.5 * degrees.to_radians()).tan();
@@ -83,7 +83,7 @@ impl Lens {
                 let f = h / world;
                 if !(1.0 / LARGEST..=LARGEST).contains(&f) {
                     return Err(Error::Usage(format!(
-                        "the height of an orthographic view must be positive and within reason, {world} is not"
+                        "the height of an orthographic view must be positive and within reason, {world:?} is not"
                     )));
                 }
                 (Projection::Orthographic, [f, f, 0.5 * w, 0.5 * h])
@@ -127,7 +127,7 @@ pub fn check_near(near: f64) -> Result<()> {
     if (1.0 / LARGEST..=LARGEST).contains(&near) {
         return Ok(());
     }
-    Err(Error::Usage(format!("the near depth must be positive and within reason, {near} is not")))
+    Err(Error::Usage(format!("the near depth must be positive and within reason, {near:?} is not")))
 }
 
 impl Camera {

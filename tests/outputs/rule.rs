@@ -11,15 +11,16 @@ const OUT: &str = "OUT";
 /// A folder with one of all that commands read.
 fn inputs() -> Folder {
     let folder = Folder::new();
-    for name in ["cube.obj", "cube.mtl", "cube.png"] {
-        std::fs::copy(Path::new(DATA).join(name), folder.path(name)).unwrap();
-    }
+    let data = |name: &str| std::fs::read(Path::new(DATA).join(name)).unwrap();
+    folder.file("cube.obj", [b"mtllib cube.mtl\nusemtl x\n", &data("cube.obj")[..]].concat());
+    folder.file("cube.mtl", "newmtl x\nmap_Kd cube.png\n");
+    folder.file("cube.png", data("cube.png"));
     let rows: String = (0..36).map(|i| format!("{} {} 0 0 0 1 1\n", i % 6, i / 6)).collect();
     folder.file("s.ply", ply("x y z nx ny nz radius", 36, &rows));
     succeeds(&["sample", text(&folder.path("cube.obj")), "-o", text(&folder.path("painted.ply")), "--count", "30"]);
-    let render = ["render", text(&folder.path("s.ply")), "--backend", "reference", "--size", "8x8", "-o"];
     for name in ["a.png", "b.png"] {
-        succeeds(&[&render[..], &[text(&folder.path(name))]].concat());
+        let (cloud, image) = (folder.path("s.ply"), folder.path(name));
+        succeeds(&["render", text(&cloud), "--backend", "reference", "--size", "8x8", "-o", text(&image)]);
     }
     std::fs::copy(folder.path("cube.png"), folder.path("t.png")).unwrap();
     folder.file("camera.json", r#"{"width": 8, "height": 8, "eye": [0,0,5], "target": [0,0,0]}"#);
@@ -162,10 +163,10 @@ fn two_outputs_are_two_files() {
     std::fs::hard_link(&made, &hard).unwrap();
     refused(&hard);
     assert_eq!(std::fs::read(&made).unwrap(), b"old");
-    let pictures = ["render", text(&folder.path("s.ply")), "--cameras", text(&folder.path("transforms.json"))];
-    let views = folder.path("views");
-    let json = ["-o", text(&views), "--json", text(&views.join("p.png"))].map(str::to_owned);
-    fails(&[&pictures[..], &json.each_ref().map(String::as_str)].concat(), 2, &["one file"]);
+    let (cloud, cameras, views) = (folder.path("s.ply"), folder.path("transforms.json"), folder.path("views"));
+    let json = views.join("p.png");
+    let render = ["render", text(&cloud), "--cameras", text(&cameras), "-o", text(&views), "--json", text(&json)];
+    fails(&render, 2, &["one file"]);
     // What is no file is written to, by one command for two outputs too.
     for json in ["-", "/dev/null", "/dev/stdout"] {
         let output = run(&simplify(json));
@@ -184,14 +185,17 @@ fn two_outputs_are_two_files() {
 fn stdout_by_name_is_written_to_and_not_replaced() {
     let folder = inputs();
     let script = "(echo first; $BIN info s.ply --json /dev/stdout; echo last) >> log";
-    let status = std::process::Command::new("sh").args(["-c", script]).env("BIN", env!("CARGO_BIN_EXE_epsplat"));
-    assert!({ status }.current_dir(folder.path("")).status().unwrap().success());
+    let run = |script: &str| {
+        let mut shell = std::process::Command::new("sh");
+        shell.args(["-c", script]).env("BIN", env!("CARGO_BIN_EXE_epsplat")).current_dir(folder.path(""));
+        shell.output().unwrap()
+    };
+    assert!(run(script).status.success());
     let log = std::fs::read_to_string(folder.path("log")).unwrap();
     assert!(log.starts_with("first\n{") && log.ends_with("}\nlast\n") && log.contains("\"points\": 36"), "{log}");
     // What is read from stdin is not written over either.
     let script = "$BIN compare a.png /dev/stdin --json b.png < b.png";
-    let output = std::process::Command::new("sh").args(["-c", script]).env("BIN", env!("CARGO_BIN_EXE_epsplat"));
-    let output = { output }.current_dir(folder.path("")).output().unwrap();
+    let output = run(script);
     assert_eq!(output.status.code(), Some(2), "{output:?}");
 }
 

@@ -106,8 +106,8 @@ fn bytes(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let of_times = |path: &Path| path.extension().is_some_and(|e| ["json", "html", "csv"].iter().any(|x| e == *x));
     let read = |path: PathBuf| {
         let bytes = std::fs::read(&path).unwrap();
-        // Of these the last byte tells whether they are whole.
-        let bytes = if of_times(&path) { bytes[bytes.len().saturating_sub(2)..].to_vec() } else { bytes };
+        // Of these the last byte, a line feed, tells whether they are whole.
+        let bytes = if of_times(&path) { bytes.last().map(|last| vec![*last]).unwrap_or_default() } else { bytes };
         (path, bytes)
     };
     files(folder).into_iter().map(read).collect()

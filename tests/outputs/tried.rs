@@ -57,7 +57,8 @@ fn a_user_without_rights_is_told_before_anything_is_read() {
         std::fs::set_permissions(folder.path(name), std::fs::Permissions::from_mode(bits)).unwrap();
     };
     mode("", 0o755);
-    let cloud = folder.file("c.ply", ply("x y z", 3, "0 0 0\n1 0 0\n0 1 0\n"));
+    let rows: String = (0..36).map(|i| format!("{} {} 0\n", i % 6, i / 6)).collect();
+    let cloud = folder.file("c.ply", ply("x y z", 36, &rows));
     mode("c.ply", 0o644);
     for (name, bits) in [("closed", 0o555), ("open", 0o777)] {
         std::fs::create_dir(folder.path(name)).unwrap();

@@ -137,11 +137,11 @@ fn a_signal_at_any_time_leaves_old_or_whole_files() {
     let mut random = Random(u64::from(std::process::id()));
     let (mut ended, mut writing) = (0, 0);
     for kill in 0..kills {
-        let which = kill as usize % commands.len();
+        let which = kill % commands.len();
         let (whole, time) = &made[which];
         let _ = std::fs::remove_dir_all(&out);
         std::fs::create_dir(&out).unwrap();
-        let old = random.bits() % 2 == 0;
+        let old = random.bits().is_multiple_of(2);
         for path in whole.keys().filter(|_| old) {
             std::fs::create_dir_all(path.parent().unwrap()).unwrap();
             std::fs::write(path, "old").unwrap();

@@ -116,8 +116,8 @@ fn a_broken_kernel_fails_a_hard_case() {
         ("rows.wgsl", "(a - rows.a) + vec3<f32>(", "(a - a) + 0.0 * vec3<f32>(", "anisotropy 1000:1"),
         ("camera_pinhole.wgsl", "vec2<f32>(min(extent.x, k), max(extent.y, k))", "extent", "across the near depth"),
         ("camera_pinhole.wgsl", "chord_1) + blur)", "chord_1) - 0.5)", "across the near depth"),
-        ("project.wgsl", "d.low - held.eye_low[i]", "d.low", "UTM, a kilometre off"),
-        ("project.wgsl", "surfel.center[i] * held.unit", "surfel.center[i]", "coordinates of 1e12"),
+        ("center.wgsl", "d.low - held.eye_low[i]", "d.low", "UTM, a kilometre off"),
+        ("center.wgsl", "surfel.center[i] * held.unit", "surfel.center[i]", "coordinates of 1e12"),
         ("visibility.wgsl", "kept_depth(", "NOTHING - kept_depth(", "intersecting sheets"),
         (
             "accumulate.wgsl",

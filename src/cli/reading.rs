@@ -13,8 +13,8 @@ use super::progress::Bars;
 #[derive(Args)]
 pub(super) struct InputFormat {
     /// The format of the inputs [default: what their names say, or else their first bytes]
-    #[arg(long = "input-format", value_name = "FORMAT", value_parser = formats())]
-    format: Option<Format>,
+    #[arg(long, value_name = "FORMAT", value_parser = formats())]
+    input_format: Option<Format>,
 }
 
 /// How point clouds are read.
@@ -50,7 +50,7 @@ pub(super) fn named(error: Error, inputs: &[PathBuf]) -> Error {
 impl InputFormat {
     /// The triangles of a mesh.
     pub(super) fn mesh(&self, path: &Path, bars: &Bars) -> Result<Mesh> {
-        let Self { format } = *self;
+        let format = self.input_format;
         if format.is_some_and(|format| format != Format::Obj && format != Format::Ply) {
             return Err(Error::Usage(
                 "only obj and ply files are read as meshes: choose one of them for --input-format".into(),
@@ -63,7 +63,7 @@ impl InputFormat {
 impl Reading {
     /// The points of a file.
     pub(super) fn points(&self, path: &Path, bars: &Bars) -> Result<Points> {
-        let options = ReadOptions { format: self.input.format, keep_withheld: self.keep_withheld };
+        let options = ReadOptions { format: self.input.input_format, keep_withheld: self.keep_withheld };
         io::read_with(path, options, bars)
     }
 
@@ -74,7 +74,7 @@ impl Reading {
 
     /// These options as arguments, for a command that reads the same file.
     pub(super) fn arguments(&self) -> String {
-        let format = self.input.format.and_then(|format| Format::READ.iter().find(|(_, known)| *known == format));
+        let format = self.input.input_format.and_then(|format| Format::READ.iter().find(|(_, known)| *known == format));
         let format = format.map_or(String::new(), |(name, _)| format!(" --input-format {name}"));
         let withheld = if self.keep_withheld { " --keep-withheld" } else { "" };
         format + withheld

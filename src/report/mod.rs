@@ -25,7 +25,7 @@ pub use self::results::{ImageSet, Machine, Measurement, Numeric, Study, Summary}
 use crate::io::atomic::write_together;
 use crate::{Error, Result};
 
-/// The files that [`write`] writes.
+/// The files that [`write()`] writes.
 pub const FILES: [&str; 3] = ["results.csv", "results.json", "index.html"];
 
 /// Writes [`FILES`] into the folder `dir`, which is created if it is missing. Each file appears whole or not at all, and

@@ -30,9 +30,9 @@ pub(crate) fn body(count: usize, position: impl Fn(usize) -> DVec3 + Sync) -> (B
     let all = box_of(count, &position, |_| true).0;
     let Some(core) = core(count, &position) else { return (all, 0) };
     let far = FAR * core.extent().max_element();
-    // Nearly all at one place is no core to go by.
     let (low, high) = (core.min - far, core.max + far);
     let holds = |p: DVec3| p.cmpge(low).all() && p.cmple(high).all();
+    // Nearly all at one place is no core to go by.
     if far < FAR * SMALLEST_SCENE || all.is_empty() || holds(all.min) && holds(all.max) {
         return (all, 0);
     }

@@ -223,17 +223,21 @@ fn limit_radii(surfels: &mut [Surfel], extent: f64) -> Result<u64> {
             "the scene is {size:.1e} world units wide, and scenes of {SMALLEST_SCENE:e} to {LARGEST_COORDINATE:e} are drawn: scale it"
         )));
     }
-    let most = LARGEST_IN_EXTENTS * size;
-    if f64::from(largest) <= most {
+    if f64::from(largest) <= LARGEST_IN_EXTENTS * size {
         return Ok(0);
     }
+    // Where most disks are larger than the box of their centres, they are the scene.
+    let typical = estimate::median(surfels.par_iter().map(|surfel| surfel.radius().into()).collect());
+    let most = LARGEST_IN_EXTENTS * typical.map_or(size, |radius| size.max(2.0 * radius));
     let limit = |surfel: &mut Surfel| {
-        let factor = (most / f64::from(surfel.radius())) as f32;
-        let larger = factor < 1.0;
-        if larger {
-            (surfel.s, surfel.t) = (surfel.s.map(|c| c * factor), surfel.t.map(|c| c * factor));
-        }
-        u64::from(larger)
+        // Each half-axis by itself, so that a thin ellipse stays one.
+        let shortened = |axis: [f32; 3]| {
+            let axis = DVec3::from_array(axis.map(f64::from));
+            axis.clamp_length_max(most).as_vec3().to_array()
+        };
+        let before = *surfel;
+        (surfel.s, surfel.t) = (shortened(before.s), shortened(before.t));
+        u64::from(*surfel != before)
     };
     Ok(surfels.par_iter_mut().map(limit).sum())
 }

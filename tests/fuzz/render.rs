@@ -33,9 +33,13 @@ pub fn points(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
     }
     let usable = |p: &[f64; 3]| p.iter().all(|c| c.abs() <= LARGEST_COORDINATE);
     let drawable = points.positions.iter().any(usable);
+    // What is narrower has half-axes whose products an f32 cannot hold.
+    let narrow = epsplat::surfels::bounds(&points).extent().max_element() < 1e-15;
     let (scene, _) = match build(vec![points], &()) {
         Ok(built) => built,
-        Err(error @ Error::EmptyScene(_)) if !drawable => return sentence(&error, None).map(|()| Outcome::Read),
+        Err(error @ Error::EmptyScene(_)) if !drawable || narrow => {
+            return sentence(&error, None).map(|()| Outcome::Read);
+        }
         Err(error) => return Err(format!("{count} points make no scene: {error}")),
     };
     let camera = match Camera::framing(SIZE, Lens::Fov(45.0), &scene, Camera::default_near(&scene)) {

@@ -79,7 +79,7 @@ impl Frame<'_> {
     fn lens(&self, width: f64, height: f64, sized: bool) -> Result<Lens, String> {
         let of_angle = |key: &str, side: f64| match self.number(key)? {
             Some(angle) if !(angle > 0.0 && angle < PI) => {
-                Err(format!("its {key} lies between 0 and pi, {angle} does not: it is in radians"))
+                Err(format!("its {key} lies between 0 and pi, {angle:?} does not: it is in radians"))
             }
             angle => Ok(angle.map(|angle| 0.5 * side / (0.5 * angle).tan())),
         };

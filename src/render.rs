@@ -178,7 +178,7 @@ impl<'a> Renderer<'a> {
         progress: &dyn Progress,
     ) -> Result<(Frame, Report)> {
         let needs = SceneNeeds::of(self.scene, &self.ranges.color, camera, self.options)
-            .with_copies(self.ranges.copies && self.options.has(Optimisation::Copies))
+            .with_copies(self.ranges.copies && self.options.draws_copies_once())
             .with_atomics_u64(gpu.adapter.atomics_u64 && self.options.has(Optimisation::Pairs))
             .with_long_words(gpu.adapter.integers_u64 && self.options.has(Optimisation::LongWords));
         let surfels = self.scene.surfels.len() as u64;

@@ -15,7 +15,7 @@ use crate::error::Result;
 use crate::gpu::buffers::{Buffer, counts};
 use crate::gpu::kernel::{Bound, Grid, grid};
 use crate::gpu::{Gpu, layout};
-use crate::scene::{Camera, LowPass, Optimisation, RenderOptions, Scene, Surfel, copies, has_copies};
+use crate::scene::{Camera, LowPass, RenderOptions, Scene, Surfel, copies, has_copies};
 
 /// A projected surfel in f64: the twin of [`layout::Splat`], in world units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -118,7 +118,7 @@ pub(super) fn projected(
 pub fn reference_all(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Splat> {
     let design = Design::of(options);
     let surfels = scene.surfels.par_iter().enumerate();
-    let copies = (has_copies(scene) && options.has(Optimisation::Copies)).then(|| copies(scene));
+    let copies = (has_copies(scene) && options.draws_copies_once()).then(|| copies(scene));
     let project = |(index, surfel): (usize, &Surfel)| {
         let copies = copies.as_ref().map_or(1, |copies| copies[index]);
         let splat = || reference(index as u32, surfel, scene.origin + scene.low_of(index), camera, &design);

@@ -269,6 +269,11 @@ pub struct RenderOptions {
 }
 
 impl RenderOptions {
+    /// Surfels that are the same are drawn once, unless tiles are asked for, in which each is listed.
+    pub fn draws_copies_once(&self) -> bool {
+        self.has(Optimisation::Copies) && self.organisation != Organisation::Tile
+    }
+
     /// Whether an optimisation is not left out.
     pub fn has(&self, optimisation: Optimisation) -> bool {
         !self.without.contains(&optimisation)

@@ -10,9 +10,16 @@ use std::time::{Duration, Instant};
 
 const SIGNALS: [(&str, i32); 3] = [("INT", 130), ("TERM", 143), ("HUP", 129)];
 
+/// Starts a run that heeds signals, whatever those who started the tests ignore: a shell's jobs in the background ignore SIGINT.
 fn start(arguments: &[String]) -> Child {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_epsplat"));
-    command.args(arguments).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    let mut command = Command::new("env");
+    command
+        .args(["--default-signal=INT,TERM,HUP", env!("CARGO_BIN_EXE_epsplat")])
+        .args(arguments)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap()
 }
 
 fn signal(child: &Child, name: &str) {

@@ -272,7 +272,7 @@ fn a_broken_projection_is_noticed() {
         broken("project.wgsl", "last = min(floor(h.high + margin", "last = min(floor(h.high - 1.0"),
         "bounds",
     );
-    noticed(&all[0], broken("project.wgsl", "d.low - held.eye_low[i]", "d.low * 0.0"), "eye of 24 bits");
+    noticed(&all[0], broken("center.wgsl", "d.low - held.eye_low[i]", "d.low * 0.0"), "eye of 24 bits");
     noticed(&all[0], broken("project.wgsl", "h.away > 0.0", "h.away < 0.0"), "the other side");
     let camera = "camera_orthographic.wgsl";
     noticed(&all[1], broken(camera, "p_z - dot(c, offset)", "p_z * 1.00001 - dot(c, offset)"), "orthographic depth");

@@ -107,3 +107,22 @@ fn scenes_too_small_for_f32_are_refused() {
     }
     check("1e-14", &sphere(1e-14, DVec3::ZERO, &[]), &view(1e-14, DVec3::ZERO), Epsilon::Relative(0.01));
 }
+
+#[test]
+fn disks_larger_than_the_box_of_their_centres_are_the_scene() {
+    let of = |width: f64, radius: f32| {
+        let positions = (0..50).map(|k| [width * f64::from(k) / 49.0, 0.0, 0.0]).collect();
+        let radii = Some(vec![radius; 50]);
+        build(vec![Points { positions, radii, ..Points::default() }], &())
+    };
+    for width in [1e-17, 1e-9, 0.1] {
+        let (scene, preparation) = of(width, 1.0).unwrap();
+        assert_eq!((scene.largest_radius(), preparation.limited_radii), (1.0, 0), "{width}");
+        let camera = Camera::framing((64, 64), Lens::Fov(45.0), &scene, Camera::default_near(&scene)).unwrap();
+        let (frame, _) = render(&scene, &camera, &RenderOptions::default(), &Backend::Reference, &()).unwrap();
+        let covered = |pixel: usize| frame.color[pixel][3] > 0.0;
+        assert!((0..64).all(|k| !covered(k) && !covered(63 * 64 + k) && !covered(64 * k) && !covered(64 * k + 63)));
+        assert!((0..64 * 64).filter(|pixel| covered(*pixel)).count() > 500, "{width}");
+    }
+    assert!(of(1e-17, 1e-17).is_err());
+}

@@ -69,6 +69,9 @@ impl Reading {
 
     /// The points of each of several files.
     pub(super) fn all(&self, paths: &[PathBuf], bars: &Bars) -> Result<Vec<Points>> {
+        if paths.iter().filter(|path| *path == Path::new("-")).count() > 1 {
+            return Err(Error::Usage("standard input can be read once only: name - once".into()));
+        }
         paths.iter().map(|path| self.points(path, bars)).collect()
     }
 

@@ -23,10 +23,11 @@ pub fn watch() {
 #[cfg(not(unix))]
 pub fn watch() {}
 
-/// The signals that are ignored, a bit each, the lowest for number 1; none where the system does not say.
+/// The signals that are ignored, a bit each, the lowest for number 1, SIGHUP; that one where the system does not say, as
+/// `nohup` may have it.
 #[cfg(unix)]
 fn ignored() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0)
+    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(1)
 }

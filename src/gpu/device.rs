@@ -104,8 +104,8 @@ impl AdapterDescription {
     }
 }
 
-/// The most storage buffers a kernel uses (accumulate: splats, surfels, depths, sums, colours, the queue, the overflow
-/// count, filters).
+/// The most storage buffers a kernel uses (accumulate: splats, surfels, depths, sums, colours, the queue, filters, and the overflow
+/// count of some accumulators or the copies of another).
 pub const STORAGE_BUFFERS: u32 = 8;
 
 /// Features that are used where an adapter has them: GPU times, atomics of some accumulators, and a format of blending.

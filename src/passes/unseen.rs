@@ -16,6 +16,8 @@ pub struct Unseen {
     pub outside: u64,
     /// In the image, but over no pixel's centre: too small, or seen edge-on.
     pub between: u64,
+    /// Over pixels that they do not change: seen edge-on, transparent, or of the background's colour.
+    pub over: u64,
 }
 
 impl Unseen {
@@ -27,22 +29,22 @@ impl Unseen {
         let design = Design::of(options);
         let look = |(index, surfel): (usize, &Surfel)| {
             let seen = projected(0, surfel, scene.origin + scene.low_of(index), camera, &design);
-            // What may touch a pixel touched none.
-            let why = seen.err().unwrap_or(Missed::Between);
-            [Missed::Behind, Missed::Outside, Missed::Between].map(|reason| u64::from(why == reason))
+            let reasons = [Some(Missed::Behind), Some(Missed::Outside), Some(Missed::Between), None];
+            reasons.map(|reason| u64::from(seen.as_ref().err() == reason.as_ref()))
         };
-        let add = |a: [u64; 3], b: [u64; 3]| std::array::from_fn(|k| a[k] + b[k]);
-        let [behind, outside, between] = scene.surfels.par_iter().enumerate().map(look).reduce(|| [0; 3], add);
-        Some(Self { behind, outside, between })
+        let add = |a: [u64; 4], b: [u64; 4]| std::array::from_fn(|k| a[k] + b[k]);
+        let [behind, outside, between, over] = scene.surfels.par_iter().enumerate().map(look).reduce(|| [0; 4], add);
+        Some(Self { behind, outside, between, over })
     }
 
     /// One sentence for people.
     pub fn sentence(&self) -> String {
-        let total = self.behind + self.outside + self.between;
+        let total = self.behind + self.outside + self.between + self.over;
         let reasons = [
             (self.behind, "behind the camera or nearer than --near"),
             (self.outside, "outside the image"),
             (self.between, "between the centres of its pixels, small or edge-on (--lowpass max shows them)"),
+            (self.over, "over pixels that they do not change: edge-on, transparent or of the background's colour"),
         ];
         let count = |count: u64| if count == total { "all".to_owned() } else { count.to_string() };
         let given = reasons.into_iter().filter(|(surfels, _)| *surfels > 0);
@@ -76,9 +78,12 @@ mod tests {
         let options = RenderOptions::default();
         let mut frame = Frame::new(&camera, &options.maps);
         let unseen = Unseen::of(&frame, &scene, &camera, &options).unwrap();
-        assert_eq!(unseen, Unseen { behind: 1, outside: 2, between: 3 });
+        assert_eq!(unseen, Unseen { behind: 1, outside: 2, between: 3, over: 0 });
         assert!(unseen.sentence().contains("of 6 surfels 1 lie behind the camera"), "{}", unseen.sentence());
-        assert!(Unseen { behind: 0, outside: 0, between: 6 }.sentence().contains("all lie between"));
+        assert!(Unseen { between: 6, ..Unseen::default() }.sentence().contains("all lie between"));
+        let black = Surfel::disk(Vec3::new(0.0, 0.0, 3.0), Vec3::Z, 1.0);
+        let over = Scene { surfels: vec![black], ..scene.clone() };
+        assert_eq!(Unseen::of(&frame, &over, &camera, &options).unwrap().over, 1);
         frame.color[7] = [0.5, 0.5, 0.5, 1.0];
         assert_eq!(Unseen::of(&frame, &scene, &camera, &options), None);
     }

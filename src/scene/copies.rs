@@ -19,11 +19,11 @@ const FEWEST: usize = 1024;
 
 /// Whether one surfel of `scene` seems to have many copies; of a sample, the same each time.
 pub(crate) fn has_copies(scene: &Scene) -> bool {
-    let step = scene.surfels.len().div_ceil(SAMPLED).max(1);
-    let mut sample: Vec<usize> = (0..scene.surfels.len()).step_by(step).collect();
     if matches!(scene.colors, Colors::Textured(_)) {
         return false;
     }
+    let step = scene.surfels.len().div_ceil(SAMPLED).max(1);
+    let mut sample: Vec<usize> = (0..scene.surfels.len()).step_by(step).collect();
     sample.sort_unstable_by(|&a, &b| by_content(scene, a, b));
     let runs = sample.chunk_by(|&a, &b| by_content(scene, a, b).is_eq());
     runs.map(|run| if run.len() > 1 || step == 1 { run.len() * step } else { 0 })

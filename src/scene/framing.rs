@@ -111,11 +111,15 @@ impl<'a> Framing<'a> {
         let (body, _) = scene.body();
         // A scene of one place has no extent but its surfels'.
         let half = 0.5 * body.extent().length();
-        let (radius, clearance) = if half > 0.0 {
-            (half, 0.05 * half)
-        } else {
-            let radius = f64::from(scene.largest_radius());
-            (radius, 3.0 * radius)
+        let largest = f64::from(scene.largest_radius());
+        let (radius, clearance) = match half > 0.0 {
+            // Where most disks are larger than the box of their centres, they are the scene.
+            true if largest > half => {
+                let radius = half.max(median_radius(scene));
+                (radius, 0.05 * radius)
+            }
+            true => (half, 0.05 * half),
+            false => (largest, 3.0 * largest),
         };
         let axes = [right, forward.cross(right), forward];
         Self { scene, pinhole, image, axes, body, center: body.center(), radius, clearance }
@@ -185,6 +189,13 @@ impl<'a> Framing<'a> {
             (right > mid_x + half_x || -left < mid_x - half_x) || (bottom > mid_y + half_y || -top < mid_y - half_y);
         self.pinhole && (front >= 0.0 || beyond)
     }
+}
+
+/// The middle one of the radii: no order of the surfels shows.
+fn median_radius(scene: &Scene) -> f64 {
+    let mut radii: Vec<f32> = scene.surfels.par_iter().map(Surfel::radius).collect();
+    let middle = radii.len() / 2;
+    if radii.is_empty() { 0.0 } else { f64::from(*radii.select_nth_unstable_by(middle, f32::total_cmp).1) }
 }
 
 /// The default direction of view.

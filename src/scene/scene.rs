@@ -112,7 +112,7 @@ impl Scene {
     /// The box of the surfel centres without those few that stray, world units relative to [`Scene::origin`], and how many
     /// do: a point strays that lies farther from the box of nearly all than sixteen times its longest edge.
     pub fn body(&self) -> (Bounds, u64) {
-        super::body(self.surfels.len(), |index| DVec3::from_array(self.surfels[index].center.map(f64::from)))
+        super::body(self.surfels.len(), |index| self.center(index))
     }
 
     /// The box of the finite surfel centres, world units relative to [`Scene::origin`]; disks reach past it by up to

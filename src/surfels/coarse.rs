@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::estimate::median;
 use crate::io::Points;
-use crate::scene::Bounds;
+use crate::scene::body;
 
 /// The median radius, in diagonals of the mesh's box, from which on disks show as disks: about that of a sphere of 500 vertices.
 const COARSE: f64 = 0.03;
@@ -13,9 +13,9 @@ const COARSE: f64 = 0.03;
 /// diagonals of their box, if it shows. `sample` in [`sampling`](super::sampling) covers such a mesh.
 pub fn coarse(points: &Points) -> Option<f64> {
     let radii = points.radii.as_ref().filter(|_| points.of_mesh)?;
-    let box_ = points.positions.iter().fold(Bounds::EMPTY, |all, p| all.with_point(DVec3::from_array(*p)));
+    let (body, _) = body(points.positions.len(), |index| DVec3::from_array(points.positions[index]));
     let given = radii.iter().map(|radius| f64::from(*radius)).filter(|radius| *radius > 0.0);
-    let share = median(given.collect())? / box_.extent().length();
+    let share = median(given.collect())? / body.extent().length();
     (share > COARSE).then_some(share)
 }
 

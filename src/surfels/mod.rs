@@ -148,8 +148,7 @@ fn built(gathered: Gathered, progress: &dyn Progress) -> Result<(Scene, Preparat
     let Gathered { positions, normals, radii, axes, colors, up, mut preparation, .. } = gathered;
     let colors = colors::folded(colors);
     let bounds = bounds_of(&positions);
-    let (body, strays) = body(positions.len(), |index| DVec3::from_array(positions[index]));
-    preparation.strays = strays;
+    let (body, _) = body(positions.len(), |index| DVec3::from_array(positions[index]));
     let origin = origin_for(&body);
     let up = up.unwrap_or_else(|| guess_up(&body));
 
@@ -207,7 +206,10 @@ fn built(gathered: Gathered, progress: &dyn Progress) -> Result<(Scene, Preparat
     let low = low_parts(&surfels, relative);
     preparation.rounding = rounding(&surfels, &low, relative);
     let oriented = preparation.estimated_normals == 0;
-    Ok((Scene { origin, surfels, low, colors, oriented, up }, preparation))
+    let scene = Scene { origin, surfels, low, colors, oriented, up };
+    // As the default view sees it.
+    preparation.strays = scene.body().1;
+    Ok((scene, preparation))
 }
 
 /// Limits disks to [`LARGEST_IN_EXTENTS`] and says how many were larger.
@@ -217,18 +219,18 @@ fn built(gathered: Gathered, progress: &dyn Progress) -> Result<(Scene, Preparat
 /// [`Error::EmptyScene`] if the scene is too small for f32 arithmetic.
 fn limit_radii(surfels: &mut [Surfel], extent: f64) -> Result<u64> {
     let largest = surfels.par_iter().map(Surfel::radius).reduce(|| 0.0, f32::max);
-    let size = if extent > 0.0 { extent } else { 2.0 * f64::from(largest) };
+    if extent >= SMALLEST_SCENE && f64::from(largest) <= LARGEST_IN_EXTENTS * extent {
+        return Ok(0);
+    }
+    // Where most disks are larger than the box of their centres, they are the scene.
+    let typical = estimate::median(surfels.par_iter().map(|surfel| surfel.radius().into()).collect());
+    let size = extent.max(2.0 * typical.unwrap_or(0.0));
     if size < SMALLEST_SCENE {
         return Err(Error::EmptyScene(format!(
             "the scene is {size:.1e} world units wide, and scenes of {SMALLEST_SCENE:e} to {LARGEST_COORDINATE:e} are drawn: scale it"
         )));
     }
-    if f64::from(largest) <= LARGEST_IN_EXTENTS * size {
-        return Ok(0);
-    }
-    // Where most disks are larger than the box of their centres, they are the scene.
-    let typical = estimate::median(surfels.par_iter().map(|surfel| surfel.radius().into()).collect());
-    let most = LARGEST_IN_EXTENTS * typical.map_or(size, |radius| size.max(2.0 * radius));
+    let most = LARGEST_IN_EXTENTS * size;
     let limit = |surfel: &mut Surfel| {
         // Each half-axis by itself, so that a thin ellipse stays one.
         let shortened = |axis: [f32; 3]| {

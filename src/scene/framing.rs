@@ -129,8 +129,9 @@ impl<'a> Framing<'a> {
     /// the scene, as one of a stray point may be, counts by its centre.
     fn largest<const N: usize>(&self, of: Of, f: impl Fn(Disk) -> [f64; N] + Sync) -> [f64; N] {
         let local = |v: DVec3| DVec3::from_array(self.axes.map(|axis| v.dot(axis)));
-        let value = |surfel: &Surfel| {
-            let [p, s, t] = [surfel.center, surfel.s, surfel.t].map(|v| DVec3::from_array(v.map(f64::from)));
+        let value = |(index, surfel): (usize, &Surfel)| {
+            let [s, t] = [surfel.s, surfel.t].map(|v| DVec3::from_array(v.map(f64::from)));
+            let p = self.scene.center(index);
             let inside = p.cmpge(self.body.min).all() && p.cmple(self.body.max).all();
             let whole = of == Of::Disks && s.length().max(t.length()) <= 2.0 * self.radius;
             let [s, t] = if whole { [local(s), local(t)] } else { [DVec3::ZERO; 2] };
@@ -138,7 +139,7 @@ impl<'a> Framing<'a> {
         };
         let join = |a: [f64; N], b: [f64; N]| std::array::from_fn(|k| a[k].max(b[k]));
         let none = || [f64::NEG_INFINITY; N];
-        self.scene.surfels.par_iter().map(|surfel| value(surfel).unwrap_or_else(none)).reduce(none, join)
+        self.scene.surfels.par_iter().enumerate().map(|surfel| value(surfel).unwrap_or_else(none)).reduce(none, join)
     }
 
     /// Where what is framed ends toward the right, left, bottom and top, as X/Z or X, seen from `eye`.
@@ -171,7 +172,9 @@ impl<'a> Framing<'a> {
             let z = -((left + right) / (2.0 * half_x)).max((above + below) / (2.0 * half_y)).max(behind);
             eye = DVec3::new(0.5 * (left - right) + mid_x * z, 0.5 * (above - below) + mid_y * z, z);
         }
-        for _ in 0..ROUNDS {
+        // Disks that come near the eye in front of others would make the rounds swing; between the planes they are as it is.
+        let rounds = if of == Of::Disks { 0 } else { ROUNDS };
+        for _ in 0..rounds {
             let reach = self.reach(eye, of);
             let depth = if self.pinhole { -eye.z } else { 1.0 };
             eye.x += (0.5 * (reach[0] - reach[1]) - mid_x) * depth;
@@ -284,6 +287,21 @@ mod tests {
             assert!(low.min_element() > 0.0 && (size - high).min_element() > 0.0, "{low} {high}");
             let filled = (high - low) / size;
             assert!(filled.max_element() > 0.97, "{filled}");
+        }
+    }
+
+    #[test]
+    fn huge_disks_far_apart_are_framed() {
+        let at = |y: f32, normal| Surfel::disk(glam::Vec3::new(0.0, y, y), normal, 2.6e9);
+        let surfels = vec![at(0.0, glam::Vec3::new(0.3, -0.7, 0.2)), at(-2.1e9, glam::Vec3::new(-0.1, 0.2, 0.9))];
+        let colors = Colors::Constant([1.0; 4]);
+        // Trailing parts that put both past the box of what f32 has of their centres.
+        let low = vec![[-1e-9, 1e-9, -1e-9], [1e-9, -1e-9, 1e-9]];
+        let scene = Scene { origin: DVec3::ZERO, surfels, low, colors, oriented: true, up: Up::Z };
+        let camera = Camera::framing((64, 48), Lens::Fov(45.0), &scene, 1.0).unwrap();
+        for surfel in &scene.surfels {
+            let p = camera.to_camera(glam::Vec3::from_array(surfel.center).as_dvec3());
+            assert!(p.z > 2.6e9 * 0.05 && p.z < 1e11, "{p}");
         }
     }
 

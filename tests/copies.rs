@@ -74,8 +74,8 @@ fn the_reference_multiplies_too() {
 fn a_wrong_number_shows() {
     for (file, from, to) in [
         ("copies.wgsl", "times = copies[index];", "times = 1u;"),
-        ("accumulator_fixed_copies.wgsl", "a_high * b_high + (one >> 16u)", "a_high * b_high"),
-        ("accumulator_fixed_copies.wgsl", "select(0u, 1u, before + all.x < before)", "0u"),
+        ("copies.wgsl", "a_high * b_high + (one >> 16u)", "a_high * b_high"),
+        ("accumulator_fixed_wide.wgsl", "select(0u, 1u, before + term.x < before)", "0u"),
     ] {
         let Some(gpu) = common::gpu() else { return };
         let right = Backend::gpu(gpu);

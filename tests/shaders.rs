@@ -246,12 +246,7 @@ fn absent_parts_have_their_partners_signatures() {
     };
     let alike = |prefix: &str, functions: &[&str]| alike_in(prefix, starting(prefix), functions);
     alike("accumulator_", &["add", "add_pair", "settle", "show", "sum_at", "weight_at"]);
-    let apart = [
-        "accumulator_fixed.wgsl",
-        "accumulator_fixed_copies.wgsl",
-        "accumulator_fixed_pairs.wgsl",
-        "accumulator_fixed_wide.wgsl",
-    ];
+    let apart = ["accumulator_fixed.wgsl", "accumulator_fixed_pairs.wgsl", "accumulator_fixed_wide.wgsl"];
     let with_terms =
         [starting("accumulator_"), starting("terms")].concat().into_iter().filter(|name| !apart.contains(name));
     alike_in("terms", with_terms.collect(), &["quantise", "term"]);

@@ -5,3 +5,7 @@ fn copies_of(index: u32) -> u32 {
 }
 
 fn hold_copies(index: u32) {}
+
+fn multiplied(term: vec2<u32>) -> vec2<u32> {
+    return term;
+}

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use epsplat::gpu::Gpu;
 use epsplat::io::Texture;
-use epsplat::passes::unseen::Unseen;
+use epsplat::passes::unseen::{Unseen, is_empty};
 use epsplat::render::{Backend, render};
 use epsplat::scene::light::MAX_LIGHTS;
 use epsplat::scene::options::SHININESS_RANGE;
@@ -211,8 +211,8 @@ fn one(arguments: &Arguments) -> Result<()> {
     let camera = view.camera(&scene, Camera::default_near(&scene))?;
     let (frame, report) = render(&scene, &camera, &options, &backend, &bars)?;
     note_overflows(&report);
-    if let Some(unseen) = Unseen::of(&frame, &scene, &camera, &options) {
-        note(&unseen.sentence());
+    if is_empty(&frame, &options) {
+        note(&Unseen::of(&scene, &camera, &options).sentence());
     }
     format.write(&arguments.output, &frame)?;
     match &arguments.json {

@@ -24,7 +24,6 @@ pub const FILES: &[(&str, &str)] = wgsl![
     "accumulator_fixed.wgsl",
     "accumulator_fixed32.wgsl",
     "accumulator_fixed64.wgsl",
-    "accumulator_fixed_copies.wgsl",
     "accumulator_fixed_pairs.wgsl",
     "accumulator_fixed_wide.wgsl",
     "accumulator_float.wgsl",

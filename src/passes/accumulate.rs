@@ -75,18 +75,16 @@ pub enum Features {
 /// The rounding of one f32 operation.
 const U: f64 = 1.0 / 16_777_216.0;
 
-/// The file that keeps the sums of `fixed`, by whether terms may be small ([`SceneNeeds::wide_sums`]) and whether the adapter
-/// adds 64 bits at once ([`SceneNeeds::atomics_u64`]): the sums are the same with it, in half the additions. They are the same too
-/// where one surfel stands for its copies ([`SceneNeeds::copies`]).
+/// The file that keeps the sums of `fixed`, by whether terms may reach past a word, because weights may be small
+/// ([`SceneNeeds::wide_sums`]) or one surfel stands for its copies ([`SceneNeeds::copies`]), and whether the adapter adds 64 bits at
+/// once ([`SceneNeeds::atomics_u64`]): the sums are the same with it, in half the additions.
 fn fixed_file(needs: &SceneNeeds) -> &'static str {
-    if needs.copies {
-        return "accumulator_fixed_copies.wgsl";
-    }
-    match (needs.wide_sums, needs.atomics_u64) {
+    match (needs.wide_sums || needs.copies, needs.atomics_u64) {
         (false, false) => "accumulator_fixed.wgsl",
         (false, true) => "accumulator_fixed_pairs.wgsl",
-        (true, false) => "accumulator_fixed_wide.wgsl",
-        (true, true) => "accumulator_fixed64.wgsl",
+        // Products are made of words.
+        (true, true) if !needs.copies => "accumulator_fixed64.wgsl",
+        (true, _) => "accumulator_fixed_wide.wgsl",
     }
 }
 

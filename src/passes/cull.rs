@@ -177,7 +177,8 @@ mod tests {
 
     /// Whether the image of a ball holds what `surfel` may touch.
     fn holds([low, high]: [DVec2; 2], surfel: &Surfel, camera: &Camera, design: &Design) -> bool {
-        project::reference(0, surfel, DVec3::ZERO, camera, design).is_none_or(|splat| {
+        let center = Vec3::from_array(surfel.center).as_dvec3();
+        project::reference((0, surfel), center - camera.eye, camera, design).is_none_or(|splat| {
             (0..2).all(|k| low[k] <= f64::from(splat.first[k]) && f64::from(splat.last[k]) <= high[k])
         })
     }

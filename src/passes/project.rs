@@ -44,10 +44,10 @@ pub struct Splat {
     pub copies: u32,
 }
 
-/// The twin of `wgsl/project.wgsl` for one surfel, whose centre is relative to `origin` (world coordinates); `None` if no pixel can
-/// be touched.
-pub fn reference(index: u32, surfel: &Surfel, origin: DVec3, camera: &Camera, design: &Design) -> Option<Splat> {
-    projected(index, surfel, origin, camera, design).ok()
+/// The twin of `wgsl/project.wgsl` for one surfel, whose centre is at `relative` (world units) from the camera's eye; `None` if no
+/// pixel can be touched.
+pub fn reference(of: (u32, &Surfel), relative: DVec3, camera: &Camera, design: &Design) -> Option<Splat> {
+    projected(of, relative, camera, design).ok()
 }
 
 /// Why a surfel touches no pixel.
@@ -61,16 +61,14 @@ pub(super) enum Missed {
     Between,
 }
 
-/// The same, or why there is none.
+/// The splat of [`reference`], or why there is none.
 pub(super) fn projected(
-    index: u32,
-    surfel: &Surfel,
-    origin: DVec3,
+    (index, surfel): (u32, &Surfel),
+    relative: DVec3,
     camera: &Camera,
     design: &Design,
 ) -> Result<Splat, Missed> {
     let vector = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
-    let relative = vector(surfel.center) - (camera.eye - origin);
     let (s_world, t_world) = (vector(surfel.s), vector(surfel.t));
     let (p, s, t) = (camera.rotation * relative, camera.rotation * s_world, camera.rotation * t_world);
     if p.z + slope(s, t) < camera.near {
@@ -118,10 +116,11 @@ pub(super) fn projected(
 pub fn reference_all(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Splat> {
     let design = Design::of(options);
     let surfels = scene.surfels.par_iter().enumerate();
+    let eye = camera.eye - scene.origin;
     let copies = (has_copies(scene) && options.draws_copies_once()).then(|| copies(scene));
     let project = |(index, surfel): (usize, &Surfel)| {
         let copies = copies.as_ref().map_or(1, |copies| copies[index]);
-        let splat = || reference(index as u32, surfel, scene.origin + scene.low_of(index), camera, &design);
+        let splat = || reference((index as u32, surfel), scene.center(index) - eye, camera, &design);
         (copies > 0).then(splat).flatten().map(|splat| Splat { copies, ..splat })
     };
     surfels.filter_map(project).collect()

@@ -41,8 +41,10 @@ const SAMPLED: usize = 1024;
 pub fn gathers(scene: &Scene, camera: &Camera, options: &RenderOptions) -> bool {
     let design = Design::of(options);
     let step = scene.surfels.len().div_ceil(SAMPLED).max(1);
-    let sampled = scene.surfels.iter().step_by(step);
-    let splats = sampled.filter_map(|surfel| project::reference(0, surfel, scene.origin, camera, &design));
+    let eye = camera.eye - scene.origin;
+    let sampled = scene.surfels.iter().enumerate().step_by(step);
+    let splats = sampled
+        .filter_map(|(index, surfel)| project::reference((0, surfel), scene.center(index) - eye, camera, &design));
     let across = |first: u32, last: u32, size: u32| 1.0 + f64::from(last.saturating_sub(first)) / f64::from(size);
     let touched = splats.map(|splat| {
         let ([left, top], [right, bottom]) = (splat.first, splat.last);

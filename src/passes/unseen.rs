@@ -21,20 +21,18 @@ pub struct Unseen {
 }
 
 impl Unseen {
-    /// Those of `scene` in the view of `camera`; None if `frame`, the picture, shows anything but the background.
-    pub fn of(frame: &Frame, scene: &Scene, camera: &Camera, options: &RenderOptions) -> Option<Self> {
-        if frame.color.par_iter().any(|color| *color != options.background) {
-            return None;
-        }
+    /// Those of `scene` in the view of `camera`.
+    pub fn of(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Self {
+        let eye = camera.eye - scene.origin;
         let design = Design::of(options);
         let look = |(index, surfel): (usize, &Surfel)| {
-            let seen = projected(0, surfel, scene.origin + scene.low_of(index), camera, &design);
+            let seen = projected((0, surfel), scene.center(index) - eye, camera, &design);
             let reasons = [Some(Missed::Behind), Some(Missed::Outside), Some(Missed::Between), None];
             reasons.map(|reason| u64::from(seen.as_ref().err() == reason.as_ref()))
         };
         let add = |a: [u64; 4], b: [u64; 4]| std::array::from_fn(|k| a[k] + b[k]);
         let [behind, outside, between, over] = scene.surfels.par_iter().enumerate().map(look).reduce(|| [0; 4], add);
-        Some(Self { behind, outside, between, over })
+        Self { behind, outside, between, over }
     }
 
     /// One sentence for people.
@@ -51,6 +49,11 @@ impl Unseen {
         let parts: Vec<String> = given.map(|(surfels, where_)| format!("{} lie {where_}", count(surfels))).collect();
         format!("warning: nothing shows: of {total} surfels {}", parts.join(", "))
     }
+}
+
+/// Whether `frame` shows nothing but the background.
+pub fn is_empty(frame: &Frame, options: &RenderOptions) -> bool {
+    frame.color.par_iter().all(|color| *color == options.background)
 }
 
 #[cfg(test)]
@@ -77,14 +80,15 @@ mod tests {
         let camera = Camera::look_at((32, 32), Lens::Fov(45.0), DVec3::ZERO, DVec3::Z, None, Up::Y, 0.1).unwrap();
         let options = RenderOptions::default();
         let mut frame = Frame::new(&camera, &options.maps);
-        let unseen = Unseen::of(&frame, &scene, &camera, &options).unwrap();
+        let unseen = Unseen::of(&scene, &camera, &options);
         assert_eq!(unseen, Unseen { behind: 1, outside: 2, between: 3, over: 0 });
         assert!(unseen.sentence().contains("of 6 surfels 1 lie behind the camera"), "{}", unseen.sentence());
         assert!(Unseen { between: 6, ..Unseen::default() }.sentence().contains("all lie between"));
         let black = Surfel::disk(Vec3::new(0.0, 0.0, 3.0), Vec3::Z, 1.0);
         let over = Scene { surfels: vec![black], ..scene.clone() };
-        assert_eq!(Unseen::of(&frame, &over, &camera, &options).unwrap().over, 1);
+        assert_eq!(Unseen::of(&over, &camera, &options).over, 1);
+        assert!(is_empty(&frame, &options));
         frame.color[7] = [0.5, 0.5, 0.5, 1.0];
-        assert_eq!(Unseen::of(&frame, &scene, &camera, &options), None);
+        assert!(!is_empty(&frame, &options));
     }
 }

@@ -92,6 +92,11 @@ impl Bounds {
         if point.is_finite() { Self { min: self.min.min(point), max: self.max.max(point) } } else { self }
     }
 
+    /// The smallest box of the finite ones of `points`.
+    pub fn of(points: impl ParallelIterator<Item = DVec3>) -> Self {
+        points.fold(|| Self::EMPTY, Self::with_point).reduce(|| Self::EMPTY, Self::union)
+    }
+
     /// The smallest box that holds both.
     pub fn union(self, other: Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
@@ -101,12 +106,8 @@ impl Bounds {
 impl Scene {
     /// The centre of surfel `index`, world units relative to [`Scene::origin`], with all its digits.
     pub fn center(&self, index: usize) -> DVec3 {
-        DVec3::from_array(self.surfels[index].center.map(f64::from)) + self.low_of(index)
-    }
-
-    /// What the f32 centre of surfel `index` leaves out, world units.
-    pub fn low_of(&self, index: usize) -> DVec3 {
-        self.low.get(index).map_or(DVec3::ZERO, |low| DVec3::from_array(low.map(f64::from)))
+        let low = self.low.get(index).map_or(DVec3::ZERO, |low| DVec3::from_array(low.map(f64::from)));
+        DVec3::from_array(self.surfels[index].center.map(f64::from)) + low
     }
 
     /// The box of the surfel centres without those few that stray, world units relative to [`Scene::origin`], and how many
@@ -118,16 +119,7 @@ impl Scene {
     /// The box of the finite surfel centres, world units relative to [`Scene::origin`]; disks reach past it by up to
     /// [`Scene::largest_radius`].
     pub fn bounds(&self) -> Bounds {
-        self.surfels
-            .par_iter()
-            .fold(
-                || Bounds::EMPTY,
-                |bounds, surfel| {
-                    let [x, y, z] = surfel.center.map(f64::from);
-                    bounds.with_point(DVec3::new(x, y, z))
-                },
-            )
-            .reduce(|| Bounds::EMPTY, Bounds::union)
+        Bounds::of((0..self.surfels.len()).into_par_iter().with_min_len(4096).map(|index| self.center(index)))
     }
 
     /// A box of nearly all finite surfel centres, in the same space: those few that lie far from all others, as scanners' stray

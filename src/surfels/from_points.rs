@@ -11,9 +11,9 @@ use super::outliers::inliers;
 use super::positions::DistinctPositions;
 use super::sheets;
 use super::sizes::{Size, bsp_radii, ellipse_at, knn_radii, local_limits, offsets};
-use super::{Preparation, bounds_of, guess_up, origin_for, unit, usable_axes};
+use super::{Preparation, guess_up, origin_for, unit, usable_axes};
 use crate::io::Points;
-use crate::scene::body;
+use crate::scene::{Bounds, body};
 use crate::{Error, Progress, Result};
 
 /// How surfels are made of points.
@@ -92,7 +92,7 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
     if options.estimate_normals {
         (gathered.normals, gathered.axes) = (None, None);
     }
-    let bounds = bounds_of(&gathered.positions);
+    let bounds = Bounds::of(gathered.positions.par_iter().map(|position| DVec3::from_array(*position)));
     let (body, strays) = body(gathered.positions.len(), |index| DVec3::from_array(gathered.positions[index]));
     let up = gathered.up.unwrap_or_else(|| guess_up(&body)).axis();
     let origin = origin_for(&body);

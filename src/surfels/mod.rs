@@ -147,7 +147,7 @@ pub fn build_textured(inputs: Vec<Points>, texture: Texture, progress: &dyn Prog
 fn built(gathered: Gathered, progress: &dyn Progress) -> Result<(Scene, Preparation)> {
     let Gathered { positions, normals, radii, axes, colors, up, mut preparation, .. } = gathered;
     let colors = colors::folded(colors);
-    let bounds = bounds_of(&positions);
+    let bounds = Bounds::of(positions.par_iter().map(|position| DVec3::from_array(*position)));
     let (body, _) = body(positions.len(), |index| DVec3::from_array(positions[index]));
     let origin = origin_for(&body);
     let up = up.unwrap_or_else(|| guess_up(&body));
@@ -285,18 +285,8 @@ fn usable_axes(axes: [[f32; 3]; 2]) -> Option<[Vec3; 2]> {
 /// The box of the points whose coordinates are usable, world coordinates as they were read.
 pub fn bounds(points: &Points) -> Bounds {
     let usable = points.positions.par_iter().filter(|position| gather::is_usable(position));
-    usable
-        // Adding +0 makes -0 the same coordinate as 0.
-        .fold(|| Bounds::EMPTY, |bounds, p| bounds.with_point(DVec3::from_array(*p) + DVec3::ZERO))
-        .reduce(|| Bounds::EMPTY, Bounds::union)
-}
-
-/// The box of the positions, world units.
-fn bounds_of(positions: &[[f64; 3]]) -> Bounds {
-    positions
-        .par_iter()
-        .fold(|| Bounds::EMPTY, |bounds, p| bounds.with_point(DVec3::from_array(*p)))
-        .reduce(|| Bounds::EMPTY, Bounds::union)
+    // Adding +0 makes -0 the same coordinate as 0.
+    Bounds::of(usable.map(|position| DVec3::from_array(*position) + DVec3::ZERO))
 }
 
 /// The scene's origin for positions in `bounds`, world units, axis by axis.

@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use epsplat::io::write_behind::write_behind;
 use epsplat::io::{atomic, cameras};
-use epsplat::passes::unseen::Unseen;
+use epsplat::passes::unseen::{Unseen, is_empty};
 use epsplat::render::{Renderer, Report};
 use epsplat::scene::{Camera, Maps};
 use epsplat::{Error, Progress, Result};
@@ -66,11 +66,16 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
     let mut renderer = Renderer::new(&scene, &options, &backend)?;
     let start = Instant::now();
     bars.begin("rendering views", views.len() as u64);
-    let blank = RefCell::new(Vec::new());
+    // The first empty picture and why it is, and how many are.
+    let empty = RefCell::new((None, 0));
     let frames = views.iter().map(|(file, view)| {
         let frame = view.camera(&scene, near).and_then(|camera| {
             let frame = renderer.frame(&camera, &())?;
-            blank.borrow_mut().extend(Unseen::of(&frame.0, &scene, &camera, &options).map(|unseen| (file, unseen)));
+            if is_empty(&frame.0, &options) {
+                let (first, count) = &mut *empty.borrow_mut();
+                first.get_or_insert_with(|| (file, Unseen::of(&scene, &camera, &options)));
+                *count += 1;
+            }
             Ok(frame)
         });
         frame.map(|(frame, report)| (file, frame, report)).map_err(|error| error.of_view(file))
@@ -86,9 +91,8 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
     });
     bars.end();
     let pictures = pictures?;
-    if let [(first, unseen), rest @ ..] = &blank.into_inner()[..] {
-        let (first, sentence) = (first.display(), unseen.sentence());
-        note(&format!("{sentence} ({first}, the first of {} empty pictures)", rest.len() + 1));
+    if let (Some((first, unseen)), count) = empty.into_inner() {
+        note(&format!("{} ({}, the first of {count} empty pictures)", unseen.sentence(), first.display()));
     }
     let views = pictures;
     views.iter().for_each(|view| note_overflows(&view.report));

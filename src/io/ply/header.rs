@@ -141,19 +141,8 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
                 textures.extend(name.map(|name| name.trim().to_owned()));
             }
             Some("format") => {
-                let parsed = match words.next() {
-                    Some("ascii") => Some(Encoding::Ascii),
-                    Some("binary_little_endian") => Some(Encoding::LittleEndian),
-                    Some("binary_big_endian") => Some(Encoding::BigEndian),
-                    _ => None,
-                };
-                let version = words.next();
-                encoding = parsed.filter(|_| version.is_none_or(|v| v == "1.0"));
-                if encoding.is_none() {
-                    return Err(malformed(
-                        "not a PLY format that is read (ascii, binary_little_endian or binary_big_endian 1.0)",
-                    ));
-                }
+                let unread = "not a PLY format that is read (ascii, binary_little_endian or binary_big_endian 1.0)";
+                encoding = Some(format(words).ok_or_else(|| malformed(unread))?);
             }
             Some("element") => {
                 let (Some(name), Some(count), None) = (words.next(), words.next(), words.next()) else {
@@ -175,6 +164,17 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
         }
     }
     Err(Fault::Malformed("the PLY header has no end".into()))
+}
+
+/// `ENCODING VERSION`; the version may be left out.
+fn format<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Encoding> {
+    let encoding = match words.next()? {
+        "ascii" => Encoding::Ascii,
+        "binary_little_endian" => Encoding::LittleEndian,
+        "binary_big_endian" => Encoding::BigEndian,
+        _ => return None,
+    };
+    words.next().is_none_or(|version| version == "1.0").then_some(encoding)
 }
 
 /// `TYPE NAME` or `list COUNT ITEM NAME`.

@@ -1,0 +1,283 @@
+//! What frames are, to the bit: a list of renders of every kind, each with a hash.
+//!
+//! The hashes of the f64 reference are kept in `tests/golden/frames.txt`: whatever is rearranged, they stay. Those of an adapter
+//! differ from driver to driver, so they are written to the file that `EPSPLAT_FRAMES` names, with those of the reference: run it
+//! before a change and after it, and compare. `EPSPLAT_TEST_ADAPTER` chooses the adapter.
+//!
+//! ```text
+//! EPSPLAT_FRAMES=before.txt cargo test --release --test frames
+//! ```
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use std::fmt::Write;
+
+use common::bits;
+use common::scenes::{Case, cases, crowded, sphere, sphere_camera};
+use epsplat::frame::Frame;
+use epsplat::gpu::Gpu;
+use epsplat::io::{Points, Texture};
+use epsplat::render::{Backend, Renderer};
+use epsplat::scene::{
+    Camera, Colors, Epsilon, Light, LowPass, Maps, Optimisation, Organisation, Projection, RenderOptions, Scene,
+    Shading, Surfel,
+};
+use epsplat::surfels::build_textured;
+use glam::{DVec3, Vec3};
+
+const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
+
+/// A scene and a view of it.
+type View = (Scene, Camera);
+
+/// One render of the list.
+struct Row<'a> {
+    name: String,
+    view: &'a View,
+    options: RenderOptions,
+    /// Bytes that a buffer may have: small ones make pages and bands.
+    buffer_limit: Option<u64>,
+}
+
+/// The scenes of the list, by name.
+struct Scenes {
+    sphere: View,
+    orthographic: View,
+    dense: View,
+    large: View,
+    mixed: View,
+    mixed_orthographic: View,
+    near: View,
+    far: View,
+    copies: View,
+    textured: View,
+    plain: View,
+}
+
+fn scenes() -> Scenes {
+    let case = |name: &str| {
+        let Case { scene, camera, .. } = cases().into_iter().find(|case| case.name == name).unwrap();
+        (scene, camera)
+    };
+    let plain = Scene { colors: Colors::Constant([0.25, 0.5, 0.75, 1.0]), oriented: false, ..sphere(700, 1.5) };
+    Scenes {
+        sphere: (sphere(3000, 1.7), sphere_camera(72, Projection::Pinhole)),
+        orthographic: (sphere(3000, 1.7), sphere_camera(72, Projection::Orthographic)),
+        dense: (sphere(20_000, 1.2), sphere_camera(64, Projection::Pinhole)),
+        large: (sphere(60, 2.0), sphere_camera(96, Projection::Pinhole)),
+        mixed: crowded().remove(1),
+        mixed_orthographic: crowded().remove(2),
+        near: case("pinhole, across the near depth"),
+        far: doubled(),
+        copies: (copies(), sphere_camera(72, Projection::Pinhole)),
+        textured: (textured(), sphere_camera(72, Projection::Pinhole)),
+        plain: (plain, sphere_camera(72, Projection::Orthographic)),
+    }
+}
+
+/// A sphere whose centres have digits past those of an f32.
+fn doubled() -> View {
+    let scene = sphere(2000, 1.7);
+    let far = |surfel: &Surfel| Vec3::from_array(surfel.center).as_dvec3() + DVec3::new(3e6, -7e5, 1e6);
+    let surfels: Vec<_> =
+        scene.surfels.iter().map(|surfel| Surfel { center: far(surfel).as_vec3().to_array(), ..*surfel }).collect();
+    let low = |(surfel, stored): (&Surfel, &Surfel)| {
+        (far(surfel) - Vec3::from_array(stored.center).as_dvec3()).as_vec3().to_array()
+    };
+    let low = scene.surfels.iter().zip(&surfels).map(low).collect();
+    let origin = DVec3::new(-3e6, 7e5, -1e6);
+    (Scene { origin, surfels, low, ..scene }, sphere_camera(72, Projection::Pinhole))
+}
+
+/// A sphere and many copies of one disk.
+fn copies() -> Scene {
+    let mut scene = sphere(800, 1.7);
+    let Colors::Srgb8(codes) = &mut scene.colors else { unreachable!() };
+    let disk = Surfel::disk(Vec3::new(0.5, 0.2, 1.0), Vec3::new(0.3, 0.1, 1.0), 0.4);
+    scene.surfels.extend(vec![disk; 2000]);
+    codes.extend(vec![[200, 30, 40, 255]; 2000]);
+    scene
+}
+
+/// A sphere with a picture on it.
+fn textured() -> Scene {
+    let scene = sphere(2000, 1.7);
+    let centers: Vec<[f32; 3]> = scene.surfels.iter().map(|surfel| surfel.center).collect();
+    let code = |k: u32, step: u32| (40 + k * step % 200) as u8;
+    let texels = (0..32 * 16).map(|k| [code(k, 7), code(k, 13), code(k / 32, 29), 255]).collect();
+    let points = Points {
+        positions: centers.iter().map(|center| center.map(f64::from)).collect(),
+        normals: Some(centers.clone()),
+        radii: Some(vec![scene.surfels[0].radius(); centers.len()]),
+        texture: Some(centers.iter().map(|[x, y, _]| [0.5 + 0.4 * x, 0.5 + 0.4 * y]).collect()),
+        ..Points::default()
+    };
+    build_textured(vec![points], Texture::new(32, 16, texels).unwrap(), &()).unwrap().0
+}
+
+fn unlit() -> RenderOptions {
+    RenderOptions { shading: Shading::Unlit, ..RenderOptions::default() }
+}
+
+fn with_maps() -> RenderOptions {
+    RenderOptions { maps: MAPS, ..RenderOptions::default() }
+}
+
+/// Every render of the list: kernels, epsilons, low-passes, shadings, maps, accumulators, organisations, what is left out, pages,
+/// bands, and the rasteriser.
+fn list(scenes: &Scenes) -> Vec<Row<'_>> {
+    let mut rows = Vec::new();
+    let mut add = |name: String, view, options| rows.push(Row { name, view, options, buffer_limit: None });
+    let views = [
+        ("sphere", &scenes.sphere),
+        ("orthographic", &scenes.orthographic),
+        ("dense", &scenes.dense),
+        ("large", &scenes.large),
+        ("mixed", &scenes.mixed),
+        ("mixed orthographic", &scenes.mixed_orthographic),
+        ("near", &scenes.near),
+        ("far", &scenes.far),
+        ("copies", &scenes.copies),
+        ("textured", &scenes.textured),
+        ("plain", &scenes.plain),
+    ];
+    for (name, view) in views {
+        add(format!("{name}, default"), view, RenderOptions::default());
+        for low_pass in [LowPass::Max, LowPass::Ewa] {
+            add(format!("{name}, {low_pass:?}, maps"), view, RenderOptions { low_pass, ..with_maps() });
+        }
+        add(
+            format!("{name}, scatter, maps"),
+            view,
+            RenderOptions { organisation: Organisation::Scatter, ..with_maps() },
+        );
+    }
+    for kernel in ["gaussian", "gaussian:0.5", "ellipse:4,2,smooth", "hat", "constant"] {
+        for (name, view) in [("sphere", &scenes.sphere), ("mixed", &scenes.mixed)] {
+            add(format!("{name}, {kernel}"), view, RenderOptions { kernel: kernel.parse().unwrap(), ..unlit() });
+        }
+    }
+    for epsilon in [Epsilon::Relative(0.0), Epsilon::Absolute(0.05), Epsilon::Radius(1.5)] {
+        add(format!("mixed, {epsilon:?}"), &scenes.mixed, RenderOptions { epsilon, ..with_maps() });
+    }
+    let lights = vec![
+        Light::Headlight { intensity: 0.5 },
+        Light::Directional { toward: Vec3::new(0.6, 0.0, 0.8), intensity: 0.7 },
+    ];
+    for (name, view) in [("sphere", &scenes.sphere), ("plain", &scenes.plain), ("textured", &scenes.textured)] {
+        let background = [0.1, 0.2, 0.3, 0.5];
+        let phong = RenderOptions { shading: Shading::Phong, lights: lights.clone(), background, ..with_maps() };
+        add(format!("{name}, Phong, two lights, background"), view, phong);
+    }
+    for accumulator in ["fixed32", "fixed64", "packed64"] {
+        for (name, view) in [("sphere", &scenes.sphere), ("mixed", &scenes.mixed)] {
+            add(format!("{name}, {accumulator}"), view, RenderOptions { accumulator, ..with_maps() });
+        }
+    }
+    for organisation in [Organisation::Scatter, Organisation::Tile] {
+        for (name, view) in [("sphere", &scenes.sphere), ("dense", &scenes.dense), ("large", &scenes.large)] {
+            add(format!("{name}, {organisation:?}"), view, RenderOptions { organisation, ..unlit() });
+        }
+    }
+    for (optimisation, name) in Optimisation::ALL {
+        let without = vec![optimisation];
+        add(format!("dense, without {name}"), &scenes.dense, RenderOptions { without, ..RenderOptions::default() });
+    }
+    for depth in ["exact", "offset", "ray"] {
+        for format in ["rgba16float", "rgba32float"] {
+            let raster = epsplat::scene::Raster { format: format.parse().unwrap(), depth: depth.parse().unwrap() };
+            let options = RenderOptions { raster: Some(raster), ..with_maps() };
+            add(format!("sphere, raster {depth} {format}"), &scenes.sphere, options);
+        }
+    }
+    for (name, view) in [("sphere", &scenes.sphere), ("mixed", &scenes.mixed), ("large", &scenes.large)] {
+        for limit in [40_000, 120_000] {
+            let options = RenderOptions { low_pass: LowPass::Max, ..with_maps() };
+            let name = format!("{name}, buffers of {limit} bytes");
+            rows.push(Row { name, view, options, buffer_limit: Some(limit) });
+        }
+    }
+    rows
+}
+
+/// The 64-bit FNV-1a hash (Fowler, Noll, Vo) of all bits of a frame.
+fn hash(frame: &Frame) -> u64 {
+    bits(frame)
+        .into_iter()
+        .flat_map(u32::to_le_bytes)
+        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3))
+}
+
+/// The hash of the second frame, which is the first one's too.
+fn rendered(row: &Row<'_>, backend: &Backend) -> u64 {
+    let (scene, camera) = row.view;
+    let mut renderer = Renderer::new(scene, &row.options, backend).unwrap();
+    let [first, second] = [0, 1].map(|_| hash(&renderer.frame(camera, &()).unwrap().0));
+    assert_eq!(first, second, "{}: the second frame differs", row.name);
+    first
+}
+
+/// Whether the reference draws it in another way than a row that is in the list anyway.
+fn differs_in_f64(row: &Row<'_>) -> bool {
+    let options = &row.options;
+    let own = RenderOptions { raster: None, organisation: Organisation::Auto, accumulator: "fixed", ..options.clone() };
+    row.buffer_limit.is_none() && own == *options && options.without.is_empty()
+}
+
+#[test]
+fn frames_of_the_reference_are_what_they_were() {
+    let scenes = scenes();
+    let mut made = String::new();
+    for row in list(&scenes).iter().filter(|row| differs_in_f64(row)) {
+        writeln!(made, "{:016x} {}", rendered(row, &Backend::Reference), row.name).unwrap();
+    }
+    let kept = include_str!("golden/frames.txt");
+    let pairs = made.lines().zip(kept.lines().filter(|line| !line.starts_with('#')));
+    let other: Vec<_> = pairs.clone().filter(|(made, kept)| made != kept).collect();
+    assert!(other.is_empty() && pairs.count() == made.lines().count(), "now:\n{made}\nother than before: {other:#?}");
+    // A single moved surfel shows.
+    let mut moved = scenes.sphere.clone();
+    moved.0.surfels[1234].center[0] += 1e-6;
+    let row = |view| Row { name: String::new(), view, options: RenderOptions::default(), buffer_limit: None };
+    assert!(rendered(&row(&moved), &Backend::Reference) != rendered(&row(&scenes.sphere), &Backend::Reference));
+}
+
+#[test]
+fn frames_of_an_adapter_repeat() {
+    let Some(gpu) = common::gpu() else { return };
+    let scenes = scenes();
+    let all = list(&scenes);
+    assert!(all.len() >= 90, "{}", all.len());
+    let mut made = format!("# {}\n", gpu.adapter.name);
+    let backend = Backend::gpu(gpu);
+    for row in &all {
+        let limited = |limit| common::gpu().map(|gpu| Backend::gpu(Gpu::with_buffer_limit(gpu, limit))).unwrap();
+        let own = row.buffer_limit.map(limited);
+        if let Backend::Gpu { gpu, .. } = &backend
+            && let Some(why) = refused(row, gpu)
+        {
+            writeln!(made, "{why:16} {}", row.name).unwrap();
+            continue;
+        }
+        writeln!(made, "{:016x} {}", rendered(row, own.as_ref().unwrap_or(&backend)), row.name).unwrap();
+    }
+    if let Ok(file) = std::env::var("EPSPLAT_FRAMES") {
+        std::fs::write(file, made).unwrap();
+    }
+}
+
+/// Why an adapter does not render a row: what it lacks.
+fn refused(row: &Row<'_>, gpu: &Gpu) -> Option<&'static str> {
+    let (wants_u64, raster) = (row.options.accumulator.ends_with("64"), row.options.raster);
+    let lacks = [
+        (wants_u64 && !gpu.adapter.atomics_u64, "no 64-bit atomics"),
+        (
+            raster.is_some_and(|raster| raster.format.name() == "rgba32float") && !gpu.adapter.blends_f32,
+            "no f32 blending",
+        ),
+        (raster.is_some_and(|raster| raster.depth.name() != "exact") && gpu.adapter.api == "gl", "no fine depths"),
+    ];
+    lacks.into_iter().find(|(lacks, _)| *lacks).map(|(_, why)| why)
+}

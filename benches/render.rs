@@ -7,8 +7,9 @@ use std::time::Duration;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use epsplat::gpu::Gpu;
 use epsplat::io::Points;
+use epsplat::plan::RenderOptions;
 use epsplat::render::{Backend, Renderer, render};
-use epsplat::scene::{Camera, Lens, RenderOptions};
+use epsplat::scene::{Camera, Lens};
 use epsplat::surfels::analytic::{Shape, generate};
 use epsplat::surfels::build;
 

@@ -14,11 +14,12 @@ use crate::passes::cull::Part;
 use crate::passes::order::order;
 use crate::passes::project::SplatBuffer;
 use crate::passes::upload::SurfelBuffer;
-use crate::passes::variant::{PixelLayout, Variant};
+use crate::passes::variant::Variant;
 use crate::passes::visibility::VisibilityBuffer;
 use crate::passes::{Recorder, accumulate, project, visibility};
+use crate::plan::{Facts, Optimisation, PixelLayout, RenderOptions, SceneNeeds};
 use crate::render::bands;
-use crate::scene::{Camera, Optimisation, Ranges, RenderOptions, Scene, SceneNeeds};
+use crate::scene::{Camera, Scene};
 
 /// What the first three stages leave on the device.
 #[derive(Clone, Debug)]
@@ -68,8 +69,8 @@ impl Stages {
 /// # Errors
 /// [`Error::Usage`] if the image's sums need more than one buffer; and whatever a render can fail with.
 pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu, sources: &Sources) -> Result<Stages> {
-    let ranges = Ranges::of(scene);
-    let needs = SceneNeeds { tiles: false, ..SceneNeeds::of(scene, &ranges.color, camera, options) };
+    let facts = Facts::of(scene);
+    let needs = SceneNeeds { tiles: false, ..SceneNeeds::of(scene, &facts.color, camera, options) };
     let needs = needs.with_long_words(gpu.adapter.integers_u64 && options.has(Optimisation::LongWords));
     let variant = Variant::of(&needs, options, scene.surfels.len() as u64)?;
     variant.accumulator.check(gpu)?;
@@ -85,12 +86,12 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
             gpu.adapter.name
         )));
     };
-    let view = View::new(scene, &ranges, camera, options);
+    let view = View::new(scene, &facts, camera, options);
     let uniform = Buffer::uniform(gpu, "view", &view)?;
     let timing = Timing::new(gpu);
     let mut recorder = Recorder { gpu, program: &program, view: &uniform, variant: &variant, timing };
     let mut projected =
-        SplatBuffer::new(gpu, SurfelBuffer::upload(gpu, scene, &needs, Some(&ranges.core), &())?, needs.low_pass)?;
+        SplatBuffer::new(gpu, SurfelBuffer::upload(gpu, scene, &needs, Some(&facts.core), &())?, needs.low_pass)?;
     projected.make_room_for_all(gpu)?;
     let nearest = VisibilityBuffer::new(gpu, &bands)?;
     let sums = AttributeBuffer::new(gpu, &variant, rows.pixels)?;
@@ -101,7 +102,7 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
     accumulate::record(&mut recorder, &projected, rows, &nearest, &sums)?;
     accumulate::record_large(&mut recorder, &projected, rows, &nearest, &sums)?;
     let mut splats = vec![Splat::zeroed(); scene.surfels.len()];
-    let mut order = order(&scene.surfels, &ranges.core).into_iter();
+    let mut order = order(&scene.surfels, &facts.core).into_iter();
     for page in &projected.pages {
         for (splat, index) in page.splats.read(gpu, page.splats.len)?.into_iter().zip(&mut order) {
             splats[index as usize] = splat;

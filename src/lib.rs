@@ -13,13 +13,14 @@
 //! Four rules make it one design:
 //!
 //! 1. Each fragment is quantised, then integers are added: the same scene gives the same bits, in any order.
-//! 2. Only what a scene needs exists: [`scene::SceneNeeds`] chooses the files that are joined into a kernel.
+//! 2. Only what a scene needs exists: [`plan::SceneNeeds`] chooses the files that are joined into a kernel.
 //! 3. WGSL states a layout, [`gpu::layout`] mirrors it, a test decides.
 //! 4. Every kernel has a twin in f64, which is the oracle of each error figure and the backend without an adapter.
 //!
 //! ```
 //! use epsplat::render::{Backend, render};
-//! use epsplat::scene::{Camera, Lens, RenderOptions};
+//! use epsplat::plan::RenderOptions;
+//! use epsplat::scene::{Camera, Lens};
 //!
 //! let points = epsplat::io::Points {
 //!     positions: vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]],
@@ -42,6 +43,7 @@ pub mod inspect;
 pub mod io;
 pub mod metrics;
 pub mod passes;
+pub mod plan;
 pub mod progress;
 pub mod render;
 pub mod report;

@@ -17,7 +17,6 @@ use crate::gpu::buffers::{counts, page_len};
 use crate::gpu::layout::{BATCH, Splat, View};
 use crate::gpu::timing::Timing;
 use crate::gpu::{Gpu, Sources};
-use crate::passes::accumulate::ACCUMULATORS;
 use crate::passes::covered::Covered;
 use crate::passes::cull::Part;
 use crate::passes::project::SplatBuffer;
@@ -25,9 +24,10 @@ use crate::passes::tiles::{Listed, Tiles};
 use crate::passes::upload::SurfelBuffer;
 use crate::passes::variant::Variant;
 use crate::passes::{Recorder, accumulate, cull, project, raster, resolve, tiles, visibility};
+use crate::plan::{Accumulator, Facts, Optimisation, Organisation, RenderOptions, SceneNeeds};
 use crate::progress::Progress;
 use crate::scene::light::MAX_LIGHTS;
-use crate::scene::{Camera, Optimisation, Organisation, Ranges, RenderOptions, Scene, SceneNeeds};
+use crate::scene::{Camera, Scene};
 
 /// Who renders.
 pub enum Backend {
@@ -108,7 +108,7 @@ pub struct Renderer<'a> {
     scene: &'a Scene,
     options: &'a RenderOptions,
     backend: &'a Backend,
-    ranges: Ranges,
+    facts: Facts,
     splats: Option<SplatBuffer>,
     pixels: Option<PixelBuffers>,
     tiles: Option<Tiles>,
@@ -141,7 +141,7 @@ impl<'a> Renderer<'a> {
             scene,
             options,
             backend,
-            ranges: Ranges::of(scene),
+            facts: Facts::of(scene),
             splats: None,
             pixels: None,
             tiles: None,
@@ -177,8 +177,8 @@ impl<'a> Renderer<'a> {
         camera: &Camera,
         progress: &dyn Progress,
     ) -> Result<(Frame, Report)> {
-        let needs = SceneNeeds::of(self.scene, &self.ranges.color, camera, self.options)
-            .with_copies(self.ranges.copies && self.options.draws_copies_once())
+        let needs = SceneNeeds::of(self.scene, &self.facts.color, camera, self.options)
+            .with_copies(self.facts.copies && self.options.draws_copies_once())
             .with_atomics_u64(gpu.adapter.atomics_u64 && self.options.has(Optimisation::Pairs))
             .with_long_words(gpu.adapter.integers_u64 && self.options.has(Optimisation::LongWords));
         let surfels = self.scene.surfels.len() as u64;
@@ -206,7 +206,7 @@ impl<'a> Renderer<'a> {
             None => variant.accumulator.check(gpu)?,
         }
         let program = variant.compile(gpu, sources)?;
-        let core = self.options.has(Optimisation::Order).then_some(&self.ranges.core);
+        let core = self.options.has(Optimisation::Order).then_some(&self.facts.core);
         let mut splats = match self.splats.take() {
             Some(splats) => splats,
             None => {
@@ -329,7 +329,7 @@ impl<'a> Renderer<'a> {
         if overflows > 0 {
             // The device's memory is free again before the second try.
             drop((pixels, splats));
-            let exact = RenderOptions { accumulator: ACCUMULATORS[0].name, ..self.options.clone() };
+            let exact = RenderOptions { accumulator: Accumulator::Fixed, ..self.options.clone() };
             let mut again = Renderer::new(self.scene, &exact, self.backend)?;
             let (frame, report) = again.frame(camera, progress)?;
             self.held = again.held;
@@ -358,6 +358,6 @@ impl<'a> Renderer<'a> {
     }
 
     fn view(&self, camera: &Camera) -> View {
-        View::new(self.scene, &self.ranges, camera, self.options)
+        View::new(self.scene, &self.facts, camera, self.options)
     }
 }

@@ -13,12 +13,10 @@ use epsplat::frame::Frame;
 use epsplat::gpu::layout::View;
 use epsplat::gpu::{Gpu, Sources};
 use epsplat::hardcases::precision::E;
-use epsplat::passes::accumulate::{ACCUMULATORS, Accumulator};
 use epsplat::passes::project::reference_all;
+use epsplat::plan::{Accumulator, AccumulatorRow, Facts, RenderOptions};
 use epsplat::render::{Backend, render};
-use epsplat::scene::{
-    Camera, Colors, Epsilon, Kernel, Maps, Projection, Ranges, RenderOptions, Scene, Shading, Surfel,
-};
+use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Maps, Projection, Scene, Shading, Surfel};
 use glam::Vec3;
 
 const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
@@ -57,7 +55,7 @@ fn case(kernel: &str, epsilon: Epsilon, projection: Projection) -> Case {
     };
     let (reference, _) = render(&scene, &camera, &options, &Backend::Reference, &()).unwrap();
     let enclosure = enclose(&scene, &camera, &options, &reference_all(&scene, &camera, &options));
-    let view = View::new(&scene, &Ranges::of(&scene), &camera, &options);
+    let view = View::new(&scene, &Facts::of(&scene), &camera, &options);
     Case { name: format!("{kernel}, {epsilon:?}, {projection:?}"), scene, camera, options, reference, enclosure, view }
 }
 
@@ -82,7 +80,7 @@ struct Findings {
     used: [f64; 4],
 }
 
-fn compare(case: &Case, row: &Accumulator, device: &Frame) -> Findings {
+fn compare(case: &Case, row: &AccumulatorRow, device: &Frame) -> Findings {
     let mut findings = Findings::default();
     let (low, high) = case.scene.color_range();
     let fraction_bits = row.fraction_bits(case.scene.surfels.len() as u64);
@@ -137,8 +135,8 @@ fn compare(case: &Case, row: &Accumulator, device: &Frame) -> Findings {
 }
 
 /// Renders by `row`; a frame that fell back to another accumulator would show nothing about this one.
-fn run(case: &Case, row: &Accumulator, backend: &Backend) -> Findings {
-    let options = RenderOptions { accumulator: row.name, ..case.options.clone() };
+fn run(case: &Case, row: &AccumulatorRow, backend: &Backend) -> Findings {
+    let options = RenderOptions { accumulator: row.of, ..case.options.clone() };
     let (frame, report) = render(&case.scene, &case.camera, &options, backend, &()).unwrap();
     assert_eq!((report.accumulator, report.overflows), (row.name, 0), "{}", case.name);
     compare(case, row, &frame)
@@ -171,18 +169,18 @@ fn broken(file: &str, from: &str, to: &str, gpu: Gpu) -> Backend {
 #[test]
 fn a_broken_accumulator_kernel_or_epsilon_is_noticed() {
     let Some(gpu) = common::gpu() else { return };
-    let noticed = |case: &Case, row: &Accumulator, file: &str, from: &str, to: &str| {
+    let noticed = |case: &Case, row: &AccumulatorRow, file: &str, from: &str, to: &str| {
         let Some(gpu) = common::gpu_for(file) else { return };
         let findings = run(case, row, &broken(file, from, to, gpu));
         assert!(findings.wrong.len() >= 20, "{file} with {to}: only {} differences", findings.wrong.len());
     };
     let plain = case("ellipse:6,3", EPSILONS[0], Projection::Pinhole);
     for row in common::accumulators(&gpu) {
-        let terms = if row.name == ACCUMULATORS[0].name { "terms.wgsl" } else { row.file };
+        let terms = if row.of == Accumulator::Fixed { "terms.wgsl" } else { row.file };
         noticed(&plain, row, terms, "clamp(value, 0.0, 1.0)", "clamp(value * 1.0005, 0.0, 1.0)");
         noticed(&plain, row, row.file, "sum_at(pixel, WEIGHT_CHANNEL)", "1.0005 * sum_at(pixel, WEIGHT_CHANNEL)");
     }
-    let row = &ACCUMULATORS[0];
+    let row = Accumulator::Fixed.row();
     for (kernel, file, from, to) in [
         ("gaussian", "kernel_gaussian.wgsl", "-KERNEL_FALL", "-1.0005 * KERNEL_FALL"),
         ("ellipse:6,3,smooth", "kernel_ellipse.wgsl", "power) - KERNEL_STEP", "power)"),
@@ -206,24 +204,24 @@ fn sums_that_do_not_fit_are_noticed_and_made_again() {
     let all = common::accumulators(&gpu);
     let backend = Backend::gpu(gpu);
     let with = |accumulator| RenderOptions { kernel: Kernel::Constant, maps: MAPS, accumulator, ..Default::default() };
-    let exact = ACCUMULATORS[0].name;
+    let exact = Accumulator::Fixed;
     // 255 full weights of 2^24 units fit 32 bits, 256 do not.
     for (disks, fits) in [(200, true), (255, true), (256, false), (300, false), (100_000, false)] {
         let (scene, camera) = stack(disks, 0.3);
         let (expected, report) = render(&scene, &camera, &with(exact), &backend, &()).unwrap();
-        assert_eq!((report.accumulator, report.overflows), (exact, 0));
+        assert_eq!((report.accumulator, report.overflows), (exact.name(), 0));
         assert!(expected.count.as_ref().unwrap().iter().all(|count| *count == disks as f32));
         assert!(expected.weight.as_ref().unwrap().iter().all(|weight| *weight == disks as f32));
         for row in &all {
-            let (frame, report) = render(&scene, &camera, &with(row.name), &backend, &()).unwrap();
+            let (frame, report) = render(&scene, &camera, &with(row.of), &backend, &()).unwrap();
             let name = format!("{}, {disks} disks", row.name);
             if ["fixed32", "packed64"].contains(&row.name) && !fits {
                 assert!(report.overflows > 0, "{name}: no overflow");
-                assert_eq!(report.accumulator, exact, "{name}");
+                assert_eq!(report.accumulator, exact.name(), "{name}");
                 assert!(bits(&frame) == bits(&expected), "{name}: not what {exact} gives");
                 let Some(gpu) = common::gpu() else { return };
                 let blind = broken(row.file, "atomicAdd(&overflows, 1u);", "", gpu);
-                let (frame, report) = render(&scene, &camera, &with(row.name), &blind, &()).unwrap();
+                let (frame, report) = render(&scene, &camera, &with(row.of), &blind, &()).unwrap();
                 assert_eq!((report.accumulator, report.overflows), (row.name, 0), "{name}");
                 assert!(bits(&frame) != bits(&expected), "{name}: an overflow does not show");
             } else {
@@ -234,7 +232,7 @@ fn sums_that_do_not_fit_are_noticed_and_made_again() {
                 let bound = (row.error_bound)(n, n, row.fraction_bits(scene.surfels.len() as u64)) + 2.0 * E;
                 let color = |frame: &Frame| f64::from(frame.color[9][0]);
                 let apart = (color(&frame) - color(&expected)).abs();
-                let own = (ACCUMULATORS[0].error_bound)(n, n, 24);
+                let own = (Accumulator::Fixed.row().error_bound)(n, n, 24);
                 assert!(apart <= bound + own, "{name}: {apart:e} over {bound:e}");
             }
         }

@@ -8,8 +8,9 @@ use common::bits;
 use common::command::{DATA, Folder, epsplat, succeeds, text};
 use common::scenes::{crowded, sphere, sphere_camera};
 use epsplat::gpu::AdapterDescription;
+use epsplat::plan::{Organisation, RenderOptions};
 use epsplat::render::{Backend, Renderer};
-use epsplat::scene::{Organisation, Projection, RenderOptions};
+use epsplat::scene::Projection;
 use std::path::Path;
 use std::process::{Command, Output};
 

@@ -9,8 +9,9 @@ use common::scenes::{shuffled, sphere, sphere_camera};
 use epsplat::frame::Frame;
 use epsplat::gpu::Sources;
 use epsplat::metrics::compare;
+use epsplat::plan::{Optimisation, RenderOptions};
 use epsplat::render::{Backend, Report, render};
-use epsplat::scene::{Colors, LowPass, Maps, Optimisation, Projection, RenderOptions, Scene, Shading, Surfel};
+use epsplat::scene::{Colors, LowPass, Maps, Projection, Scene, Shading, Surfel};
 use glam::Vec3;
 
 /// A sphere of disks in all colours, with many copies of two disks, one of them in two colours, before it.

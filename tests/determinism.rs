@@ -13,9 +13,9 @@ use epsplat::gpu::buffers::page_len;
 use epsplat::gpu::layout::Splat;
 use epsplat::hardcases::cases;
 use epsplat::inspect::stages;
-use epsplat::passes::accumulate::{ACCUMULATORS, Accumulator};
+use epsplat::plan::{Accumulator, AccumulatorRow, RenderOptions};
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Lens, LowPass, Maps, RenderOptions, Scene, Shading, Surfel, Up};
+use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Lens, LowPass, Maps, Scene, Shading, Surfel, Up};
 use glam::{DVec3, Vec3};
 
 const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
@@ -23,14 +23,14 @@ const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, 
 /// Half a unit in the last place of 1 in f32.
 const E: f64 = 1.0 / 16_777_216.0;
 
-fn options(accumulator: &'static str) -> RenderOptions {
+fn options(accumulator: Accumulator) -> RenderOptions {
     RenderOptions { maps: MAPS, epsilon: Epsilon::Relative(0.02), accumulator, ..Default::default() }
 }
 
 /// All scenes for the default; for others the first, of 8-bit colours, and the last, of f32 and large splats.
-fn scenes(row: &Accumulator) -> Vec<(Scene, Camera)> {
+fn scenes(row: &AccumulatorRow) -> Vec<(Scene, Camera)> {
     let mut all = crowded();
-    if row.name != ACCUMULATORS[0].name {
+    if row.of != Accumulator::Fixed {
         all.remove(1);
     }
     all
@@ -39,7 +39,7 @@ fn scenes(row: &Accumulator) -> Vec<(Scene, Camera)> {
 /// Renders; a frame that fell back to another accumulator would show nothing about this one.
 fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Backend) -> Frame {
     let (frame, report) = render(scene, camera, options, backend, &()).unwrap();
-    assert_eq!((report.accumulator, report.overflows), (options.accumulator, 0));
+    assert_eq!((report.accumulator, report.overflows), (options.accumulator.name(), 0));
     frame
 }
 
@@ -58,7 +58,7 @@ fn order_and_repetition_do_not_change_a_bit() {
     let Some(gpu) = common::gpu() else { return };
     let backwards = Backend::Gpu { gpu: Box::new(gpu), sources: reversed(Sources::default()) };
     for row in all.into_iter().filter(|row| row.deterministic) {
-        let (name, options) = (row.name, options(row.name));
+        let (name, options) = (row.name, options(row.of));
         for (scene, camera) in scenes(row) {
             let first = bits(&frame(&scene, &camera, &options, &backend));
             assert!(bits(&frame(&scene, &camera, &options, &backend)) == first, "{name}: a second run differs");
@@ -110,7 +110,7 @@ fn an_adapters_64_bit_atomics_do_not_change_a_bit() {
     let Some(mut without) = common::gpu() else { return };
     without.adapter.atomics_u64 = false;
     let without = Backend::gpu(without);
-    let own = options(ACCUMULATORS[0].name);
+    let own = options(Accumulator::Fixed);
     let crowded = crowded().into_iter().map(|(scene, camera)| ("crowded".to_owned(), scene, camera, own.clone()));
     let hard = cases().unwrap().into_iter().map(|case| (case.name, case.scene, case.camera, case.options));
     let mut seen = [false; 2];
@@ -145,9 +145,8 @@ fn hidden_splats_do_not_change_a_bit() {
     };
     let none = with("1e-9 * reached > farthest_accepted(");
     let too_many = with("1.05 * reached > farthest_accepted(");
-    let crowded = crowded()
-        .into_iter()
-        .map(|(scene, camera)| ("crowded".to_owned(), scene, camera, options(ACCUMULATORS[0].name)));
+    let crowded =
+        crowded().into_iter().map(|(scene, camera)| ("crowded".to_owned(), scene, camera, options(Accumulator::Fixed)));
     let hard = cases().unwrap().into_iter().map(|case| (case.name, case.scene, case.camera, case.options));
     let mut noticed = 0;
     for (name, scene, camera, options) in crowded.chain(hard) {
@@ -193,7 +192,7 @@ fn batches_left_out_do_not_change_a_bit() {
         };
         for low_pass in low_passes {
             for (name, camera, most) in &views {
-                let options = RenderOptions { low_pass, ..options(ACCUMULATORS[0].name) };
+                let options = RenderOptions { low_pass, ..options(Accumulator::Fixed) };
                 let (own, report) = frame(Sources::default(), camera, &options);
                 let (all, of_all) = frame(shown(&every), camera, &options);
                 assert!(bits(&own) == bits(&all), "{name}: leaving out batches shows");
@@ -204,7 +203,7 @@ fn batches_left_out_do_not_change_a_bit() {
                 assert!(drawn[0] <= drawn[1], "{name}: {drawn:?}");
             }
             let (_, camera, _) = &views[0];
-            let options = RenderOptions { low_pass, epsilon: Epsilon::Absolute(1.9), ..options(ACCUMULATORS[0].name) };
+            let options = RenderOptions { low_pass, epsilon: Epsilon::Absolute(1.9), ..options(Accumulator::Fixed) };
             let (own, _) = frame(Sources::default(), camera, &options);
             let (less, _) = frame(wrong.clone(), camera, &options);
             assert!(bits(&own) != bits(&less), "what is left out wrongly does not show");
@@ -220,7 +219,7 @@ fn pages_and_bands_do_not_change_a_bit() {
     let all = common::accumulators(&whole);
     let whole = Backend::gpu(whole);
     for row in all.into_iter().filter(|row| row.deterministic) {
-        let (name, options) = (row.name, options(row.name));
+        let (name, options) = (row.name, options(row.of));
         // 160 pixels of 12 sums, or of 10 words of the image: a row of the image a band, and some 200 surfels a page.
         let one_row = 160 * 4 * u64::from(12 * row.words).max(10) + 700;
         for limit in [one_row, 40_000] {
@@ -271,13 +270,13 @@ fn sums_that_show_the_order_stay_within_their_bounds() {
         kernel: Kernel::Gaussian { sigma: 0.5 },
         ..options(accumulator)
     };
-    let exact = frame(&scene, &camera, &with(ACCUMULATORS[0].name), &backend);
+    let exact = frame(&scene, &camera, &with(Accumulator::Fixed), &backend);
     let (counts, weights) = (exact.count.as_ref().unwrap(), exact.weight.as_ref().unwrap());
     let fewest = counts.iter().copied().fold(f32::INFINITY, f32::min);
     assert!(fewest > 1000.0, "only {fewest} fragments on a pixel");
     for row in all.into_iter().filter(|row| !row.deterministic) {
         let runs: Vec<Frame> =
-            (0..6).map(|seed| frame(&shuffled(&scene, 40 + seed / 2), &camera, &with(row.name), &backend)).collect();
+            (0..6).map(|seed| frame(&shuffled(&scene, 40 + seed / 2), &camera, &with(row.of), &backend)).collect();
         let repeated = runs.chunks_exact(2).any(|pair| bits(&pair[0]) != bits(&pair[1]));
         let reordered = runs.iter().any(|run| bits(run) != bits(&runs[0]));
         let words = |differ| if differ { "differ" } else { "happen not to differ" };
@@ -288,7 +287,7 @@ fn sums_that_show_the_order_stay_within_their_bounds() {
             for pixel in 0..camera.pixels() {
                 let (n, w) = (counts[pixel].into(), weights[pixel].into());
                 // Both sides err, and both map back to a range of at most 1 in f32.
-                let bound = (row.error_bound)(n, w, 24) + (ACCUMULATORS[0].error_bound)(n, w, 24);
+                let bound = (row.error_bound)(n, w, 24) + (Accumulator::Fixed.row().error_bound)(n, w, 24);
                 for k in 0..3 {
                     let difference = f64::from((run.color[pixel][k] - exact.color[pixel][k]).abs());
                     used = used.max(difference / bound);

@@ -6,8 +6,9 @@ mod common;
 
 use epsplat::io::Points;
 use epsplat::metrics::compare;
+use epsplat::plan::RenderOptions;
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Epsilon, Lens, Maps, RenderOptions, Scene, Up};
+use epsplat::scene::{Camera, Epsilon, Lens, Maps, Scene, Up};
 use epsplat::surfels::analytic::{Shape, generate};
 use epsplat::surfels::build;
 use glam::DVec3;

@@ -19,11 +19,9 @@ use common::scenes::{Case, cases, crowded, sphere, sphere_camera};
 use epsplat::frame::Frame;
 use epsplat::gpu::Gpu;
 use epsplat::io::{Points, Texture};
+use epsplat::plan::{Accumulator, Features, Optimisation, Organisation, RenderOptions};
 use epsplat::render::{Backend, Renderer};
-use epsplat::scene::{
-    Camera, Colors, Epsilon, Light, LowPass, Maps, Optimisation, Organisation, Projection, RenderOptions, Scene,
-    Shading, Surfel,
-};
+use epsplat::scene::{Camera, Colors, Epsilon, Light, LowPass, Maps, Projection, Scene, Shading, Surfel};
 use epsplat::surfels::build_textured;
 use glam::{DVec3, Vec3};
 
@@ -171,7 +169,7 @@ fn list(scenes: &Scenes) -> Vec<Row<'_>> {
         let phong = RenderOptions { shading: Shading::Phong, lights: lights.clone(), background, ..with_maps() };
         add(format!("{name}, Phong, two lights, background"), view, phong);
     }
-    for accumulator in ["fixed32", "fixed64", "packed64"] {
+    for accumulator in [Accumulator::Fixed32, Accumulator::Fixed64, Accumulator::Packed64] {
         for (name, view) in [("sphere", &scenes.sphere), ("mixed", &scenes.mixed)] {
             add(format!("{name}, {accumulator}"), view, RenderOptions { accumulator, ..with_maps() });
         }
@@ -187,7 +185,7 @@ fn list(scenes: &Scenes) -> Vec<Row<'_>> {
     }
     for depth in ["exact", "offset", "ray"] {
         for format in ["rgba16float", "rgba32float"] {
-            let raster = epsplat::scene::Raster { format: format.parse().unwrap(), depth: depth.parse().unwrap() };
+            let raster = epsplat::plan::Raster { format: format.parse().unwrap(), depth: depth.parse().unwrap() };
             let options = RenderOptions { raster: Some(raster), ..with_maps() };
             add(format!("sphere, raster {depth} {format}"), &scenes.sphere, options);
         }
@@ -222,7 +220,12 @@ fn rendered(row: &Row<'_>, backend: &Backend) -> u64 {
 /// Whether the reference draws it in another way than a row that is in the list anyway.
 fn differs_in_f64(row: &Row<'_>) -> bool {
     let options = &row.options;
-    let own = RenderOptions { raster: None, organisation: Organisation::Auto, accumulator: "fixed", ..options.clone() };
+    let own = RenderOptions {
+        raster: None,
+        organisation: Organisation::Auto,
+        accumulator: Accumulator::Fixed,
+        ..options.clone()
+    };
     row.buffer_limit.is_none() && own == *options && options.without.is_empty()
 }
 
@@ -270,7 +273,7 @@ fn frames_of_an_adapter_repeat() {
 
 /// Why an adapter does not render a row: what it lacks.
 fn refused(row: &Row<'_>, gpu: &Gpu) -> Option<&'static str> {
-    let (wants_u64, raster) = (row.options.accumulator.ends_with("64"), row.options.raster);
+    let (wants_u64, raster) = (row.options.accumulator.row().features == Features::AtomicsU64, row.options.raster);
     let lacks = [
         (wants_u64 && !gpu.adapter.atomics_u64, "no 64-bit atomics"),
         (

@@ -7,9 +7,9 @@ mod common;
 use epsplat::gpu::Sources;
 use epsplat::hardcases::{self, Verdict};
 use epsplat::metrics::compare;
-use epsplat::passes::accumulate;
+use epsplat::plan::{Accumulator, RenderOptions};
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, Lens, Maps, RenderOptions, Scene, Surfel, Up};
+use epsplat::scene::{Camera, Colors, Lens, Maps, Scene, Surfel, Up};
 use glam::{DVec3, Vec3};
 
 /// Disks seen by a camera at the origin that looks along z; colours differ, so that every attribute is summed.
@@ -146,7 +146,7 @@ fn a_broken_kernel_fails_a_hard_case() {
         let backend = Backend::Gpu { gpu: Box::new(gpu), sources };
         let case = cases.iter().find(|case| case.name == name).unwrap();
         let truth = case.truth().unwrap();
-        let row = case.judge(&truth, accumulate::accumulator("fixed").unwrap(), &backend).unwrap();
+        let row = case.judge(&truth, Accumulator::Fixed.row(), &backend).unwrap();
         if !row.failed() {
             unnoticed.push(format!("{name}: {file}, {from:?}"));
         }

@@ -9,9 +9,10 @@ use std::path::{Path, PathBuf};
 
 use epsplat::frame::Frame;
 use epsplat::io;
+use epsplat::plan::RenderOptions;
 use epsplat::render::{Backend, render};
 use epsplat::scene::color::linear_to_srgb;
-use epsplat::scene::{Camera, Colors, Lens, Light, RenderOptions, Scene, Shading};
+use epsplat::scene::{Camera, Colors, Lens, Light, Scene, Shading};
 use epsplat::surfels::analytic::{Shape, generate};
 use epsplat::surfels::build;
 use glam::Vec3;

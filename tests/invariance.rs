@@ -10,13 +10,13 @@ use epsplat::frame::Frame;
 use epsplat::gpu::layout::ONE;
 use epsplat::gpu::{Gpu, Sources};
 use epsplat::inspect::stages;
-use epsplat::passes::accumulate::{Accumulator, PixelSums};
+use epsplat::passes::accumulate::PixelSums;
 use epsplat::passes::resolve;
-use epsplat::passes::variant::COLOR_CHANNEL;
+use epsplat::plan::{AccumulatorRow, COLOR_CHANNEL, RenderOptions};
 use epsplat::render::{Backend, render};
 use epsplat::scene::camera::Lens;
 use epsplat::scene::options::HIGHLIGHT;
-use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Maps, Projection, RenderOptions, Scene, Shading, Surfel, Up};
+use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Maps, Projection, Scene, Shading, Surfel, Up};
 use glam::{DVec3, Vec3};
 
 const E: f64 = 1.0 / 16_777_216.0;
@@ -48,10 +48,10 @@ fn a_plane_of_one_colour_is_exactly_that_colour() {
     }
 }
 
-fn check_plane(row: &Accumulator, backend: &Backend) {
+fn check_plane(row: &AccumulatorRow, backend: &Backend) {
     let camera = front(64);
     let surfels = plane(64, 5.0);
-    let options = RenderOptions { shading: Shading::Unlit, accumulator: row.name, ..options() };
+    let options = RenderOptions { shading: Shading::Unlit, accumulator: row.of, ..options() };
     let color = [0.123_456_7, 7.654_321, 0.333_333_34, 1.0];
     let code = [200, 17, 99, 255];
     let decoded = Colors::Srgb8(vec![code]).linear(0);
@@ -85,7 +85,7 @@ fn one_of_two_colours_comes_out_within_the_stated_bound() {
     }
 }
 
-fn check_two_colours(row: &Accumulator, backend: &Backend) {
+fn check_two_colours(row: &AccumulatorRow, backend: &Backend) {
     let camera = front(64);
     let mut surfels = plane(64, 5.0);
     let near = surfels.len();
@@ -95,7 +95,7 @@ fn check_two_colours(row: &Accumulator, backend: &Backend) {
     let colors = (0..surfels.len()).map(|k| if k < near { seen } else { hidden }).collect();
     let scene =
         Scene { origin: DVec3::ZERO, surfels, low: vec![], colors: Colors::Linear(colors), oriented: true, up: Up::Y };
-    let options = RenderOptions { shading: Shading::Unlit, accumulator: row.name, ..options() };
+    let options = RenderOptions { shading: Shading::Unlit, accumulator: row.of, ..options() };
     let fraction_bits = row.fraction_bits(scene.surfels.len() as u64);
     let frame = frame(&scene, &camera, &options, backend);
     let (weights, counts) = (frame.weight.unwrap(), frame.count.unwrap());

@@ -8,8 +8,9 @@ use common::bits;
 use common::scenes::{crowded, sphere, sphere_camera};
 use epsplat::frame::Frame;
 use epsplat::gpu::{Gpu, Sources};
+use epsplat::plan::{Optimisation, RenderOptions};
 use epsplat::render::{Backend, Report, render};
-use epsplat::scene::{Camera, Epsilon, Maps, Optimisation, Projection, RenderOptions, Scene};
+use epsplat::scene::{Camera, Epsilon, Maps, Projection, Scene};
 
 const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
 

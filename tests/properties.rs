@@ -10,9 +10,9 @@ use std::cell::Cell;
 use epsplat::frame::Frame;
 use epsplat::gpu::Sources;
 use epsplat::hardcases::{HardCase, judge};
-use epsplat::passes::accumulate::{ACCUMULATORS, accumulator};
+use epsplat::plan::{ACCUMULATORS, RenderOptions};
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Lens, Light, Maps, RenderOptions, Scene, Shading, Surfel, Up};
+use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Lens, Light, Maps, Scene, Shading, Surfel, Up};
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
@@ -68,7 +68,7 @@ fn options() -> impl Strategy<Value = RenderOptions> {
         RenderOptions {
             epsilon: epsilons[epsilon],
             kernel,
-            accumulator: ACCUMULATORS[accumulator].name,
+            accumulator: ACCUMULATORS[accumulator].of,
             shading: Shading::Unlit,
             lights: vec![Light::Headlight { intensity: 0.7 }, Light::Directional { toward: Vec3::Z, intensity: 0.3 }],
             maps: Maps { depth: true, normal: true, weight: true, count: true, decision: false },
@@ -155,7 +155,7 @@ fn agree(backend: Option<&Backend>, cases: u32) -> Result<(), String> {
         let truth = case.truth().unwrap();
         check_maps(&truth.frame)?;
         let Some(backend @ Backend::Gpu { gpu, .. }) = backend else { return Ok(()) };
-        let row = accumulator(options.accumulator).unwrap();
+        let row = options.accumulator.row();
         prop_assume!(row.check(gpu).is_ok());
         let (frame, report) = render(scene, camera, options, backend, &()).unwrap();
         check_maps(&frame)?;

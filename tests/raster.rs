@@ -7,9 +7,9 @@ mod common;
 use epsplat::frame::Frame;
 use epsplat::gpu::{Gpu, Sources};
 use epsplat::hardcases::{HardCase, Row, Truth, cases, judge};
-use epsplat::passes::accumulate::{Accumulator, Features};
+use epsplat::plan::{Accumulator, AccumulatorRow, BlendFormat, Features, Raster, RasterDepth, RenderOptions};
 use epsplat::render::{Backend, Report, render};
-use epsplat::scene::{BlendFormat, Camera, Maps, Raster, RasterDepth, RenderOptions, Shading};
+use epsplat::scene::{Camera, Maps, Shading};
 
 const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
 
@@ -40,8 +40,16 @@ fn frame(case: &HardCase, options: &RenderOptions, backend: &Backend) -> (Frame,
 }
 
 /// The bound of src/passes/raster.rs for a floating format of unit roundoff `2^-bits`.
-fn floating(error_bound: fn(f64, f64, u32) -> f64) -> Accumulator {
-    Accumulator { name: "raster", file: "", words: 0, deterministic: false, features: Features::None, error_bound }
+fn floating(error_bound: fn(f64, f64, u32) -> f64) -> AccumulatorRow {
+    AccumulatorRow {
+        of: Accumulator::Float,
+        name: "raster",
+        file: "",
+        words: 0,
+        deterministic: false,
+        features: Features::None,
+        error_bound,
+    }
 }
 
 fn judged(case: &HardCase, truth: &Truth, format: BlendFormat, backend: &Backend) -> Row {

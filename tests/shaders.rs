@@ -10,9 +10,9 @@ use common::modules::{self, Made, Reflected};
 use epsplat::gpu::Sources;
 use epsplat::gpu::device::STORAGE_BUFFERS;
 use epsplat::gpu::kernel::{FILES, reflect};
-use epsplat::passes::accumulate::{ACCUMULATORS, Features, accumulator};
-use epsplat::passes::variant::{self, COLOR_CHANNEL, PixelLayout, color_channels, overrides};
-use epsplat::scene::{ColorNeed, Kernel, KernelShape, RenderOptions};
+use epsplat::passes::variant::{self, overrides};
+use epsplat::plan::{Accumulator, COLOR_CHANNEL, ColorNeed, Features, PixelLayout, RenderOptions, color_channels};
+use epsplat::scene::{Kernel, KernelShape};
 use naga::AddressSpace;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use rayon::prelude::*;
@@ -43,7 +43,7 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
         let module = &made.reflected().module;
         let features = match needs.raster {
             None if needs.atomics_u64 => Features::AtomicsU64,
-            None => accumulator(needs.accumulator).unwrap().features,
+            None => needs.accumulator.row().features,
             Some(_) => Features::None,
         };
         let features = if made.of_tiles() { Features::None } else { features };
@@ -76,13 +76,13 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
         needed.into_iter().map(move |of| match of {
             Capabilities::SUBGROUP => "tiles",
             Capabilities::SHADER_INT64 if long => "records",
-            _ => needs.accumulator,
+            _ => needs.accumulator.name(),
         })
     });
     let without: BTreeSet<&str> = without.collect();
     assert_eq!(without, BTreeSet::from(["fixed", "fixed64", "float", "packed64", "records", "tiles"]));
     // The default runs anywhere.
-    assert_eq!(ACCUMULATORS[0].features, Features::None);
+    assert_eq!(Accumulator::Fixed.row().features, Features::None);
 }
 
 #[test]

@@ -7,10 +7,9 @@ mod common;
 use common::bits;
 use common::scenes::sphere;
 use epsplat::gpu::Sources;
+use epsplat::plan::{Optimisation, Organisation, RenderOptions};
 use epsplat::render::{Backend, Renderer, render};
-use epsplat::scene::{
-    Camera, Lens, LowPass, Maps, Optimisation, Organisation, RenderOptions, Scene, Shading, Surfel, Up,
-};
+use epsplat::scene::{Camera, Lens, LowPass, Maps, Scene, Shading, Surfel, Up};
 use glam::DVec3;
 
 const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };

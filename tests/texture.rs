@@ -13,10 +13,9 @@ use epsplat::gpu::Sources;
 use epsplat::io::{Points, Texture};
 use epsplat::passes::project::reference_all;
 use epsplat::passes::{accumulate, visibility};
+use epsplat::plan::{Accumulator, RenderOptions};
 use epsplat::render::{Backend, render};
-use epsplat::scene::{
-    Camera, Colors, Lens, LowPass, Maps, Place, Projection, RenderOptions, Scene, Shading, Textured, Up,
-};
+use epsplat::scene::{Camera, Colors, Lens, LowPass, Maps, Place, Projection, Scene, Shading, Textured, Up};
 use epsplat::surfels::build_textured;
 use glam::{DVec3, Vec3};
 
@@ -70,10 +69,10 @@ fn camera(size: u32, projection: Projection) -> Camera {
 
 /// Pixels at which the device's colour is farther from the twin's than the sums' bound, the texture's slope and the passage
 /// between the texture and the blended colour allow; and how many were looked at, were undecided, and lie in the passage.
-fn beyond_bounds(scene: &Scene, camera: &Camera, accumulator: &'static str, sources: &Sources) -> Option<[usize; 4]> {
+fn beyond_bounds(scene: &Scene, camera: &Camera, accumulator: Accumulator, sources: &Sources) -> Option<[usize; 4]> {
     let gpu = common::gpu()?;
     let options = RenderOptions { accumulator, ..unlit() };
-    let row = accumulate::accumulator(accumulator).unwrap();
+    let row = accumulator.row();
     let fraction_bits = row.fraction_bits(scene.surfels.len() as u64);
     let backend = Backend::Gpu { gpu: Box::new(gpu), sources: sources.clone() };
     let (device, _) = render(scene, camera, &options, &backend, &()).unwrap();
@@ -132,14 +131,14 @@ fn the_device_paints_as_its_twin_does() {
     let globe = globe(3000, 1.5, waves(true));
     for row in common::accumulators(&gpu) {
         let camera = camera(160, Projection::Pinhole);
-        let Some(found) = beyond_bounds(&globe, &camera, row.name, &Sources::default()) else { return };
+        let Some(found) = beyond_bounds(&globe, &camera, row.of, &Sources::default()) else { return };
         let [wrong, covered, open, passing] = found;
         assert!(wrong == 0 && covered > 8000 && open < covered / 50 && passing > 0, "{}: {found:?}", row.name);
     }
     for (scene, projection) in
         [(&globe, Projection::Orthographic), (&self::globe(3000, 1.5, waves(false)), Projection::Pinhole)]
     {
-        let found = beyond_bounds(scene, &camera(160, projection), "fixed", &Sources::default()).unwrap();
+        let found = beyond_bounds(scene, &camera(160, projection), Accumulator::Fixed, &Sources::default()).unwrap();
         assert!(found[0] == 0 && found[1] > 8000, "{found:?}");
     }
     for (file, from, to) in [
@@ -151,7 +150,7 @@ fn the_device_paints_as_its_twin_does() {
         ("resolve.wgsl", "textured(sums_of, weight, resolve_color(sums_of, weight))", "resolve_color(sums_of, weight)"),
     ] {
         let broken = Sources::default().replace(file, from, to).unwrap();
-        let found = beyond_bounds(&globe, &camera(160, Projection::Pinhole), "fixed", &broken).unwrap();
+        let found = beyond_bounds(&globe, &camera(160, Projection::Pinhole), Accumulator::Fixed, &broken).unwrap();
         assert!(found[0] >= 20, "{from} became {to}, and {found:?}");
     }
 }

@@ -8,11 +8,9 @@ use common::bits;
 use common::scenes::{cases, crowded, front, sphere, stack};
 use epsplat::frame::Frame;
 use epsplat::gpu::{Gpu, Sources};
+use epsplat::plan::{Optimisation, Organisation, RenderOptions};
 use epsplat::render::{Backend, Renderer, Report, render};
-use epsplat::scene::{
-    Camera, Colors, Epsilon, Kernel, LowPass, Maps, Optimisation, Organisation, Projection, RenderOptions, Scene,
-    Shading, Surfel, Up,
-};
+use epsplat::scene::{Camera, Colors, Epsilon, Kernel, LowPass, Maps, Projection, Scene, Shading, Surfel, Up};
 use glam::{DVec3, Vec3};
 
 const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };

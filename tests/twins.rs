@@ -14,11 +14,11 @@ use epsplat::hardcases::precision::{E, Precision};
 use epsplat::inspect::{Stages, stages};
 use epsplat::passes::footprint::footprint;
 use epsplat::passes::project::{Splat, reference_all};
-use epsplat::passes::variant::COLOR_CHANNEL;
 use epsplat::passes::{accumulate, visibility};
+use epsplat::plan::{Accumulator, COLOR_CHANNEL, RenderOptions};
 use epsplat::render::{Backend, render};
 use epsplat::scene::options::HIGHLIGHT;
-use epsplat::scene::{Epsilon, Kernel, LowPass, Maps, Projection, RenderOptions, Shading};
+use epsplat::scene::{Epsilon, Kernel, LowPass, Maps, Projection, Shading};
 
 fn options(kernel: Kernel) -> RenderOptions {
     RenderOptions {
@@ -347,7 +347,7 @@ fn the_frame_of_the_device_is_the_frame_of_the_twins() {
                 // The documented bound of the sums, of ranges of 1 (colour) and 2 (normal), and a few units of f32.
                 let weight = twin.weight.as_ref().unwrap()[pixel];
                 let count = twin.count.as_ref().unwrap()[pixel];
-                let bound = accumulate::ACCUMULATORS[0].error_bound;
+                let bound = Accumulator::Fixed.row().error_bound;
                 let sums = bound(count.max(1.0).into(), weight.max(1e-3).into(), 24) as f32;
                 let limit = 3.0 * sums + 1e-5;
                 // A highlight's cosine moves by four times what the normal does, and its power by the exponent times that.

@@ -17,8 +17,9 @@ use std::time::Instant;
 
 use epsplat::frame::Frame;
 use epsplat::passes::order::order;
+use epsplat::plan::RenderOptions;
 use epsplat::scene::color::SRGB8_TO_LINEAR;
-use epsplat::scene::{Camera, Colors, RenderOptions, Scene, Surfel};
+use epsplat::scene::{Camera, Colors, Scene, Surfel};
 use glam::{Mat3, Vec2, Vec3};
 
 /// Threads of the program.

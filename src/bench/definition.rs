@@ -7,11 +7,8 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 
 use crate::error::{Error, Result};
-use crate::passes::accumulate::{ACCUMULATORS, Accumulator, accumulator};
-use crate::scene::{
-    BlendFormat, Epsilon, Kernel, LowPass, Maps, Optimisation, Organisation, Raster, RasterDepth, RenderOptions,
-    Shading,
-};
+use crate::plan::{Accumulator, BlendFormat, Optimisation, Organisation, Raster, RasterDepth, RenderOptions};
+use crate::scene::{Epsilon, Kernel, LowPass, Maps, Shading};
 use crate::surfels::analytic::Shape;
 
 /// A study: every configuration on every scene.
@@ -153,8 +150,8 @@ pub struct Config {
     /// Who renders.
     pub backend: BackendName,
     /// How the compute kernels keep sums.
-    #[serde(default, deserialize_with = "accumulator_row")]
-    pub accumulator: Option<&'static Accumulator>,
+    #[serde(default, deserialize_with = "parsed")]
+    pub accumulator: Option<Accumulator>,
     /// How the compute kernels draw splats.
     #[serde(default, deserialize_with = "parsed")]
     pub organisation: Option<Organisation>,
@@ -255,10 +252,6 @@ fn all_parsed<'de, D: Deserializer<'de>, T: FromStr<Err = Error>>(texts: D) -> R
     texts.iter().map(|text| text.parse().map_err(D::Error::custom)).collect()
 }
 
-fn accumulator_row<'de, D: Deserializer<'de>>(text: D) -> Result<Option<&'static Accumulator>, D::Error> {
-    accumulator(&String::deserialize(text)?).map(Some).map_err(D::Error::custom)
-}
-
 impl Config {
     /// The options of a render, on a scene whose own shading is `shading`.
     pub fn options(&self, shading: Option<Shading>) -> RenderOptions {
@@ -269,7 +262,7 @@ impl Config {
             epsilon: self.epsilon.unwrap_or(default.epsilon),
             kernel: self.kernel.unwrap_or(default.kernel),
             low_pass: self.lowpass.unwrap_or(default.low_pass),
-            accumulator: self.accumulator().map_or(default.accumulator, |row| row.name),
+            accumulator: self.accumulator().unwrap_or_default(),
             organisation: self.organisation.unwrap_or_default(),
             without: self.without.clone(),
             raster: (self.backend == BackendName::Raster).then(|| Raster {
@@ -289,14 +282,14 @@ impl Config {
     }
 
     /// How the compute kernels keep sums; none if others render.
-    pub fn accumulator(&self) -> Option<&'static Accumulator> {
-        (self.backend == BackendName::Gpu).then(|| self.accumulator.unwrap_or(&ACCUMULATORS[0]))
+    pub fn accumulator(&self) -> Option<Accumulator> {
+        (self.backend == BackendName::Gpu).then(|| self.accumulator.unwrap_or_default())
     }
 
     /// How sums are kept, by name; empty for the reference.
     pub fn sums(&self) -> &'static str {
         match self.backend {
-            BackendName::Gpu => self.accumulator().map_or("", |row| row.name),
+            BackendName::Gpu => self.accumulator().map_or("", Accumulator::name),
             BackendName::Raster => self.blend_format.unwrap_or(Raster::default().format).name(),
             BackendName::Reference => "",
         }
@@ -305,7 +298,7 @@ impl Config {
     /// Whether two frames must have the same bits. The rasteriser blends in no fixed order.
     pub fn deterministic(&self) -> bool {
         match self.backend {
-            BackendName::Gpu => self.accumulator().is_some_and(|row| row.deterministic),
+            BackendName::Gpu => self.accumulator().is_some_and(|sums| sums.row().deterministic),
             BackendName::Raster => false,
             BackendName::Reference => true,
         }

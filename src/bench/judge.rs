@@ -6,10 +6,11 @@ use super::runner::{Case, Timed};
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::metrics::{Reconstruction, compare, reconstruction};
+use crate::plan::RenderOptions;
 use crate::progress::Progress;
 use crate::render::{Backend, Renderer, render};
 use crate::report::{ImageSet, Measurement, Numeric};
-use crate::scene::{Maps, RenderOptions};
+use crate::scene::Maps;
 use crate::truth::{DEFAULT_GRID, Truth};
 
 /// The side that pictures for the page are kept at, pixels.

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::definition::{BackendName, Config, Definition, Making, OneOrMany, SceneEntry};
 use crate::error::{Error, Result};
-use crate::passes::accumulate::ACCUMULATORS;
+use crate::plan::Accumulator;
 use crate::scene::camera::check_size;
 
 impl Definition {
@@ -148,7 +148,7 @@ impl Config {
         if self.backend != BackendName::Gpu && self.accumulator.is_some() {
             return Err("accumulator: only the backend gpu has one".into());
         }
-        if self.organisation.is_some() && self.accumulator().is_none_or(|row| row.name != ACCUMULATORS[0].name) {
+        if self.organisation.is_some() && self.accumulator() != Some(Accumulator::Fixed) {
             return Err("organisation: only the accumulator fixed of the backend gpu has more than one".into());
         }
         if self.backend != BackendName::Gpu && !self.without.is_empty() {
@@ -198,7 +198,7 @@ mod tests {
         assert_eq!((study.size, study.runs), ([1024, 1024], 7));
         assert!(study.needs_gpu() && study.baseline.is_none());
         let options = study.configs[0].options(None);
-        assert_eq!(options, crate::scene::RenderOptions::default());
+        assert_eq!(options, crate::plan::RenderOptions::default());
         assert_eq!(study.configs[0].options(Some(Shading::Unlit)).shading, Shading::Unlit);
         assert_eq!(study.path_of(Path::new("../a.obj")), Path::new("folder/../a.obj"));
     }
@@ -214,7 +214,7 @@ mod tests {
         let study = parse(text).unwrap();
         let options = study.configs[0].options(None);
         assert_eq!((options.epsilon, options.low_pass), (Epsilon::Absolute(2.0), LowPass::Ewa));
-        assert!(options.accumulator == "fixed64" && options.maps.depth && !options.maps.normal);
+        assert!(options.accumulator == Accumulator::Fixed64 && options.maps.depth && !options.maps.normal);
         assert_eq!(study.scenes[0].configs, None);
         assert_eq!(study.scenes[1].configs, Some(vec!["r".to_owned()]));
         assert!(study.configs[0].deterministic() && !study.configs[1].deterministic());

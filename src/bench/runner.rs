@@ -10,10 +10,11 @@ use super::staging::{Staged, points, stage};
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::passes::raster;
+use crate::plan::{RenderOptions, SceneNeeds};
 use crate::progress::Progress;
 use crate::render::{Backend, DeviceBytes, Renderer};
 use crate::report::{Measurement, Study, Summary};
-use crate::scene::{Camera, RenderOptions, SceneNeeds};
+use crate::scene::Camera;
 
 /// What a study gave.
 #[derive(Debug)]
@@ -199,7 +200,7 @@ impl<'a> Case<'a> {
                 let needs = SceneNeeds::of(&self.staged.scene, &self.staged.scene.color_range(), camera, options);
                 raster::check(gpu, raster, &needs, camera)
             }),
-            (None, Some(row)) => row.check(gpu),
+            (None, Some(sums)) => sums.row().check(gpu),
             (None, None) => Ok(()),
         };
         outcome.map_err(Unfit::Adapter)

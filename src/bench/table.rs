@@ -1,9 +1,8 @@
 //! A study's outcome as text: for a terminal, and as Markdown for a README.
 
 use super::definition::{Config, Definition};
-use crate::passes::accumulate::Features;
+use crate::plan::{BlendFormat, Features};
 use crate::report::{Measurement, Study};
-use crate::scene::BlendFormat;
 
 /// A column: its head, and its cell for a measurement.
 type Column<'a> = (String, Box<dyn Fn(&Measurement) -> String + 'a>);
@@ -80,7 +79,7 @@ pub fn markdown(definition: &Definition, study: &Study) -> String {
 /// Which adapters run a configuration.
 fn runs_on(config: &Config) -> &'static str {
     let raster = config.options(None).raster;
-    match (raster.map(|raster| raster.format), config.accumulator().map(|row| row.features)) {
+    match (raster.map(|raster| raster.format), config.accumulator().map(|sums| sums.row().features)) {
         (Some(BlendFormat::Rgba32Float), _) => "adapters that blend 32-bit floats",
         (Some(_), _) | (None, Some(Features::None)) => "any adapter",
         (None, Some(Features::AtomicsU64)) => "adapters with 64-bit atomics",

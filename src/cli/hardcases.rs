@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use epsplat::gpu::Gpu;
 use epsplat::hardcases::{Row, Verdict, cases, run as run_cases, supported};
-use epsplat::passes::accumulate::accumulator;
+use epsplat::plan::Accumulator;
 use epsplat::render::Backend;
 use epsplat::{Error, Result};
 use serde::Serialize;
@@ -28,7 +28,7 @@ pub struct Arguments {
     json: Option<PathBuf>,
     /// Only this accumulator; else all that the adapter has
     #[arg(long, value_name = "NAME")]
-    accumulator: Option<String>,
+    accumulator: Option<Accumulator>,
     /// An API (vulkan, gl, metal, dx12) or part of an adapter's name, as `epsplat adapters` lists them
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
@@ -47,7 +47,7 @@ struct Outcome<'a> {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let chosen = arguments.accumulator.as_deref().map(accumulator).transpose()?;
+    let chosen = arguments.accumulator.map(Accumulator::row);
     let mut cases = cases()?;
     if let Some(part) = &arguments.case {
         cases.retain(|case| case.name.contains(part.as_str()));

@@ -1,13 +1,7 @@
 //! Values of arguments: texts into numbers, or a sentence that says what is expected.
 
-use epsplat::passes::accumulate::accumulator;
 use epsplat::surfels::Orientation;
 use glam::DVec3;
-
-/// An accumulator's name.
-pub(super) fn parse_accumulator(text: &str) -> Result<&'static str, String> {
-    accumulator(text).map(|row| row.name).map_err(|e| e.to_string())
-}
 
 /// `WIDTHxHEIGHT`, pixels.
 pub(super) fn parse_size(text: &str) -> Result<(u32, u32), String> {

@@ -10,19 +10,17 @@ use clap::{Args, ValueEnum};
 use epsplat::gpu::Gpu;
 use epsplat::io::Texture;
 use epsplat::passes::unseen::{Unseen, is_empty};
+use epsplat::plan::{Accumulator, BlendFormat, Organisation, Raster, RasterDepth, RenderOptions};
 use epsplat::render::{Backend, render};
 use epsplat::scene::light::MAX_LIGHTS;
 use epsplat::scene::options::SHININESS_RANGE;
-use epsplat::scene::{
-    BlendFormat, Camera, Epsilon, Kernel, Light, LowPass, Maps, Organisation, Raster, RasterDepth, RenderOptions,
-    Scene, Shading,
-};
+use epsplat::scene::{Camera, Epsilon, Kernel, Light, LowPass, Maps, Scene, Shading};
 use epsplat::{Error, Result, surfels};
 use glam::DVec3;
 
 use self::output::{Format, note_overflows, summary};
 use self::view::View;
-use super::parse::{parse_accumulator, parse_color, parse_intrinsics, parse_scale, parse_size, parse_vector};
+use super::parse::{parse_color, parse_intrinsics, parse_scale, parse_size, parse_vector};
 use super::progress::Bars;
 use super::reading::{Reading, help_of, named};
 use super::{note, outputs, write_json};
@@ -106,8 +104,8 @@ pub struct Arguments {
     #[arg(long, value_enum, default_value_t = LowPassName::None)]
     lowpass: LowPassName,
     /// How sums are kept on the device: fixed, fixed32, fixed64, packed64, float or cas (see the README)
-    #[arg(long, value_name = "NAME", value_parser = parse_accumulator)]
-    accumulator: Option<&'static str>,
+    #[arg(long, value_name = "NAME")]
+    accumulator: Option<Accumulator>,
     /// How the device draws splats, to the same image: scatter (one by one), tile (by tiles of the image) or auto (large
     /// ones by tiles, and on software adapters all but tiny ones) [default: auto]
     #[arg(long, value_name = "HOW")]
@@ -283,7 +281,7 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
             LowPassName::Max => LowPass::Max,
             LowPassName::Ewa => LowPass::Ewa,
         },
-        accumulator: arguments.accumulator.unwrap_or(default.accumulator),
+        accumulator: arguments.accumulator.unwrap_or_default(),
         organisation: organisation(arguments)?,
         raster: raster(arguments)?,
         shading: match arguments.shading {
@@ -316,7 +314,7 @@ fn shininess(arguments: &Arguments) -> Result<Option<f32>> {
 /// How the compute kernels draw splats, of which only `fixed` has a choice.
 fn organisation(arguments: &Arguments) -> Result<Organisation> {
     let kernels = matches!(arguments.backend, BackendName::Auto | BackendName::Gpu);
-    let fixed = arguments.accumulator.is_none_or(|name| name == RenderOptions::default().accumulator);
+    let fixed = arguments.accumulator.unwrap_or_default() == Accumulator::Fixed;
     match arguments.organisation {
         Some(_) if !kernels => Err(Error::Usage("--organisation is a choice of --backend gpu: leave it out".into())),
         Some(Organisation::Tile) if !fixed => {

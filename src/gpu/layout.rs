@@ -4,9 +4,10 @@
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
+use crate::plan::{Facts, RenderOptions};
 use crate::scene::light::MAX_LIGHTS;
 use crate::scene::texture::PlaceRange;
-use crate::scene::{Bounds, Camera, Colors, Light, Ranges, RenderOptions, Scene};
+use crate::scene::{Bounds, Camera, Colors, Light, Scene};
 
 /// Invocations of a workgroup, in every kernel.
 pub const WORKGROUP: u32 = 64;
@@ -84,7 +85,7 @@ pub const ONE_WIDE: u64 = 1 << 40;
 /// Bit of [`Splat::bounds_last`] that says that s x t points away from the viewer.
 pub const AWAY: u32 = 1 << 31;
 
-/// The camera, options and ranges of one render, as the kernels see them. See the WGSL for the meaning of each field.
+/// The camera, options and facts of one render, as the kernels see them. See the WGSL for the meaning of each field.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[allow(missing_docs)]
@@ -192,9 +193,9 @@ pub fn device_unit(body: &Bounds, bounds: &Bounds, eye: DVec3) -> f64 {
 }
 
 impl View {
-    /// The view of `scene`, whose values lie in `ranges`, by `camera`.
-    pub fn new(scene: &Scene, ranges: &Ranges, camera: &Camera, options: &RenderOptions) -> Self {
-        let Ranges { bounds, body, core, color: (low, high), largest_radius, .. } = ranges;
+    /// The view of `scene`, whose values lie in `facts`, by `camera`.
+    pub fn new(scene: &Scene, facts: &Facts, camera: &Camera, options: &RenderOptions) -> Self {
+        let Facts { bounds, body, core, color: (low, high), largest_radius, .. } = facts;
         let largest_radius = f64::from(*largest_radius);
         let eye_relative = camera.eye - scene.origin;
         let unit = device_unit(body, bounds, eye_relative);

@@ -17,10 +17,10 @@
 use glam::{DVec2, DVec3, Vec3};
 
 use super::precision::{E as U, Precision};
-use crate::passes::accumulate::Accumulator;
 use crate::passes::footprint::footprint;
 use crate::passes::project::{Splat, reference_all};
-use crate::scene::{Camera, Kernel, LowPass, RenderOptions, Scene};
+use crate::plan::{AccumulatorRow, RenderOptions};
+use crate::scene::{Camera, Kernel, LowPass, Scene};
 
 /// What a division may err by, relative: WGSL grants 2.5 units in the last place.
 const DIVISION: f64 = 5.0 * U;
@@ -105,7 +105,7 @@ impl ColorRange {
 
 impl Pixel {
     /// The bounds for sums by `accumulator` with `bits` fraction bits.
-    pub fn bound(&self, accumulator: &Accumulator, bits: u32, range: &ColorRange) -> PixelBound {
+    pub fn bound(&self, accumulator: &AccumulatorRow, bits: u32, range: &ColorRange) -> PixelBound {
         if self.count == 0 {
             return PixelBound::default();
         }

@@ -7,6 +7,7 @@ use super::HardCase;
 use super::cases::FRAGMENTS;
 use super::staging::{BOTH, Entry, Filling, Stage, build, fraction};
 use crate::error::Result;
+use crate::plan::Accumulator;
 use crate::scene::{Epsilon, Kernel, Projection, Surfel};
 
 /// The cases.
@@ -190,7 +191,7 @@ fn million(stage: &Stage) -> Filling {
         let normal = DVec3::new(0.4 * (fraction(k, 3) - 0.5), 0.4 * (fraction(k, 4) - 0.5), -1.0);
         stage.disk(stage.at(x, y, z), normal, 0.45 * stage.pixel(z))
     });
-    Filling::of(surfels.collect(), (1.0 / 1024.0, 1.0 / 1024.0)).expect(&["float", "cas"], SUMS)
+    Filling::of(surfels.collect(), (1.0 / 1024.0, 1.0 / 1024.0)).expect(&[Accumulator::Float, Accumulator::Cas], SUMS)
 }
 
 fn depth_ratio(stage: &Stage) -> Filling {

@@ -6,7 +6,7 @@ use super::bounds::{ColorRange, PixelBound};
 use super::{HardCase, Truth};
 use crate::frame::Frame;
 use crate::metrics::DECISION_MARGIN;
-use crate::passes::accumulate::{ACCUMULATORS, Accumulator};
+use crate::plan::{Accumulator, AccumulatorRow};
 use crate::render::Report;
 
 /// How a row ends.
@@ -171,9 +171,9 @@ impl Gathered {
 }
 
 /// Judges `frame`, rendered with `accumulator`.
-pub fn judge(case: &HardCase, truth: &Truth, accumulator: &Accumulator, frame: &Frame, report: &Report) -> Row {
+pub fn judge(case: &HardCase, truth: &Truth, accumulator: &AccumulatorRow, frame: &Frame, report: &Report) -> Row {
     let range = ColorRange::of(&case.scene);
-    let exact = ACCUMULATORS.first().unwrap_or(accumulator);
+    let exact = Accumulator::Fixed.row();
     let bits = accumulator.fraction_bits(case.scene.surfels.len() as u64);
     let mut maps = ["color", "alpha", "depth", "normal", "weight", "count"].map(Gathered::new);
     let (mut lost, mut invented, mut nan, mut excused, mut covered) = (0, 0, 0, 0, 0);
@@ -285,7 +285,7 @@ fn verdict(case: &HardCase, row: &Row) -> Verdict {
     if case_bound.is_empty() {
         return Verdict::Pass;
     }
-    match case.expected.iter().find(|expected| expected.accumulator == row.accumulator) {
+    match case.expected.iter().find(|expected| expected.accumulator.name() == row.accumulator) {
         Some(expected) => Verdict::ExpectedFailure(format!("{}: {}", case_bound.join(", "), expected.reason)),
         None => Verdict::Fail(format!("{} over the case's bound", case_bound.join(", "))),
     }
@@ -296,7 +296,7 @@ fn verdict(case: &HardCase, row: &Row) -> Verdict {
 /// of one case.
 pub fn compare_rmse(rows: &mut [Row]) {
     let rounding = 1.0 / 16_777_216.0;
-    let floats = |row: &&Row| ["float", "cas"].contains(&row.accumulator);
+    let floats = |row: &&Row| [Accumulator::Float, Accumulator::Cas].map(Accumulator::name).contains(&row.accumulator);
     let worse = |fixed: &Row| {
         let mut worse = Vec::new();
         for float in rows.iter().filter(floats) {
@@ -311,8 +311,8 @@ pub fn compare_rmse(rows: &mut [Row]) {
         }
         (!worse.is_empty()).then(|| worse.join("; "))
     };
-    let found = rows.iter().find(|row| row.accumulator == "fixed").and_then(worse);
-    if let Some(row) = rows.iter_mut().find(|row| row.accumulator == "fixed") {
+    let found = rows.iter().find(|row| row.accumulator == Accumulator::Fixed.name()).and_then(worse);
+    if let Some(row) = rows.iter_mut().find(|row| row.accumulator == Accumulator::Fixed.name()) {
         if let (Some(what), false) = (&found, row.failed()) {
             row.verdict = Verdict::Fail(format!("a larger RMSE than f32 sums: {what}"));
         }
@@ -325,8 +325,8 @@ mod tests {
     #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
     use super::*;
     use crate::hardcases::{MAPS, cases};
+    use crate::plan::RenderOptions;
     use crate::render::{Backend, render};
-    use crate::scene::RenderOptions;
 
     /// The reference judged by itself passes, and whatever is changed in it is noticed.
     #[test]
@@ -336,7 +336,7 @@ mod tests {
         let truth = case.truth().unwrap();
         let options = RenderOptions { maps: MAPS, ..case.options.clone() };
         let (frame, report) = render(&case.scene, &case.camera, &options, &Backend::Reference, &()).unwrap();
-        let (exact, one_word) = (&ACCUMULATORS[0], &ACCUMULATORS[1]);
+        let (exact, one_word) = (Accumulator::Fixed.row(), Accumulator::Fixed32.row());
         let row = judge(case, &truth, exact, &frame, &report);
         assert_eq!((row.verdict, row.lost, row.invented, row.nan), (Verdict::Pass, 0, 0, 0));
         let decided = truth.pixels.iter().position(|pixel| !pixel.open && pixel.count > 1).unwrap();

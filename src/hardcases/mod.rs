@@ -27,16 +27,16 @@ pub use judge::{MapError, Row, Verdict, compare_rmse, judge};
 
 use crate::error::{Error, Result};
 use crate::frame::Frame;
-use crate::passes::accumulate::{ACCUMULATORS, Accumulator};
+use crate::plan::{ACCUMULATORS, Accumulator, AccumulatorRow, RenderOptions};
 use crate::progress::Progress;
 use crate::render::{Backend, render};
-use crate::scene::{Camera, Maps, RenderOptions, Scene};
+use crate::scene::{Camera, Maps, Scene};
 
 /// An accumulator that is expected to exceed a case's bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Expected {
     /// Its name.
-    pub accumulator: &'static str,
+    pub accumulator: Accumulator,
     /// Why.
     pub reason: &'static str,
 }
@@ -102,16 +102,16 @@ impl HardCase {
     ///
     /// # Errors
     /// Those of [`render`].
-    pub fn judge(&self, truth: &Truth, accumulator: &'static Accumulator, backend: &Backend) -> Result<Row> {
-        let options = RenderOptions { accumulator: accumulator.name, maps: MAPS, ..self.options.clone() };
+    pub fn judge(&self, truth: &Truth, accumulator: &'static AccumulatorRow, backend: &Backend) -> Result<Row> {
+        let options = RenderOptions { accumulator: accumulator.of, maps: MAPS, ..self.options.clone() };
         let (frame, report) = render(&self.scene, &self.camera, &options, backend, &())?;
         Ok(judge(self, truth, accumulator, &frame, &report))
     }
 }
 
 /// The accumulators that the adapter of `backend` has; all of them for the reference, which ignores the choice.
-pub fn supported(backend: &Backend) -> Vec<&'static Accumulator> {
-    let fits = |row: &&Accumulator| match backend {
+pub fn supported(backend: &Backend) -> Vec<&'static AccumulatorRow> {
+    let fits = |row: &&AccumulatorRow| match backend {
         Backend::Gpu { gpu, .. } => row.check(gpu).is_ok(),
         Backend::Reference => true,
     };
@@ -124,7 +124,7 @@ pub fn supported(backend: &Backend) -> Vec<&'static Accumulator> {
 /// Those of [`render`], with the case's name.
 pub fn run(
     cases: &[HardCase],
-    accumulators: &[&'static Accumulator],
+    accumulators: &[&'static AccumulatorRow],
     backend: &Backend,
     progress: &dyn Progress,
 ) -> Result<Vec<Row>> {

@@ -4,7 +4,8 @@ use glam::{DMat3, DVec3};
 
 use super::{Expected, HardCase};
 use crate::error::Result;
-use crate::scene::{Camera, Colors, Kernel, Lens, Optimisation, Projection, RenderOptions, Scene, Shading, Surfel, Up};
+use crate::plan::{Accumulator, Optimisation, RenderOptions};
+use crate::scene::{Camera, Colors, Kernel, Lens, Projection, Scene, Shading, Surfel, Up};
 
 /// Part of `x` beyond a whole number, for the k-th of a sequence that fills [0, 1) evenly along each of six axes.
 pub fn fraction(k: usize, axis: usize) -> f64 {
@@ -176,7 +177,7 @@ impl Filling {
             expected: Vec::new(),
             smallest: None,
         };
-        filling.expect(&["fixed32", "packed64"], BITS)
+        filling.expect(&[Accumulator::Fixed32, Accumulator::Packed64], BITS)
     }
 
     /// With another kernel.
@@ -186,7 +187,7 @@ impl Filling {
     }
 
     /// With `accumulators` that may exceed the bound.
-    pub fn expect(mut self, accumulators: &[&'static str], reason: &'static str) -> Self {
+    pub fn expect(mut self, accumulators: &[Accumulator], reason: &'static str) -> Self {
         self.expected.extend(accumulators.iter().map(|&accumulator| Expected { accumulator, reason }));
         self
     }

@@ -159,7 +159,8 @@ fn luma(color: &[f32; 4]) -> f64 {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::scene::{Camera, Lens, RenderOptions, Up};
+    use crate::plan::RenderOptions;
+    use crate::scene::{Camera, Lens, Up};
     use crate::surfels::analytic::Shape;
     use crate::truth::Surface;
 

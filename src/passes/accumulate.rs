@@ -5,7 +5,7 @@
 //!
 //! Let W be a fragment's weight w, turned into the units of its sum, and a its attribute, mapped from the scene's own
 //! range to [0, 1]. A fragment adds W to the weight and W a to each attribute. The mean of n accepted fragments of summed
-//! weight w then errs by at most [`Accumulator::error_bound`], as a fraction of the attribute's range, beside the errors
+//! weight w then errs by at most [`AccumulatorRow::error_bound`](crate::plan::AccumulatorRow::error_bound), as a fraction of the attribute's range, beside the errors
 //! of the fragments themselves. Let u = 2^-24, the rounding of one f32 operation.
 //!
 //! - **fixed**: W = round(F w) with F = 2^32 - 2^10, so that a term fills a word, and W a is rounded to f32 and then to
@@ -19,7 +19,7 @@
 //!   such sums, dividing, and the product that maps back: `6 u` with the term's own. A sum carries once for each full
 //!   weight, which is rarer than fragments (on a software adapter carries are a fifth of the pass); and the rim of the
 //!   paper's kernel, exp(-6), keeps 23 bits. Where weights may be smaller still, or alphas differ
-//!   ([`SceneNeeds::wide_sums`](crate::scene::SceneNeeds::wide_sums)), terms are those of `fixed64` in two words, which
+//!   ([`SceneNeeds::wide_sums`](crate::plan::SceneNeeds::wide_sums)), terms are those of `fixed64` in two words, which
 //!   takes two additions for most. An adapter with 64-bit atomics makes the same sums in half the additions.
 //! - **fixed32**: the same in one word. B fraction bits, `32 - bits(min(surfels, 255))`, are at least 24 and let 255 full
 //!   weights (or all surfels there are) meet in a pixel; a sum that wraps is noticed and the frame rendered again with
@@ -36,44 +36,13 @@ use super::project::{Splat, SplatBuffer};
 use super::variant::Variant;
 use super::visibility::VisibilityBuffer;
 use super::{Recorder, Rows};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::kernel::Bound;
-use crate::gpu::layout::ONE;
+use crate::plan::{Accumulator, RenderOptions, SceneNeeds};
 use crate::scene::options::LEAST_FILTERED_WEIGHT;
-use crate::scene::{Camera, Colors, RenderOptions, Scene, SceneNeeds};
-
-/// An accumulator: one row of the table below, one file `wgsl/accumulator_*.wgsl`.
-#[derive(Debug)]
-pub struct Accumulator {
-    /// Its name.
-    pub name: &'static str,
-    /// Its file.
-    pub file: &'static str,
-    /// u32 words of one sum.
-    pub words: u32,
-    /// The image's bits are the same for any order of fragments.
-    pub deterministic: bool,
-    /// What it needs of the adapter beyond core WebGPU.
-    pub features: Features,
-    /// Bound on the error of a mean of n fragments of summed weight w, B fraction bits, as a fraction of the range.
-    pub error_bound: fn(n: f64, w: f64, bits: u32) -> f64,
-}
-
-/// Optional features of an adapter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Features {
-    /// Core WebGPU.
-    None,
-    /// 64-bit integers and atomics.
-    AtomicsU64,
-    /// f32 atomic add.
-    AtomicsF32,
-}
-
-/// The rounding of one f32 operation.
-const U: f64 = 1.0 / 16_777_216.0;
+use crate::scene::{Camera, Colors, Scene};
 
 /// The file that keeps the sums of `fixed`, by whether terms may reach past a word, because weights may be small
 /// ([`SceneNeeds::wide_sums`]) or one surfel stands for its copies ([`SceneNeeds::copies`]), and whether the adapter adds 64 bits at
@@ -95,13 +64,12 @@ fn terms_file(needs: &SceneNeeds) -> &'static str {
 
 /// The files that keep the sums of a render with `needs` in storage.
 pub fn files(needs: &SceneNeeds) -> Vec<&'static str> {
-    match accumulator(needs.accumulator) {
-        Ok(row) if row.name == ACCUMULATORS[0].name => match fixed_file(needs) {
+    match needs.accumulator {
+        Accumulator::Fixed => match fixed_file(needs) {
             whole @ "accumulator_fixed64.wgsl" => vec![whole],
             sums => vec![terms_file(needs), sums],
         },
-        Ok(row) => vec![row.file],
-        Err(_) => Vec::new(),
+        other => vec![other.row().file],
     }
 }
 
@@ -114,88 +82,6 @@ pub fn tile_files(needs: &SceneNeeds) -> [&'static str; 4] {
         "tile_sums.wgsl",
         if pairs { "tile_deposit_pairs.wgsl" } else { "tile_deposit.wgsl" },
     ]
-}
-
-/// Every accumulator; the first is the default.
-pub const ACCUMULATORS: &[Accumulator] = &[
-    Accumulator {
-        name: "fixed",
-        file: "accumulator_fixed.wgsl",
-        words: 2,
-        deterministic: true,
-        features: Features::None,
-        error_bound: |n, w, _| n / (ONE as f64 * w) + 6.0 * U,
-    },
-    Accumulator {
-        name: "fixed32",
-        file: "accumulator_fixed32.wgsl",
-        words: 1,
-        deterministic: true,
-        features: Features::None,
-        error_bound: |n, w, bits| n * (-f64::from(bits)).exp2() / w + 5.0 * U,
-    },
-    Accumulator {
-        name: "fixed64",
-        file: "accumulator_fixed64.wgsl",
-        words: 2,
-        deterministic: true,
-        features: Features::AtomicsU64,
-        error_bound: |n, w, _| n * (-40f64).exp2() / w + 6.0 * U,
-    },
-    Accumulator {
-        name: "packed64",
-        file: "accumulator_packed64.wgsl",
-        words: 1,
-        deterministic: true,
-        features: Features::AtomicsU64,
-        error_bound: |n, w, bits| n * (-f64::from(bits)).exp2() / w + 5.0 * U,
-    },
-    Accumulator {
-        name: "float",
-        file: "accumulator_float.wgsl",
-        words: 1,
-        deterministic: false,
-        features: Features::AtomicsF32,
-        error_bound: |n, _, _| 2.0 * n * U + 4.0 * U,
-    },
-    Accumulator {
-        name: "cas",
-        file: "accumulator_cas.wgsl",
-        words: 1,
-        deterministic: false,
-        features: Features::None,
-        error_bound: |n, _, _| 2.0 * n * U + 4.0 * U,
-    },
-];
-
-/// The accumulator called `name`.
-pub fn accumulator(name: &str) -> Result<&'static Accumulator> {
-    ACCUMULATORS.iter().find(|row| row.name == name).ok_or_else(|| {
-        let names = ACCUMULATORS.iter().map(|row| row.name).collect::<Vec<_>>().join(", ");
-        Error::Usage(format!("there is no accumulator {name:?}: take one of {names}"))
-    })
-}
-
-impl Accumulator {
-    /// Fraction bits of the one-word accumulators in a scene of `surfels`: as many as the sums of all surfels, or of 255
-    /// full weights, leave free.
-    pub fn fraction_bits(&self, surfels: u64) -> u32 {
-        let most = surfels.clamp(1, 255) as u32;
-        32 - (32 - most.leading_zeros())
-    }
-
-    /// Fails with a sentence if `gpu` lacks what it needs.
-    pub fn check(&self, gpu: &Gpu) -> Result<()> {
-        let (has, what) = match self.features {
-            Features::None => return Ok(()),
-            Features::AtomicsU64 => (gpu.adapter.atomics_u64, "64-bit atomics"),
-            Features::AtomicsF32 => (gpu.adapter.atomics_f32, "f32 atomic add"),
-        };
-        if has {
-            return Ok(());
-        }
-        Err(gpu.error(format!("the accumulator {} needs {what}, which this adapter lacks: take fixed", self.name)))
-    }
 }
 
 /// The sums of one pixel, in f64: weight, weight times attributes.
@@ -370,23 +256,6 @@ pub fn record_large(
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn every_accumulator_has_its_file_and_its_own_name() {
-        for row in ACCUMULATORS {
-            assert!(crate::gpu::kernel::FILES.iter().any(|(name, _)| *name == row.file), "{}", row.file);
-            assert_eq!(accumulator(row.name).map(|r| r.file).ok(), Some(row.file));
-        }
-        assert!(accumulator("double").is_err());
-    }
-
-    #[test]
-    fn fraction_bits_leave_room_for_every_surfel() {
-        for (surfels, bits) in [(0, 31), (1, 31), (2, 30), (3, 30), (4, 29), (127, 25), (128, 24), (1_000_000_000, 24)]
-        {
-            assert_eq!(ACCUMULATORS[1].fraction_bits(surfels), bits, "{surfels}");
-        }
-    }
 
     #[test]
     fn a_decision_is_near_only_if_nothing_else_decides() {

@@ -8,7 +8,7 @@ use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::kernel::{Bound, Grid, Program, grid};
 use crate::gpu::layout::{COVERED_GRID, COVERED_GRID_OF_EIGHTS, COVERED_LIST};
-use crate::scene::RenderOptions;
+use crate::plan::RenderOptions;
 
 /// Whether a pixel differs from 0 where nothing is.
 pub fn lists_empty(options: &RenderOptions) -> bool {

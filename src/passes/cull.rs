@@ -166,7 +166,8 @@ pub fn record(
 mod tests {
     use super::*;
     use crate::passes::project;
-    use crate::scene::{Lens, RenderOptions};
+    use crate::plan::RenderOptions;
+    use crate::scene::Lens;
     use glam::DMat3;
     use proptest::prelude::*;
 

@@ -16,7 +16,8 @@ use glam::DVec2;
 
 use super::footprint::Intersection;
 use super::project::Splat;
-use crate::scene::{Camera, Kernel, LowPass, Projection, RenderOptions};
+use crate::plan::RenderOptions;
+use crate::scene::{Camera, Kernel, LowPass, Projection};
 
 /// The radius of `max`, pixels: half a pixel's diagonal, and a little for rounding.
 pub const RADIUS: f64 = 0.7072;

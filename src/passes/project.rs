@@ -15,7 +15,8 @@ use crate::error::Result;
 use crate::gpu::buffers::{Buffer, counts};
 use crate::gpu::kernel::{Bound, Grid, grid};
 use crate::gpu::{Gpu, layout};
-use crate::scene::{Camera, LowPass, RenderOptions, Scene, Surfel, copies, has_copies};
+use crate::plan::RenderOptions;
+use crate::scene::{Camera, LowPass, Scene, Surfel, copies, has_copies};
 
 /// A projected surfel in f64: the twin of [`layout::Splat`], in world units.
 #[derive(Clone, Copy, Debug, PartialEq)]

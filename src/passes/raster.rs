@@ -19,13 +19,13 @@
 
 use super::covered::Covered;
 use super::project::SplatBuffer;
-use super::variant::PixelLayout;
 use super::{Recorder, Rows};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::kernel::{Bound, Draw};
-use crate::scene::{BlendFormat, Camera, ColorNeed, Raster, RasterDepth, SceneNeeds};
+use crate::plan::{BlendFormat, ColorNeed, PixelLayout, Raster, RasterDepth, SceneNeeds};
+use crate::scene::Camera;
 
 /// Vertices of a splat; see raster.wgsl.
 pub fn vertices(needs: &SceneNeeds) -> u32 {

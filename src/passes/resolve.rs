@@ -12,8 +12,9 @@ use crate::frame::Frame;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::{Buffer, Readback};
 use crate::gpu::kernel::Bound;
+use crate::plan::RenderOptions;
 use crate::scene::options::HIGHLIGHT;
-use crate::scene::{Camera, Colors, Light, RenderOptions, Scene, Shading};
+use crate::scene::{Camera, Colors, Light, Scene, Shading};
 
 /// The twin: resolves `sums`, which start at row `first_row` of the image, into `frame`, which holds just their rows.
 pub fn reference(

@@ -6,7 +6,7 @@
 //! tile that it touches about as much as a dozen of scatter's fragments, so large splats are cheaper by tiles on any adapter:
 //! those whose bounds hold more than [`LARGE_BY_TILES`](crate::gpu::layout::LARGE_BY_TILES) pixels are. On a software adapter,
 //! whose atomics are slow, all splats are summed so if they are not tiny ([`gathers`]), have one page, and the image has one
-//! band ([`SceneNeeds::gather`](crate::scene::SceneNeeds::gather)): then a tile resolves its pixels at once, and no sum is
+//! band ([`SceneNeeds::gather`](crate::plan::SceneNeeds::gather)): then a tile resolves its pixels at once, and no sum is
 //! stored. Nearest depths of small splats are found by scatter in any case, and all splats share the nearest depths before any
 //! is accumulated. Opaque blending within epsilon does not ask for an order, so no list is sorted.
 //!
@@ -27,7 +27,8 @@ use crate::gpu::Gpu;
 use crate::gpu::buffers::{Buffer, counts};
 use crate::gpu::kernel::{Bound, Grid, Program, grid};
 use crate::gpu::layout::{BLOCK_SIDE, LIST_ENDS, QUEUE_LISTING, TILE_ROWS_SHARED, TILE_WIDTH};
-use crate::scene::{Camera, RenderOptions, Scene, SceneNeeds};
+use crate::plan::{RenderOptions, SceneNeeds};
+use crate::scene::{Camera, Scene};
 
 /// The fewest tiles that a splat touches on average for all to be summed by tiles. On a software adapter at 1024x1024 frames
 /// of 1,000,000 splats that touch 1.4, 1.9 and 2.2 tiles, and of 300,000 that touch 2.8, take 1.5, 1.1, 0.96 and 0.82 times as

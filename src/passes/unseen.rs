@@ -5,7 +5,8 @@ use rayon::prelude::*;
 use super::lowpass::Design;
 use super::project::{Missed, projected};
 use crate::frame::Frame;
-use crate::scene::{Camera, RenderOptions, Scene, Surfel};
+use crate::plan::RenderOptions;
+use crate::scene::{Camera, Scene, Surfel};
 
 /// The surfels of a scene in a view that shows none of them, by the reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

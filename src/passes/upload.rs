@@ -13,9 +13,10 @@ use crate::gpu::Gpu;
 use crate::gpu::buffers::{Buffer, page_len};
 use crate::gpu::kernel::Bound;
 use crate::gpu::layout::{BATCH, MOST_GROUPS, Splat};
+use crate::plan::{ColorNeed, SceneNeeds};
 use crate::progress::Progress;
 use crate::scene::color::SRGB8_TO_LINEAR;
-use crate::scene::{Bounds, ColorNeed, Colors, Scene, SceneNeeds, Surfel, copies};
+use crate::scene::{Bounds, Colors, Scene, Surfel, copies};
 
 /// Surfels and, if they differ in it, their colour.
 pub struct SurfelBuffer {

@@ -3,17 +3,18 @@
 
 use std::sync::Arc;
 
-use super::accumulate::{self, Accumulator, accumulator};
+use super::accumulate;
 use super::lowpass::Design;
 use super::{covered, cull, lowpass, raster};
 use crate::error::Result;
 use crate::gpu::kernel::Program;
 use crate::gpu::layout::{LARGE_BY_TILES, LARGE_BY_WORKGROUPS, TILE_ROWS_PLAIN, TILE_ROWS_SHARED};
 use crate::gpu::{Gpu, Sources};
-use crate::scene::{
-    ColorNeed, Kernel, KernelShape, LowPass, Optimisation, Organisation, Projection, RasterDepth, RenderOptions,
-    SceneNeeds, Shading,
+use crate::plan::{
+    AccumulatorRow, ColorNeed, Optimisation, Organisation, PixelLayout, RasterDepth, RenderOptions, SceneNeeds,
+    color_channels,
 };
+use crate::scene::{Kernel, KernelShape, LowPass, Projection, Shading};
 
 /// The entry points that a render with `needs` dispatches.
 fn stages(needs: &SceneNeeds) -> Vec<&'static str> {
@@ -50,7 +51,7 @@ pub struct Variant {
     /// The key.
     pub needs: SceneNeeds,
     /// How sums are kept.
-    pub accumulator: &'static Accumulator,
+    pub accumulator: &'static AccumulatorRow,
     /// The room a pixel takes.
     pub pixel: PixelLayout,
     /// Tiles that nothing covers are resolved too.
@@ -62,7 +63,7 @@ pub struct Variant {
 impl Variant {
     /// The kernels for `surfels` surfels with these needs.
     pub fn of(needs: &SceneNeeds, options: &RenderOptions, surfels: u64) -> Result<Self> {
-        let accumulator = accumulator(needs.accumulator)?;
+        let accumulator = needs.accumulator.row();
         let constants = overrides(needs, options, accumulator.fraction_bits(surfels));
         let lists_empty = covered::lists_empty(options);
         Ok(Self { needs: *needs, accumulator, pixel: PixelLayout::of(needs), lists_empty, constants })
@@ -185,70 +186,6 @@ fn tile_files(needs: &SceneNeeds) -> Vec<&'static str> {
     files.push(pick(needs.gather, "tile_small.wgsl", "tile_small_absent.wgsl"));
     files.push(pick(needs.subgroups, "splat_shared.wgsl", "splat_plain.wgsl"));
     files
-}
-
-/// Where a pixel's values lie, in the sums (by channel) and in the image (by word). What is not needed takes no room.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PixelLayout {
-    /// Sums of a pixel: an even number, for accumulators that keep them in pairs. The weight's is channel 0.
-    pub channels: u32,
-    /// The first of the normal's three channels.
-    pub normal_channel: u32,
-    /// The depth's channel.
-    pub depth_channel: u32,
-    /// The fragment count's channel.
-    pub count_channel: u32,
-    /// The first of the four channels of places in a texture.
-    pub place_channel: u32,
-    /// Words of a pixel in the image; the colour's four come first.
-    pub image_words: u32,
-    /// Word of the normal map's x in the image.
-    pub normal_image: u32,
-    /// Word of the depth in the image.
-    pub depth_image: u32,
-    /// Word of the weight in the image.
-    pub weight_image: u32,
-    /// Word of the count in the image.
-    pub count_image: u32,
-}
-
-/// The first colour channel: next to the weight's, so that the two make a pair.
-pub const COLOR_CHANNEL: u32 = 1;
-
-impl PixelLayout {
-    /// The layout for `needs`.
-    pub fn of(needs: &SceneNeeds) -> Self {
-        let channels = |needed: bool, count: u32| if needed { count } else { 0 };
-        // The normal's x and y are a pair, and pairs start at even channels.
-        let normal_channel = (COLOR_CHANNEL + color_channels(needs)).next_multiple_of(2);
-        let depth_channel = normal_channel + channels(needs.normal, 3);
-        let count_channel = depth_channel + channels(needs.depth, 1);
-        let place_channel = (count_channel + channels(needs.count, 1)).next_multiple_of(2);
-        let normal_image = 4;
-        let depth_image = normal_image + channels(needs.normal_map, 3);
-        let weight_image = depth_image + channels(needs.depth, 1);
-        let count_image = weight_image + channels(needs.weight_map, 1);
-        Self {
-            channels: place_channel + channels(needs.color == ColorNeed::Textured, 4),
-            normal_channel,
-            depth_channel,
-            count_channel,
-            place_channel,
-            image_words: count_image + channels(needs.count, 1),
-            normal_image,
-            depth_image,
-            weight_image,
-            count_image,
-        }
-    }
-}
-
-/// Colour sums of a pixel.
-pub fn color_channels(needs: &SceneNeeds) -> u32 {
-    match needs.color {
-        ColorNeed::Constant => 0,
-        _ => 3 + u32::from(needs.alpha),
-    }
 }
 
 /// Pixels of a tile, down.

@@ -7,10 +7,11 @@ use crate::gpu::buffers::Buffer;
 use crate::gpu::layout::{Band, MOST_ROUNDS, OCCLUSION_TILE, TILE, View};
 use crate::passes::accumulate::AttributeBuffer;
 use crate::passes::resolve::ImageBuffer;
-use crate::passes::variant::{PixelLayout, Variant};
+use crate::passes::variant::Variant;
 use crate::passes::visibility::VisibilityBuffer;
 use crate::passes::{Rows, raster};
-use crate::scene::{Camera, Raster};
+use crate::plan::{PixelLayout, Raster};
+use crate::scene::Camera;
 
 /// The buffers of a frame's pixels.
 pub(super) struct PixelBuffers {

@@ -9,8 +9,9 @@ use rayon::prelude::*;
 use super::Report;
 use crate::frame::Frame;
 use crate::passes::{accumulate, project, resolve, visibility};
+use crate::plan::{RenderOptions, SceneNeeds};
 use crate::progress::Progress;
-use crate::scene::{Camera, RenderOptions, Scene, SceneNeeds};
+use crate::scene::{Camera, Scene};
 
 /// Rows that one thread of the reference works on at a time.
 const REFERENCE_ROWS: u32 = 8;

@@ -1,8 +1,7 @@
-//! What a caller may choose about a render.
+//! What a picture is: which fragments are one surface, how they are blended, lit and filtered, and which maps there are.
 
 use std::str::FromStr;
 
-use super::{Light, Optimisation, Raster};
 use crate::error::Error;
 
 /// The depth tolerance: a fragment counts as the visible surface if `z <= nearest + epsilon` (paper 000, section 5.3).
@@ -176,31 +175,6 @@ pub enum LowPass {
     Ewa,
 }
 
-/// How the compute kernels draw splats. The image is the same to the bit.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Organisation {
-    /// Small ones one by one, large ones by tiles of the image; on a software adapter tiles sum all, unless they are tiny.
-    #[default]
-    Auto,
-    /// One by one, large ones by a workgroup each.
-    Scatter,
-    /// All by tiles.
-    Tile,
-}
-
-impl FromStr for Organisation {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self, Error> {
-        match text {
-            "auto" => Ok(Self::Auto),
-            "scatter" => Ok(Self::Scatter),
-            "tile" => Ok(Self::Tile),
-            _ => Err(Error::Usage(format!("there is no organisation {text:?}: take auto, scatter or tile"))),
-        }
-    }
-}
-
 /// How a resolved pixel gets its colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -219,7 +193,7 @@ pub enum Shading {
 /// With one light of 1 it does not clip the colour of surfels that have none (`DEFAULT_COLOR`).
 pub const HIGHLIGHT: f64 = 0.3;
 
-/// Exponents that [`RenderOptions::shininess`] may have: with more, the cosine's rounding in f32 would show.
+/// Exponents that [`RenderOptions::shininess`](crate::plan::RenderOptions::shininess) may have: with more, the cosine's rounding in f32 would show.
 pub const SHININESS_RANGE: (f32, f32) = (1.0, 1000.0);
 
 /// Maps beside the colour. Every one is normalised by the weight sum; all but `decision` exist on every backend.
@@ -237,66 +211,6 @@ pub struct Maps {
     /// Reference only: the smallest relative distance of any fragment of the pixel to a yes-or-no decision (disk rim,
     /// epsilon, near depth). Where it is tiny, f32 may rightly decide otherwise.
     pub decision: bool,
-}
-
-/// Everything a caller may choose, scene and camera apart.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RenderOptions {
-    /// Depth tolerance.
-    pub epsilon: Epsilon,
-    /// Blending kernel.
-    pub kernel: Kernel,
-    /// Low-pass filter.
-    pub low_pass: LowPass,
-    /// Name of the device's accumulator; see [`crate::passes::accumulate::ACCUMULATORS`].
-    pub accumulator: &'static str,
-    /// How the device draws splats; accumulators other than `fixed` scatter.
-    pub organisation: Organisation,
-    /// Sums by the rasteriser instead, on a GPU.
-    pub raster: Option<Raster>,
-    /// Shading model.
-    pub shading: Shading,
-    /// Exponent of [`Shading::Phong`], in [`SHININESS_RANGE`]: the higher, the smaller a highlight is.
-    pub shininess: f32,
-    /// Lights of the shading models; unlit pixels have none.
-    pub lights: Vec<Light>,
-    /// What lies behind the scene: linear RGB and straight alpha.
-    pub background: [f32; 4],
-    /// Maps wanted beside the colour.
-    pub maps: Maps,
-    /// What is left out that makes frames faster; none changes a bit of the image.
-    pub without: Vec<Optimisation>,
-}
-
-impl RenderOptions {
-    /// Surfels that are the same are drawn once, unless tiles are asked for, in which each is listed.
-    pub fn draws_copies_once(&self) -> bool {
-        self.has(Optimisation::Copies) && self.organisation != Organisation::Tile
-    }
-
-    /// Whether an optimisation is not left out.
-    pub fn has(&self, optimisation: Optimisation) -> bool {
-        !self.without.contains(&optimisation)
-    }
-}
-
-impl Default for RenderOptions {
-    fn default() -> Self {
-        Self {
-            epsilon: Epsilon::Relative(0.01),
-            kernel: Kernel::Ellipse { a: 6.0, n: 3.0, smooth: false },
-            low_pass: LowPass::None,
-            accumulator: "fixed",
-            organisation: Organisation::Auto,
-            raster: None,
-            shading: Shading::Lambert,
-            shininess: 32.0,
-            lights: vec![Light::Headlight { intensity: 1.0 }],
-            background: [0.0; 4],
-            maps: Maps::default(),
-            without: Vec::new(),
-        }
-    }
 }
 
 #[cfg(test)]

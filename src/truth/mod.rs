@@ -19,9 +19,10 @@ use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::io::{self, Mesh};
 use crate::passes::resolve::{over, shade};
+use crate::plan::RenderOptions;
 use crate::progress::Progress;
+use crate::scene::Camera;
 use crate::scene::color::SRGB8_TO_LINEAR;
-use crate::scene::{Camera, RenderOptions};
 use crate::surfels::analytic::{Shape, depth_along_ray};
 
 /// A surface that rays can meet.

@@ -4,7 +4,8 @@
 
 use epsplat::passes::footprint::footprint;
 use epsplat::passes::project::Splat;
-use epsplat::scene::{Camera, Kernel, LowPass, RenderOptions, Scene};
+use epsplat::plan::RenderOptions;
+use epsplat::scene::{Camera, Kernel, LowPass, Scene};
 
 use super::UNIT;
 use epsplat::hardcases::precision::{E, Precision};

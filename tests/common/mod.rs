@@ -11,10 +11,10 @@ pub mod scenes;
 use epsplat::frame::Frame;
 use epsplat::gpu::Gpu;
 use epsplat::gpu::layout::{ONE, View};
-use epsplat::passes::accumulate::{ACCUMULATORS, Accumulator};
-use epsplat::scene::{
-    BlendFormat, ColorNeed, KernelShape, LowPass, Projection, Raster, RasterDepth, RenderOptions, SceneNeeds, Shading,
+use epsplat::plan::{
+    ACCUMULATORS, Accumulator, AccumulatorRow, BlendFormat, ColorNeed, Raster, RasterDepth, RenderOptions, SceneNeeds,
 };
+use epsplat::scene::{KernelShape, LowPass, Projection, Shading};
 
 /// What one unit in a sum of the accumulator `fixed` is of a full weight.
 pub const UNIT: f64 = 1.0 / ONE as f64;
@@ -51,8 +51,8 @@ pub fn gpu_for(file: &str) -> Option<Gpu> {
 }
 
 /// The accumulators that the adapter can run; of each other one a line on stderr.
-pub fn accumulators(gpu: &Gpu) -> Vec<&'static Accumulator> {
-    let able = |row: &&Accumulator| row.check(gpu).inspect_err(|why| eprintln!("skipped: {why}")).is_ok();
+pub fn accumulators(gpu: &Gpu) -> Vec<&'static AccumulatorRow> {
+    let able = |row: &&AccumulatorRow| row.check(gpu).inspect_err(|why| eprintln!("skipped: {why}")).is_ok();
     ACCUMULATORS.iter().filter(able).collect()
 }
 
@@ -70,11 +70,11 @@ pub fn all_needs() -> Vec<SceneNeeds> {
                     // A step that shares no factor with the number of needs, so that it comes to all of them.
                     next = (next + 101) % base.len();
                     let low_pass = [LowPass::None, LowPass::Max, LowPass::Ewa][next % 3];
-                    let accumulator = row.name;
-                    let tiles = accumulator == ACCUMULATORS[0].name && base[next].color != ColorNeed::Textured;
+                    let accumulator = row.of;
+                    let tiles = accumulator == Accumulator::Fixed && base[next].color != ColorNeed::Textured;
                     let gather = tiles && next % 2 == 0;
                     all.push(SceneNeeds { accumulator, tiles, gather, kernel, epsilon_radius, low_pass, ..base[next] });
-                    if accumulator == ACCUMULATORS[0].name {
+                    if accumulator == Accumulator::Fixed {
                         for (wide_sums, atomics_u64) in [(true, false), (false, true), (true, true)] {
                             let next = base[next];
                             all.push(SceneNeeds { wide_sums, atomics_u64, kernel, epsilon_radius, low_pass, ..next });
@@ -132,7 +132,7 @@ fn base_needs() -> Vec<SceneNeeds> {
             let (depth, count, weight_map) = (bit(5), bit(6), bit(7));
             all.push(SceneNeeds {
                 projection,
-                accumulator: ACCUMULATORS[0].name,
+                accumulator: Accumulator::Fixed,
                 wide_sums: false,
                 atomics_u64: false,
                 long_words: bits.count_ones() % 4 < 2,

@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 use epsplat::gpu::Sources;
 use epsplat::gpu::kernel::{Bindings, reflect};
 use epsplat::passes::variant::modules;
-use epsplat::scene::SceneNeeds;
+use epsplat::plan::SceneNeeds;
 use rayon::prelude::*;
 
 use super::all_needs;

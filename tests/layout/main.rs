@@ -16,9 +16,8 @@ use epsplat::gpu::layout::{
     AWAY, BATCH, BLOCK_SIDE, COVERED_GRID, COVERED_GRID_OF_EIGHTS, COVERED_LIST, LIST_ENDS, LIST_FAR, LIST_START,
     MOST_GROUPS, OCCLUSION_TILE, ONE, ONE_WIDE, QUEUE_GRID, QUEUE_LISTING, QUEUE_START, TILE, TILE_WIDTH, WORKGROUP,
 };
-use epsplat::passes::accumulate::accumulator;
-use epsplat::passes::variant::{self, COLOR_CHANNEL, PixelLayout, color_channels};
-use epsplat::scene::SceneNeeds;
+use epsplat::passes::variant::{self};
+use epsplat::plan::{Accumulator, COLOR_CHANNEL, PixelLayout, SceneNeeds, color_channels};
 use epsplat::scene::camera::MAX_SIDE;
 use epsplat::scene::options::{LEAST_FILTERED_WEIGHT, LEAST_WEIGHT};
 use mirrors::{differences, elements, kept_as, mirrors, sums_of};
@@ -65,7 +64,7 @@ fn a_changed_layout_is_noticed() {
     let needs = common::all_needs().into_iter().find(|needs| !needs.cull).unwrap();
     let broken = |from: &str, to: &str| {
         let sources = Sources::default().replace("layout.wgsl", from, to).unwrap();
-        differences(&first_of(&sources, &needs), needs.accumulator).join("; ")
+        differences(&first_of(&sources, &needs), needs.accumulator.name()).join("; ")
     };
     let swapped =
         broken("    a: array<f32, 3>,\n    b: array<f32, 3>,\n", "    b: array<f32, 3>,\n    a: array<f32, 3>,\n");
@@ -80,14 +79,14 @@ fn a_changed_layout_is_noticed() {
     assert!(exchanged.contains("\"farthest\"") && exchanged.contains("\"middle\""), "{exchanged}");
     let cut = Sources::default().replace("records.wgsl", "array<Words, 4>", "array<Words, 5>").unwrap();
     let cut = cut.replace("records.wgsl", "splat.a_low[2]))),", "splat.a_low[2]))), words(vec4<u32>()),").unwrap();
-    let cut = differences(&first_of(&cut, &needs), needs.accumulator).join("; ");
+    let cut = differences(&first_of(&cut, &needs), needs.accumulator.name()).join("; ");
     assert!(cut.contains("projected holds") && cut.contains("splats holds"), "{cut}");
     let longer = broken("    rows: u32,\n    padding_0: u32,\n", "    rows: u32,\n    padding_0: vec2<u32>,\n");
     assert!(longer.contains("Band"), "{longer}");
     let retyped = broken("    middle: f32,\n", "    middle: u32,\n");
     assert!(retyped.contains("middle") && retyped.contains("Uint"), "{retyped}");
     // Sums of another kind than the accumulator's.
-    let wide = SceneNeeds { accumulator: "fixed64", ..needs };
+    let wide = SceneNeeds { accumulator: Accumulator::Fixed64, ..needs };
     let other = &first_of(&Sources::default(), &wide);
     assert_eq!(differences(other, "packed64"), Vec::<String>::new());
     for name in ["fixed", "float"] {
@@ -160,8 +159,8 @@ fn constants_agree() {
         assert_eq!(constant("COLOR_CHANNEL"), colors.then_some(f64::from(COLOR_CHANNEL)));
         let one = match needs.accumulator {
             _ if needs.raster.is_some() => None,
-            "fixed" if !needs.wide_sums => Some(f64::from(ONE)),
-            "fixed" | "fixed64" => Some(ONE_WIDE as f64),
+            Accumulator::Fixed if !needs.wide_sums => Some(f64::from(ONE)),
+            Accumulator::Fixed | Accumulator::Fixed64 => Some(ONE_WIDE as f64),
             _ => None,
         };
         assert_eq!(constant("ONE"), one, "{}", needs.accumulator);
@@ -191,7 +190,7 @@ fn constants_agree() {
 #[test]
 fn the_hosts_room_for_a_pixels_sums_is_the_devices() {
     for needs in common::all_needs() {
-        let (channels, row) = (PixelLayout::of(&needs).channels, accumulator(needs.accumulator).unwrap());
+        let (channels, row) = (PixelLayout::of(&needs).channels, needs.accumulator.row());
         let (shapes, halves) = sums_of(row.name);
         let bytes = channels as usize * halves as usize * shapes[0].bytes() / 2;
         assert_eq!(bytes, 4 * (channels * row.words) as usize, "{}", row.name);

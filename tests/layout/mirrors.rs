@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::mem::{offset_of, size_of};
 
 use epsplat::gpu::layout::{Band, Filter, Splat, View};
-use epsplat::scene::{SceneNeeds, Surfel};
+use epsplat::plan::SceneNeeds;
+use epsplat::scene::Surfel;
 use naga::{AddressSpace, ArraySize, Module, ScalarKind, TypeInner};
 
 /// A type as host and device can compare it: so many scalars of one kind.
@@ -187,7 +188,7 @@ fn shape(module: &Module, ty: naga::Handle<naga::Type>) -> Result<Shape, String>
 
 /// The accumulator whose sums are kept alike: 64-bit atomics keep those of `fixed` as `fixed64` does.
 pub fn kept_as(needs: &SceneNeeds) -> &'static str {
-    if needs.atomics_u64 { "fixed64" } else { needs.accumulator }
+    if needs.atomics_u64 { "fixed64" } else { needs.accumulator.name() }
 }
 
 /// Differences between a module's bindings and the host's mirrors, in words.

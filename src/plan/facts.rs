@@ -1,10 +1,10 @@
 //! What a renderer must know of all surfels together, looked up once and not for each frame.
 
-use super::{Bounds, Scene, has_copies};
+use crate::scene::{Bounds, Scene, has_copies};
 
 /// The ranges that a scene's values lie in.
 #[derive(Clone, Copy, Debug)]
-pub struct Ranges {
+pub struct Facts {
     /// [`Scene::bounds`].
     pub bounds: Bounds,
     /// The box of [`Scene::body`].
@@ -19,7 +19,7 @@ pub struct Ranges {
     pub copies: bool,
 }
 
-impl Ranges {
+impl Facts {
     /// Those of `scene`.
     pub fn of(scene: &Scene) -> Self {
         Self {

@@ -1,9 +1,7 @@
 //! What a scene and its options need, computed once: the only variant key of the kernels.
 
-use super::{
-    Camera, Colors, Epsilon, KernelShape, LowPass, Organisation, Projection, Raster, RasterDepth, RenderOptions, Scene,
-    Shading,
-};
+use super::{Accumulator, Organisation, Raster, RasterDepth, RenderOptions};
+use crate::scene::{Camera, Colors, Epsilon, KernelShape, LowPass, Projection, Scene, Shading};
 
 /// Where a surfel's colour comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -23,8 +21,8 @@ pub enum ColorNeed {
 pub struct SceneNeeds {
     /// The camera model.
     pub projection: Projection,
-    /// How sums are kept on the device, by name.
-    pub accumulator: &'static str,
+    /// How sums are kept on the device.
+    pub accumulator: Accumulator,
     /// The accumulator is `fixed` and terms may be small: alphas differ, so that means are divided by a small mean alpha;
     /// or a fragment's weight may be less than [`SMALL_WEIGHT`]. Then terms keep 40 bits.
     pub wide_sums: bool,
@@ -106,14 +104,14 @@ impl SceneNeeds {
             projection: camera.projection,
             accumulator: options.accumulator,
             wide_sums: options.raster.is_none()
-                && options.accumulator == "fixed"
+                && options.accumulator == Accumulator::Fixed
                 && (low[3] != high[3] || may_be_small(options)),
             atomics_u64: false,
             long_words: false,
             doubled: !scene.low.is_empty(),
             copies: false,
             cull: false,
-            tiles: options.accumulator == "fixed"
+            tiles: options.accumulator == Accumulator::Fixed
                 && options.raster.is_none()
                 && color != ColorNeed::Textured
                 && options.organisation != Organisation::Scatter,
@@ -140,7 +138,7 @@ impl SceneNeeds {
     /// The same on an adapter that has 64-bit atomics or not.
     pub fn with_atomics_u64(self, atomics_u64: bool) -> Self {
         Self {
-            atomics_u64: atomics_u64 && !self.copies && self.accumulator == "fixed" && self.raster.is_none(),
+            atomics_u64: atomics_u64 && !self.copies && self.accumulator == Accumulator::Fixed && self.raster.is_none(),
             ..self
         }
     }
@@ -152,7 +150,10 @@ impl SceneNeeds {
 
     /// The same where surfels have many `copies`, or not. Those are drawn by scatter: of tiles they would make long lists.
     pub fn with_copies(self, copies: bool) -> Self {
-        let stand = copies && self.accumulator == "fixed" && self.raster.is_none() && self.color != ColorNeed::Textured;
+        let stand = copies
+            && self.accumulator == Accumulator::Fixed
+            && self.raster.is_none()
+            && self.color != ColorNeed::Textured;
         if stand { Self { copies: true, tiles: false, ..self } } else { self }
     }
 

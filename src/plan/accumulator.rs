@@ -1,0 +1,200 @@
+//! How sums are kept on the device. What each costs and how much it errs: `src/passes/accumulate.rs`.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Serialize, Serializer};
+
+use crate::error::Error;
+use crate::gpu::Gpu;
+use crate::gpu::layout::ONE;
+
+/// How sums are kept on the device.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Accumulator {
+    /// Fixed point, two words a sum: the default.
+    #[default]
+    Fixed,
+    /// Fixed point in one word.
+    Fixed32,
+    /// Fixed point in one u64.
+    Fixed64,
+    /// Fixed point, two sums in one u64.
+    Packed64,
+    /// f32, by atomic add.
+    Float,
+    /// f32, by compare and exchange.
+    Cas,
+}
+
+impl Accumulator {
+    /// What is true of it.
+    pub fn row(self) -> &'static AccumulatorRow {
+        // The table has a row for each, in this order, which a test holds.
+        &ACCUMULATORS[self as usize]
+    }
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        self.row().name
+    }
+}
+
+impl fmt::Display for Accumulator {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl Serialize for Accumulator {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+impl FromStr for Accumulator {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        ACCUMULATORS.iter().find(|row| row.name == text).map(|row| row.of).ok_or_else(|| {
+            let names = ACCUMULATORS.iter().map(|row| row.name).collect::<Vec<_>>().join(", ");
+            Error::Usage(format!("there is no accumulator {text:?}: take one of {names}"))
+        })
+    }
+}
+
+/// What is true of an accumulator: a row of [`ACCUMULATORS`], a file `wgsl/accumulator_*.wgsl`.
+#[derive(Debug)]
+pub struct AccumulatorRow {
+    /// Which it is.
+    pub of: Accumulator,
+    /// Its name.
+    pub name: &'static str,
+    /// Its file.
+    pub file: &'static str,
+    /// u32 words of one sum.
+    pub words: u32,
+    /// The image's bits are the same for any order of fragments.
+    pub deterministic: bool,
+    /// What it needs of the adapter beyond core WebGPU.
+    pub features: Features,
+    /// Bound on the error of a mean of n fragments of summed weight w, B fraction bits, as a fraction of the range.
+    pub error_bound: fn(n: f64, w: f64, bits: u32) -> f64,
+}
+
+/// Optional features of an adapter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Features {
+    /// Core WebGPU.
+    None,
+    /// 64-bit integers and atomics.
+    AtomicsU64,
+    /// f32 atomic add.
+    AtomicsF32,
+}
+
+/// The rounding of one f32 operation.
+const U: f64 = 1.0 / 16_777_216.0;
+
+/// Every accumulator, in the order of [`Accumulator`]; the first is the default.
+pub const ACCUMULATORS: &[AccumulatorRow] = &[
+    AccumulatorRow {
+        of: Accumulator::Fixed,
+        name: "fixed",
+        file: "accumulator_fixed.wgsl",
+        words: 2,
+        deterministic: true,
+        features: Features::None,
+        error_bound: |n, w, _| n / (ONE as f64 * w) + 6.0 * U,
+    },
+    AccumulatorRow {
+        of: Accumulator::Fixed32,
+        name: "fixed32",
+        file: "accumulator_fixed32.wgsl",
+        words: 1,
+        deterministic: true,
+        features: Features::None,
+        error_bound: |n, w, bits| n * (-f64::from(bits)).exp2() / w + 5.0 * U,
+    },
+    AccumulatorRow {
+        of: Accumulator::Fixed64,
+        name: "fixed64",
+        file: "accumulator_fixed64.wgsl",
+        words: 2,
+        deterministic: true,
+        features: Features::AtomicsU64,
+        error_bound: |n, w, _| n * (-40f64).exp2() / w + 6.0 * U,
+    },
+    AccumulatorRow {
+        of: Accumulator::Packed64,
+        name: "packed64",
+        file: "accumulator_packed64.wgsl",
+        words: 1,
+        deterministic: true,
+        features: Features::AtomicsU64,
+        error_bound: |n, w, bits| n * (-f64::from(bits)).exp2() / w + 5.0 * U,
+    },
+    AccumulatorRow {
+        of: Accumulator::Float,
+        name: "float",
+        file: "accumulator_float.wgsl",
+        words: 1,
+        deterministic: false,
+        features: Features::AtomicsF32,
+        error_bound: |n, _, _| 2.0 * n * U + 4.0 * U,
+    },
+    AccumulatorRow {
+        of: Accumulator::Cas,
+        name: "cas",
+        file: "accumulator_cas.wgsl",
+        words: 1,
+        deterministic: false,
+        features: Features::None,
+        error_bound: |n, _, _| 2.0 * n * U + 4.0 * U,
+    },
+];
+
+impl AccumulatorRow {
+    /// Fraction bits of the one-word accumulators in a scene of `surfels`: as many as the sums of all surfels, or of 255
+    /// full weights, leave free.
+    pub fn fraction_bits(&self, surfels: u64) -> u32 {
+        let most = surfels.clamp(1, 255) as u32;
+        32 - (32 - most.leading_zeros())
+    }
+
+    /// Fails with a sentence if `gpu` lacks what it needs.
+    pub fn check(&self, gpu: &Gpu) -> Result<(), Error> {
+        let (has, what) = match self.features {
+            Features::None => return Ok(()),
+            Features::AtomicsU64 => (gpu.adapter.atomics_u64, "64-bit atomics"),
+            Features::AtomicsF32 => (gpu.adapter.atomics_f32, "f32 atomic add"),
+        };
+        if has {
+            return Ok(());
+        }
+        Err(gpu.error(format!("the accumulator {} needs {what}, which this adapter lacks: take fixed", self.name)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_accumulator_has_its_row_its_file_and_its_own_name() {
+        for row in ACCUMULATORS {
+            assert!(std::ptr::eq(row.of.row(), row), "{}", row.name);
+            assert!(crate::gpu::kernel::FILES.iter().any(|(name, _)| *name == row.file), "{}", row.file);
+            assert_eq!(row.name.parse::<Accumulator>().ok(), Some(row.of));
+        }
+        assert!("double".parse::<Accumulator>().is_err());
+    }
+
+    #[test]
+    fn fraction_bits_leave_room_for_every_surfel() {
+        for (surfels, bits) in [(0, 31), (1, 31), (2, 30), (3, 30), (4, 29), (127, 25), (128, 24), (1_000_000_000, 24)]
+        {
+            assert_eq!(ACCUMULATORS[1].fraction_bits(surfels), bits, "{surfels}");
+        }
+    }
+}

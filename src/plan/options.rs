@@ -1,0 +1,92 @@
+//! What a caller may choose about a render.
+
+use std::str::FromStr;
+
+use super::{Accumulator, Optimisation, Raster};
+use crate::error::Error;
+use crate::scene::{Epsilon, Kernel, Light, LowPass, Maps, Shading};
+
+/// How the compute kernels draw splats. The image is the same to the bit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Organisation {
+    /// Small ones one by one, large ones by tiles of the image; on a software adapter tiles sum all, unless they are tiny.
+    #[default]
+    Auto,
+    /// One by one, large ones by a workgroup each.
+    Scatter,
+    /// All by tiles.
+    Tile,
+}
+
+impl FromStr for Organisation {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            "scatter" => Ok(Self::Scatter),
+            "tile" => Ok(Self::Tile),
+            _ => Err(Error::Usage(format!("there is no organisation {text:?}: take auto, scatter or tile"))),
+        }
+    }
+}
+
+/// Everything a caller may choose, scene and camera apart.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderOptions {
+    /// Depth tolerance.
+    pub epsilon: Epsilon,
+    /// Blending kernel.
+    pub kernel: Kernel,
+    /// Low-pass filter.
+    pub low_pass: LowPass,
+    /// How the device keeps sums.
+    pub accumulator: Accumulator,
+    /// How the device draws splats; accumulators other than `fixed` scatter.
+    pub organisation: Organisation,
+    /// Sums by the rasteriser instead, on a GPU.
+    pub raster: Option<Raster>,
+    /// Shading model.
+    pub shading: Shading,
+    /// Exponent of [`Shading::Phong`], in [`SHININESS_RANGE`](crate::scene::options::SHININESS_RANGE): the higher, the smaller a highlight is.
+    pub shininess: f32,
+    /// Lights of the shading models; unlit pixels have none.
+    pub lights: Vec<Light>,
+    /// What lies behind the scene: linear RGB and straight alpha.
+    pub background: [f32; 4],
+    /// Maps wanted beside the colour.
+    pub maps: Maps,
+    /// What is left out that makes frames faster; none changes a bit of the image.
+    pub without: Vec<Optimisation>,
+}
+
+impl RenderOptions {
+    /// Surfels that are the same are drawn once, unless tiles are asked for, in which each is listed.
+    pub fn draws_copies_once(&self) -> bool {
+        self.has(Optimisation::Copies) && self.organisation != Organisation::Tile
+    }
+
+    /// Whether an optimisation is not left out.
+    pub fn has(&self, optimisation: Optimisation) -> bool {
+        !self.without.contains(&optimisation)
+    }
+}
+
+impl Default for RenderOptions {
+    fn default() -> Self {
+        Self {
+            epsilon: Epsilon::Relative(0.01),
+            kernel: Kernel::Ellipse { a: 6.0, n: 3.0, smooth: false },
+            low_pass: LowPass::None,
+            accumulator: Accumulator::Fixed,
+            organisation: Organisation::Auto,
+            raster: None,
+            shading: Shading::Lambert,
+            shininess: 32.0,
+            lights: vec![Light::Headlight { intensity: 1.0 }],
+            background: [0.0; 4],
+            maps: Maps::default(),
+            without: Vec::new(),
+        }
+    }
+}

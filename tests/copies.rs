@@ -31,7 +31,7 @@ fn scene() -> Scene {
 }
 
 fn options(low_pass: LowPass, without: &[Optimisation]) -> RenderOptions {
-    let maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
+    let maps = Maps::ON_DEVICE;
     RenderOptions { maps, low_pass, shading: Shading::Phong, without: without.to_vec(), ..RenderOptions::default() }
 }
 

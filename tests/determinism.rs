@@ -9,7 +9,6 @@ use common::scenes::{crowded, front, shuffled, sphere};
 use common::{Random, bits};
 use epsplat::frame::Frame;
 use epsplat::gpu::Sources;
-use epsplat::gpu::buffers::page_len;
 use epsplat::gpu::layout::Splat;
 use epsplat::hardcases::cases;
 use epsplat::inspect::stages;
@@ -18,13 +17,11 @@ use epsplat::render::{Backend, render};
 use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Lens, LowPass, Maps, Scene, Shading, Surfel, Up};
 use glam::{DVec3, Vec3};
 
-const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
-
 /// Half a unit in the last place of 1 in f32.
 const E: f64 = 1.0 / 16_777_216.0;
 
 fn options(accumulator: Accumulator) -> RenderOptions {
-    RenderOptions { maps: MAPS, epsilon: Epsilon::Relative(0.02), accumulator, ..Default::default() }
+    RenderOptions { maps: Maps::ON_DEVICE, epsilon: Epsilon::Relative(0.02), accumulator, ..Default::default() }
 }
 
 /// All scenes for the default; for others the first, of 8-bit colours, and the last, of f32 and large splats.
@@ -80,6 +77,7 @@ fn order_and_repetition_do_not_change_a_bit() {
         let sources = [
             "atomicAdd(&sums[2u * (pixel * CHANNELS + channel)], value)",
             ADD_TO_CHANNEL,
+            "atomicAdd(&sums[pixel * CHANNELS + channel], u64(value))",
             "atomicAdd(&sums[pair], (u64",
         ]
         .into_iter()
@@ -120,7 +118,7 @@ fn an_adapters_64_bit_atomics_do_not_change_a_bit() {
     });
     let mut noticed = [false; 2];
     for (name, scene, camera, options) in crowded.chain(hard) {
-        let options = RenderOptions { maps: MAPS, accumulator: own.accumulator, ..options };
+        let options = RenderOptions { maps: Maps::ON_DEVICE, accumulator: own.accumulator, ..options };
         let [(one, report), (other, plain)] =
             [&with, &without].map(|backend| render(&scene, &camera, &options, backend, &()).unwrap());
         assert!(report.needs.contains(&"atomics-u64") && !plain.needs.contains(&"atomics-u64"));
@@ -229,7 +227,7 @@ fn pages_and_bands_do_not_change_a_bit() {
             let (scene, camera) = crowded().remove(1);
             let refused = stages(&scene, &camera, &options, &small, &Sources::default());
             assert!(refused.unwrap_err().to_string().contains("bands"));
-            assert!(page_len(&small, size_of::<Splat>()) < scene.surfels.len() as u64 / 2);
+            assert!(small.adapter.page_len(size_of::<Splat>()) < scene.surfels.len() as u64 / 2);
             let small = Backend::gpu(small);
             for (scene, camera) in scenes(row) {
                 let one = frame(&scene, &camera, &options, &whole);

@@ -7,8 +7,8 @@ mod common;
 use bytemuck::Zeroable;
 use common::Random;
 use epsplat::gpu::Gpu;
-use epsplat::gpu::kernel::FILES;
 use epsplat::gpu::layout::View;
+use epsplat::gpu::sources::FILES;
 use epsplat::inspect::evaluate;
 
 /// All functions on one pair of doubles each.

@@ -34,7 +34,7 @@ fn view(scale: f64, shift: DVec3) -> Camera {
 
 fn check(name: &str, scene: &Scene, camera: &Camera, epsilon: Epsilon) {
     let Some(gpu) = common::gpu() else { return };
-    let maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
+    let maps = Maps::ON_DEVICE;
     let options = RenderOptions { epsilon, maps, ..RenderOptions::default() };
     let with_decision = RenderOptions { maps: Maps { decision: true, ..maps }, ..options.clone() };
     let (reference, _) = render(scene, camera, &with_decision, &Backend::Reference, &()).unwrap();

@@ -21,10 +21,8 @@ use glam::{DVec3, Vec3};
 
 const E: f64 = 1.0 / 16_777_216.0;
 
-const ALL_MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
-
 fn options() -> RenderOptions {
-    RenderOptions { maps: ALL_MAPS, epsilon: Epsilon::Relative(0.02), ..Default::default() }
+    RenderOptions { maps: Maps::ON_DEVICE, epsilon: Epsilon::Relative(0.02), ..Default::default() }
 }
 
 fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Backend) -> Frame {
@@ -149,7 +147,7 @@ fn resolve_matches_its_twin_on_the_devices_own_sums() {
             }
             let device = frame(&scene, &camera, &options, &backend);
             let sums = unmapped(&scene, &camera, &options, gpu);
-            let mut twin = Frame::new(&camera, &ALL_MAPS);
+            let mut twin = Frame::new(&camera, &Maps::ON_DEVICE);
             resolve::reference(&sums, &scene, &camera, &options, 0, &mut twin);
             // Of the largest colour; of one; of the depth; of the weight.
             let largest = scene.color_range().1.map(f64::from).into_iter().fold(1.0, f64::max);

@@ -16,8 +16,6 @@ use epsplat::surfels::build;
 use epsplat::truth::{DEFAULT_GRID, Surface, Truth};
 use glam::{DVec3, Vec3};
 
-const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
-
 /// `count` disks of `radius` spacings on `shape`.
 fn surfels(shape: Shape, count: u64, radius: f32) -> Scene {
     let samples: Vec<_> = generate(shape, count).collect();
@@ -33,7 +31,7 @@ fn surfels(shape: Shape, count: u64, radius: f32) -> Scene {
 }
 
 fn options(low_pass: LowPass) -> RenderOptions {
-    RenderOptions { low_pass, shading: Shading::Unlit, maps: MAPS, ..RenderOptions::default() }
+    RenderOptions { low_pass, shading: Shading::Unlit, maps: Maps::ON_DEVICE, ..RenderOptions::default() }
 }
 
 /// The error of the reference's picture against 16 rays a pixel.
@@ -140,7 +138,8 @@ fn the_device_filters_as_the_reference_does() {
             for lens in [Lens::Fov(45.0), Lens::OrthographicHeight(3.0)] {
                 let near = Camera::default_near(scene);
                 let camera = Camera::framing((120, 90), lens, scene, near).unwrap();
-                let with_decision = RenderOptions { maps: Maps { decision: true, ..MAPS }, ..options(low_pass) };
+                let with_decision =
+                    RenderOptions { maps: Maps { decision: true, ..Maps::ON_DEVICE }, ..options(low_pass) };
                 let (reference, _) = render(scene, &camera, &with_decision, &Backend::Reference, &()).unwrap();
                 let (frame, _) = render(scene, &camera, &options(low_pass), backend, &()).unwrap();
                 let comparison = compare(&frame, &reference).unwrap();

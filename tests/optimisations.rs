@@ -12,10 +12,13 @@ use epsplat::plan::{Optimisation, RenderOptions};
 use epsplat::render::{Backend, Report, render};
 use epsplat::scene::{Camera, Epsilon, Maps, Projection, Scene};
 
-const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
-
 fn options(without: &[Optimisation]) -> RenderOptions {
-    RenderOptions { maps: MAPS, epsilon: Epsilon::Relative(0.02), without: without.to_vec(), ..Default::default() }
+    RenderOptions {
+        maps: Maps::ON_DEVICE,
+        epsilon: Epsilon::Relative(0.02),
+        without: without.to_vec(),
+        ..Default::default()
+    }
 }
 
 /// Splats of many sizes, which are too few for culling, and a closed surface of small ones, half of it hidden.

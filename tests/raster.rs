@@ -11,8 +11,6 @@ use epsplat::plan::{Accumulator, AccumulatorRow, BlendFormat, Features, Raster, 
 use epsplat::render::{Backend, Report, render};
 use epsplat::scene::{Camera, Maps, Shading};
 
-const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
-
 /// Cases with every kind of footprint and attribute, and depths of many magnitudes.
 const CASES: [&str; 6] = [
     "intersecting sheets",
@@ -31,7 +29,7 @@ fn all_cases() -> Vec<(HardCase, Truth)> {
 }
 
 fn options(case: &HardCase, format: BlendFormat, depth: RasterDepth) -> RenderOptions {
-    let maps = Maps { count: format != BlendFormat::Rgba8Unorm, ..MAPS };
+    let maps = Maps { count: format != BlendFormat::Rgba8Unorm, ..Maps::ON_DEVICE };
     RenderOptions { raster: Some(Raster { format, depth }), maps, ..case.options.clone() }
 }
 
@@ -156,7 +154,8 @@ fn eight_bits_lose_what_they_must_and_refuse_to_count() {
     };
     let (half, _) = frame(&case, &options(&case, BlendFormat::Rgba16Float, RasterDepth::Exact), &backend);
     assert!(worst(&eight) > 10.0 * worst(&half), "{} and {}", worst(&eight), worst(&half));
-    let counted = RenderOptions { maps: MAPS, ..options(&case, BlendFormat::Rgba8Unorm, RasterDepth::Exact) };
+    let counted =
+        RenderOptions { maps: Maps::ON_DEVICE, ..options(&case, BlendFormat::Rgba8Unorm, RasterDepth::Exact) };
     let error = render(&case.scene, &case.camera, &counted, &backend, &()).unwrap_err().to_string();
     assert!(error.contains("8-bit"), "{error}");
 }

@@ -8,9 +8,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use common::modules::{self, Made, Reflected};
 use epsplat::gpu::Sources;
-use epsplat::gpu::device::STORAGE_BUFFERS;
-use epsplat::gpu::kernel::{FILES, reflect};
-use epsplat::passes::variant::{self, overrides};
+use epsplat::gpu::adapter::STORAGE_BUFFERS;
+use epsplat::gpu::kernel::reflect;
+use epsplat::gpu::sources::FILES;
+use epsplat::passes;
+use epsplat::plan::pass::Making;
 use epsplat::plan::{Accumulator, COLOR_CHANNEL, ColorNeed, Features, PixelLayout, RenderOptions, color_channels};
 use epsplat::scene::{Kernel, KernelShape};
 use naga::AddressSpace;
@@ -39,7 +41,7 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
     let different = modules::different();
     assert!(different.len() > 500, "{}", different.len());
     let without = different.par_iter().flat_map_iter(|made| {
-        let Made { needs, files, stages, .. } = made;
+        let Made { needs, files, kernels, .. } = made;
         let module = &made.reflected().module;
         let features = match needs.raster {
             None if needs.atomics_u64 => Features::AtomicsU64,
@@ -62,7 +64,7 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
         } else {
             &[]
         };
-        let own: BTreeSet<&str> = stages.iter().chain(drawn).copied().collect();
+        let own: BTreeSet<&str> = kernels.iter().map(|kernel| kernel.name).chain(drawn.iter().copied()).collect();
         // Of a render by tiles each module has entry points that only the other needs.
         let shared = entries.difference(&own).count();
         let leaves = made.of_tiles() || needs.gather;
@@ -89,10 +91,10 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
 fn an_invalid_kernel_or_one_with_a_feature_is_noticed() {
     let needs = common::all_needs()[0];
     let broken = Sources::default().replace("kernel_ellipse.wgsl", "exp(-KERNEL_A", "exp(-view").unwrap();
-    assert!(reflect(&broken.join(&variant::modules(&needs)[0].0)).is_err());
+    assert!(reflect(&broken.join(&passes::modules(&needs)[0].files)).is_err());
     let wide =
         Sources::default().replace("kernel_ellipse.wgsl", "var power: f32;", "var power: f32; let w = 1lu;").unwrap();
-    let text = wide.join(&variant::modules(&needs)[0].0);
+    let text = wide.join(&passes::modules(&needs)[0].files);
     let module = naga::front::wgsl::parse_str(&text).unwrap();
     assert!(Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module).is_err());
 }
@@ -127,7 +129,7 @@ fn host_and_kernels_agree_about_overrides() {
         };
         assert_eq!(kernel.shape(), needs.kernel);
         let options = RenderOptions { kernel, ..RenderOptions::default() };
-        let constants = overrides(needs, &options, 24);
+        let constants = passes::constants(&Making { needs, options: &options, surfels: 1000 });
         assert!(constants.iter().all(|(_, value)| value.is_finite()));
         let set: BTreeSet<String> = constants.into_iter().map(|(name, _)| name.to_owned()).collect();
         for (_, declared) in module.overrides.iter() {
@@ -152,7 +154,8 @@ fn storage_buffers_stay_within_core_limits() {
             .filter(|(_, v)| matches!(v.space, AddressSpace::Storage { .. }))
             .filter_map(|(_, v)| v.name.as_deref())
             .collect();
-        let dispatched = |stage: &str| made.needs.raster.is_some() || made.stages.contains(&stage);
+        let dispatched =
+            |stage: &str| made.needs.raster.is_some() || made.kernels.iter().any(|kernel| kernel.name == stage);
         for (stage, variables) in bindings.iter().filter(|(stage, _)| dispatched(stage)) {
             let count = variables.iter().filter(|(name, _)| stored.contains(name.as_str())).count();
             assert!(count <= CORE_STORAGE_BUFFERS, "{stage} of {:?} uses {count}", made.needs.names());
@@ -246,7 +249,12 @@ fn absent_parts_have_their_partners_signatures() {
     };
     let alike = |prefix: &str, functions: &[&str]| alike_in(prefix, starting(prefix), functions);
     alike("accumulator_", &["add", "add_pair", "settle", "show", "sum_at", "weight_at"]);
-    let apart = ["accumulator_fixed.wgsl", "accumulator_fixed_pairs.wgsl", "accumulator_fixed_wide.wgsl"];
+    let apart = [
+        "accumulator_fixed.wgsl",
+        "accumulator_fixed64.wgsl",
+        "accumulator_fixed_pairs.wgsl",
+        "accumulator_fixed_wide.wgsl",
+    ];
     let with_terms =
         [starting("accumulator_"), starting("terms")].concat().into_iter().filter(|name| !apart.contains(name));
     alike_in("terms", with_terms.collect(), &["quantise", "term"]);

@@ -12,8 +12,6 @@ use epsplat::render::{Backend, Renderer, render};
 use epsplat::scene::{Camera, Lens, LowPass, Maps, Scene, Shading, Surfel, Up};
 use glam::DVec3;
 
-const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
-
 /// Where the second view is from.
 const OUTSIDE: DVec3 = DVec3::new(1.0, 0.7, 3.0);
 
@@ -46,7 +44,7 @@ fn views() -> Vec<Camera> {
 }
 
 fn options() -> Vec<RenderOptions> {
-    let lit = RenderOptions { maps: MAPS, ..RenderOptions::default() };
+    let lit = RenderOptions { maps: Maps::ON_DEVICE, ..RenderOptions::default() };
     vec![
         RenderOptions { shading: Shading::Unlit, ..RenderOptions::default() },
         RenderOptions { low_pass: LowPass::Ewa, organisation: Organisation::Scatter, ..lit.clone() },

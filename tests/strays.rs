@@ -57,7 +57,7 @@ fn camera(target: DVec3, away: f64) -> Camera {
 /// The kernels' picture of `scene` against the f64 reference of the sphere alone around zero, which has no digits to lose.
 fn against_alone(scene: &Scene, center: DVec3, away: f64, options: &RenderOptions) -> Option<Comparison> {
     let gpu = common::gpu()?;
-    let maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
+    let maps = Maps::ON_DEVICE;
     let options = RenderOptions { maps, ..options.clone() };
     let decided = RenderOptions { maps: Maps { decision: true, ..maps }, ..options.clone() };
     let (alone, _) = self::scene(&[DVec3::ZERO], &[]);

@@ -13,8 +13,6 @@ use epsplat::render::{Backend, Renderer, Report, render};
 use epsplat::scene::{Camera, Colors, Epsilon, Kernel, LowPass, Maps, Projection, Scene, Shading, Surfel, Up};
 use glam::{DVec3, Vec3};
 
-const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
-
 /// Kernels that take splats of more than `pixels` pixels for large.
 fn large_from(pixels: u32) -> Sources {
     Sources::default().replace("footprint.wgsl", "size.y > LARGE", &format!("size.y > {pixels}u")).unwrap()
@@ -32,7 +30,7 @@ fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Back
 
 /// Scenes whose splats are of all sizes, and options that need each form of the kernels.
 fn drawn() -> Vec<(&'static str, Scene, Camera, RenderOptions)> {
-    let plain = RenderOptions { maps: MAPS, epsilon: Epsilon::Relative(0.02), ..Default::default() };
+    let plain = RenderOptions { maps: Maps::ON_DEVICE, epsilon: Epsilon::Relative(0.02), ..Default::default() };
     let mut all = Vec::new();
     let (scene, camera) = crowded().swap_remove(1);
     all.push(("crowded", scene, camera, plain.clone()));
@@ -201,7 +199,7 @@ fn the_longest_lists_are_drawn_to_their_end() {
         let options = RenderOptions {
             kernel: Kernel::Constant,
             shading: Shading::Unlit,
-            maps: MAPS,
+            maps: Maps::ON_DEVICE,
             organisation: Organisation::Tile,
             ..Default::default()
         };
@@ -225,7 +223,7 @@ fn long_lists_are_drawn_to_their_end() {
     let options = RenderOptions {
         kernel: Kernel::Constant,
         shading: Shading::Unlit,
-        maps: MAPS,
+        maps: Maps::ON_DEVICE,
         epsilon: Epsilon::Absolute(1.0),
         // They are all the same.
         without: vec![Optimisation::Copies],

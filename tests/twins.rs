@@ -13,7 +13,8 @@ use epsplat::gpu::{Gpu, Sources};
 use epsplat::hardcases::precision::{E, Precision};
 use epsplat::inspect::{Stages, stages};
 use epsplat::passes::footprint::footprint;
-use epsplat::passes::project::{Splat, reference_all};
+use epsplat::passes::project::reference_all;
+use epsplat::passes::splat::Splat;
 use epsplat::passes::{accumulate, visibility};
 use epsplat::plan::{Accumulator, COLOR_CHANNEL, RenderOptions};
 use epsplat::render::{Backend, render};
@@ -21,12 +22,7 @@ use epsplat::scene::options::HIGHLIGHT;
 use epsplat::scene::{Epsilon, Kernel, LowPass, Maps, Projection, Shading};
 
 fn options(kernel: Kernel) -> RenderOptions {
-    RenderOptions {
-        kernel,
-        epsilon: Epsilon::Relative(0.02),
-        maps: Maps { depth: true, normal: true, weight: true, count: true, decision: false },
-        ..Default::default()
-    }
+    RenderOptions { kernel, epsilon: Epsilon::Relative(0.02), maps: Maps::ON_DEVICE, ..Default::default() }
 }
 
 const WEIGHT_CHANNEL: u32 = 0;

@@ -1,27 +1,13 @@
-// Sums in fixed point of one u64: 40 fractional bits a term, room for 2^24 full weights. Needs 64-bit atomics.
+// Sums of terms_wide.wgsl in fixed point of one u64: room for 2^24 full weights. Needs 64-bit atomics.
 // Error bound: src/passes/accumulate.rs.
 
 override CHANNELS: u32;
 
 @group(0) @binding(8) var<storage, read_write> sums: array<atomic<u64>>;
 
-alias Term = u64;
-const COUNT_ONE: Term = 1lu;
-
-// The units of a weight of 1: 2^40.
-const ONE: f32 = 1099511627776.0;
-
-// Scaling by a power of two is exact, and what of an f32 of at least 2^-10 lies below 2^-40 is less than its rounding.
-fn quantise(weight: f32) -> Term {
-    return u64(weight * ONE);
-}
-
-fn term(weight: Term, value: f32) -> Term {
-    return u64(f32(weight) * clamp(value, 0.0, 1.0));
-}
-
+// A term is cut below the unit, as the two words of accumulator_fixed_wide.wgsl are.
 fn add(pixel: u32, channel: u32, value: Term) {
-    atomicAdd(&sums[pixel * CHANNELS + channel], value);
+    atomicAdd(&sums[pixel * CHANNELS + channel], u64(value));
 }
 
 fn add_pair(pixel: u32, channel: u32, first: Term, second: Term) {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::runner::{Case, Timed};
+use super::case::{Case, Timed};
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::metrics::{Reconstruction, compare, reconstruction};

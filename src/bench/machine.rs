@@ -12,8 +12,7 @@ pub(super) fn machine(gpu: Option<&Backend>) -> Machine {
         Some(Backend::Gpu { gpu, .. }) => Some(&gpu.adapter),
         _ => None,
     };
-    let of_adapter =
-        |f: fn(&crate::gpu::device::AdapterDescription) -> &String| adapter.map(f).cloned().unwrap_or_default();
+    let of_adapter = |f: fn(&crate::gpu::AdapterDescription) -> &String| adapter.map(f).cloned().unwrap_or_default();
     let cpu = line_after("/proc/cpuinfo", "model name", ':').unwrap_or_else(|| std::env::consts::ARCH.to_owned());
     let os = line_after("/etc/os-release", "PRETTY_NAME", '=').unwrap_or_else(|| std::env::consts::OS.to_owned());
     Machine {

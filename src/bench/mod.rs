@@ -3,6 +3,7 @@
 //! [`Definition`] is such a file, [`run`] renders it, [`report::write`](crate::report::write) makes files of the outcome
 //! and [`table`] text.
 
+mod case;
 pub mod definition;
 mod judge;
 pub mod machine;

@@ -3,16 +3,16 @@
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-use super::definition::{BackendName, Config, Definition, SceneEntry};
+use super::case::{Case, Timed};
+use super::definition::{BackendName, Config, Definition};
 use super::judge;
 use super::machine::machine;
-use super::staging::{Staged, points, stage};
+use super::staging::{points, stage};
 use crate::error::{Error, Result};
 use crate::frame::Frame;
-use crate::passes::raster;
-use crate::plan::{RenderOptions, SceneNeeds};
+use crate::plan::{Facts, RenderOptions, SceneNeeds, check};
 use crate::progress::Progress;
-use crate::render::{Backend, DeviceBytes, Renderer};
+use crate::render::{Backend, Renderer};
 use crate::report::{Measurement, Study, Summary};
 use crate::scene::Camera;
 
@@ -25,29 +25,6 @@ pub struct Outcome {
     pub notes: Vec<String>,
     /// Configurations that missed their error limit or gave different bits in two runs: a sentence each.
     pub failures: Vec<String>,
-}
-
-/// One scene of a sweep.
-pub(super) struct Case<'a> {
-    pub definition: &'a Definition,
-    pub entry: &'a SceneEntry,
-    pub staged: &'a Staged,
-    gpu: Option<&'a Backend>,
-}
-
-/// One configuration on it.
-pub(super) struct Timed<'a> {
-    pub config: &'a Config,
-    pub options: &'a RenderOptions,
-    /// Mean milliseconds of a frame over the cameras, one value a run.
-    total_ms: Vec<f64>,
-    /// The same of each pass.
-    passes: BTreeMap<String, Vec<f64>>,
-    /// What the last run showed, a frame for each camera.
-    pub frames: Vec<Frame>,
-    bytes: DeviceBytes,
-    /// Whether the last run has the bits of the first.
-    stable: bool,
 }
 
 /// Renders every configuration on every scene. Times are those of whole frames, from the uploaded scene to the frame in host
@@ -195,14 +172,11 @@ impl<'a> Case<'a> {
     /// Whether the adapter has what a configuration needs.
     fn check(&self, config: &Config, options: &RenderOptions) -> Result<(), Unfit> {
         let Backend::Gpu { gpu, .. } = self.backend(config) else { return Ok(()) };
-        let outcome = match (options.raster, config.accumulator()) {
-            (Some(raster), _) => self.staged.cameras.iter().try_for_each(|camera| {
-                let needs = SceneNeeds::of(&self.staged.scene, &self.staged.scene.color_range(), camera, options);
-                raster::check(gpu, raster, &needs, camera)
-            }),
-            (None, Some(sums)) => sums.row().check(gpu),
-            (None, None) => Ok(()),
-        };
+        let facts = Facts::of(&self.staged.scene);
+        let outcome = self.staged.cameras.iter().try_for_each(|camera| {
+            let needs = SceneNeeds::of(&facts, &gpu.adapter, camera, options);
+            check::on_adapter(&gpu.adapter, &needs, camera)
+        });
         outcome.map_err(Unfit::Adapter)
     }
 

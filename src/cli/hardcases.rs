@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use epsplat::gpu::Gpu;
 use epsplat::hardcases::{Row, Verdict, cases, run as run_cases, supported};
-use epsplat::plan::Accumulator;
+use epsplat::plan::{Accumulator, check};
 use epsplat::render::Backend;
 use epsplat::{Error, Result};
 use serde::Serialize;
@@ -61,7 +61,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         other => other,
     })?;
     if let Some(chosen) = chosen {
-        chosen.check(&gpu)?;
+        check::sums(&gpu.adapter, chosen.of)?;
     }
     let name = gpu.adapter.name.clone();
     note(&format!("rendering on {name} ({}, {})", gpu.adapter.api, gpu.adapter.kind));

@@ -42,10 +42,16 @@ impl<T: Pod> Buffer<T> {
 
     /// A uniform of one element.
     pub fn uniform(gpu: &Gpu, what: &str, value: &T) -> Result<Self> {
-        let limit = gpu.limits.max_uniform_buffer_binding_size;
+        let limit = gpu.adapter.max_uniform_buffer_binding_size;
         let buffer = Self::create(gpu, what, 1, wgpu::BufferUsages::UNIFORM, limit)?;
         buffer.set(gpu, value);
         Ok(buffer)
+    }
+
+    /// The same as words of 32 bits.
+    pub(crate) fn words(self) -> Buffer<u32> {
+        let len = self.raw.size() / 4;
+        Buffer { raw: self.raw, len, element: PhantomData }
     }
 
     /// All of it, as a binding.
@@ -85,7 +91,7 @@ impl<T: Pod> Buffer<T> {
             return Err(Error::Limit {
                 adapter: gpu.adapter.name.clone(),
                 limit: match storage {
-                    true if gpu.limits.max_buffer_size < gpu.limits.max_storage_buffer_binding_size => {
+                    true if gpu.adapter.max_buffer_size < gpu.adapter.max_storage_buffer_binding_size => {
                         "max_buffer_size"
                     }
                     true => "max_storage_buffer_binding_size",
@@ -215,13 +221,6 @@ pub(crate) fn counts(gpu: &Gpu, buffers: &[&Buffer<u32>]) -> Result<Vec<[u32; 2]
     }
     gpu.queue.submit([encoder.finish()]);
     all.read(gpu, buffers.len() as u64)
-}
-
-/// How many elements of `stride` bytes fit a page, for the largest of the strides that are paged together.
-pub fn page_len(gpu: &Gpu, stride: usize) -> u64 {
-    let invocations =
-        u64::from(gpu.limits.max_compute_workgroups_per_dimension).pow(2) * u64::from(super::layout::WORKGROUP);
-    (gpu.buffer_limit() / stride as u64).min(invocations).min(u64::from(u32::MAX))
 }
 
 impl<T> Buffer<T> {

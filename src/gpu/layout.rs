@@ -2,22 +2,11 @@
 //! test in `tests/layout.rs` compares it with this mirror field by field.
 
 use bytemuck::{Pod, Zeroable};
-use glam::DVec3;
 
-use crate::plan::{Facts, RenderOptions};
 use crate::scene::light::MAX_LIGHTS;
-use crate::scene::texture::PlaceRange;
-use crate::scene::{Bounds, Camera, Colors, Light, Scene};
 
 /// Invocations of a workgroup, in every kernel.
 pub const WORKGROUP: u32 = 64;
-
-/// Splats whose bounds hold more pixels than this are drawn by tiles. Of 64, 128, 256, 512 and 1024 this gave the shortest
-/// frames of 30,000 and of 100,000 splats of a sphere on a software adapter.
-pub const LARGE_BY_TILES: u32 = 256;
-
-/// Where there are no tiles, splats whose bounds hold more pixels than this get a workgroup each instead of an invocation.
-pub const LARGE_BY_WORKGROUPS: u32 = 1024;
 
 /// Words at the start of a page's queue of large splats: how many there are, how many splats are out of view, and two grids of
 /// workgroups.
@@ -162,109 +151,4 @@ pub struct Filter {
     pub r_xy: f32,
     pub r_yy: f32,
     pub gain: f32,
-}
-
-/// x as the nearest f32 and the nearest f32 to what that leaves.
-fn split(x: f64) -> (f32, f32) {
-    let high = x as f32;
-    (high, (x - f64::from(high)) as f32)
-}
-
-fn split_all<const N: usize>(values: [f64; N]) -> ([f32; 4], [f32; 4]) {
-    let (mut high, mut low) = ([0.0; 4], [0.0; 4]);
-    for (k, value) in values.into_iter().enumerate() {
-        (high[k], low[k]) = split(value);
-    }
-    (high, low)
-}
-
-/// The largest coordinate of a stray surfel in device units: squares of lengths stay finite.
-const FARTHEST_STRAY: f64 = (1u64 << 60) as f64;
-
-/// The power of two that brings the extent of the scene's `body` and its distance from the camera to at most one, and all of
-/// its `bounds` to at most 2^60.
-pub fn device_unit(body: &Bounds, bounds: &Bounds, eye: DVec3) -> f64 {
-    let reach = |bounds: &Bounds| {
-        let corners = [bounds.min, bounds.max].into_iter();
-        corners.flat_map(|corner| [corner.abs().max_element(), (corner - eye).abs().max_element()]).fold(0.0, f64::max)
-    };
-    let reach = reach(body).max(reach(bounds) / FARTHEST_STRAY);
-    if reach > 0.0 && reach.is_finite() { (-reach.log2().ceil()).clamp(-126.0, 126.0).exp2() } else { 1.0 }
-}
-
-impl View {
-    /// The view of `scene`, whose values lie in `facts`, by `camera`.
-    pub fn new(scene: &Scene, facts: &Facts, camera: &Camera, options: &RenderOptions) -> Self {
-        let Facts { bounds, body, core, color: (low, high), largest_radius, .. } = facts;
-        let largest_radius = f64::from(*largest_radius);
-        let eye_relative = camera.eye - scene.origin;
-        let unit = device_unit(body, bounds, eye_relative);
-        let (eye, eye_low) = split_all((eye_relative * unit).to_array());
-        let (mut rotation, mut rotation_low) = ([[0.0; 4]; 3], [[0.0; 4]; 3]);
-        for row in 0..3 {
-            (rotation[row], rotation_low[row]) = split_all(camera.rotation.row(row).to_array());
-        }
-        // Pinhole intrinsics have no length; an orthographic scale is pixels per length.
-        let per_unit = match camera.projection {
-            crate::scene::Projection::Pinhole => 1.0,
-            crate::scene::Projection::Orthographic => 1.0 / unit,
-        };
-        let (intrinsics, intrinsics_low) =
-            split_all([camera.fx * per_unit, camera.fy * per_unit, camera.cx, camera.cy]);
-        let span: [f32; 4] = std::array::from_fn(|k| high[k] - low[k]);
-        let mut lights = [[0.0; 4]; MAX_LIGHTS];
-        for (slot, light) in lights.iter_mut().zip(&options.lights) {
-            *slot = match *light {
-                Light::Headlight { intensity } => [0.0, 0.0, 0.0, intensity],
-                Light::Directional { toward, intensity } => toward.extend(intensity).to_array(),
-            };
-        }
-        let ([texture_width, texture_height], place) = match &scene.colors {
-            Colors::Textured(textured) => {
-                let PlaceRange { middle: [u, v], span, most_reach_2 } = textured.range();
-                (textured.texture().size(), [u, v, span, most_reach_2])
-            }
-            _ => ([0; 2], [0.0; 4]),
-        };
-        let (relative, absolute, of_radius) = options.epsilon.parts();
-        // Past every surfel, with room for the rounding of depths. An epsilon that accepts everything must not make the
-        // interval that depths are measured in infinite, nor coarser than the scene.
-        let corners = (0..8).map(|corner| {
-            let pick = |axis: usize| if corner >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
-            DVec3::new(pick(0), pick(1), pick(2)) - eye_relative
-        });
-        let farthest = corners.map(|corner| camera.rotation.row(2).dot(corner)).fold(0.0, f64::max);
-        let farthest = (farthest + largest_radius) * 1.001;
-        Self {
-            rotation,
-            rotation_low,
-            eye,
-            eye_low,
-            intrinsics,
-            intrinsics_low,
-            color_low: *low,
-            color_span: span,
-            color_scale: span.map(|s| if s > 0.0 { 1.0 / s } else { 0.0 }),
-            background: options.background,
-            lights,
-            width: camera.width,
-            height: camera.height,
-            zero: 0,
-            unit: unit as f32,
-            // Squares of 1 / near must stay finite.
-            near: (camera.near * unit).max(1e-18) as f32,
-            epsilon_relative: relative as f32,
-            epsilon_absolute: (absolute * unit) as f32,
-            world: (1.0 / unit) as f32,
-            epsilon_radius: of_radius as f32,
-            epsilon_deepest: (of_radius * largest_radius * unit) as f32,
-            farthest: (farthest * unit) as f32,
-            middle: (camera.rotation.row(2).dot(core.center() - eye_relative) * unit) as f32,
-            texture_width,
-            texture_height,
-            padding_0: 0,
-            padding_1: 0,
-            place,
-        }
-    }
 }

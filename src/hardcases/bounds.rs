@@ -18,7 +18,8 @@ use glam::{DVec2, DVec3, Vec3};
 
 use super::precision::{E as U, Precision};
 use crate::passes::footprint::footprint;
-use crate::passes::project::{Splat, reference_all};
+use crate::passes::project::reference_all;
+use crate::passes::splat::Splat;
 use crate::plan::{AccumulatorRow, RenderOptions};
 use crate::scene::{Camera, Kernel, LowPass, Scene};
 

@@ -324,9 +324,10 @@ pub fn compare_rmse(rows: &mut [Row]) {
 mod tests {
     #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
     use super::*;
-    use crate::hardcases::{MAPS, cases};
+    use crate::hardcases::cases;
     use crate::plan::RenderOptions;
     use crate::render::{Backend, render};
+    use crate::scene::Maps;
 
     /// The reference judged by itself passes, and whatever is changed in it is noticed.
     #[test]
@@ -334,7 +335,7 @@ mod tests {
         let cases = cases().unwrap();
         let case = cases.iter().find(|case| case.name == "intersecting sheets").unwrap();
         let truth = case.truth().unwrap();
-        let options = RenderOptions { maps: MAPS, ..case.options.clone() };
+        let options = RenderOptions { maps: Maps::ON_DEVICE, ..case.options.clone() };
         let (frame, report) = render(&case.scene, &case.camera, &options, &Backend::Reference, &()).unwrap();
         let (exact, one_word) = (Accumulator::Fixed.row(), Accumulator::Fixed32.row());
         let row = judge(case, &truth, exact, &frame, &report);

@@ -27,7 +27,7 @@ pub use judge::{MapError, Row, Verdict, compare_rmse, judge};
 
 use crate::error::{Error, Result};
 use crate::frame::Frame;
-use crate::plan::{ACCUMULATORS, Accumulator, AccumulatorRow, RenderOptions};
+use crate::plan::{ACCUMULATORS, Accumulator, AccumulatorRow, RenderOptions, check};
 use crate::progress::Progress;
 use crate::render::{Backend, render};
 use crate::scene::{Camera, Maps, Scene};
@@ -85,15 +85,13 @@ pub struct Truth {
 }
 
 /// Every map.
-const MAPS: Maps = Maps { depth: true, normal: true, weight: true, count: true, decision: false };
-
 impl HardCase {
     /// Renders the reference and derives the bounds.
     ///
     /// # Errors
     /// Those of [`render`].
     pub fn truth(&self) -> Result<Truth> {
-        let options = RenderOptions { maps: Maps { decision: true, ..MAPS }, ..self.options.clone() };
+        let options = RenderOptions { maps: Maps { decision: true, ..Maps::ON_DEVICE }, ..self.options.clone() };
         let (frame, _) = render(&self.scene, &self.camera, &options, &Backend::Reference, &())?;
         Ok(Truth { frame, pixels: bounds::pixels(&self.scene, &self.camera, &self.options) })
     }
@@ -103,7 +101,7 @@ impl HardCase {
     /// # Errors
     /// Those of [`render`].
     pub fn judge(&self, truth: &Truth, accumulator: &'static AccumulatorRow, backend: &Backend) -> Result<Row> {
-        let options = RenderOptions { accumulator: accumulator.of, maps: MAPS, ..self.options.clone() };
+        let options = RenderOptions { accumulator: accumulator.of, maps: Maps::ON_DEVICE, ..self.options.clone() };
         let (frame, report) = render(&self.scene, &self.camera, &options, backend, &())?;
         Ok(judge(self, truth, accumulator, &frame, &report))
     }
@@ -112,7 +110,7 @@ impl HardCase {
 /// The accumulators that the adapter of `backend` has; all of them for the reference, which ignores the choice.
 pub fn supported(backend: &Backend) -> Vec<&'static AccumulatorRow> {
     let fits = |row: &&AccumulatorRow| match backend {
-        Backend::Gpu { gpu, .. } => row.check(gpu).is_ok(),
+        Backend::Gpu { gpu, .. } => check::sums(&gpu.adapter, row.of).is_ok(),
         Backend::Reference => true,
     };
     ACCUMULATORS.iter().filter(fits).collect()

@@ -17,8 +17,7 @@
 //!
 //! rho moves by no more than the vector (u, v) does, and a relative error of the depth is one of rho too (pinhole).
 
-use crate::passes::footprint::Intersection;
-use crate::passes::project::Splat;
+use crate::passes::splat::{Intersection, Splat};
 use crate::scene::{Camera, Projection, Scene};
 use glam::{DVec2, DVec3, Vec3};
 

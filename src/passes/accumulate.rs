@@ -30,17 +30,12 @@
 //! - **float**, **cas**: f32 sums, by atomic add or by compare and exchange. A sum of n terms in any order errs by at most
 //!   `(n - 1) u` of itself, and so does the weight's: `2 n u + 4 u`. The order shows.
 
-use super::cull::Part;
 use super::footprint::footprint;
-use super::project::{Splat, SplatBuffer};
-use super::variant::Variant;
-use super::visibility::VisibilityBuffer;
-use super::{Recorder, Rows};
-use crate::error::Result;
-use crate::gpu::Gpu;
-use crate::gpu::buffers::Buffer;
-use crate::gpu::kernel::Bound;
-use crate::plan::{Accumulator, RenderOptions, SceneNeeds};
+use super::splat::Splat;
+use crate::gpu::layout::TILE;
+use crate::plan::pass::Pass;
+use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage};
+use crate::plan::{Accumulator, Plan, RenderOptions, SceneNeeds};
 use crate::scene::options::LEAST_FILTERED_WEIGHT;
 use crate::scene::{Camera, Colors, Scene};
 
@@ -57,7 +52,7 @@ fn fixed_file(needs: &SceneNeeds) -> &'static str {
     }
 }
 
-/// The file of its terms, where [`fixed_file`] does not have them.
+/// The file of its terms.
 fn terms_file(needs: &SceneNeeds) -> &'static str {
     if needs.wide_sums { "terms_wide.wgsl" } else { "terms.wgsl" }
 }
@@ -65,10 +60,8 @@ fn terms_file(needs: &SceneNeeds) -> &'static str {
 /// The files that keep the sums of a render with `needs` in storage.
 pub fn files(needs: &SceneNeeds) -> Vec<&'static str> {
     match needs.accumulator {
-        Accumulator::Fixed => match fixed_file(needs) {
-            whole @ "accumulator_fixed64.wgsl" => vec![whole],
-            sums => vec![terms_file(needs), sums],
-        },
+        Accumulator::Fixed => vec![terms_file(needs), fixed_file(needs)],
+        Accumulator::Fixed64 => vec!["terms_wide.wgsl", "accumulator_fixed64.wgsl"],
         other => vec![other.row().file],
     }
 }
@@ -189,68 +182,40 @@ fn decision(rho: f64, depth: f64, back: f64, near: f64) -> f64 {
     }
 }
 
-/// The sums of each pixel of some rows.
-pub struct AttributeBuffer {
-    /// [`Variant::sum_words`](super::variant::Variant::sum_words) a pixel.
-    pub sums: Buffer<u32>,
-    /// How often a one-word sum wrapped in this frame.
-    overflows: Buffer<u32>,
+/// The pass's kernels, files and constants.
+pub const PASS: Pass = Pass {
+    name: "accumulate",
+    files: |needs| if needs.raster.is_none() { vec!["accumulate.wgsl"] } else { Vec::new() },
+    kernels: |needs| match needs.raster.is_none() && !needs.gather {
+        true => vec![ACCUMULATE, ACCUMULATE_LARGE],
+        false => Vec::new(),
+    },
+    constants: |making| vec![("FRACTION_BITS", making.needs.accumulator.row().fraction_bits(making.surfels).into())],
+};
+
+/// The files that keep the sums of a render's first module.
+pub const SUMS: Pass = Pass {
+    name: "sums",
+    files: |needs| if needs.raster.is_none() { files(needs) } else { Vec::new() },
+    kernels: |_| Vec::new(),
+    constants: |_| Vec::new(),
+};
+
+const ACCUMULATE: Kernel = Kernel::new("accumulate");
+const ACCUMULATE_LARGE: Kernel = Kernel::of("accumulate_large", [TILE, TILE, 1]);
+
+/// The pass of the small splats.
+pub fn steps(plan: &Plan, band: usize) -> Stage {
+    let mut clears = vec![Clear::of("sums", 0, plan.bands[band].pixels * u64::from(plan.sum_words))];
+    if band == 0 {
+        clears.push(Clear { buffer: "overflows", first: 0, count: None });
+    }
+    Stage::new("accumulate", band, vec![Run { kernel: ACCUMULATE, over: Over::Slots(Part::All) }]).after(clears)
 }
 
-impl AttributeBuffer {
-    /// Room for `pixels`.
-    pub fn new(gpu: &Gpu, variant: &Variant, pixels: u64) -> Result<Self> {
-        let words = pixels * u64::from(variant.sum_words());
-        Ok(Self {
-            sums: Buffer::storage(gpu, "weighted sums", words)?,
-            overflows: Buffer::storage(gpu, "overflow count", 2)?,
-        })
-    }
-
-    /// Device memory that it takes, bytes.
-    pub fn bytes(&self) -> u64 {
-        self.sums.bytes() + self.overflows.bytes()
-    }
-
-    /// What says, in its first word, how often a sum wrapped: the image is wrong unless that is 0.
-    pub(crate) fn counter(&self) -> &Buffer<u32> {
-        &self.overflows
-    }
-}
-
-impl AttributeBuffer {
-    /// What the pass binds of its own, and of the one before it.
-    pub(crate) fn bindings<'a>(&'a self, visible: &'a VisibilityBuffer) -> Bound<'a> {
-        vec![("visible", visible.nearest.bound()), ("sums", self.sums.bound()), ("overflows", self.overflows.bound())]
-    }
-}
-
-/// Records the pass of the small splats over `rows`.
-pub fn record(
-    recorder: &mut Recorder<'_>,
-    splats: &SplatBuffer,
-    rows: &Rows,
-    visible: &VisibilityBuffer,
-    buffer: &AttributeBuffer,
-) -> Result<()> {
-    let bytes = rows.pixels * u64::from(recorder.variant.sum_words()) * 4;
-    splats.dispatch(recorder, ("accumulate", Part::All), rows, &buffer.bindings(visible), |encoder| {
-        encoder.clear_buffer(&buffer.sums.raw, 0, Some(bytes));
-        if rows.first == 0 {
-            encoder.clear_buffer(&buffer.overflows.raw, 0, None);
-        }
-    })
-}
-
-/// Records the pass of the large splats over `rows`, a workgroup each.
-pub fn record_large(
-    recorder: &mut Recorder<'_>,
-    splats: &SplatBuffer,
-    rows: &Rows,
-    visible: &VisibilityBuffer,
-    buffer: &AttributeBuffer,
-) -> Result<()> {
-    splats.dispatch_large(recorder, ("accumulate", "accumulate_large"), rows, &buffer.bindings(visible))
+/// The pass of the large splats, a workgroup each.
+pub fn large(band: usize) -> Stage {
+    Stage::new("accumulate", band, vec![Run { kernel: ACCUMULATE_LARGE, over: Over::Large }])
 }
 
 #[cfg(test)]

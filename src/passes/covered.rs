@@ -2,67 +2,47 @@
 //! takes as long as to resolve others; so those tiles stay as the image was cleared, unless its background or its depth map
 //! differ from 0 there.
 
-use super::Rows;
-use crate::error::Result;
-use crate::gpu::Gpu;
-use crate::gpu::buffers::Buffer;
-use crate::gpu::kernel::{Bound, Grid, Program, grid};
-use crate::gpu::layout::{COVERED_GRID, COVERED_GRID_OF_EIGHTS, COVERED_LIST};
-use crate::plan::RenderOptions;
+use crate::gpu::layout::COVERED_LIST;
+use crate::plan::pass::Pass;
+use crate::plan::steps::{Clear, Kernel, Over, Run};
+use crate::plan::{Band, Plan};
 
-/// Whether a pixel differs from 0 where nothing is.
-pub fn lists_empty(options: &RenderOptions) -> bool {
-    options.maps.depth || options.background.iter().any(|value| value.to_bits() != 0)
+/// The pass's kernels, files and constants.
+pub const PASS: Pass = Pass {
+    name: "covered",
+    files: |_| vec!["covered.wgsl"],
+    kernels: |_| vec![LIST, ARRANGE],
+    constants: |making| {
+        let list_empty = making.options.shows_where_nothing_is();
+        vec![("LIST_EMPTY", u32::from(list_empty).into()), ("TILE_ROWS", super::tiles::rows(making.needs).into())]
+    },
+};
+
+const LIST: Kernel = Kernel::new("list_covered");
+const ARRANGE: Kernel = Kernel::of("arrange_covered", [1; 3]);
+
+/// Words that the list of a band takes at most.
+pub fn words(band: &Band) -> u64 {
+    u64::from(COVERED_LIST) + band.tiles
 }
 
-/// The list of the covered tiles, a part of a buffer.
-#[derive(Clone, Copy)]
-pub struct Covered<'a> {
-    words: &'a Buffer<u32>,
-    first: u64,
+/// The word of the buffer of nearest depths at which the list of a band starts: the rasteriser keeps no depths in it.
+pub fn start(plan: &Plan, band: usize) -> u64 {
+    let band = &plan.bands[band];
+    if plan.needs.raster.is_some() { 0 } else { band.pixels + band.tiles }
 }
 
-impl<'a> Covered<'a> {
-    /// The list that starts at the word `first` of `words`.
-    pub fn new(words: &'a Buffer<u32>, first: u64) -> Self {
-        Self { words, first }
+/// What is cleared before the list is made: its head, and the image, of which covered tiles alone are written.
+pub fn clears(plan: &Plan, band: usize) -> Vec<Clear> {
+    let mut clears = vec![Clear::of("nearest", start(plan, band), COVERED_LIST.into())];
+    if !plan.lists_empty {
+        let words = plan.bands[band].pixels * u64::from(plan.pixel.image_words);
+        clears.push(Clear::of("image", 0, words));
     }
+    clears
+}
 
-    /// Words that the list of `rows` takes at most.
-    pub fn room(rows: &Rows) -> u64 {
-        u64::from(COVERED_LIST) + rows.tiles
-    }
-
-    /// A workgroup for each covered tile.
-    pub(crate) fn each(&self) -> Grid<'a> {
-        Grid::In(&self.words.raw, (self.first + u64::from(COVERED_GRID)) * 4)
-    }
-
-    /// A workgroup for eight covered tiles.
-    pub(crate) fn eights(&self) -> Grid<'a> {
-        Grid::In(&self.words.raw, (self.first + u64::from(COVERED_GRID_OF_EIGHTS)) * 4)
-    }
-
-    /// Clears the list.
-    pub(crate) fn clear(&self, encoder: &mut wgpu::CommandEncoder) {
-        encoder.clear_buffer(&self.words.raw, self.first * 4, Some(u64::from(COVERED_LIST) * 4));
-    }
-
-    /// The buffer that it is in.
-    pub(crate) fn bound(&self) -> wgpu::BindingResource<'a> {
-        self.words.bound()
-    }
-
-    /// Records the list of `rows`; `bound` binds their sums, unless their nearest depths tell.
-    pub(crate) fn record(
-        &self,
-        (gpu, program): (&Gpu, &Program),
-        pass: &mut wgpu::ComputePass<'_>,
-        rows: &Rows,
-        bound: &[(&str, wgpu::BindingResource<'_>)],
-    ) -> Result<()> {
-        let bound: Bound<'_> = bound.iter().cloned().chain([("nearest", self.bound())]).collect();
-        program.dispatch(gpu, pass, "list_covered", &bound, Grid::Of(grid(gpu, rows.tiles)?))?;
-        program.dispatch(gpu, pass, "arrange_covered", &bound, Grid::Of((1, 1)))
-    }
+/// What makes the list.
+pub fn runs() -> [Run; 2] {
+    [Run { kernel: LIST, over: Over::Occlusion }, Run { kernel: ARRANGE, over: Over::Once }]
 }

@@ -1,6 +1,6 @@
 //! Stage 1, its start: batches of surfels that cannot show are left out before they are projected.
 //!
-//! The order of the surfels makes each [`BATCH`] of them a neighbourhood, with a bounding ball. Of the batches in view those
+//! The order of the surfels makes each [`BATCH`](crate::gpu::layout::BATCH) of them a neighbourhood, with a bounding ball. Of the batches in view those
 //! nearer than the middle of the scene are projected and drawn first ([`Part::Near`]). What is then farthest in each tile of
 //! pixels hides those of the others ([`Part::Far`]) that lie behind it, and epsilon behind that, at all of their pixels. Of a
 //! closed surface that is most of its back.
@@ -13,31 +13,15 @@
 //! There are no normal cones: a surfel is seen from both sides, so that a surface with a border has no holes.
 //!
 //! What is left out takes no room: the splats of the listed batches are stored one batch after the other, in slots, and
-//! [`SplatBuffer::make_room`] reads from the device how many there are.
+//! [`Look::Slots`](crate::plan::steps::Look::Slots) reads from the device how many there are.
 
 use glam::{DVec2, DVec3, Vec3};
 
 use super::lowpass::{Design, RADIUS};
-use super::project::SplatBuffer;
-use super::visibility::VisibilityBuffer;
-use super::{Recorder, Rows};
-use crate::error::Result;
-use crate::gpu::Gpu;
-use crate::gpu::buffers::Buffer;
-use crate::gpu::kernel::{Grid, grid};
-use crate::gpu::layout::{BATCH, LIST_FAR, LIST_START, QUEUE_START, WORKGROUP};
+use crate::gpu::layout::{LIST_FAR, QUEUE_START};
+use crate::plan::pass::Pass;
+use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage};
 use crate::scene::{Camera, LowPass, Projection, Surfel};
-
-/// Which batches a stage draws.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
-    /// Every one that is projected: of all there are, or where some are left out, the near and the far ones.
-    All,
-    /// In view and nearer than the middle of the scene.
-    Near,
-    /// In view, farther, and not hidden by the near ones.
-    Far,
-}
 
 /// A ball around disks, each with its centre: centre x, y, z and radius, world units relative to the scene's origin.
 pub(crate) fn ball<'a>(surfels: impl Iterator<Item = (DVec3, &'a Surfel)> + Clone) -> [f32; 4] {
@@ -88,77 +72,31 @@ pub fn reference(center: DVec3, radius: f64, camera: &Camera, filter_reach: f64)
     Some([image - extent, image + extent])
 }
 
-/// The batches of a page.
-pub(crate) struct Batches {
-    /// Those that are drawn, as `surviving` in `wgsl/cull.wgsl`.
-    drawn: Buffer<u32>,
-    /// Those that may be.
-    rest: Buffer<u32>,
-}
+/// The pass's kernels, files and constants.
+pub const PASS: Pass = Pass {
+    name: "cull",
+    files: |needs| vec![if needs.cull { "cull.wgsl" } else { "cull_absent.wgsl" }],
+    kernels: |needs| if needs.cull { vec![CULL_NEAR, CULL_FAR] } else { Vec::new() },
+    constants: |making| match making.needs.cull {
+        true => vec![("FILTER_REACH", filter_reach(&Design::of(making.options)))],
+        false => Vec::new(),
+    },
+};
 
-impl Batches {
-    /// Room for the batches of `surfels` surfels.
-    pub(crate) fn new(gpu: &Gpu, surfels: u64) -> Result<Self> {
-        let batches = surfels.div_ceil(BATCH.into());
-        let drawn = Buffer::indirect(gpu, "batches that are drawn", batches + u64::from(LIST_START))?;
-        // A row of a grid is a batch.
-        gpu.queue.write_buffer(&drawn.raw, 0, bytemuck::cast_slice(&[[BATCH / WORKGROUP, 0, 1]; 2]));
-        Ok(Self { drawn, rest: Buffer::storage(gpu, "batches that may be drawn", batches + 1)? })
-    }
+const CULL_NEAR: Kernel = Kernel::new("cull_near");
+const CULL_FAR: Kernel = Kernel::new("cull_far");
 
-    /// A workgroup for every [`WORKGROUP`] slots of `part`, and what says which surfels they are for.
-    pub(super) fn of(&self, part: Part) -> (Grid<'_>, (&'static str, wgpu::BindingResource<'_>)) {
-        let at = if part == Part::Far { u64::from(LIST_FAR) * 4 } else { 0 };
-        (Grid::In(&self.drawn.raw, at), ("drawn", self.drawn.bound()))
-    }
-
-    /// What says how many are drawn, in its second word.
-    pub(super) fn counter(&self) -> &Buffer<u32> {
-        &self.drawn
-    }
-
-    pub(crate) fn bytes(&self) -> u64 {
-        self.drawn.bytes() + self.rest.bytes()
-    }
-}
-
-/// Records which batches of every page are in `part`, [`Part::Near`] or, after `visible` holds the near ones, [`Part::Far`].
-pub fn record(
-    recorder: &mut Recorder<'_>,
-    buffer: &SplatBuffer,
-    part: Part,
-    (rows, visible): (&Rows, &VisibilityBuffer),
-) -> Result<()> {
-    let (gpu, program) = (recorder.gpu, recorder.program);
-    let view = recorder.view.bound();
+/// Which batches of every page are in `part`, [`Part::Near`] or, after the nearest depths are those of the near ones,
+/// [`Part::Far`].
+pub fn steps(band: usize, part: Part) -> Stage {
     let near = part == Part::Near;
-    let clear = |encoder: &mut wgpu::CommandEncoder| {
-        // The far ones follow the near ones.
-        for page in buffer.pages.iter().filter(|_| near) {
-            for word in [1, u64::from(LIST_FAR) + 1] {
-                encoder.clear_buffer(&page.batches.drawn.raw, word * 4, Some(4));
-            }
-            encoder.clear_buffer(&page.batches.rest.raw, 0, Some(4));
-            encoder.clear_buffer(&page.queue.raw, 0, Some(u64::from(QUEUE_START) * 4));
-        }
-    };
-    recorder.timing.pass(gpu, "project", clear, |pass| {
-        for (surfels, page) in buffer.surfels.pages.iter().zip(&buffer.pages) {
-            let bound = [
-                ("view", view.clone()),
-                ("band", rows.uniform.bound()),
-                ("surfels", surfels.surfels.bound()),
-                ("balls", surfels.balls.bound()),
-                ("queue", page.queue.bound()),
-                ("surviving", page.batches.drawn.bound()),
-                ("rest", page.batches.rest.bound()),
-                ("visible", visible.nearest.bound()),
-            ];
-            let stage = if near { "cull_near" } else { "cull_far" };
-            program.dispatch(gpu, pass, stage, &bound, Grid::Of(grid(gpu, surfels.balls.len)?))?;
-        }
-        Ok(())
-    })
+    let kernel = if near { CULL_NEAR } else { CULL_FAR };
+    // The far ones follow the near ones.
+    let counts = [("drawn", 1), ("drawn", u64::from(LIST_FAR) + 1), ("rest", 0)];
+    let mut clears: Vec<_> = counts.into_iter().map(|(list, word)| Clear::of(list, word, 1)).collect();
+    clears.push(Clear::of("queue", 0, QUEUE_START.into()));
+    let stage = Stage::new("project", band, vec![Run { kernel, over: Over::Batches }]);
+    if near { stage.after(clears) } else { stage }
 }
 
 #[cfg(test)]

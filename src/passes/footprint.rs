@@ -1,24 +1,40 @@
 //! A splat at a pixel: coverage, depth and rho. The twin of `wgsl/footprint.wgsl`.
 
 use super::lowpass::filtered;
-use super::project::Splat;
-use crate::scene::{Camera, LowPass, Projection};
+use super::splat::{Intersection, Splat};
+use crate::plan::pass::Pass;
+use crate::scene::{Camera, Kernel, KernelShape, LowPass, Projection};
 
-/// The ray through a pixel's centre meets a splat's plane in front of the camera.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Intersection {
-    /// Camera-space z, world units.
-    pub depth: f64,
-    /// Squared radius on the unit disk; the disk ends at 1.
-    pub rho2: f64,
-}
-
-impl Intersection {
-    /// Inside the disk and not nearer than the near depth.
-    pub fn hit(&self, camera: &Camera) -> bool {
-        self.rho2 <= 1.0 && self.depth >= camera.near
-    }
-}
+/// The files of the footprint and its weight; kernels of other passes evaluate them.
+pub const PASS: Pass = Pass {
+    name: "footprint",
+    files: |needs| {
+        vec![
+            match needs.projection {
+                Projection::Pinhole => "camera_pinhole.wgsl",
+                Projection::Orthographic => "camera_orthographic.wgsl",
+            },
+            "footprint.wgsl",
+            "blend.wgsl",
+            if needs.epsilon_radius { "epsilon_radius.wgsl" } else { "epsilon.wgsl" },
+            match needs.kernel {
+                KernelShape::Gaussian => "kernel_gaussian.wgsl",
+                KernelShape::Ellipse => "kernel_ellipse.wgsl",
+                KernelShape::Hat => "kernel_hat.wgsl",
+                KernelShape::Constant => "kernel_constant.wgsl",
+            },
+        ]
+    },
+    kernels: |_| Vec::new(),
+    constants: |making| match making.options.kernel {
+        Kernel::Gaussian { sigma } => vec![("KERNEL_FALL", 0.5 / (sigma * sigma))],
+        Kernel::Ellipse { a, n, smooth } => {
+            let step = if smooth { (-a).exp() } else { 0.0 };
+            vec![("KERNEL_A", a), ("KERNEL_N", n), ("KERNEL_STEP", step)]
+        }
+        Kernel::Hat | Kernel::Constant => Vec::new(),
+    },
+};
 
 /// Where the ray through the centre of pixel (x, y) meets the splat's plane, or its low-pass, and the factor on the
 /// kernel's weight; `None` behind the camera.

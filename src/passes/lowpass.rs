@@ -14,9 +14,9 @@
 
 use glam::DVec2;
 
-use super::footprint::Intersection;
-use super::project::Splat;
+use super::splat::{Filter, Intersection, Splat};
 use crate::plan::RenderOptions;
+use crate::plan::pass::Pass;
 use crate::scene::{Camera, Kernel, LowPass, Projection};
 
 /// The radius of `max`, pixels: half a pixel's diagonal, and a little for rounding.
@@ -26,21 +26,6 @@ pub const RADIUS: f64 = 0.7072;
 /// through all of it average. With Zwicker's wider Gaussians (standard deviations 0.5 and 0.36 were tried) the images of
 /// benches/lowpass.toml are 3 to 9 dB farther from 16 rays a pixel.
 pub const PIXEL_VARIANCE: f64 = 1.0 / 12.0;
-
-/// A splat's filter: the twin of [`crate::gpu::layout::Filter`], depths in world units.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Filter {
-    /// The splat's centre relative to its anchor's centre, pixels.
-    pub center: DVec2,
-    /// The depths on the disk.
-    pub depths: [f64; 2],
-    /// R: `(r[0] x + r[1] y, r[2] y)`.
-    pub r: [f64; 3],
-    /// Half the extent of the filter, pixels.
-    pub extent: DVec2,
-    /// Factor on the kernel's weight.
-    pub gain: f64,
-}
 
 /// `(pixel's sigma / kernel's sigma)^2`, pixels squared, but at least the square of [`RADIUS`]: what is added to J J^T.
 pub fn blur(kernel: Kernel) -> f64 {
@@ -59,6 +44,21 @@ pub fn blur(kernel: Kernel) -> f64 {
     // Wide kernels would end before the next pixel's centre.
     (PIXEL_VARIANCE / sigma_2).max(RADIUS * RADIUS)
 }
+
+/// The files and constants of the low-pass; kernels of other passes evaluate it.
+pub const PASS: Pass = Pass {
+    name: "lowpass",
+    files: |needs| match needs.low_pass {
+        LowPass::None => vec!["lowpass_none.wgsl"],
+        LowPass::Max => vec!["filter.wgsl", "lowpass_max.wgsl"],
+        LowPass::Ewa => vec!["filter.wgsl", "lowpass_ewa.wgsl"],
+    },
+    kernels: |_| Vec::new(),
+    constants: |making| match making.needs.low_pass {
+        LowPass::Ewa => vec![("FILTER_BLUR", blur(making.options.kernel))],
+        LowPass::None | LowPass::Max => Vec::new(),
+    },
+};
 
 /// A low-pass with its number, computed once a render.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -9,6 +9,7 @@
 use rayon::prelude::*;
 
 use crate::gpu::layout::BATCH;
+use crate::morton;
 use crate::scene::{Bounds, Surfel};
 
 /// Surfels of a run: whole batches. Of 64, 512 and 4096 the middle gave the shortest frames on a software adapter.
@@ -21,15 +22,6 @@ const BITS: u32 = 10;
 /// The last cell along each axis.
 const LAST: u32 = (1 << BITS) - 1;
 
-/// Spreads the low [`BITS`] bits of `x` to every third bit.
-fn spread(x: u32) -> u32 {
-    let mut x = x & LAST;
-    x = (x | x << 16) & 0x0300_00ff;
-    x = (x | x << 8) & 0x0300_f00f;
-    x = (x | x << 4) & 0x030c_30c3;
-    (x | x << 2) & 0x0924_9249
-}
-
 /// The indices of `surfels`, of which `core` holds nearly all, in the order in which they are stored. There are fewer than 2^32.
 /// Those outside are in the outermost cells, so that they make no cell larger.
 pub fn order(surfels: &[Surfel], core: &Bounds) -> Vec<u32> {
@@ -39,8 +31,8 @@ pub fn order(surfels: &[Surfel], core: &Bounds) -> Vec<u32> {
     let cells = if extent > 0.0 { LAST as f32 / extent } else { 0.0 };
     // The index breaks ties, so that the order is the same each time.
     let place = |(index, surfel): (usize, &Surfel)| {
-        let [x, y, z] = std::array::from_fn(|k| spread((((surfel.center[k] - low[k]) * cells) as u32).min(LAST)));
-        u64::from(x | y << 1 | z << 2) << 32 | index as u64
+        let cell = std::array::from_fn(|k| (((surfel.center[k] - low[k]) * cells) as u32).min(LAST).into());
+        morton::code(cell) << 32 | index as u64
     };
     let mut along: Vec<u64> = surfels.par_iter().enumerate().map(place).collect();
     along.par_sort_unstable();

@@ -17,32 +17,47 @@
 //! step of 1/255 of the [`BlendFormat::MOST_WEIGHTS_8`] weights that it can hold: `8 n / (255 w)` for a summed weight w,
 //! and what passes 8 weights is lost. Blending rounds in the order of the quads, so the order of the surfels shows.
 
-use super::covered::Covered;
-use super::project::SplatBuffer;
-use super::{Recorder, Rows};
-use crate::error::{Error, Result};
-use crate::gpu::Gpu;
-use crate::gpu::buffers::Buffer;
-use crate::gpu::kernel::{Bound, Draw};
-use crate::plan::{BlendFormat, ColorNeed, PixelLayout, Raster, RasterDepth, SceneNeeds};
-use crate::scene::Camera;
+use crate::gpu::program::Draw;
+use crate::plan::pass::Pass;
+use crate::plan::steps::Step;
+use crate::plan::{BlendFormat, PixelLayout, Plan, Raster, RasterDepth, SceneNeeds};
+
+/// The files and constants; the pipelines are [`draws`].
+pub const PASS: Pass = Pass {
+    name: "raster",
+    files: |needs| match needs.raster {
+        None => Vec::new(),
+        Some(raster) => vec![
+            "raster.wgsl",
+            "accumulator_raster.wgsl",
+            targets_file(needs),
+            match raster.depth {
+                RasterDepth::Exact => "raster_exact.wgsl",
+                RasterDepth::Offset | RasterDepth::Ray => "raster_offset.wgsl",
+            },
+        ],
+    },
+    kernels: |_| Vec::new(),
+    constants: |making| match making.needs.raster {
+        None => Vec::new(),
+        Some(raster) => vec![
+            ("VERTICES", vertices(making.needs).into()),
+            ("BLEND_SCALE", blend_scale(raster.format)),
+            // The visibility pass's pipeline says otherwise.
+            ("MOVED", 0.0),
+            ("ALONG_RAY", u32::from(raster.depth == RasterDepth::Ray).into()),
+        ],
+    },
+};
 
 /// Vertices of a splat; see raster.wgsl.
 pub fn vertices(needs: &SceneNeeds) -> u32 {
     if needs.triangles { 3 } else { 6 }
 }
 
-/// Channels of a target.
-const CHANNELS: u32 = 4;
-
-/// Targets that a pixel's sums need.
-fn targets(pixel: PixelLayout) -> u32 {
-    pixel.channels.div_ceil(CHANNELS)
-}
-
 /// The file that declares as many targets as `needs` have.
-pub fn targets_file(needs: &SceneNeeds) -> &'static str {
-    match targets(PixelLayout::of(needs)) {
+fn targets_file(needs: &SceneNeeds) -> &'static str {
+    match PixelLayout::of(needs).targets() {
         1 => "raster_targets_1.wgsl",
         2 => "raster_targets_2.wgsl",
         // Weight, four of colour, a gap, three of the normal, depth and count: twelve channels at most.
@@ -51,14 +66,15 @@ pub fn targets_file(needs: &SceneNeeds) -> &'static str {
 }
 
 /// What terms are multiplied with.
-pub fn blend_scale(format: BlendFormat) -> f64 {
+fn blend_scale(format: BlendFormat) -> f64 {
     match format {
         BlendFormat::Rgba8Unorm => 1.0 / f64::from(BlendFormat::MOST_WEIGHTS_8),
         BlendFormat::Rgba16Float | BlendFormat::Rgba32Float => 1.0,
     }
 }
 
-fn texture_format(format: BlendFormat) -> wgpu::TextureFormat {
+/// The format of the blended targets.
+pub fn texture_format(format: BlendFormat) -> wgpu::TextureFormat {
     match format {
         BlendFormat::Rgba8Unorm => wgpu::TextureFormat::Rgba8Unorm,
         BlendFormat::Rgba16Float => wgpu::TextureFormat::Rgba16Float,
@@ -66,10 +82,11 @@ fn texture_format(format: BlendFormat) -> wgpu::TextureFormat {
     }
 }
 
-const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+/// The format of nearest depths.
+pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
 /// The pipelines of the two passes.
-pub(crate) fn draws(raster: Raster, pixel: PixelLayout) -> Vec<Draw> {
+pub fn draws(raster: Raster, pixel: PixelLayout) -> Vec<Draw> {
     let depth = |compare, write| {
         Some(wgpu::DepthStencilState {
             format: DEPTH_FORMAT,
@@ -109,156 +126,20 @@ pub(crate) fn draws(raster: Raster, pixel: PixelLayout) -> Vec<Draw> {
         draw(
             "accumulate",
             ("shape_with_attributes", "raster_attributes"),
-            vec![target; targets(pixel) as usize],
+            vec![target; pixel.targets() as usize],
             test,
             false,
         ),
     ]
 }
 
-/// Fails with a sentence if `gpu` cannot blend this way, or `needs` ask for what blending cannot give.
-pub fn check(gpu: &Gpu, raster: Raster, needs: &SceneNeeds, camera: &Camera) -> Result<()> {
-    let limit = |limit, available: u32, needed: u32, what: &str| match needed > available {
-        false => Ok(()),
-        true => Err(Error::Limit {
-            adapter: gpu.adapter.name.clone(),
-            limit,
-            available: available.into(),
-            needed: needed.into(),
-            what: what.into(),
-        }),
-    };
-    if needs.color == ColorNeed::Textured {
-        return Err(Error::Usage(
-            "the rasteriser blends no texture coordinates: leave the texture out, or render by compute".into(),
-        ));
-    }
-    if !gpu.adapter.vertex_storage {
-        return Err(gpu.error("vertex shaders cannot read the splats here: take --backend gpu, or another --adapter"));
-    }
-    if raster.depth != RasterDepth::Exact && gpu.adapter.api == "gl" {
-        return Err(
-            gpu.error("OpenGL interpolates depths too coarsely: take --raster-depth exact, or another --adapter")
-        );
-    }
-    if raster.format == BlendFormat::Rgba32Float && !gpu.adapter.blends_f32 {
-        return Err(gpu.error("this adapter does not blend into 32-bit floats: take --blend-format rgba16float"));
-    }
-    if raster.format == BlendFormat::Rgba8Unorm && needs.count {
-        return Err(Error::Usage(
-            "an 8-bit target cannot count fragments: leave count out, or take rgba16float".into(),
-        ));
-    }
-    let side = gpu.limits.max_texture_dimension_2d;
-    limit("max_texture_dimension_2d", side, camera.width.max(camera.height), "for the image; choose a smaller one")?;
-    let bytes = match raster.format {
-        BlendFormat::Rgba8Unorm => 8,
-        BlendFormat::Rgba16Float => 8,
-        BlendFormat::Rgba32Float => 16,
-    };
-    let needed = bytes * targets(PixelLayout::of(needs));
-    let name = "max_color_attachment_bytes_per_sample";
-    limit(name, gpu.limits.max_color_attachment_bytes_per_sample, needed, "for the sums; ask for fewer maps")
-}
+/// Both passes, over the whole image.
+pub const STEP: Step = Step::Draw;
 
-/// The rasteriser's depth buffer and blended sums, of the whole image.
-pub struct Targets {
-    depth: wgpu::TextureView,
-    sums: Vec<wgpu::TextureView>,
-    /// The list of covered tiles.
-    pub covered: Buffer<u32>,
-    /// Device memory, bytes.
-    pub bytes: u64,
-}
+/// The names of the blended targets in WGSL.
+pub const SUM_NAMES: [&str; 3] = ["sums_0", "sums_1", "sums_2"];
 
-const SUM_NAMES: [&str; 3] = ["sums_0", "sums_1", "sums_2"];
-
-impl Targets {
-    /// For an image by `camera`.
-    pub fn new(gpu: &Gpu, raster: Raster, pixel: PixelLayout, camera: &Camera, bands: &[Rows]) -> Result<Self> {
-        let covered = Buffer::indirect(gpu, "covered tiles", bands.iter().map(Covered::room).max().unwrap_or(0))?;
-        let mut bytes = covered.bytes();
-        let guard = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
-        let mut view = |label, format: wgpu::TextureFormat| {
-            bytes += u64::from(format.block_copy_size(None).unwrap_or(4)) * camera.pixels() as u64;
-            let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some(label),
-                size: wgpu::Extent3d { width: camera.width, height: camera.height, depth_or_array_layers: 1 },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-                view_formats: &[],
-            });
-            texture.create_view(&Default::default())
-        };
-        let depth = view("nearest depths", DEPTH_FORMAT);
-        let format = texture_format(raster.format);
-        let sums = SUM_NAMES.iter().take(targets(pixel) as usize).map(|name| view(name, format)).collect();
-        if pollster::block_on(guard.pop()).is_some() {
-            return Err(gpu.error("out of memory for the blended sums: choose a smaller image"));
-        }
-        gpu.check()?;
-        Ok(Self { depth, sums, covered, bytes })
-    }
-
-    /// What resolve reads.
-    pub(crate) fn bindings(&self) -> Bound<'_> {
-        let sums = SUM_NAMES.iter().zip(&self.sums);
-        let mut bound: Bound<'_> = sums.map(|(name, view)| (*name, wgpu::BindingResource::TextureView(view))).collect();
-        bound.push(("nearest_depth", wgpu::BindingResource::TextureView(&self.depth)));
-        bound
-    }
-}
-
-/// Records both passes over the whole image.
-pub fn record(
-    recorder: &mut Recorder<'_>,
-    raster: Raster,
-    splats: &SplatBuffer,
-    rows: &Rows,
-    targets: &Targets,
-) -> Result<()> {
-    let (gpu, program) = (recorder.gpu, recorder.program);
-    // Where nothing is: the farthest there can be.
-    let nothing = if raster.depth == RasterDepth::Exact { 1.0 } else { 0.0 };
-    let attachment =
-        |load| wgpu::RenderPassDepthStencilAttachment { view: &targets.depth, depth_ops: load, stencil_ops: None };
-    let view = [("view", recorder.view.bound()), ("band", rows.uniform.bound())];
-    let nearest = ("nearest_depth", wgpu::BindingResource::TextureView(&targets.depth));
-    let draw = |pass: &mut wgpu::RenderPass<'_>, name, own: &[(&str, wgpu::BindingResource<'_>)]| {
-        for (index, page) in splats.pages.iter().enumerate() {
-            // Of more splats a binding would have 45 GB.
-            let vertices = u32::try_from(page.splats.len * u64::from(vertices(&recorder.variant.needs)))
-                .map_err(|_| gpu.error("a page has too many splats for the rasteriser's vertices"))?;
-            program.draw(gpu, pass, name, &splats.bindings(index, own), vertices)?;
-        }
-        Ok(())
-    };
-    let clear = wgpu::Operations { load: wgpu::LoadOp::Clear(nothing), store: wgpu::StoreOp::Store };
-    recorder
-        .timing
-        .draw(gpu, "visibility", &[], Some(attachment(Some(clear))), |pass| draw(pass, "visibility", &view))?;
-    let sums: Vec<_> = targets
-        .sums
-        .iter()
-        .map(|view| {
-            Some(wgpu::RenderPassColorAttachment {
-                view,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-                    store: wgpu::StoreOp::Store,
-                },
-            })
-        })
-        .collect();
-    // Without operations the depth buffer is read only, and the shader may not see it either way.
-    let (depth, own) = match raster.depth {
-        RasterDepth::Exact => (None, [view[0].clone(), view[1].clone(), nearest].to_vec()),
-        RasterDepth::Offset | RasterDepth::Ray => (Some(attachment(None)), view.to_vec()),
-    };
-    recorder.timing.draw(gpu, "accumulate", &sums, depth, |pass| draw(pass, "accumulate", &own))
+/// The vertices of the splats in `slots` slots; None for more than a draw has, of which a binding would have 45 GB.
+pub fn vertices_of(plan: &Plan, slots: u64) -> Option<u32> {
+    u32::try_from(slots * u64::from(vertices(&plan.needs))).ok()
 }

@@ -4,15 +4,11 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::accumulate::PixelSums;
-use super::covered::Covered;
-use super::variant::Variant;
-use super::{Recorder, Rows};
-use crate::error::Result;
+use super::covered;
 use crate::frame::Frame;
-use crate::gpu::Gpu;
-use crate::gpu::buffers::{Buffer, Readback};
-use crate::gpu::kernel::Bound;
-use crate::plan::RenderOptions;
+use crate::plan::pass::Pass;
+use crate::plan::steps::{Kernel, Over, Run, Stage};
+use crate::plan::{PixelLayout, Plan, RenderOptions};
 use crate::scene::options::HIGHLIGHT;
 use crate::scene::{Camera, Colors, Light, Scene, Shading};
 
@@ -64,7 +60,7 @@ fn unit_or_zero(mean: DVec3) -> DVec3 {
 }
 
 /// The linear colour that a surface of colour `straight` and unit `normal` has at the image point `at`, pixels.
-pub(crate) fn shade(straight: DVec3, normal: DVec3, camera: &Camera, options: &RenderOptions, at: DVec2) -> DVec3 {
+fn shade(straight: DVec3, normal: DVec3, camera: &Camera, options: &RenderOptions, at: DVec2) -> DVec3 {
     match options.shading {
         Shading::Unlit => straight,
         Shading::Lambert => {
@@ -98,7 +94,7 @@ fn irradiances(normal: DVec3, camera: &Camera, lights: &[Light], at: DVec2) -> i
 }
 
 /// Straight alpha over straight alpha.
-pub(crate) fn over(front: [f64; 4], back: [f64; 4]) -> [f64; 4] {
+fn over(front: [f64; 4], back: [f64; 4]) -> [f64; 4] {
     let behind = back[3] * (1.0 - front[3]);
     let alpha = front[3] + behind;
     if alpha > 0.0 {
@@ -109,91 +105,74 @@ pub(crate) fn over(front: [f64; 4], back: [f64; 4]) -> [f64; 4] {
     }
 }
 
-/// Resolved pixels of some rows.
-pub struct ImageBuffer {
-    /// [`PixelLayout::image_words`](super::variant::PixelLayout::image_words) a pixel.
-    pub image: Buffer<f32>,
-    readback: Readback,
-}
-
-impl ImageBuffer {
-    /// Room for `pixels`.
-    pub fn new(gpu: &Gpu, variant: &Variant, pixels: u64) -> Result<Self> {
-        let record = u64::from(variant.pixel.image_words);
-        let image = Buffer::readable(gpu, "image", pixels * record)?;
-        let readback = Readback::new(gpu, &image, pixels * record * 4, record * 4);
-        Ok(Self { image, readback })
-    }
-
-    /// Clears what covered tiles do not write, and their list.
-    pub(crate) fn clear(
-        &self,
-        variant: &Variant,
-        encoder: &mut wgpu::CommandEncoder,
-        rows: &Rows,
-        covered: Covered<'_>,
-    ) {
-        covered.clear(encoder);
-        if !variant.lists_empty {
-            let bytes = rows.pixels * u64::from(variant.pixel.image_words) * 4;
-            encoder.clear_buffer(&self.image.raw, 0, Some(bytes));
-        }
-    }
-
-    /// Memory that it takes, bytes, with what the host reads it through.
-    pub fn bytes(&self) -> u64 {
-        self.image.bytes() + self.readback.bytes()
-    }
-}
-
-/// Records the pass over the covered tiles of `rows`, whose sums `sums` binds.
-pub fn record(
-    recorder: &mut Recorder<'_>,
-    rows: &Rows,
-    (covered, sums): (Covered<'_>, Bound<'_>),
-    buffer: &ImageBuffer,
-) -> Result<()> {
-    let (gpu, program) = (recorder.gpu, recorder.program);
-    let own = [("view", recorder.view.bound()), ("band", rows.uniform.bound()), ("image", buffer.image.bound())];
-    let sums: Bound<'_> = own.into_iter().chain(sums).collect();
-    let bound: Bound<'_> = sums.iter().cloned().chain([("visible", covered.bound())]).collect();
-    let variant = recorder.variant;
-    let clear = |encoder: &mut wgpu::CommandEncoder| buffer.clear(variant, encoder, rows, covered);
-    recorder.timing.pass(gpu, "resolve", clear, |pass| {
-        covered.record((gpu, program), pass, rows, &sums)?;
-        program.dispatch(gpu, pass, "resolve", &bound, covered.each())
-    })
-}
-
-/// Reads resolved rows back into `frame`.
-pub fn read_back(recorder: &Recorder<'_>, rows: &Rows, buffer: &ImageBuffer, frame: &mut Frame) -> Result<()> {
-    let layout = recorder.variant.pixel;
-    let record = layout.image_words as usize * 4;
-    let start = rows.first as usize * frame.width as usize;
-    buffer.readback.visit(recorder.gpu, &buffer.image, rows.pixels * record as u64, |offset, bytes| {
-        let first = start + offset as usize / record;
-        let pixels = bytes.len() / record;
-        // Word `word` of each pixel on, in a map of N values a pixel.
-        fn copy<const N: usize>(map: &mut [[f32; N]], bytes: &[u8], record: usize, word: u32) {
-            let at = word as usize * 4;
-            map.par_iter_mut().zip(bytes.par_chunks_exact(record)).with_min_len(1 << 14).for_each(|(value, bytes)| {
-                *value = bytemuck::pod_read_unaligned(&bytes[at..at + 4 * N]);
-            });
-        }
-        let range = first..first + pixels;
-        copy(&mut frame.color[range.clone()], bytes, record, 0);
-        if let Some(map) = &mut frame.normal {
-            copy(&mut map[range.clone()], bytes, record, layout.normal_image);
-        }
-        let maps = [
-            (&mut frame.depth, layout.depth_image),
-            (&mut frame.weight, layout.weight_image),
-            (&mut frame.count, layout.count_image),
+/// The pass's kernels, files and constants.
+pub const PASS: Pass = Pass {
+    name: "resolve",
+    files: |needs| {
+        let pick = |needed, file, absent| if needed { file } else { absent };
+        let has_maps = needs.normal_map || needs.depth || needs.weight_map || needs.count;
+        vec![
+            "resolve.wgsl",
+            pick(has_maps, "image_maps.wgsl", "image_color.wgsl"),
+            pick(needs.normal_map, "normal_map.wgsl", "normal_map_absent.wgsl"),
+            pick(needs.weight_map, "weight_map.wgsl", "weight_map_absent.wgsl"),
+            match needs.shading {
+                Shading::Unlit => "shade_unlit.wgsl",
+                Shading::Lambert => "shade_lambert.wgsl",
+                Shading::Phong => "shade_phong.wgsl",
+            },
+        ]
+    },
+    kernels: |needs| if needs.gather { Vec::new() } else { vec![RESOLVE] },
+    constants: |making| {
+        let layout = PixelLayout::of(making.needs);
+        let mut constants = vec![
+            ("LIGHTS", making.options.lights.len() as f64),
+            ("IMAGE_WORDS", layout.image_words.into()),
+            ("NORMAL_IMAGE", layout.normal_image.into()),
+            ("DEPTH_IMAGE", layout.depth_image.into()),
+            ("WEIGHT_IMAGE", layout.weight_image.into()),
+            ("COUNT_IMAGE", layout.count_image.into()),
         ];
-        for (map, word) in maps {
-            if let Some(map) = map {
-                copy(bytemuck::cast_slice_mut::<f32, [f32; 1]>(&mut map[range.clone()]), bytes, record, word);
-            }
+        if making.needs.shading == Shading::Phong {
+            constants.push(("SHININESS", making.options.shininess.into()));
         }
-    })
+        constants
+    },
+};
+
+const RESOLVE: Kernel = Kernel::new("resolve");
+
+/// The pass over the tiles that anything covers.
+pub fn steps(plan: &Plan, band: usize) -> Stage {
+    let mut runs = covered::runs().to_vec();
+    runs.push(Run { kernel: RESOLVE, over: Over::Covered });
+    Stage::new("resolve", band, runs).after(covered::clears(plan, band))
+}
+
+/// Puts `bytes` of resolved pixels into `frame`, from its pixel `first` on.
+pub fn unpack(layout: &PixelLayout, bytes: &[u8], first: usize, frame: &mut Frame) {
+    let record = layout.image_words as usize * 4;
+    // Word `word` of each pixel on, in a map of N values a pixel.
+    fn copy<const N: usize>(map: &mut [[f32; N]], bytes: &[u8], record: usize, word: u32) {
+        let at = word as usize * 4;
+        map.par_iter_mut().zip(bytes.par_chunks_exact(record)).with_min_len(1 << 14).for_each(|(value, bytes)| {
+            *value = bytemuck::pod_read_unaligned(&bytes[at..at + 4 * N]);
+        });
+    }
+    let range = first..first + bytes.len() / record;
+    copy(&mut frame.color[range.clone()], bytes, record, 0);
+    if let Some(map) = &mut frame.normal {
+        copy(&mut map[range.clone()], bytes, record, layout.normal_image);
+    }
+    let maps = [
+        (&mut frame.depth, layout.depth_image),
+        (&mut frame.weight, layout.weight_image),
+        (&mut frame.count, layout.count_image),
+    ];
+    for (map, word) in maps {
+        if let Some(map) = map {
+            copy(bytemuck::cast_slice_mut::<f32, [f32; 1]>(&mut map[range.clone()]), bytes, record, word);
+        }
+    }
 }

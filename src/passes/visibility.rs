@@ -5,15 +5,13 @@
 //! that it is an atomic max over a buffer of zeros. What is then farthest in each tile of
 //! pixels lets the next pass leave out splats that are hidden altogether.
 
-use super::covered::Covered;
-use super::cull::Part;
+use super::covered;
 use super::footprint::footprint;
-use super::project::{Splat, SplatBuffer};
-use super::{Recorder, Rows};
-use crate::error::Result;
-use crate::gpu::Gpu;
-use crate::gpu::buffers::Buffer;
-use crate::gpu::kernel::{Grid, grid};
+use super::splat::Splat;
+use crate::gpu::layout::TILE;
+use crate::plan::pass::Pass;
+use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage};
+use crate::plan::{Band, Optimisation, Plan};
 use crate::scene::{Camera, LowPass};
 
 /// The twin: nearest depths of the rows `first_row..first_row + rows`, +inf where nothing is.
@@ -39,70 +37,44 @@ pub fn reference<'a>(
     nearest
 }
 
-/// The nearest depth of each pixel of some rows, device units, as what its bits lack to those of +inf.
-pub struct VisibilityBuffer {
-    /// One word a pixel, then one a tile (occlusion.wgsl), then the covered tiles.
-    pub nearest: Buffer<u32>,
+/// The pass's kernels, files and constants.
+pub const PASS: Pass = Pass {
+    name: "visibility",
+    files: |needs| if needs.raster.is_none() { vec!["visibility.wgsl", "occlusion.wgsl"] } else { Vec::new() },
+    kernels: |needs| match (needs.raster, needs.cull) {
+        (None, false) => vec![VISIBILITY, VISIBILITY_LARGE, OCCLUDE],
+        (None, true) => vec![VISIBILITY, VISIBILITY_LARGE, OCCLUDE, OCCLUDE_OPEN],
+        (Some(_), _) => Vec::new(),
+    },
+    constants: |making| vec![("HIDES", u32::from(making.options.has(Optimisation::Hiding)).into())],
+};
+
+const VISIBILITY: Kernel = Kernel::new("visibility");
+const VISIBILITY_LARGE: Kernel = Kernel::of("visibility_large", [TILE, TILE, 1]);
+const OCCLUDE: Kernel = Kernel::new("occlude");
+const OCCLUDE_OPEN: Kernel = Kernel::new("occlude_open");
+
+/// Words of the buffer of nearest depths: one a pixel, one a tile (occlusion.wgsl), then the covered tiles.
+pub fn nearest_words(band: &Band) -> u64 {
+    band.pixels + band.tiles + covered::words(band)
 }
 
-impl VisibilityBuffer {
-    /// Room for each of `bands`.
-    pub fn new(gpu: &Gpu, bands: &[Rows]) -> Result<Self> {
-        let words = bands.iter().map(|rows| rows.pixels + rows.tiles + Covered::room(rows)).max().unwrap_or(0);
-        Ok(Self { nearest: Buffer::indirect(gpu, "nearest depths", words)? })
+/// The pass of `part` of the small splats.
+pub fn steps(plan: &Plan, band: usize, part: Part) -> Stage {
+    let stage = Stage::new("visibility", band, vec![Run { kernel: VISIBILITY, over: Over::Slots(part) }]);
+    match part {
+        Part::Far => stage,
+        Part::All | Part::Near => stage.after(vec![Clear::of("nearest", 0, plan.bands[band].pixels)]),
     }
-
-    /// Where the covered tiles of `rows` are listed.
-    pub fn covered(&self, rows: &Rows) -> Covered<'_> {
-        Covered::new(&self.nearest, rows.pixels + rows.tiles)
-    }
 }
 
-/// Records the pass of `part` of the small splats over `rows`.
-pub fn record(
-    recorder: &mut Recorder<'_>,
-    (splats, part): (&SplatBuffer, Part),
-    rows: &Rows,
-    buffer: &VisibilityBuffer,
-) -> Result<()> {
-    let clear = |encoder: &mut wgpu::CommandEncoder| {
-        if part != Part::Far {
-            encoder.clear_buffer(&buffer.nearest.raw, 0, Some(rows.pixels * 4));
-        }
-    };
-    splats.dispatch(recorder, ("visibility", part), rows, &[("nearest", buffer.nearest.bound())], clear)
+/// The pass of the large splats, a workgroup each.
+pub fn large(band: usize) -> Stage {
+    Stage::new("visibility", band, vec![Run { kernel: VISIBILITY_LARGE, over: Over::Large }])
 }
 
-/// Records the pass of the large splats over `rows`, a workgroup each.
-pub fn record_large(
-    recorder: &mut Recorder<'_>,
-    splats: &SplatBuffer,
-    rows: &Rows,
-    buffer: &VisibilityBuffer,
-) -> Result<()> {
-    let buffers = [("nearest", buffer.nearest.bound())];
-    splats.dispatch_large(recorder, ("visibility", "visibility_large"), rows, &buffers)
-}
-
-/// Records the farthest of the nearest depths in each tile; after [`Part::Near`], what is empty hides nothing.
-pub fn occlude(recorder: &mut Recorder<'_>, part: Part, rows: &Rows, buffer: &VisibilityBuffer) -> Result<()> {
-    let stage = if part == Part::Near { "occlude_open" } else { "occlude" };
-    over(recorder, stage, (rows, rows.tiles), buffer)
-}
-
-/// Records a kernel over the depths alone.
-fn over(
-    recorder: &mut Recorder<'_>,
-    stage: &str,
-    (rows, invocations): (&Rows, u64),
-    buffer: &VisibilityBuffer,
-) -> Result<()> {
-    let (gpu, program) = (recorder.gpu, recorder.program);
-    let bound = [("view", recorder.view.bound()), ("band", rows.uniform.bound()), ("nearest", buffer.nearest.bound())];
-    recorder.timing.pass(
-        gpu,
-        "visibility",
-        |_| {},
-        |pass| program.dispatch(gpu, pass, stage, &bound, Grid::Of(grid(gpu, invocations)?)),
-    )
+/// The farthest of the nearest depths in each tile; after [`Part::Near`], what is empty hides nothing.
+pub fn occlude(band: usize, part: Part) -> Stage {
+    let kernel = if part == Part::Near { OCCLUDE_OPEN } else { OCCLUDE };
+    Stage::new("visibility", band, vec![Run { kernel, over: Over::Occlusion }])
 }

@@ -6,7 +6,6 @@ use std::str::FromStr;
 use serde::{Serialize, Serializer};
 
 use crate::error::Error;
-use crate::gpu::Gpu;
 use crate::gpu::layout::ONE;
 
 /// How sums are kept on the device.
@@ -161,19 +160,6 @@ impl AccumulatorRow {
         let most = surfels.clamp(1, 255) as u32;
         32 - (32 - most.leading_zeros())
     }
-
-    /// Fails with a sentence if `gpu` lacks what it needs.
-    pub fn check(&self, gpu: &Gpu) -> Result<(), Error> {
-        let (has, what) = match self.features {
-            Features::None => return Ok(()),
-            Features::AtomicsU64 => (gpu.adapter.atomics_u64, "64-bit atomics"),
-            Features::AtomicsF32 => (gpu.adapter.atomics_f32, "f32 atomic add"),
-        };
-        if has {
-            return Ok(());
-        }
-        Err(gpu.error(format!("the accumulator {} needs {what}, which this adapter lacks: take fixed", self.name)))
-    }
 }
 
 #[cfg(test)]
@@ -184,7 +170,7 @@ mod tests {
     fn every_accumulator_has_its_row_its_file_and_its_own_name() {
         for row in ACCUMULATORS {
             assert!(std::ptr::eq(row.of.row(), row), "{}", row.name);
-            assert!(crate::gpu::kernel::FILES.iter().any(|(name, _)| *name == row.file), "{}", row.file);
+            assert!(crate::gpu::sources::FILES.iter().any(|(name, _)| *name == row.file), "{}", row.file);
             assert_eq!(row.name.parse::<Accumulator>().ok(), Some(row.of));
         }
         assert!("double".parse::<Accumulator>().is_err());

@@ -1,34 +1,85 @@
-//! What a renderer must know of all surfels together, looked up once and not for each frame.
+//! What a renderer must know of all surfels together, looked up once and not for each frame. No view is in it.
 
-use crate::scene::{Bounds, Scene, has_copies};
+use glam::DVec3;
 
-/// The ranges that a scene's values lie in.
-#[derive(Clone, Copy, Debug)]
+use crate::scene::texture::PlaceRange;
+use crate::scene::{Bounds, Colors, Scene, Surfel, has_copies};
+
+/// Where a surfel's colour comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ColorNeed {
+    /// All surfels share one colour: none is stored, none is accumulated.
+    Constant,
+    /// A word of 8-bit sRGB each.
+    Srgb8,
+    /// Four f32 each.
+    Linear,
+    /// The same of the texture's mean over the disk, and a place in the texture, which is looked up once a pixel.
+    Textured,
+}
+
+/// Surfels that are kept in [`Facts::sample`], about.
+const SAMPLED: usize = 1024;
+
+/// The ranges that a scene's values lie in, and its counts.
+#[derive(Clone, Debug)]
 pub struct Facts {
+    /// [`Scene::origin`].
+    pub origin: DVec3,
+    /// Its surfels.
+    pub surfels: u64,
     /// [`Scene::bounds`].
     pub bounds: Bounds,
     /// The box of [`Scene::body`].
     pub body: Bounds,
     /// [`Scene::core`].
     pub core: Bounds,
-    /// [`Scene::color_range`].
+    /// Smallest and largest colour, [`Scene::color_range`].
     pub color: ([f32; 4], [f32; 4]),
+    /// Where the colours come from.
+    pub colors: ColorNeed,
+    /// The texture's width and height, and the range of places in it.
+    pub texture: Option<([u32; 2], PlaceRange)>,
     /// [`Scene::largest_radius`].
     pub largest_radius: f32,
-    /// One surfel has many copies, which are drawn as one.
+    /// [`Scene::oriented`].
+    pub oriented: bool,
+    /// Centres have trailing parts, [`Scene::low`].
+    pub doubled: bool,
+    /// One surfel has many copies, which can be drawn as one.
     pub copies: bool,
+    /// Every so many surfels one, and its centre with all digits.
+    pub sample: Vec<(Surfel, DVec3)>,
 }
 
 impl Facts {
     /// Those of `scene`.
     pub fn of(scene: &Scene) -> Self {
+        let (low, high) = scene.color_range();
+        let step = scene.surfels.len().div_ceil(SAMPLED).max(1);
         Self {
+            origin: scene.origin,
+            surfels: scene.surfels.len() as u64,
             bounds: scene.bounds(),
             body: scene.body().0,
             core: scene.core(),
-            color: scene.color_range(),
+            color: (low, high),
+            colors: match scene.colors {
+                Colors::Textured(_) => ColorNeed::Textured,
+                _ if low == high => ColorNeed::Constant,
+                Colors::Constant(_) => ColorNeed::Constant,
+                Colors::Srgb8(_) => ColorNeed::Srgb8,
+                Colors::Linear(_) => ColorNeed::Linear,
+            },
+            texture: match &scene.colors {
+                Colors::Textured(textured) => Some((textured.texture().size(), textured.range())),
+                _ => None,
+            },
             largest_radius: scene.largest_radius(),
+            oriented: scene.oriented,
+            doubled: !scene.low.is_empty(),
             copies: has_copies(scene),
+            sample: (0..scene.surfels.len()).step_by(step).map(|k| (scene.surfels[k], scene.center(k))).collect(),
         }
     }
 }

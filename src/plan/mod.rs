@@ -1,17 +1,129 @@
-//! What a frame is made of, before a device is asked for anything.
+//! What a frame is made of, before a device is asked for anything: a pure function of what is known of the scene, the adapter, the
+//! view and the options.
 
 mod accumulator;
+pub mod check;
+mod cuts;
 mod facts;
+pub mod known;
 mod needs;
 mod optimisation;
 mod options;
+pub mod pass;
 mod pixel;
 mod raster;
+pub mod steps;
+pub mod tuning;
+mod view;
 
 pub use accumulator::{ACCUMULATORS, Accumulator, AccumulatorRow, Features};
-pub use facts::Facts;
-pub use needs::{ColorNeed, SMALL_WEIGHT, SceneNeeds};
+pub use cuts::{Band, bands, page_surfels};
+pub use facts::{ColorNeed, Facts};
+pub use known::Known;
+pub use needs::{SMALL_WEIGHT, SceneNeeds};
 pub use optimisation::Optimisation;
 pub use options::{Organisation, RenderOptions};
 pub use pixel::{COLOR_CHANNEL, PixelLayout, color_channels};
 pub use raster::{BlendFormat, Raster, RasterDepth};
+pub use view::device_unit;
+
+use crate::error::Result;
+use crate::gpu::adapter::AdapterDescription;
+use crate::gpu::layout::BATCH;
+use crate::scene::Camera;
+use known::Listed;
+use steps::Part;
+
+/// How a frame is rendered.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// What exists: the key of the kernels.
+    pub needs: SceneNeeds,
+    /// The room that a pixel takes.
+    pub pixel: PixelLayout,
+    /// u32 words of a pixel's sums in storage; the rasteriser's are in textures, those of tiles that gather in registers.
+    pub sum_words: u32,
+    /// Columns of the image.
+    pub width: u32,
+    /// The rows that buffers hold at a time.
+    pub bands: Vec<Band>,
+    /// Pages that the surfels fill, where each is drawn by itself.
+    pub pages: usize,
+    /// Pixels that nothing covers differ from 0.
+    pub lists_empty: bool,
+    /// The slots of splats are counted on the way.
+    pub looks_for_slots: bool,
+    /// Large splats are drawn by tiles, not by a workgroup each.
+    pub large_by_tiles: bool,
+    /// The entries of lists are counted on the way: of the large splats, of the small ones.
+    pub looks_for_lists: [bool; 2],
+}
+
+impl Plan {
+    /// The plan for a view by `camera` of the scene that `facts` are of.
+    ///
+    /// # Errors
+    /// [`Error::Usage`](crate::Error::Usage) for what does not go together, and a limit of the adapter.
+    pub fn of(
+        facts: &Facts,
+        adapter: &AdapterDescription,
+        camera: &Camera,
+        options: &RenderOptions,
+        known: &Known,
+    ) -> Result<Self> {
+        let accumulator = if known.overflows > 0 { Accumulator::Fixed } else { options.accumulator };
+        let options = &RenderOptions { accumulator, ..options.clone() };
+        let needs = SceneNeeds::of(facts, adapter, camera, options);
+        check::on_adapter(adapter, &needs, camera)?;
+        let pixel = PixelLayout::of(&needs);
+        let sum_words = pixel.sum_words(&needs);
+        let bands = bands(adapter, camera, sum_words.max(pixel.image_words))?;
+        let page = page_surfels(adapter);
+        let one_band = bands.len() == 1;
+        let gathers = match options.organisation {
+            Organisation::Auto => needs.subgroups && known.touched_tiles >= tuning::GATHERED_TOUCHED_TILES,
+            Organisation::Tile => true,
+            Organisation::Scatter => false,
+        };
+        let gather = needs.tiles
+            && gathers
+            && one_band
+            && facts.surfels <= page
+            && !known.crowded
+            && options.has(Optimisation::Gathering);
+        // What is drawn first hides what is drawn later in the same band alone. The rasteriser draws every splat.
+        let cull = one_band
+            && options.has(Optimisation::Culling)
+            && tuning::PIXELS_A_CULLED_SURFEL * facts.surfels > camera.pixels() as u64
+            && page >= BATCH.into()
+            && !needs.copies
+            && needs.raster.is_none();
+        let needs = SceneNeeds { gather, cull, ..needs };
+        let looks = [Listed::Large, Listed::Small].map(|of| {
+            let wanted = match of {
+                Listed::Large => needs.tiles && !known.crowded_large && (gather || known.large != Some(false)),
+                Listed::Small => gather,
+            };
+            wanted && known.entries_of(of).is_none()
+        });
+        Ok(Self {
+            needs,
+            pixel,
+            sum_words: if gather { 0 } else { sum_words },
+            width: camera.width,
+            bands,
+            pages: facts.surfels.div_ceil(page).max(1) as usize,
+            lists_empty: options.shows_where_nothing_is(),
+            looks_for_slots: cull && !known.slots,
+            large_by_tiles: needs.tiles
+                && !known.crowded_large
+                && (looks[0] || known.entries_of(Listed::Large).is_some()),
+            looks_for_lists: looks,
+        })
+    }
+
+    /// The parts that are drawn one after the other.
+    pub fn parts(&self) -> &'static [Part] {
+        if self.needs.cull { &[Part::Near, Part::Far] } else { &[Part::All] }
+    }
+}

@@ -1,20 +1,8 @@
 //! What a scene and its options need, computed once: the only variant key of the kernels.
 
-use super::{Accumulator, Organisation, Raster, RasterDepth, RenderOptions};
-use crate::scene::{Camera, Colors, Epsilon, KernelShape, LowPass, Projection, Scene, Shading};
-
-/// Where a surfel's colour comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum ColorNeed {
-    /// All surfels share one colour: none is stored, none is accumulated.
-    Constant,
-    /// A word of 8-bit sRGB each.
-    Srgb8,
-    /// Four f32 each.
-    Linear,
-    /// The same of the texture's mean over the disk, and a place in the texture, which is looked up once a pixel.
-    Textured,
-}
+use super::{Accumulator, ColorNeed, Facts, Optimisation, Organisation, Raster, RasterDepth, RenderOptions, tuning};
+use crate::gpu::adapter::AdapterDescription;
+use crate::scene::{Camera, Epsilon, KernelShape, LowPass, Projection, Shading};
 
 /// What exists in this render: it chooses the WGSL files that are joined, and so the bindings, buffers and sums.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -34,9 +22,8 @@ pub struct SceneNeeds {
     pub doubled: bool,
     /// A surfel stands for all that are the same: the accumulator is `fixed`, one has many copies, and there is no texture.
     pub copies: bool,
-    /// Batches of surfels that are out of view or hidden are left out: the image is one band, and there is more than a surfel for
-    /// every six pixels, all of which are looked at for what hides. On a software adapter at 1024x1024, frames of 300,000 splats
-    /// take 0.86 times as long by it, of 100,000 1.08 times, of 1,000 small ones 1.13 times.
+    /// Batches of surfels that are out of view or hidden are left out: the image is one band, and there are enough surfels for its
+    /// pixels, all of which are looked at for what hides ([`tuning::PIXELS_A_CULLED_SURFEL`]).
     pub cull: bool,
     /// Large splats, at least, are drawn by tiles: the accumulator is `fixed`, the options do not say scatter, and there is no
     /// texture, whose sums are more than a tile's registers hold.
@@ -48,9 +35,7 @@ pub struct SceneNeeds {
     pub subgroups: bool,
     /// Sums are the rasteriser's.
     pub raster: Option<Raster>,
-    /// It draws a triangle a splat instead of a quad, as there are more surfels than tenths of the image's pixels. On a
-    /// software adapter at 1024x1024, frames of 1,000,000 splats take 0.6 times as long by triangles as by quads, of
-    /// 100,000 as long, of 10,000 1.2 times.
+    /// It draws a triangle a splat instead of a quad ([`tuning::PIXELS_A_TRIANGLE`]).
     pub triangles: bool,
     /// The kernel's formula.
     pub kernel: KernelShape,
@@ -89,43 +74,32 @@ fn may_be_small(options: &RenderOptions) -> bool {
 }
 
 impl SceneNeeds {
-    /// The needs of `scene` under `options`; `color_range` is [`Scene::color_range`].
-    pub fn of(scene: &Scene, color_range: &([f32; 4], [f32; 4]), camera: &Camera, options: &RenderOptions) -> Self {
-        let (low, high) = color_range;
-        let color = match scene.colors {
-            Colors::Textured(_) => ColorNeed::Textured,
-            _ if low == high => ColorNeed::Constant,
-            Colors::Constant(_) => ColorNeed::Constant,
-            Colors::Srgb8(_) => ColorNeed::Srgb8,
-            Colors::Linear(_) => ColorNeed::Linear,
-        };
+    /// What the picture needs of the scene that `facts` are of, whoever renders it.
+    pub fn of_picture(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Self {
+        let (low, high) = facts.color;
         let lit = options.shading != Shading::Unlit;
+        let fixed = options.accumulator == Accumulator::Fixed && options.raster.is_none();
         Self {
             projection: camera.projection,
             accumulator: options.accumulator,
-            wide_sums: options.raster.is_none()
-                && options.accumulator == Accumulator::Fixed
-                && (low[3] != high[3] || may_be_small(options)),
+            wide_sums: fixed && (low[3] != high[3] || may_be_small(options)),
             atomics_u64: false,
             long_words: false,
-            doubled: !scene.low.is_empty(),
+            doubled: facts.doubled,
             copies: false,
             cull: false,
-            tiles: options.accumulator == Accumulator::Fixed
-                && options.raster.is_none()
-                && color != ColorNeed::Textured
-                && options.organisation != Organisation::Scatter,
+            tiles: fixed && facts.colors != ColorNeed::Textured && options.organisation != Organisation::Scatter,
             gather: false,
             subgroups: false,
             raster: options.raster,
-            triangles: options.raster.is_some() && 10 * scene.surfels.len() > camera.pixels(),
+            triangles: options.raster.is_some() && tuning::PIXELS_A_TRIANGLE * facts.surfels > camera.pixels() as u64,
             kernel: options.kernel.shape(),
             low_pass: options.low_pass,
             epsilon_radius: matches!(options.epsilon, Epsilon::Radius(_)),
-            color,
+            color: facts.colors,
             alpha: low[3] != high[3],
             normal: lit || options.maps.normal,
-            turn_normals: !scene.oriented && (lit || options.maps.normal),
+            turn_normals: !facts.oriented && (lit || options.maps.normal),
             depth: options.maps.depth,
             count: options.maps.count,
             shading: options.shading,
@@ -135,41 +109,21 @@ impl SceneNeeds {
         }
     }
 
-    /// The same on an adapter that has 64-bit atomics or not.
-    pub fn with_atomics_u64(self, atomics_u64: bool) -> Self {
+    /// What a render on `adapter` needs, before the image is cut into bands.
+    pub fn of(facts: &Facts, adapter: &AdapterDescription, camera: &Camera, options: &RenderOptions) -> Self {
+        let picture = Self::of_picture(facts, camera, options);
+        let fixed = picture.accumulator == Accumulator::Fixed && picture.raster.is_none();
+        let copies = facts.copies && options.draws_copies_once() && fixed && picture.color != ColorNeed::Textured;
+        // Of copies tiles would make long lists.
+        let tiles = picture.tiles && !copies;
         Self {
-            atomics_u64: atomics_u64 && !self.copies && self.accumulator == Accumulator::Fixed && self.raster.is_none(),
-            ..self
+            copies,
+            tiles,
+            atomics_u64: adapter.atomics_u64 && options.has(Optimisation::Pairs) && fixed && !copies,
+            long_words: adapter.integers_u64 && options.has(Optimisation::LongWords),
+            subgroups: tiles && tuning::shares(adapter) && options.has(Optimisation::Sharing),
+            ..picture
         }
-    }
-
-    /// The same on an adapter that has 64-bit integers or not.
-    pub fn with_long_words(self, long_words: bool) -> Self {
-        Self { long_words, ..self }
-    }
-
-    /// The same where surfels have many `copies`, or not. Those are drawn by scatter: of tiles they would make long lists.
-    pub fn with_copies(self, copies: bool) -> Self {
-        let stand = copies
-            && self.accumulator == Accumulator::Fixed
-            && self.raster.is_none()
-            && self.color != ColorNeed::Textured;
-        if stand { Self { copies: true, tiles: false, ..self } } else { self }
-    }
-
-    /// The same with batches that are `culled`, or not. The rasteriser draws every splat.
-    pub fn with_culling(self, culled: bool) -> Self {
-        Self { cull: culled && !self.copies && self.raster.is_none(), ..self }
-    }
-
-    /// The same on an adapter whose `subgroups` should share what they read, or not.
-    pub fn with_subgroups(self, subgroups: bool) -> Self {
-        Self { subgroups: self.tiles && subgroups, ..self }
-    }
-
-    /// The same where tiles should sum all splats, if there are tiles, or only the large ones.
-    pub fn with_gather(self, gather: bool) -> Self {
-        Self { gather: self.tiles && gather, ..self }
     }
 
     /// The needs by name, for people and JSON.

@@ -66,6 +66,11 @@ impl RenderOptions {
         self.has(Optimisation::Copies) && self.organisation != Organisation::Tile
     }
 
+    /// Whether a pixel of the image differs from 0 where nothing is.
+    pub fn shows_where_nothing_is(&self) -> bool {
+        self.maps.depth || self.background.iter().any(|value| value.to_bits() != 0)
+    }
+
     /// Whether an optimisation is not left out.
     pub fn has(&self, optimisation: Optimisation) -> bool {
         !self.without.contains(&optimisation)

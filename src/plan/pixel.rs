@@ -56,6 +56,16 @@ impl PixelLayout {
             count_image,
         }
     }
+
+    /// u32 words of a pixel's sums in storage; the rasteriser's are in textures.
+    pub fn sum_words(&self, needs: &SceneNeeds) -> u32 {
+        if needs.raster.is_some() { 0 } else { self.channels * needs.accumulator.row().words }
+    }
+
+    /// Blended targets of four channels that a pixel's sums need.
+    pub fn targets(&self) -> u32 {
+        self.channels.div_ceil(4)
+    }
 }
 
 /// Colour sums of a pixel.

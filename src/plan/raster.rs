@@ -32,6 +32,15 @@ impl BlendFormat {
     /// Full weights that a sum of 8 bits holds: terms are divided by it, which costs three of the bits.
     pub const MOST_WEIGHTS_8: u32 = 8;
 
+    /// Bytes of a pixel of one target, of four channels, as an adapter counts them.
+    pub fn bytes(self) -> u32 {
+        match self {
+            // Counted as eight, by the letter of WebGPU.
+            Self::Rgba8Unorm | Self::Rgba16Float => 8,
+            Self::Rgba32Float => 16,
+        }
+    }
+
     /// Its name.
     pub fn name(self) -> &'static str {
         Self::ALL.iter().find(|(format, _)| *format == self).map_or("", |(_, name)| name)

@@ -8,8 +8,9 @@ use rayon::prelude::*;
 
 use super::Report;
 use crate::frame::Frame;
+use crate::passes::splat::Splat;
 use crate::passes::{accumulate, project, resolve, visibility};
-use crate::plan::{RenderOptions, SceneNeeds};
+use crate::plan::{Facts, RenderOptions, SceneNeeds};
 use crate::progress::Progress;
 use crate::scene::{Camera, Scene};
 
@@ -19,11 +20,12 @@ const REFERENCE_ROWS: u32 = 8;
 /// Renders `scene`.
 pub(super) fn frame(
     scene: &Scene,
+    facts: &Facts,
     camera: &Camera,
     options: &RenderOptions,
     progress: &dyn Progress,
 ) -> (Frame, Report) {
-    let needs = SceneNeeds::of(scene, &scene.color_range(), camera, options);
+    let needs = SceneNeeds::of_picture(facts, camera, options);
     let start = Instant::now();
     let splats = project::reference_all(scene, camera, options);
     let project_ms = start.elapsed().as_secs_f64() * 1e3;
@@ -85,9 +87,8 @@ pub(super) fn frame(
 }
 
 /// The splats of each band of rows, by count, scan, place: `members[starts[b]..starts[b + 1]]` are band b's, in order.
-fn bin(splats: &[project::Splat], bands: usize) -> (Vec<usize>, Vec<u32>) {
-    let range =
-        |splat: &project::Splat| (splat.first[1] / REFERENCE_ROWS) as usize..=(splat.last[1] / REFERENCE_ROWS) as usize;
+fn bin(splats: &[Splat], bands: usize) -> (Vec<usize>, Vec<u32>) {
+    let range = |splat: &Splat| (splat.first[1] / REFERENCE_ROWS) as usize..=(splat.last[1] / REFERENCE_ROWS) as usize;
     let mut starts = vec![0; bands + 1];
     for splat in splats {
         range(splat).for_each(|band| starts[band + 1] += 1);

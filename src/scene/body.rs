@@ -7,6 +7,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::Bounds;
+use crate::random;
 
 /// Positions that are looked at for the core, about.
 const SAMPLED: usize = 1 << 13;
@@ -77,14 +78,9 @@ fn core(count: usize, position: &(impl Fn(usize) -> DVec3 + Sync)) -> Option<Bou
     Some(core)
 }
 
-/// Spreads the bits of the coordinates over a word (the finaliser of SplitMix64, Steele et al. 2014, for each).
+/// Spreads the bits of the coordinates over a word (the finaliser of SplitMix64 for each).
 fn hash(p: DVec3) -> u64 {
-    p.to_array().into_iter().fold(0, |mixed, x| {
-        let mut x = (mixed ^ (x + 0.0).to_bits()).wrapping_add(0x9e37_79b9_7f4a_7c15);
-        x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        x = (x ^ x >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        x ^ x >> 31
-    })
+    p.to_array().into_iter().fold(0, |mixed, x| random::mixed((mixed ^ (x + 0.0).to_bits()).wrapping_add(random::STEP)))
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ pub mod light;
 pub mod options;
 #[expect(clippy::module_inception, reason = "the file is named for the type it holds")]
 pub mod scene;
+mod srgb;
 pub mod surfel;
 pub mod texture;
 

@@ -213,6 +213,11 @@ pub struct Maps {
     pub decision: bool,
 }
 
+impl Maps {
+    /// All that a device makes.
+    pub const ON_DEVICE: Self = Self { depth: true, normal: true, weight: true, count: true, decision: false };
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::color::SRGB8_TO_LINEAR;
+use super::srgb::SRGB8_TO_LINEAR;
 use crate::error::{Error, Result};
 
 /// An image of 8-bit sRGB colours with straight alpha.

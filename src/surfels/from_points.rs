@@ -100,17 +100,10 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
     let mut distinct = DistinctPositions::new(&gathered.positions, &bounds, origin)?;
     progress.end();
     let mut graph = NeighbourGraph::new(&distinct, NORMAL_NEIGHBOURS, progress);
-    let mut dropped_outliers = 0;
-    if let Some(deviations) = options.outliers {
-        let inside = inliers(&distinct, &graph, deviations);
-        let keep: Vec<bool> = distinct.of_point().iter().map(|&position| inside[position as usize]).collect();
-        dropped_outliers = keep.iter().filter(|keep| !**keep).count() as u64;
-        if dropped_outliers > 0 {
-            gathered.retain(&keep);
-            distinct.retain(&inside);
-            graph = NeighbourGraph::new(&distinct, NORMAL_NEIGHBOURS, progress);
-        }
-    }
+    let dropped_outliers = match options.outliers {
+        Some(deviations) => drop_outliers(&mut gathered, &mut distinct, &mut graph, deviations, progress),
+        None => 0,
+    };
     let given = given_normals(&gathered);
     let count = gathered.positions.len();
     let preparation = Preparation {
@@ -126,82 +119,158 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
     progress.begin("fitting planes", 0);
     let mut normals = fit_normals(&distinct, &graph, up);
     progress.end();
-    let mut parts = None;
-    match &options.orientation {
-        _ if preparation.estimated_normals == 0 => {}
-        Orientation::Up => {}
-        Orientation::Toward(scanners) => {
-            let center = |index: usize| distinct.position(index as u32) / distinct.scale() + origin;
-            orient::toward(center, &mut normals, scanners);
+    let parts = match preparation.estimated_normals {
+        0 => None,
+        _ => {
+            oriented((&distinct, &graph), &mut normals, given.as_deref(), (&options.orientation, up, origin), progress)
         }
-        Orientation::Propagate => {
-            let given = given.iter().flatten().zip(distinct.of_point());
-            let given: Vec<_> = given.filter_map(|(normal, &position)| Some((position, (*normal)?))).collect();
-            parts = Some(orient::propagate(&distinct, &graph, &mut normals, &given, up, progress));
-            progress.begin("telling sheets apart", 0);
-            sheets::refit(&distinct, &graph, &mut normals);
-            progress.end();
-        }
-    }
+    };
 
     progress.begin("measuring surfels", 0);
-    let mut collinear = 0;
-    // Those of the positions' own normals.
-    let mut ellipses = Vec::new();
-    let radii: Vec<f64> = match options.size {
-        Size::Knn => knn_radii(&distinct, &graph),
-        Size::Ellipse => {
-            let own = normals.par_iter().zip(0..distinct.len() as u32);
-            ellipses = own.map(|(normal, position)| ellipse_at(&distinct, &graph, position, *normal)).collect();
-            ellipses.par_iter().map(|[s, _]| s.length()).collect()
-        }
-        Size::Bsp(triangle) => {
-            let (radii, degenerate) = bsp_radii(&distinct, triangle, progress);
-            collinear = degenerate;
-            radii
-        }
-    };
-    let limits = local_limits(&graph, &radii, options.largest_ratio);
-
-    let world = |length: f64| (length / distinct.scale()).clamp(RADIUS_RANGE.0, RADIUS_RANGE.1);
-    let limited = radii.iter().zip(&limits).filter(|(radius, limit)| radius > limit).count() as u64;
-    let normal_of = |point: usize, position: u32| {
-        given.as_ref().and_then(|all| *all.get(point)?).unwrap_or(normals[position as usize])
+    let sizes = Sizes::of(&distinct, &graph, &normals, options, progress);
+    let normal_of = |(point, position): (usize, &u32)| {
+        given.as_ref().and_then(|all| *all.get(point)?).unwrap_or(normals[*position as usize])
     };
     let of_point = distinct.of_point();
-    let point_normals: Vec<[f32; 3]> =
-        of_point.par_iter().enumerate().map(|(point, &position)| normal_of(point, position)).collect();
-    let size_of = |position: u32| {
-        let radius = radii[position as usize].min(limits[position as usize]);
-        if radius > 0.0 { world(radius) } else { LONE_RADIUS }
-    };
+    let point_normals: Vec<[f32; 3]> = of_point.par_iter().enumerate().map(normal_of).collect();
     let axes = (options.size == Size::Ellipse).then(|| {
-        let ellipse = |(&position, &normal): (&u32, &[f32; 3])| {
-            let own = normal == normals[position as usize];
-            let [s, t] =
-                if own { ellipses[position as usize] } else { ellipse_at(&distinct, &graph, position, normal) };
-            // The length that the position's own ellipse has, within its limit, also where a point has another normal.
-            let size = size_of(position);
-            let axes = if s == DVec3::ZERO {
-                let (a, b) = DVec3::from_array(normal.map(f64::from)).normalize().any_orthonormal_pair();
-                [a * size, b * size]
-            } else {
-                let factor = size.min(world(s.length())) / s.length();
-                [s * factor, t * factor]
-            };
-            axes.map(|axis| axis.as_vec3().to_array())
-        };
+        let ellipse = |(&position, &normal)| sizes.ellipse((&distinct, &graph), &normals, position, normal);
         of_point.par_iter().zip(&point_normals).map(ellipse).collect::<Vec<_>>()
     });
-    let point_radii = match &axes {
+    let radii = match &axes {
         Some(axes) => axes.par_iter().map(|[s, _]| DVec3::from_array(s.map(f64::from)).length() as f32).collect(),
-        None => of_point.par_iter().map(|&position| size_of(position) as f32).collect(),
+        None => of_point.par_iter().map(|&position| sizes.length(position) as f32).collect(),
     };
     progress.end();
     let Gathered { positions, colors, texture, up, .. } = gathered;
-    let (normals, radii) = (Some(point_normals), Some(point_radii));
+    let (normals, radii) = (Some(point_normals), Some(radii));
     let points = Points { positions, normals, radii, axes, colors, texture, up, ..Points::default() };
+    let (limited, collinear) = (sizes.limited(), sizes.collinear);
     Ok(Surfels { points, preparation, dropped_outliers, limited, parts, collinear })
+}
+
+/// Leaves out the points that lie farther from their neighbours than so many `deviations`, and says how many.
+fn drop_outliers(
+    gathered: &mut Gathered,
+    distinct: &mut DistinctPositions,
+    graph: &mut NeighbourGraph,
+    deviations: f64,
+    progress: &dyn Progress,
+) -> u64 {
+    let inside = inliers(distinct, graph, deviations);
+    let keep: Vec<bool> = distinct.of_point().iter().map(|&position| inside[position as usize]).collect();
+    let dropped = keep.iter().filter(|keep| !**keep).count() as u64;
+    if dropped > 0 {
+        gathered.retain(&keep);
+        distinct.retain(&inside);
+        *graph = NeighbourGraph::new(distinct, NORMAL_NEIGHBOURS, progress);
+    }
+    dropped
+}
+
+/// Turns the `normals` of positions to one side; the connected parts of the surface, if they were looked for.
+fn oriented(
+    (distinct, graph): (&DistinctPositions, &NeighbourGraph),
+    normals: &mut Vec<[f32; 3]>,
+    given: Option<&[Option<[f32; 3]>]>,
+    (orientation, up, origin): (&Orientation, DVec3, DVec3),
+    progress: &dyn Progress,
+) -> Option<u64> {
+    match orientation {
+        Orientation::Up => None,
+        Orientation::Toward(scanners) => {
+            let center = |index: usize| distinct.position(index as u32) / distinct.scale() + origin;
+            orient::toward(center, normals, scanners);
+            None
+        }
+        Orientation::Propagate => {
+            let given = given.into_iter().flatten().zip(distinct.of_point());
+            let given: Vec<_> = given.filter_map(|(normal, &position)| Some((position, (*normal)?))).collect();
+            let parts = orient::propagate(distinct, graph, normals, &given, up, progress);
+            progress.begin("telling sheets apart", 0);
+            sheets::refit(distinct, graph, normals);
+            progress.end();
+            Some(parts)
+        }
+    }
+}
+
+/// How large the surfels of positions are, in the units of [`DistinctPositions`].
+struct Sizes {
+    /// The longer half-axes.
+    radii: Vec<f64>,
+    /// What their neighbours allow.
+    limits: Vec<f64>,
+    /// Half-axes for the positions' own normals; empty for disks.
+    ellipses: Vec<[DVec3; 2]>,
+    /// Positions whose cluster of three spans no triangle.
+    collinear: u64,
+    /// Units of a length in the world.
+    scale: f64,
+}
+
+impl Sizes {
+    fn of(
+        distinct: &DistinctPositions,
+        graph: &NeighbourGraph,
+        normals: &[[f32; 3]],
+        options: &FromPoints,
+        progress: &dyn Progress,
+    ) -> Self {
+        let (mut ellipses, mut collinear) = (Vec::new(), 0);
+        let radii: Vec<f64> = match options.size {
+            Size::Knn => knn_radii(distinct, graph),
+            Size::Ellipse => {
+                let own = normals.par_iter().zip(0..distinct.len() as u32);
+                ellipses = own.map(|(normal, position)| ellipse_at(distinct, graph, position, *normal)).collect();
+                ellipses.par_iter().map(|[s, _]| s.length()).collect()
+            }
+            Size::Bsp(triangle) => {
+                let (radii, degenerate) = bsp_radii(distinct, triangle, progress);
+                collinear = degenerate;
+                radii
+            }
+        };
+        let limits = local_limits(graph, &radii, options.largest_ratio);
+        Self { radii, limits, ellipses, collinear, scale: distinct.scale() }
+    }
+
+    /// Positions whose surfels would be larger than their neighbours allow.
+    fn limited(&self) -> u64 {
+        self.radii.iter().zip(&self.limits).filter(|(radius, limit)| radius > limit).count() as u64
+    }
+
+    fn world(&self, length: f64) -> f64 {
+        (length / self.scale).clamp(RADIUS_RANGE.0, RADIUS_RANGE.1)
+    }
+
+    /// The longer half-axis at a position, world units.
+    fn length(&self, position: u32) -> f64 {
+        let radius = self.radii[position as usize].min(self.limits[position as usize]);
+        if radius > 0.0 { self.world(radius) } else { LONE_RADIUS }
+    }
+
+    /// The half-axes at a position for a point of this normal, world units: of the length that the position's own ellipse has, within
+    /// its limit, also where the point has another normal.
+    fn ellipse(
+        &self,
+        (distinct, graph): (&DistinctPositions, &NeighbourGraph),
+        normals: &[[f32; 3]],
+        position: u32,
+        normal: [f32; 3],
+    ) -> [[f32; 3]; 2] {
+        let own = normal == normals[position as usize];
+        let [s, t] = if own { self.ellipses[position as usize] } else { ellipse_at(distinct, graph, position, normal) };
+        let length = self.length(position);
+        let axes = if s == DVec3::ZERO {
+            let (a, b) = DVec3::from_array(normal.map(f64::from)).normalize().any_orthonormal_pair();
+            [a * length, b * length]
+        } else {
+            let factor = length.min(self.world(s.length())) / s.length();
+            [s * factor, t * factor]
+        };
+        axes.map(|axis| axis.as_vec3().to_array())
+    }
 }
 
 fn check(options: &FromPoints) -> Result<()> {

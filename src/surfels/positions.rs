@@ -6,6 +6,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::gather::retain;
+use crate::morton;
 use crate::scene::Bounds;
 use crate::{Error, Result};
 
@@ -119,8 +120,7 @@ pub(crate) fn power_of_two(e: i32) -> f64 {
 
 /// The upper 21 of 62 bits of each coordinate, interleaved.
 fn morton_prefix(cell: [u64; 3]) -> u64 {
-    let [x, y, z] = cell.map(|c| spread_bits(c >> 41));
-    x | y << 1 | z << 2
+    morton::code(cell.map(|c| c >> 41))
 }
 
 /// The order of the full interleaved coordinates, without interleaving them: the coordinate with the highest differing
@@ -135,16 +135,6 @@ fn morton_order(a: [u64; 3], b: [u64; 3]) -> Ordering {
         }
     }
     a[decisive].cmp(&b[decisive])
-}
-
-/// Puts two zeros before each of the lower 21 bits.
-fn spread_bits(x: u64) -> u64 {
-    let mut x = x.min(0x1f_ffff);
-    x = (x | x << 32) & 0x1f_0000_0000_ffff;
-    x = (x | x << 16) & 0x1f_0000_ff00_00ff;
-    x = (x | x << 8) & 0x100f_00f0_0f00_f00f;
-    x = (x | x << 4) & 0x10c3_0c30_c30c_30c3;
-    (x | x << 2) & 0x1249_2492_4924_9249
 }
 
 #[cfg(test)]

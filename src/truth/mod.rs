@@ -6,6 +6,7 @@
 
 pub mod disks;
 pub(crate) mod nearest;
+mod shading;
 pub mod triangles;
 
 use std::path::Path;
@@ -18,7 +19,6 @@ pub use self::triangles::TriangleTree;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::io::{self, Mesh};
-use crate::passes::resolve::{over, shade};
 use crate::plan::RenderOptions;
 use crate::progress::Progress;
 use crate::scene::Camera;
@@ -179,19 +179,18 @@ fn pixel(surface: &Surface, camera: &Camera, options: &RenderOptions, grid: u32,
         if let Some(hit) = see(at, camera.near) {
             let [r, g, b, opacity] = hit.color.map(f64::from);
             hits += 1;
-            light += opacity * shade(DVec3::new(r, g, b), hit.normal, camera, options, at);
+            light += opacity * shading::sent(DVec3::new(r, g, b), hit.normal, camera.ray(at.x, at.y), options);
             alpha += opacity;
         }
     }
     let samples = f64::from(grid * grid);
-    let straight = light / if alpha > 0.0 { alpha } else { f64::INFINITY };
-    let color = over([straight.x, straight.y, straight.z, alpha / samples], options.background.map(f64::from));
+    let color = shading::in_front(light / samples, alpha / samples, options.background);
     let center = corner + 0.5;
     let first = see(center, camera.near);
     let second = first.and_then(|hit| see(center, hit.distance + SAME_SURFACE * (hit.distance + surface.size())));
     let depth = |hit: Option<Hit>| hit.map_or(f32::INFINITY, |hit| hit.distance as f32);
     Pixel {
-        color: color.map(|c| c as f32),
+        color,
         depth: depth(first),
         normal: first.map_or([0.0; 3], |hit| hit.normal.as_vec3().to_array()),
         coverage: (f64::from(hits) / samples) as f32,

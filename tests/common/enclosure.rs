@@ -3,7 +3,7 @@
 //! says. No pixel is excused; how many are left undecided is counted.
 
 use epsplat::passes::footprint::footprint;
-use epsplat::passes::project::Splat;
+use epsplat::passes::splat::Splat;
 use epsplat::plan::RenderOptions;
 use epsplat::scene::{Camera, Kernel, LowPass, Scene};
 

@@ -6,13 +6,17 @@ pub mod command;
 pub mod enclosure;
 pub mod meshes;
 pub mod modules;
+mod random;
 pub mod scenes;
+
+pub use random::Random;
 
 use epsplat::frame::Frame;
 use epsplat::gpu::Gpu;
 use epsplat::gpu::layout::{ONE, View};
 use epsplat::plan::{
-    ACCUMULATORS, Accumulator, AccumulatorRow, BlendFormat, ColorNeed, Raster, RasterDepth, RenderOptions, SceneNeeds,
+    ACCUMULATORS, Accumulator, AccumulatorRow, BlendFormat, ColorNeed, Facts, Raster, RasterDepth, RenderOptions,
+    SceneNeeds, check,
 };
 use epsplat::scene::{KernelShape, LowPass, Projection, Shading};
 
@@ -22,6 +26,11 @@ pub const UNIT: f64 = 1.0 / ONE as f64;
 /// The adapter, or `None` with a line on stderr where there is none and none is required.
 pub fn gpu() -> Option<Gpu> {
     open(std::env::var("EPSPLAT_TEST_ADAPTER").ok().as_deref(), "EPSPLAT_REQUIRE_ADAPTER")
+}
+
+/// The same adapter with what every WebGPU implementation has, and no more.
+pub fn core_gpu() -> Option<Gpu> {
+    gpu().map(|_| Gpu::open_core(std::env::var("EPSPLAT_TEST_ADAPTER").ok().as_deref()).unwrap())
 }
 
 /// An adapter that is reached through OpenGL, whatever others there are; `None` as of [`gpu`].
@@ -52,7 +61,9 @@ pub fn gpu_for(file: &str) -> Option<Gpu> {
 
 /// The accumulators that the adapter can run; of each other one a line on stderr.
 pub fn accumulators(gpu: &Gpu) -> Vec<&'static AccumulatorRow> {
-    let able = |row: &&AccumulatorRow| row.check(gpu).inspect_err(|why| eprintln!("skipped: {why}")).is_ok();
+    let able = |row: &&AccumulatorRow| {
+        check::sums(&gpu.adapter, row.of).inspect_err(|why| eprintln!("skipped: {why}")).is_ok()
+    };
     ACCUMULATORS.iter().filter(able).collect()
 }
 
@@ -113,7 +124,7 @@ pub fn all_needs() -> Vec<SceneNeeds> {
 
 fn base_needs() -> Vec<SceneNeeds> {
     let (scene, camera) = scenes::stack(1, 1.0);
-    let plain = SceneNeeds::of(&scene, &scene.color_range(), &camera, &RenderOptions::default());
+    let plain = SceneNeeds::of_picture(&Facts::of(&scene), &camera, &RenderOptions::default());
     let mut all = Vec::new();
     for bits in 0..1u32 << 8 {
         let bit = |k: u32| bits >> k & 1 == 1;
@@ -175,37 +186,4 @@ pub fn depth_span(view: &View, front: f64) -> f64 {
     let epsilon = f64::from(view.epsilon_absolute).max(f64::from(view.epsilon_deepest));
     let deepest = front * (1.0 + f64::from(view.epsilon_relative)) + epsilon * world;
     deepest.min(f64::from(view.farthest) * world) - front
-}
-
-/// Seeded numbers: splitmix64 (Steele et al. 2014).
-pub struct Random(pub u64);
-
-impl Random {
-    pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// Uniform in [0, 1).
-    pub fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-
-    /// Uniform in the logarithm.
-    pub fn scale(&mut self, low: f64, high: f64) -> f64 {
-        self.between(low.ln(), high.ln()).exp()
-    }
-
-    pub fn shuffle<T>(&mut self, values: &mut [T]) {
-        for k in (1..values.len()).rev() {
-            values.swap(k, (self.bits() % (k as u64 + 1)) as usize);
-        }
-    }
 }

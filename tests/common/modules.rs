@@ -4,9 +4,12 @@ use std::collections::HashMap;
 use std::sync::LazyLock;
 
 use epsplat::gpu::Sources;
-use epsplat::gpu::kernel::{Bindings, reflect};
-use epsplat::passes::variant::modules;
+use epsplat::gpu::kernel::reflect;
+use epsplat::gpu::program::Bindings;
+use epsplat::passes::modules;
 use epsplat::plan::SceneNeeds;
+use epsplat::plan::pass::Module;
+use epsplat::plan::steps::Kernel;
 use rayon::prelude::*;
 
 use super::all_needs;
@@ -22,8 +25,8 @@ pub struct Made {
     pub needs: SceneNeeds,
     /// The files that are joined.
     pub files: Vec<&'static str>,
-    /// The entry points that the render dispatches.
-    pub stages: Vec<&'static str>,
+    /// The kernels that the render dispatches.
+    pub kernels: Vec<Kernel>,
     /// Index of its text among the different ones.
     text: usize,
 }
@@ -53,12 +56,12 @@ static ALL: LazyLock<All> = LazyLock::new(|| {
     let sources = Sources::default();
     let (mut made, mut texts, mut numbers) = (Vec::new(), Vec::new(), HashMap::new());
     for needs in all_needs() {
-        for (files, stages) in modules(&needs) {
+        for Module { files, kernels } in modules(&needs) {
             let text = *numbers.entry(files.clone()).or_insert_with(|| {
                 texts.push(sources.join(&files));
                 texts.len() - 1
             });
-            made.push(Made { needs, files, stages, text });
+            made.push(Made { needs, files, kernels, text });
         }
     }
     let reflected = texts.into_par_iter().map(|text| {

@@ -20,6 +20,8 @@ mod las;
 mod las_forms;
 mod memory;
 mod mutate;
+#[path = "../common/random.rs"]
+mod numbers;
 mod obj;
 #[cfg(feature = "pcd")]
 mod pcd;

@@ -1,46 +1,6 @@
-//! Numbers that depend on a seed alone: splitmix64 (Steele, Lea and Flood 2014).
+//! Where generated points lie.
 
-/// The generator's state.
-pub struct Random(pub u64);
-
-impl Random {
-    /// 64 random bits.
-    pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// A number less than `bound`; 0 for a bound of 0.
-    pub fn below(&mut self, bound: usize) -> usize {
-        (self.bits() >> 11) as usize % bound.max(1)
-    }
-
-    /// True once in `n` times.
-    pub fn one_in(&mut self, n: usize) -> bool {
-        self.below(n) == 0
-    }
-
-    /// One of some choices.
-    pub fn pick<'a, T: ?Sized>(&mut self, choices: &[&'a T]) -> &'a T {
-        choices[self.below(choices.len())]
-    }
-
-    /// Between `low` and `high`.
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * (self.bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// A count: often few, at most `most`.
-    pub fn count(&mut self, most: usize) -> usize {
-        match self.below(8) {
-            0 => self.below(2),
-            1..=4 => self.below(most.min(8) + 1),
-            _ => self.below(most + 1),
-        }
-    }
-}
+pub use crate::numbers::Random;
 
 /// Where the points of a generated file lie.
 #[derive(Clone, Copy)]

@@ -11,12 +11,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use common::modules;
 use epsplat::gpu::Sources;
-use epsplat::gpu::kernel::{FILES, reflect};
+use epsplat::gpu::kernel::reflect;
 use epsplat::gpu::layout::{
     AWAY, BATCH, BLOCK_SIDE, COVERED_GRID, COVERED_GRID_OF_EIGHTS, COVERED_LIST, LIST_ENDS, LIST_FAR, LIST_START,
     MOST_GROUPS, OCCLUSION_TILE, ONE, ONE_WIDE, QUEUE_GRID, QUEUE_LISTING, QUEUE_START, TILE, TILE_WIDTH, WORKGROUP,
 };
-use epsplat::passes::variant::{self};
+use epsplat::gpu::sources::FILES;
+use epsplat::passes;
 use epsplat::plan::{Accumulator, COLOR_CHANNEL, PixelLayout, SceneNeeds, color_channels};
 use epsplat::scene::camera::MAX_SIDE;
 use epsplat::scene::options::{LEAST_FILTERED_WEIGHT, LEAST_WEIGHT};
@@ -25,7 +26,7 @@ use naga::{AddressSpace, Expression, Literal, Module};
 
 /// The first module of `needs`.
 fn first_of(sources: &Sources, needs: &SceneNeeds) -> Module {
-    reflect(&sources.join(&variant::modules(needs)[0].0)).unwrap().0
+    reflect(&sources.join(&passes::modules(needs)[0].files)).unwrap().0
 }
 
 #[test]
@@ -165,14 +166,8 @@ fn constants_agree() {
         };
         assert_eq!(constant("ONE"), one, "{}", needs.accumulator);
         for entry in module.entry_points.iter().filter(|entry| entry.stage == naga::ShaderStage::Compute) {
-            let size = match entry.name.as_str() {
-                "arrange" | "arrange_rare" | "arrange_covered" => [1, 1, 1],
-                "bin_count_large" | "bin_place_large" => [8, 8, 1],
-                "bin_scan" | "bin_scan_large" => [256, 1, 1],
-                name if name.ends_with("_large") => [TILE, TILE, 1],
-                _ => [WORKGROUP, 1, 1],
-            };
-            assert_eq!(entry.workgroup_size, size, "{}", entry.name);
+            let Some(kernel) = made.kernels.iter().find(|kernel| kernel.name == entry.name) else { continue };
+            assert_eq!(entry.workgroup_size, kernel.workgroup, "{}", entry.name);
         }
     }
     // The least weight is a whole number of units, and the bits that follow from it are kept.

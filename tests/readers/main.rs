@@ -1,7 +1,6 @@
 //! The readers on files of every kind they promise to read, and on damaged ones.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-#[cfg(feature = "e57")]
 mod e57;
 #[cfg(feature = "e57")]
 #[path = "../common/e57_page.rs"]
@@ -16,9 +15,13 @@ mod obj;
 mod pcd;
 mod ply;
 mod ply_damage;
+#[cfg(feature = "e57")]
+#[path = "../common/random.rs"]
+mod random;
 
 use epsplat::io::{self, Format, Points, ReadOptions};
 use epsplat::{Error, Progress};
+pub use random::Random;
 use std::path::Path;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 use tempfile::TempDir;
@@ -58,19 +61,6 @@ pub fn sentence(error: &Error, path: &Path) -> String {
     assert!(message.lines().count() == 1 && message.len() < 400 + prefix.len(), "{message}");
     assert!(matches!(error, Error::Malformed { .. }), "{message}");
     message.strip_prefix(&prefix).unwrap_or_else(|| panic!("{message}")).to_owned()
-}
-
-/// Numbers that differ from run to run of nothing (xorshift64).
-pub struct Random(pub u64);
-
-impl Random {
-    /// The next, less than `bound`.
-    pub fn below(&mut self, bound: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 16) as usize % bound
-    }
 }
 
 /// Counts what it is told.

@@ -1,8 +1,8 @@
 //! PLY in text: words between white space, wherever lines end.
 
-use super::faces::{Faces, Role};
+use super::contents::{Contents, ends_early, negative_list};
+use super::faces::{Faces, Role, needed};
 use super::header::{Element, Header, Kind};
-use super::read::{Contents, ends_early, negative_list};
 use super::vertex::{Layout, Vertices};
 use crate::Progress;
 use crate::io::Points;
@@ -23,7 +23,7 @@ pub(super) fn read(
 ) -> Result<Contents, Fault> {
     let mut tokens = Tokens { reader, line: header.lines + 1, line_end: header.line_end, token: Vec::new() };
     let mut contents = Contents { faces, points: Points::default() };
-    for element in header.needed() {
+    for element in needed(&header.elements) {
         if element.name == "vertex" {
             contents.points = vertices(&mut tokens, element, length, progress)?;
         } else {

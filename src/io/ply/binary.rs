@@ -1,8 +1,8 @@
 //! Binary PLY: blocks of rows, decoded column by column.
 
-use super::faces::{Faces, Role};
+use super::contents::{Contents, ends_early, negative_list};
+use super::faces::{Faces, Role, needed};
 use super::header::{Element, Header, Kind, Scalar};
-use super::read::{Contents, ends_early, negative_list};
 use super::vertex::{Layout, Vertices};
 use crate::Progress;
 use crate::io::Points;
@@ -21,7 +21,7 @@ pub(super) fn read<const BIG: bool>(
     progress: &dyn Progress,
 ) -> Result<Contents, Fault> {
     let mut contents = Contents { faces, points: Points::default() };
-    for element in header.needed() {
+    for element in needed(&header.elements) {
         if element.name == "vertex" {
             contents.points = vertices::<BIG>(&mut reader, element, length, progress)?;
         } else if Faces::are(element) {

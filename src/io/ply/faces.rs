@@ -54,6 +54,12 @@ pub(super) struct Faces {
     odd: bool,
 }
 
+/// The elements up to the last one that is read.
+pub(super) fn needed(elements: &[Element]) -> &[Element] {
+    let read = |element: &Element| element.name == "vertex" || Faces::are(element);
+    &elements[..elements.iter().rposition(read).map_or(0, |last| last + 1)]
+}
+
 /// What the faces of a file are.
 #[derive(Debug, Default)]
 pub(super) struct Triangles {

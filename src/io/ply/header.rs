@@ -1,6 +1,5 @@
 //! The header of a PLY file (Turk 1994): encoding, elements and their properties.
 
-use super::faces::Faces;
 use crate::io::fault::Fault;
 use crate::io::values::{BYTE_ORDER_MARK, line_end, shown};
 use std::io::{BufRead, Read};
@@ -93,14 +92,6 @@ pub(super) struct Header {
     pub(super) lines: u64,
     /// What lines end with.
     pub(super) line_end: u8,
-}
-
-impl Header {
-    /// The elements up to the last one that is read.
-    pub(super) fn needed(&self) -> &[Element] {
-        let read = |element: &Element| element.name == "vertex" || Faces::are(element);
-        &self.elements[..self.elements.iter().rposition(read).map_or(0, |last| last + 1)]
-    }
 }
 
 /// Reads up to and including the line `end_header`.

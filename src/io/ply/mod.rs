@@ -17,6 +17,7 @@
 
 mod ascii;
 mod binary;
+mod contents;
 mod faces;
 mod header;
 mod read;

@@ -1,11 +1,11 @@
 //! From a PLY file to points or a mesh, in one pass and with one small buffer.
 
+use super::contents::Contents;
 use super::faces::{Faces, Triangles};
-use super::header::{self, Element, Encoding};
+use super::header::{self, Encoding};
 use super::{ascii, binary};
 use crate::io::fault::{self, Fault};
 use crate::io::triangles;
-use crate::io::values::shown;
 use crate::io::{Input, Material, Mesh, Points, Texture};
 use crate::{Progress, Result};
 use std::fs::File;
@@ -101,12 +101,6 @@ fn beside(folder: &Path, name: &str) -> PathBuf {
     folder.join(name.replace('\\', "/"))
 }
 
-/// What is read of a file.
-pub(super) struct Contents {
-    pub(super) points: Points,
-    pub(super) faces: Faces,
-}
-
 /// The vertices, the triangles, which name vertices that exist, and the names of textures. With `surface`, faces may have texture
 /// coordinates.
 fn contents(input: Input, surface: bool, progress: &dyn Progress) -> Result<(Points, Triangles, Vec<String>)> {
@@ -127,18 +121,4 @@ fn contents(input: Input, surface: bool, progress: &dyn Progress) -> Result<(Poi
     let Contents { points, faces } = contents.map_err(in_file)?;
     let triangles = faces.finish(&points.positions).map_err(in_file)?;
     Ok((points, triangles, header.textures))
-}
-
-/// The file ended inside an element.
-pub(super) fn ends_early(element: &Element, rows: u64) -> Fault {
-    let rows_of = match element.name.as_str() {
-        "vertex" => "vertices".to_owned(),
-        name => format!("rows of element '{}'", shown(name.as_bytes())),
-    };
-    Fault::Malformed(format!("the header promises {} {rows_of}, the file ends after {rows}", element.count))
-}
-
-pub(super) fn negative_list(element: &Element, row: u64) -> Fault {
-    let name = shown(element.name.as_bytes());
-    Fault::Malformed(format!("row {} of element '{name}' has a list of negative length", row + 1))
 }

@@ -3,9 +3,9 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::random::Random;
 use super::surface::{MeshSurface, Place};
 use super::voxels::{Voxel, fan_share};
+use crate::random::Random;
 
 /// Candidates for each sample: enough to tell the middle of its part of the surface.
 const FOR_EACH: f64 = 8.0;

@@ -118,7 +118,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::io::Mesh;
-    use crate::surfels::sampling::random::Random;
+    use crate::random::Random;
 
     #[test]
     fn a_disk_reaches_just_as_far_as_its_cell() {

@@ -16,7 +16,6 @@ mod disks;
 mod distribute;
 mod overlap;
 pub mod priority;
-mod random;
 mod relax;
 pub mod surface;
 mod uniform;

@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-use super::random::Random;
 use super::surface::{MeshSurface, Place};
+use crate::random::Random;
 
 /// `count` points of the surface: each a triangle with a probability in proportion to its area, and in it a point evenly
 /// (Turk 1990).

@@ -3,22 +3,20 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use super::kernels::Kernels;
+use super::run::Run;
+use super::sequence;
+use super::store::Store;
 use crate::error::{Error, Result};
+use crate::frame::Frame;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::kernel::{grid, reflect};
 use crate::gpu::layout::{ONE, ONE_WIDE, Splat, View};
-use crate::gpu::timing::Timing;
 use crate::gpu::{Gpu, Sources};
-use crate::passes::accumulate::AttributeBuffer;
-use crate::passes::cull::Part;
 use crate::passes::order::order;
-use crate::passes::project::SplatBuffer;
-use crate::passes::upload::SurfelBuffer;
-use crate::passes::variant::Variant;
-use crate::passes::visibility::VisibilityBuffer;
-use crate::passes::{Recorder, accumulate, project, visibility};
-use crate::plan::{Facts, Optimisation, PixelLayout, RenderOptions, SceneNeeds};
-use crate::render::bands;
+use crate::passes::upload::upload;
+use crate::plan::steps::{Stage, Step};
+use crate::plan::{Facts, Known, Optimisation, Organisation, PixelLayout, Plan, RenderOptions};
 use crate::scene::{Camera, Scene};
 
 /// What the first three stages leave on the device.
@@ -29,7 +27,7 @@ pub struct Stages {
     /// The nearest depth of each pixel, device units, as what its bits lack to those of +inf; see
     /// [`nearest_depth`](Self::nearest_depth).
     pub nearest: Vec<u32>,
-    /// [`Variant::sum_words`] a pixel; see [`sum`](Self::sum).
+    /// [`Plan::sum_words`] a pixel; see [`sum`](Self::sum).
     pub sums: Vec<u32>,
     /// Where each sum lies.
     pub pixel: PixelLayout,
@@ -69,53 +67,59 @@ impl Stages {
 /// # Errors
 /// [`Error::Usage`] if the image's sums need more than one buffer; and whatever a render can fail with.
 pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu, sources: &Sources) -> Result<Stages> {
+    // A slot for each surfel, and sums of two words in storage.
+    let mut without = options.without.clone();
+    without.extend([Optimisation::Culling, Optimisation::Copies, Optimisation::Pairs]);
+    let options = &RenderOptions { organisation: Organisation::Scatter, without, ..options.clone() };
     let facts = Facts::of(scene);
-    let needs = SceneNeeds { tiles: false, ..SceneNeeds::of(scene, &facts.color, camera, options) };
-    let needs = needs.with_long_words(gpu.adapter.integers_u64 && options.has(Optimisation::LongWords));
-    let variant = Variant::of(&needs, options, scene.surfels.len() as u64)?;
-    variant.accumulator.check(gpu)?;
-    let program = variant.compile(gpu, sources)?;
-    let bands = bands(gpu, camera, &variant)?;
-    let [rows] = bands.as_slice() else {
+    let mut known = Known::default();
+    let plan = Plan::of(&facts, &gpu.adapter, camera, options, &known)?;
+    let [band] = plan.bands[..] else {
         return Err(Error::Usage(format!(
             "an image of {}x{} pixels needs {} bands on {}, and stages are read back from images of one: choose a \
              smaller image",
             camera.width,
             camera.height,
-            bands.len(),
+            plan.bands.len(),
             gpu.adapter.name
         )));
     };
-    let view = View::new(scene, &facts, camera, options);
-    let uniform = Buffer::uniform(gpu, "view", &view)?;
-    let timing = Timing::new(gpu);
-    let mut recorder = Recorder { gpu, program: &program, view: &uniform, variant: &variant, timing };
-    let mut projected =
-        SplatBuffer::new(gpu, SurfelBuffer::upload(gpu, scene, &needs, Some(&facts.core), &())?, needs.low_pass)?;
-    projected.make_room_for_all(gpu)?;
-    let nearest = VisibilityBuffer::new(gpu, &bands)?;
-    let sums = AttributeBuffer::new(gpu, &variant, rows.pixels)?;
-    project::record(&mut recorder, &projected, Part::All)?;
-    visibility::record(&mut recorder, (&projected, Part::All), rows, &nearest)?;
-    visibility::record_large(&mut recorder, &projected, rows, &nearest)?;
-    visibility::occlude(&mut recorder, Part::All, rows, &nearest)?;
-    accumulate::record(&mut recorder, &projected, rows, &nearest, &sums)?;
-    accumulate::record_large(&mut recorder, &projected, rows, &nearest, &sums)?;
-    let mut splats = vec![Splat::zeroed(); scene.surfels.len()];
-    let mut order = order(&scene.surfels, &facts.core).into_iter();
-    for page in &projected.pages {
-        for (splat, index) in page.splats.read(gpu, page.splats.len)?.into_iter().zip(&mut order) {
-            splats[index as usize] = splat;
-        }
-    }
+    let kernels = Kernels::new(gpu, sources, &plan, options, facts.surfels)?;
+    let mut store = Store::new(gpu, upload(gpu, scene, &plan.needs, Some(&facts.core), &())?, &plan.needs)?;
+    store.fit(gpu, &plan, &known)?;
+    let view = View::new(&facts, camera, options);
+    store.set_view(gpu, &view);
+    let mut run = Run::new(gpu, &plan, &kernels, &mut store, &mut known);
+    let resolves = |step: &Step| matches!(step, Step::Stage(Stage { pass: "resolve", .. }));
+    let steps: Vec<_> = sequence::steps(&plan).into_iter().take_while(|step| !resolves(step)).collect();
+    run.steps(&steps, &mut Frame::empty(camera, &options.maps), &())?;
+    let words = |name: &str, len: u64| match store.buffer(name) {
+        Some(buffer) => buffer.read(gpu, len),
+        None => Ok(Vec::new()),
+    };
     Ok(Stages {
-        splats,
-        nearest: nearest.nearest.read(gpu, rows.pixels)?,
-        sums: sums.sums.read(gpu, rows.pixels * u64::from(variant.sum_words()))?,
-        pixel: variant.pixel,
-        one: if needs.wide_sums { ONE_WIDE as f64 } else { ONE.into() },
+        splats: splats(gpu, scene, &facts, &store)?,
+        nearest: words("nearest", band.pixels)?,
+        sums: words("sums", band.pixels * u64::from(plan.sum_words))?,
+        pixel: plan.pixel,
+        one: if plan.needs.wide_sums { ONE_WIDE as f64 } else { ONE.into() },
         view,
     })
+}
+
+/// The record of each surfel, in the order of the scene.
+fn splats(gpu: &Gpu, scene: &Scene, facts: &Facts, store: &Store) -> Result<Vec<Splat>> {
+    let mut splats = vec![Splat::zeroed(); scene.surfels.len()];
+    let mut order = order(&scene.surfels, &facts.core).into_iter();
+    let words = (size_of::<Splat>() / 4) as u64;
+    for page in &store.pages {
+        let Some(stored) = page.buffer("splats") else { continue };
+        let stored = stored.read(gpu, page.slots * words)?;
+        for (splat, index) in bytemuck::cast_slice(&stored).iter().zip(&mut order) {
+            splats[index as usize] = *splat;
+        }
+    }
+    Ok(splats)
 }
 
 /// Runs the entry point `evaluate` of the module `text` over `inputs`, an invocation each.

@@ -1,0 +1,27 @@
+//! What the values of a PLY file are read into, and what is wrong with them in text and in binary alike.
+
+use super::faces::Faces;
+use super::header::Element;
+use crate::io::Points;
+use crate::io::fault::Fault;
+use crate::io::values::shown;
+
+/// What is read of a file.
+pub(super) struct Contents {
+    pub(super) points: Points,
+    pub(super) faces: Faces,
+}
+
+/// The file ended inside an element.
+pub(super) fn ends_early(element: &Element, rows: u64) -> Fault {
+    let rows_of = match element.name.as_str() {
+        "vertex" => "vertices".to_owned(),
+        name => format!("rows of element '{}'", shown(name.as_bytes())),
+    };
+    Fault::Malformed(format!("the header promises {} {rows_of}, the file ends after {rows}", element.count))
+}
+
+pub(super) fn negative_list(element: &Element, row: u64) -> Fault {
+    let name = shown(element.name.as_bytes());
+    Fault::Malformed(format!("row {} of element '{name}' has a list of negative length", row + 1))
+}

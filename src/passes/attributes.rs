@@ -1,0 +1,40 @@
+//! What is blended beside the weight: colour, normal, depth, fragment count, and a place in a texture. Each is a file that adds its
+//! terms to a pixel's sums and one that resolves them, or an absent one.
+
+use crate::plan::pass::Pass;
+use crate::plan::{ColorNeed, PixelLayout, RasterDepth, color_channels};
+
+/// The files and constants.
+pub const PASS: Pass = Pass {
+    name: "attributes",
+    files: |needs| {
+        let pick = |needed, file, absent| if needed { file } else { absent };
+        let whole = needs.raster.is_some_and(|raster| raster.depth != RasterDepth::Exact);
+        let mut files = vec![
+            pick(needs.normal, "normal.wgsl", "normal_absent.wgsl"),
+            pick(needs.count, "count.wgsl", "count_absent.wgsl"),
+            pick(needs.depth, pick(whole, "depth_whole.wgsl", "depth.wgsl"), "depth_absent.wgsl"),
+            pick(needs.color == ColorNeed::Textured, "texture.wgsl", "texture_absent.wgsl"),
+        ];
+        files.extend(match needs.color {
+            ColorNeed::Constant => &["color_constant.wgsl"][..],
+            ColorNeed::Srgb8 => &["color_srgb8.wgsl", "srgb.wgsl", "color_sums.wgsl"],
+            ColorNeed::Linear => &["color_linear.wgsl", "color_sums.wgsl"],
+            ColorNeed::Textured => &["color_textured.wgsl", "srgb.wgsl", "color_sums.wgsl"],
+        });
+        files
+    },
+    kernels: |_| Vec::new(),
+    constants: |making| {
+        let layout = PixelLayout::of(making.needs);
+        vec![
+            ("CHANNELS", layout.channels.into()),
+            ("COLOR_CHANNELS", color_channels(making.needs).into()),
+            ("NORMAL_CHANNEL", layout.normal_channel.into()),
+            ("TURN_NORMALS", u32::from(making.needs.turn_normals).into()),
+            ("DEPTH_CHANNEL", layout.depth_channel.into()),
+            ("COUNT_CHANNEL", layout.count_channel.into()),
+            ("PLACE_CHANNEL", layout.place_channel.into()),
+        ]
+    },
+};

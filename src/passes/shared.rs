@@ -1,0 +1,22 @@
+//! What every module has: the layout that host and device share, how records are read, and where a surfel lies.
+
+use crate::plan::pass::Pass;
+
+/// The files.
+pub const PASS: Pass = Pass {
+    name: "shared",
+    files: |needs| {
+        let pick = |needed, file, absent| if needed { file } else { absent };
+        vec![
+            "layout.wgsl",
+            pick(needs.long_words, "words_long.wgsl", "words.wgsl"),
+            "records.wgsl",
+            "double.wgsl",
+            "rows.wgsl",
+            pick(needs.doubled, "center_doubled.wgsl", "center.wgsl"),
+            pick(needs.copies, "copies.wgsl", "copies_absent.wgsl"),
+        ]
+    },
+    kernels: |_| Vec::new(),
+    constants: |_| Vec::new(),
+};

@@ -1,0 +1,118 @@
+//! What goes with what: one rule for the command line, for studies and for callers of the library.
+
+use super::{Accumulator, BlendFormat, ColorNeed, Facts, Features, Organisation, PixelLayout, RasterDepth};
+use super::{RenderOptions, SceneNeeds};
+use crate::error::{Error, Result};
+use crate::gpu::adapter::AdapterDescription;
+use crate::scene::light::MAX_LIGHTS;
+use crate::scene::{Camera, Shading, options::SHININESS_RANGE};
+
+fn usage(what: impl Into<String>) -> Result<()> {
+    Err(Error::Usage(what.into()))
+}
+
+/// Fails for options that go together on no adapter; `reference` renders by the twins instead.
+///
+/// # Errors
+/// [`Error::Usage`].
+pub fn options(options: &RenderOptions, reference: bool) -> Result<()> {
+    let (least, most) = SHININESS_RANGE;
+    if options.lights.len() > MAX_LIGHTS {
+        return usage(format!("a render has at most {MAX_LIGHTS} lights, not {}", options.lights.len()));
+    }
+    if options.shading == Shading::Phong && !(least..=most).contains(&options.shininess) {
+        return usage(format!("a shininess is {least} to {most}, not {}", options.shininess));
+    }
+    if options.maps.decision && !reference {
+        return usage("the decision map is made by the reference backend only");
+    }
+    if options.organisation == Organisation::Tile && options.accumulator != Accumulator::Fixed {
+        return usage("tiles sum with the accumulator fixed only: leave the organisation or the accumulator out");
+    }
+    match options.raster {
+        Some(raster) if raster.format == BlendFormat::Rgba8Unorm && options.maps.count => {
+            usage("an 8-bit target cannot count fragments: leave count out, or take rgba16float")
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Fails for options that do not go with the scene that `facts` are of.
+///
+/// # Errors
+/// [`Error::Usage`].
+pub fn scene(facts: &Facts, options: &RenderOptions) -> Result<()> {
+    if u32::try_from(facts.surfels).is_err() {
+        return usage(format!("a scene has at most 2^32 - 1 surfels, not {}", facts.surfels));
+    }
+    if facts.colors != ColorNeed::Textured {
+        return Ok(());
+    }
+    if options.raster.is_some() {
+        return usage("the rasteriser blends no texture coordinates: leave the texture out, or render by compute");
+    }
+    if options.organisation == Organisation::Tile {
+        return usage("tiles draw no textures: leave the organisation or the texture out");
+    }
+    Ok(())
+}
+
+/// Fails if `adapter` lacks what `needs` ask for.
+///
+/// # Errors
+/// A sentence that says what is lacking and what to do.
+pub fn on_adapter(adapter: &AdapterDescription, needs: &SceneNeeds, camera: &Camera) -> Result<()> {
+    match needs.raster {
+        None => sums(adapter, needs.accumulator),
+        Some(_) => rasteriser(adapter, needs, camera),
+    }
+}
+
+/// Fails if `adapter` lacks the atomics of `accumulator`.
+///
+/// # Errors
+/// A sentence that says what is lacking and what to do.
+pub fn sums(adapter: &AdapterDescription, accumulator: Accumulator) -> Result<()> {
+    let (has, what) = match accumulator.row().features {
+        Features::None => return Ok(()),
+        Features::AtomicsU64 => (adapter.atomics_u64, "64-bit atomics"),
+        Features::AtomicsF32 => (adapter.atomics_f32, "f32 atomic add"),
+    };
+    if has {
+        return Ok(());
+    }
+    Err(adapter.error(format!("the accumulator {accumulator} needs {what}, which this adapter lacks: take fixed")))
+}
+
+fn rasteriser(adapter: &AdapterDescription, needs: &SceneNeeds, camera: &Camera) -> Result<()> {
+    let Some(raster) = needs.raster else { return Ok(()) };
+    let limit = |limit, available: u32, needed: u32, what: &str| match needed > available {
+        false => Ok(()),
+        true => Err(Error::Limit {
+            adapter: adapter.name.clone(),
+            limit,
+            available: available.into(),
+            needed: needed.into(),
+            what: what.into(),
+        }),
+    };
+    if !adapter.vertex_storage {
+        return Err(
+            adapter.error("vertex shaders cannot read the splats here: take --backend gpu, or another --adapter")
+        );
+    }
+    if raster.depth != RasterDepth::Exact && adapter.api == "gl" {
+        return Err(
+            adapter.error("OpenGL interpolates depths too coarsely: take --raster-depth exact, or another --adapter")
+        );
+    }
+    if raster.format == BlendFormat::Rgba32Float && !adapter.blends_f32 {
+        return Err(adapter.error("this adapter does not blend into 32-bit floats: take --blend-format rgba16float"));
+    }
+    let side = camera.width.max(camera.height);
+    let most = adapter.max_texture_dimension_2d;
+    limit("max_texture_dimension_2d", most, side, "for the image; choose a smaller one")?;
+    let bytes = raster.format.bytes() * PixelLayout::of(needs).targets();
+    let most = adapter.max_color_attachment_bytes_per_sample;
+    limit("max_color_attachment_bytes_per_sample", most, bytes, "for the sums; ask for fewer maps")
+}

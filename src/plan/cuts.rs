@@ -1,0 +1,54 @@
+//! Where images and scenes are cut, so that each piece fits a buffer: bands of rows, pages of surfels.
+
+use crate::error::{Error, Result};
+use crate::gpu::adapter::AdapterDescription;
+use crate::gpu::layout::{BATCH, MOST_GROUPS, MOST_ROUNDS, OCCLUSION_TILE, Splat, TILE};
+use crate::scene::Camera;
+
+/// Rows of the image that buffers hold at a time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Band {
+    /// First row.
+    pub first: u32,
+    /// How many.
+    pub rows: u32,
+    /// Pixels in them.
+    pub pixels: u64,
+    /// Tiles of [`OCCLUSION_TILE`] pixels squared that cover them.
+    pub tiles: u64,
+}
+
+/// The image in bands of whole rows, for `words` u32 words a pixel in the largest buffer.
+///
+/// # Errors
+/// [`Error::Limit`] if one row is too long.
+pub fn bands(adapter: &AdapterDescription, camera: &Camera, words: u32) -> Result<Vec<Band>> {
+    let row_bytes = u64::from(camera.width) * u64::from(words) * 4;
+    let rows = adapter.buffer_limit() / row_bytes;
+    if rows == 0 {
+        return Err(Error::Limit {
+            adapter: adapter.name.clone(),
+            limit: "max_storage_buffer_binding_size",
+            available: adapter.buffer_limit(),
+            needed: row_bytes,
+            what: format!("for one row of {} pixels; choose a narrower image", camera.width),
+        });
+    }
+    // A workgroup that draws a splat over the whole band must not tire its invocations.
+    let most_pixels = u64::from(MOST_ROUNDS * TILE * TILE);
+    let rows = rows.min(most_pixels / u64::from(camera.width)).min(camera.height.into()).max(1) as u32;
+    let band = |first: u32| {
+        let rows = rows.min(camera.height - first);
+        let [across, down] = [camera.width, rows].map(|side| u64::from(side.div_ceil(OCCLUSION_TILE)));
+        Band { first, rows, pixels: u64::from(rows) * u64::from(camera.width), tiles: across * down }
+    };
+    Ok((0..camera.height).step_by(rows as usize).map(band).collect())
+}
+
+/// Surfels of a page: whole batches, unless one is too large; each batch is a row of a dispatch, of which every adapter grants so
+/// many. The splat's record is the largest of what is paged alike.
+pub fn page_surfels(adapter: &AdapterDescription) -> u64 {
+    let most = adapter.page_len(size_of::<Splat>());
+    let whole = most / u64::from(BATCH) * u64::from(BATCH);
+    if whole > 0 { whole.min(u64::from(MOST_GROUPS * BATCH)) } else { most.max(1) }
+}

@@ -1,0 +1,52 @@
+//! What earlier tries and frames have shown of a scene on an adapter: a plan goes by it, and a frame that turns out to need more is
+//! rendered again with what it taught.
+
+/// Times that a frame is rendered at most. A try fails for one of four reasons: slots, lists of large splats, lists of all, sums that
+/// wrap; and each teaches what ends it, or, of a list whose length a view changes, what ends it in this view.
+pub const MOST_TRIES: usize = 6;
+
+/// Lists of the splats that may touch each cell of the image (`wgsl/bin.wgsl`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Listed {
+    /// The large ones, by blocks of tiles.
+    Large,
+    /// The small ones that are not hidden, by tiles.
+    Small,
+}
+
+/// What is known; at first nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Known {
+    /// Tiles that a splat touches on average in this view, by a sample.
+    pub touched_tiles: f64,
+    /// The slots of splats were counted for an earlier view, which has left some spare.
+    pub slots: bool,
+    /// Whether the last frame had large splats.
+    pub large: Option<bool>,
+    /// Entries of the lists of large and of small splats that there is room for, and how many of them.
+    pub entries: [Option<u64>; 2],
+    /// There are more splats than tiles can list, so that their sums are stored.
+    pub crowded: bool,
+    /// There are more large splats than tiles can list, so that each is drawn by a workgroup.
+    pub crowded_large: bool,
+    /// Fragments that made a sum of the accumulator that was asked for wrap.
+    pub overflows: u64,
+}
+
+impl Known {
+    /// Entries of these lists that there is room for.
+    pub fn entries_of(&self, of: Listed) -> Option<u64> {
+        self.entries[of as usize]
+    }
+
+    /// Forgets what buffers have room for.
+    pub fn forget_buffers(&mut self) {
+        self.forget_image();
+        self.slots = false;
+    }
+
+    /// Forgets what holds for one size of image.
+    pub fn forget_image(&mut self) {
+        (self.entries, self.large) = ([None; 2], None);
+    }
+}

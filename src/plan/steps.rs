@@ -1,0 +1,147 @@
+//! What a frame does, as data: stages of kernels, each over something, and what is looked at in between. A list of steps is made
+//! without a device, and one executor runs it.
+
+use super::known::Listed;
+use crate::gpu::layout::WORKGROUP;
+
+/// A kernel: an entry point of WGSL, and the invocations of its workgroup.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Kernel {
+    /// Its name in WGSL.
+    pub name: &'static str,
+    /// Invocations of a workgroup.
+    pub workgroup: [u32; 3],
+    /// The lists that it sees as `lists`.
+    pub lists: Option<Listed>,
+}
+
+impl Kernel {
+    /// One of [`WORKGROUP`] invocations.
+    pub const fn new(name: &'static str) -> Self {
+        Self::of(name, [WORKGROUP, 1, 1])
+    }
+
+    /// One of another workgroup.
+    pub const fn of(name: &'static str, workgroup: [u32; 3]) -> Self {
+        Self { name, workgroup, lists: None }
+    }
+
+    /// One that makes lists.
+    pub const fn listing(name: &'static str, workgroup: [u32; 3], lists: Listed) -> Self {
+        Self { name, workgroup, lists: Some(lists) }
+    }
+}
+
+/// Which batches a stage draws.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// Every one that is projected: of all there are, or where some are left out, the near and the far ones.
+    All,
+    /// In view and nearer than the middle of the scene.
+    Near,
+    /// In view, farther, and not hidden by the near ones.
+    Far,
+}
+
+/// What a kernel is dispatched over. A kernel that binds a page's buffer is dispatched for each page.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Over {
+    /// An invocation for each slot of a page's splats.
+    Slots(Part),
+    /// An invocation for each batch of a page.
+    Batches,
+    /// Workgroups for the splats that take long to project, as the device counted them.
+    Rare,
+    /// A workgroup for each large splat.
+    Large,
+    /// An invocation for each large splat, to list it.
+    Listing,
+    /// An invocation for each tile of pixels by which hidden splats are told.
+    Occlusion,
+    /// Eight invocations, a row of pixels, for each tile that large splats are drawn by.
+    Tiles,
+    /// A workgroup for each tile that anything covers.
+    Covered,
+    /// A workgroup for eight such tiles.
+    CoveredEights,
+    /// One workgroup.
+    Once,
+}
+
+/// A dispatch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Run {
+    /// The kernel.
+    pub kernel: Kernel,
+    /// And over what.
+    pub over: Over,
+}
+
+/// Words of a buffer, by its name in WGSL, that become 0: of each page, if pages have it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Clear {
+    /// The buffer.
+    pub buffer: &'static str,
+    /// The first word.
+    pub first: u64,
+    /// How many; None for all that follow.
+    pub count: Option<u64>,
+}
+
+impl Clear {
+    /// The words of `buffer` from `first` on, `count` of them.
+    pub fn of(buffer: &'static str, first: u64, count: u64) -> Self {
+        Self { buffer, first, count: Some(count) }
+    }
+}
+
+/// Dispatches that are timed together.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Stage {
+    /// The pass that they count for.
+    pub pass: &'static str,
+    /// The band of the image.
+    pub band: usize,
+    /// One page, or all.
+    pub page: Option<usize>,
+    /// It is not run where a look has shown no large splats.
+    pub of_large: bool,
+    /// What is cleared before.
+    pub clears: Vec<Clear>,
+    /// The dispatches.
+    pub runs: Vec<Run>,
+}
+
+impl Stage {
+    /// One of `pass` over all pages in `band`, without clears.
+    pub fn new(pass: &'static str, band: usize, runs: Vec<Run>) -> Self {
+        Self { pass, band, page: None, of_large: false, clears: Vec::new(), runs }
+    }
+
+    /// The same after `clears`.
+    pub fn after(self, clears: Vec<Clear>) -> Self {
+        Self { clears, ..self }
+    }
+}
+
+/// Something that is looked at on the device in the middle of a frame, because buffers are sized by it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Look {
+    /// The slots that the listed batches of a part take.
+    Slots(Part),
+    /// What lists hold that these stages count.
+    Lists(Listed, Vec<Stage>),
+}
+
+/// A step of a frame.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// Kernels.
+    Stage(Stage),
+    /// Makes room by what is there.
+    Look(Look),
+    /// The rasteriser's visibility and attribute pass.
+    Draw,
+    /// Rows of the image go to the host.
+    ReadBack(usize),
+}

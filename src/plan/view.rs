@@ -1,0 +1,120 @@
+//! The uniform of a view: camera, options and the scene's ranges in the units that kernels work in.
+
+use glam::DVec3;
+
+use super::{Facts, RenderOptions};
+use crate::gpu::layout::View;
+use crate::scene::light::MAX_LIGHTS;
+use crate::scene::texture::PlaceRange;
+use crate::scene::{Bounds, Camera, Light, Projection};
+
+/// x as the nearest f32 and the nearest f32 to what that leaves.
+fn split(x: f64) -> (f32, f32) {
+    let high = x as f32;
+    (high, (x - f64::from(high)) as f32)
+}
+
+fn split_all<const N: usize>(values: [f64; N]) -> ([f32; 4], [f32; 4]) {
+    let (mut high, mut low) = ([0.0; 4], [0.0; 4]);
+    for (k, value) in values.into_iter().enumerate() {
+        (high[k], low[k]) = split(value);
+    }
+    (high, low)
+}
+
+/// The largest coordinate of a stray surfel in device units: squares of lengths stay finite.
+const FARTHEST_STRAY: f64 = (1u64 << 60) as f64;
+
+/// The power of two that brings the extent of the scene's `body` and its distance from the camera to at most one, and all of
+/// its `bounds` to at most 2^60.
+pub fn device_unit(body: &Bounds, bounds: &Bounds, eye: DVec3) -> f64 {
+    let reach = |bounds: &Bounds| {
+        let corners = [bounds.min, bounds.max].into_iter();
+        corners.flat_map(|corner| [corner.abs().max_element(), (corner - eye).abs().max_element()]).fold(0.0, f64::max)
+    };
+    let reach = reach(body).max(reach(bounds) / FARTHEST_STRAY);
+    if reach > 0.0 && reach.is_finite() { (-reach.log2().ceil()).clamp(-126.0, 126.0).exp2() } else { 1.0 }
+}
+
+impl View {
+    /// The view by `camera` of the scene that `facts` are of.
+    pub fn new(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Self {
+        let Facts { bounds, body, core, color: (low, high), largest_radius, .. } = facts;
+        let largest_radius = f64::from(*largest_radius);
+        let eye_relative = camera.eye - facts.origin;
+        let unit = device_unit(body, bounds, eye_relative);
+        let (eye, eye_low) = split_all((eye_relative * unit).to_array());
+        let (mut rotation, mut rotation_low) = ([[0.0; 4]; 3], [[0.0; 4]; 3]);
+        for row in 0..3 {
+            (rotation[row], rotation_low[row]) = split_all(camera.rotation.row(row).to_array());
+        }
+        // Pinhole intrinsics have no length; an orthographic scale is pixels per length.
+        let per_unit = match camera.projection {
+            Projection::Pinhole => 1.0,
+            Projection::Orthographic => 1.0 / unit,
+        };
+        let (intrinsics, intrinsics_low) =
+            split_all([camera.fx * per_unit, camera.fy * per_unit, camera.cx, camera.cy]);
+        let span: [f32; 4] = std::array::from_fn(|k| high[k] - low[k]);
+        let ([texture_width, texture_height], place) = match facts.texture {
+            Some((size, PlaceRange { middle: [u, v], span, most_reach_2 })) => (size, [u, v, span, most_reach_2]),
+            None => ([0; 2], [0.0; 4]),
+        };
+        let (relative, absolute, of_radius) = options.epsilon.parts();
+        // Past every surfel, with room for the rounding of depths. An epsilon that accepts everything must not make the
+        // interval that depths are measured in infinite, nor coarser than the scene.
+        let farthest = (farthest_of(bounds, eye_relative, camera) + largest_radius) * 1.001;
+        Self {
+            rotation,
+            rotation_low,
+            eye,
+            eye_low,
+            intrinsics,
+            intrinsics_low,
+            color_low: *low,
+            color_span: span,
+            color_scale: span.map(|s| if s > 0.0 { 1.0 / s } else { 0.0 }),
+            background: options.background,
+            lights: lights(&options.lights),
+            width: camera.width,
+            height: camera.height,
+            zero: 0,
+            unit: unit as f32,
+            // Squares of 1 / near must stay finite.
+            near: (camera.near * unit).max(1e-18) as f32,
+            epsilon_relative: relative as f32,
+            epsilon_absolute: (absolute * unit) as f32,
+            world: (1.0 / unit) as f32,
+            epsilon_radius: of_radius as f32,
+            epsilon_deepest: (of_radius * largest_radius * unit) as f32,
+            farthest: (farthest * unit) as f32,
+            middle: (camera.rotation.row(2).dot(core.center() - eye_relative) * unit) as f32,
+            texture_width,
+            texture_height,
+            padding_0: 0,
+            padding_1: 0,
+            place,
+        }
+    }
+}
+
+/// The largest depth of a corner of `bounds`, at least 0; world units.
+fn farthest_of(bounds: &Bounds, eye: DVec3, camera: &Camera) -> f64 {
+    let corner = |corner: usize| {
+        let pick = |axis: usize| if corner >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
+        camera.rotation.row(2).dot(DVec3::new(pick(0), pick(1), pick(2)) - eye)
+    };
+    (0..8).map(corner).fold(0.0, f64::max)
+}
+
+/// The lights as the kernels see them: a direction, zero for a headlight, and an intensity.
+fn lights(lights: &[Light]) -> [[f32; 4]; MAX_LIGHTS] {
+    let mut slots = [[0.0; 4]; MAX_LIGHTS];
+    for (slot, light) in slots.iter_mut().zip(lights) {
+        *slot = match *light {
+            Light::Headlight { intensity } => [0.0, 0.0, 0.0, intensity],
+            Light::Directional { toward, intensity } => toward.extend(intensity).to_array(),
+        };
+    }
+    slots
+}

@@ -1,0 +1,68 @@
+//! The compiled kernels of a frame: a module for all passes, and one for the tiles, which is compiled when something is drawn by them.
+
+use std::cell::OnceCell;
+use std::sync::Arc;
+
+use crate::error::Result;
+use crate::gpu::program::Program;
+use crate::gpu::{Gpu, Sources};
+use crate::passes::{constants, modules, raster};
+use crate::plan::pass::{Making, Module};
+use crate::plan::steps::Kernel;
+use crate::plan::{Plan, RenderOptions, SceneNeeds};
+
+/// The kernels of one plan.
+pub struct Kernels {
+    /// What they are compiled for.
+    made: (SceneNeeds, Vec<(&'static str, u64)>),
+    sources: Sources,
+    constants: Vec<(&'static str, f64)>,
+    modules: Vec<(Module, OnceCell<Arc<Program>>)>,
+}
+
+impl Kernels {
+    /// Those of `plan`, of which the passes' are compiled.
+    pub fn new(gpu: &Gpu, sources: &Sources, plan: &Plan, options: &RenderOptions, surfels: u64) -> Result<Self> {
+        let constants = constants(&Making { needs: &plan.needs, options, surfels });
+        let modules = modules(&plan.needs).into_iter().map(|module| (module, OnceCell::new())).collect();
+        let made = (plan.needs, bits(&constants));
+        let kernels = Self { made, sources: sources.clone(), constants, modules };
+        kernels.first(gpu)?;
+        Ok(kernels)
+    }
+
+    /// Whether they serve `plan` too.
+    pub fn serve(&self, plan: &Plan, options: &RenderOptions, surfels: u64) -> bool {
+        let making = Making { needs: &plan.needs, options, surfels };
+        self.made.0 == plan.needs && self.made.1 == bits(&constants(&making))
+    }
+
+    /// The module of all passes.
+    pub fn first(&self, gpu: &Gpu) -> Result<&Program> {
+        self.compiled(gpu, 0)
+    }
+
+    /// The module that has `kernel`.
+    pub fn of(&self, gpu: &Gpu, kernel: &Kernel) -> Result<&Program> {
+        let module = self.modules.iter().position(|(module, _)| module.kernels.contains(kernel));
+        self.compiled(gpu, module.ok_or_else(|| gpu.error(format!("there is no kernel {}", kernel.name)))?)
+    }
+
+    fn compiled(&self, gpu: &Gpu, index: usize) -> Result<&Program> {
+        let (module, program) = &self.modules[index];
+        if let Some(program) = program.get() {
+            return Ok(program);
+        }
+        let draws = match self.made.0.raster {
+            Some(raster) if index == 0 => raster::draws(raster, crate::plan::PixelLayout::of(&self.made.0)),
+            _ => Vec::new(),
+        };
+        let stages: Vec<_> = module.kernels.iter().map(|kernel| kernel.name).collect();
+        let made = gpu.programs.get(gpu, (&self.sources, &module.files), &stages, &draws, &self.constants)?;
+        Ok(program.get_or_init(|| made))
+    }
+}
+
+fn bits(constants: &[(&'static str, f64)]) -> Vec<(&'static str, u64)> {
+    constants.iter().map(|&(name, value)| (name, value.to_bits())).collect()
+}

@@ -1,0 +1,279 @@
+//! The executor of a frame's steps: it binds buffers by their names, dispatches, and looks at what the device counted.
+
+use super::kernels::Kernels;
+use super::store::Store;
+use crate::error::{Error, Result};
+use crate::frame::Frame;
+use crate::gpu::Gpu;
+use crate::gpu::buffers::{Buffer, counts};
+use crate::gpu::kernel::{Grid, grid};
+use crate::gpu::layout::{
+    BATCH, COVERED_GRID, COVERED_GRID_OF_EIGHTS, LIST_FAR, QUEUE_GRID, QUEUE_LISTING, TILE_WIDTH,
+};
+use crate::gpu::timing::Timing;
+use crate::passes::tiles::{self, LONGEST, list_name};
+use crate::passes::{covered, raster, resolve};
+use crate::plan::known::{Known, Listed};
+use crate::plan::steps::{Clear, Kernel, Look, Over, Part, Stage, Step};
+use crate::plan::{Plan, RasterDepth};
+use crate::progress::Progress;
+
+/// How many splats a frame has.
+#[derive(Clone, Copy, Debug)]
+pub struct Tally {
+    /// Those that may touch a pixel of the image, and are not known to be hidden.
+    pub drawn: u64,
+    /// The image is right. If it is not, what is known now makes the next one right.
+    pub complete: bool,
+}
+
+/// A try at a frame.
+pub struct Run<'a> {
+    /// The device.
+    pub gpu: &'a Gpu,
+    /// What is rendered.
+    pub plan: &'a Plan,
+    /// Its kernels.
+    pub kernels: &'a Kernels,
+    /// Its buffers.
+    pub store: &'a mut Store,
+    /// What it learns.
+    pub known: &'a mut Known,
+    /// Time by pass.
+    pub timing: Timing,
+    /// This view was seen to have no large splats.
+    none_large: bool,
+}
+
+impl<'a> Run<'a> {
+    /// A try that has not begun.
+    pub fn new(gpu: &'a Gpu, plan: &'a Plan, kernels: &'a Kernels, store: &'a mut Store, known: &'a mut Known) -> Self {
+        Self { gpu, plan, kernels, store, known, timing: Timing::new(gpu), none_large: false }
+    }
+
+    /// Runs `steps` into `frame`; false if there is too little room for the rest, of which `known` now tells.
+    pub fn steps(&mut self, steps: &[Step], frame: &mut Frame, progress: &dyn Progress) -> Result<bool> {
+        for step in steps {
+            match step {
+                Step::Stage(stage) => self.stage(stage)?,
+                Step::Draw => self.draw()?,
+                Step::ReadBack(band) => {
+                    self.read_back(*band, frame)?;
+                    progress.advance(self.plan.bands[*band].rows.into());
+                }
+                Step::Look(Look::Slots(part)) => self.look_for_slots(*part)?,
+                Step::Look(Look::Lists(of, stages)) => {
+                    if !self.look_for_lists(*of, stages)? {
+                        return Ok(false);
+                    }
+                }
+            }
+        }
+        Ok(true)
+    }
+
+    /// What the device counted.
+    pub fn tally(&mut self) -> Result<Tally> {
+        let wanted = |name: &'static str| self.store.buffer(name);
+        let large = self.plan.large_by_tiles.then(|| wanted("large_lists")).flatten();
+        let small = self.plan.needs.gather.then(|| wanted("small_lists")).flatten();
+        let sums = wanted("overflows");
+        let of_pages = self.store.pages.iter().flat_map(|page| [page.buffer("queue"), page.buffer("drawn")]);
+        let all: Vec<&Buffer<u32>> = of_pages.chain([large, small, sums]).flatten().collect();
+        let mut counted = counts(self.gpu, &all)?.into_iter();
+        let mut next = || counted.next().unwrap_or_default();
+        let (mut tally, mut most_large, mut slots) = (Tally { drawn: 0, complete: true }, 0, true);
+        for page in &self.store.pages {
+            let ([large, unseen], [_, batches]) = (next(), next());
+            tally.drawn += page.stand_for.saturating_sub(unseen.into());
+            most_large = most_large.max(large);
+            slots &= !self.plan.needs.cull || u64::from(batches) * u64::from(BATCH) <= page.slots;
+        }
+        let mut lists = true;
+        for (of, _) in [(Listed::Large, large), (Listed::Small, small)].into_iter().filter(|(_, list)| list.is_some()) {
+            let [entries, longest] = next().map(u64::from);
+            lists &= entries <= self.store.entries(of) && longest <= LONGEST;
+        }
+        let [overflows, _] = sums.map_or([0; 2], |_| next());
+        self.known.large = Some(most_large > 0);
+        self.known.slots &= slots;
+        if !lists {
+            self.known.entries = [None; 2];
+        }
+        if overflows > 0 {
+            self.known.overflows = overflows.into();
+        }
+        tally.complete = slots && lists && overflows == 0;
+        Ok(tally)
+    }
+
+    fn stage(&mut self, stage: &Stage) -> Result<()> {
+        if stage.of_large && self.none_large {
+            return Ok(());
+        }
+        let (gpu, plan, store, kernels) = (self.gpu, self.plan, &*self.store, self.kernels);
+        let clears = |encoder: &mut wgpu::CommandEncoder| stage.clears.iter().for_each(|c| clear(store, encoder, c));
+        self.timing.pass(gpu, stage.pass, clears, |pass| {
+            for run in &stage.runs {
+                let program = kernels.of(gpu, &run.kernel)?;
+                let paged = program.variables(run.kernel.name).iter().any(|(name, _)| store.is_paged(name));
+                let pages = match stage.page {
+                    Some(page) => page..page + 1,
+                    None if paged => 0..store.pages.len(),
+                    None => 0..1,
+                };
+                for page in pages {
+                    let grid = over(gpu, plan, store, (stage.band, page), run.over)?;
+                    let binding = |name: &str| binding(store, &run.kernel, name, (stage.band, page));
+                    program.dispatch(gpu, pass, run.kernel.name, &binding, grid)?;
+                }
+            }
+            Ok(())
+        })
+    }
+
+    /// The rasteriser's passes over the whole image.
+    fn draw(&mut self) -> Result<()> {
+        let (gpu, plan, store) = (self.gpu, self.plan, &*self.store);
+        let (Some(raster), Some(targets)) = (plan.needs.raster, &store.targets) else { return Ok(()) };
+        let program = self.kernels.first(gpu)?;
+        let draw = |pass: &mut wgpu::RenderPass<'_>, name| {
+            for (number, page) in store.pages.iter().enumerate() {
+                let vertices = raster::vertices_of(plan, page.slots);
+                let vertices =
+                    vertices.ok_or_else(|| gpu.error("a page has too many splats for the rasteriser's vertices"))?;
+                let binding = |name: &str| store.binding(name, number, 0);
+                program.draw(gpu, pass, name, &binding, vertices)?;
+            }
+            Ok(())
+        };
+        let attachment =
+            |depth_ops| wgpu::RenderPassDepthStencilAttachment { view: &targets.depth, depth_ops, stencil_ops: None };
+        // Where nothing is: the farthest there can be.
+        let exact = raster.depth == RasterDepth::Exact;
+        let nothing = if exact { 1.0 } else { 0.0 };
+        let clear = wgpu::Operations { load: wgpu::LoadOp::Clear(nothing), store: wgpu::StoreOp::Store };
+        self.timing.draw(gpu, "visibility", &[], Some(attachment(Some(clear))), |pass| draw(pass, "visibility"))?;
+        let ops = wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: wgpu::StoreOp::Store };
+        let attach =
+            |view| Some(wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops });
+        let sums: Vec<_> = targets.sums.iter().map(attach).collect();
+        // Without operations the depth buffer is read only, and the shader may not see it either way.
+        let depth = (!exact).then(|| attachment(None));
+        self.timing.draw(gpu, "accumulate", &sums, depth, |pass| draw(pass, "accumulate"))
+    }
+
+    fn read_back(&self, band: usize, frame: &mut Frame) -> Result<()> {
+        let Some((image, readback)) = self.store.image() else { return Ok(()) };
+        let (layout, band) = (&self.plan.pixel, &self.plan.bands[band]);
+        let record = u64::from(layout.image_words) * 4;
+        let start = band.first as usize * frame.width as usize;
+        readback.visit(self.gpu, image, band.pixels * record, |offset, bytes| {
+            resolve::unpack(layout, bytes, start + (offset / record) as usize, frame);
+        })
+    }
+
+    /// Makes room for the splats of the batches that are listed, and an eighth more for the next view.
+    fn look_for_slots(&mut self, part: Part) -> Result<()> {
+        let lists: Vec<_> = self.store.pages.iter().filter_map(|page| page.buffer("drawn")).collect();
+        let listed = counts(self.gpu, &lists)?;
+        for (page, [_, batches]) in self.store.pages.iter_mut().zip(listed) {
+            let slots = u64::from(batches) * u64::from(BATCH);
+            if slots > page.slots {
+                // Whole batches: the last one may be listed anywhere.
+                let [slots, all] = [slots + slots / 8, page.surfels].map(|n| n.next_multiple_of(BATCH.into()));
+                page.grow(self.gpu, slots.min(all))?;
+            }
+        }
+        self.known.slots = part == Part::Far;
+        Ok(())
+    }
+
+    /// Makes room for the lists of a kind, whose entries `stages` count, and a quarter more for the next view; false if there are more
+    /// than a binding or a list holds.
+    fn look_for_lists(&mut self, of: Listed, stages: &[Stage]) -> Result<bool> {
+        let gathers = self.plan.needs.gather;
+        if of == Listed::Large && !gathers {
+            let queues: Vec<_> = self.store.pages.iter().filter_map(|page| page.buffer("queue")).collect();
+            let large = counts(self.gpu, &queues)?.iter().any(|[large, _]| *large > 0);
+            self.none_large = !large;
+            if !large {
+                return Ok(true);
+            }
+        }
+        stages.iter().try_for_each(|stage| self.stage(stage))?;
+        let Some(lists) = self.store.buffer(list_name(of)) else { return Ok(true) };
+        let [entries, longest] = counts(self.gpu, &[lists])?.first().copied().unwrap_or_default().map(u64::from);
+        let entries = entries + entries / 4;
+        let most = (self.gpu.buffer_limit() / 4).saturating_sub(self.store.list_words(self.plan, of));
+        if entries > most || longest > LONGEST {
+            self.known.crowded_large |= of == Listed::Large;
+            self.known.crowded |= gathers;
+            return Ok(false);
+        }
+        self.store.make_lists(self.gpu, self.plan, of, entries)?;
+        self.known.entries[of as usize] = Some(entries);
+        Ok(true)
+    }
+
+    /// That it goes on trying makes no sense.
+    pub fn never_fits(gpu: &Gpu) -> Error {
+        gpu.error("the room that a frame needs was measured again and again, and was never enough")
+    }
+}
+
+fn clear(store: &Store, encoder: &mut wgpu::CommandEncoder, clear: &Clear) {
+    let words = |buffer: &Buffer<u32>, encoder: &mut wgpu::CommandEncoder| {
+        encoder.clear_buffer(&buffer.raw, clear.first * 4, clear.count.map(|words| words * 4));
+    };
+    if store.is_paged(clear.buffer) {
+        store.pages.iter().filter_map(|page| page.buffer(clear.buffer)).for_each(|buffer| words(buffer, encoder));
+    } else if let Some(buffer) = store.buffer(clear.buffer) {
+        words(buffer, encoder);
+    }
+}
+
+/// What a variable of `kernel` is bound to.
+fn binding<'a>(
+    store: &'a Store,
+    kernel: &Kernel,
+    name: &str,
+    (band, page): (usize, usize),
+) -> Option<wgpu::BindingResource<'a>> {
+    let name = match kernel.lists {
+        Some(lists) if name == "lists" => list_name(lists),
+        _ => name,
+    };
+    store.binding(name, page, band)
+}
+
+/// The workgroups of a dispatch.
+fn over<'a>(gpu: &Gpu, plan: &Plan, store: &'a Store, (band, page): (usize, usize), over: Over) -> Result<Grid<'a>> {
+    let of_page = store.pages.get(page);
+    let missing = || gpu.error("a stage goes over what does not exist");
+    let counted = |buffer: Option<&'a Buffer<u32>>, word: u64| {
+        buffer.map(|buffer| Grid::In(&buffer.raw, word * 4)).ok_or_else(missing)
+    };
+    let queue = || of_page.and_then(|page| page.buffer("queue"));
+    let covered = |grid: u32| counted(store.buffer("nearest"), covered::start(plan, band) + u64::from(grid));
+    let invocations = match over {
+        Over::Slots(part) if plan.needs.cull => {
+            let word = if part == Part::Far { LIST_FAR } else { 0 };
+            return counted(of_page.and_then(|page| page.buffer("drawn")), word.into());
+        }
+        Over::Rare => return counted(of_page.and_then(|page| page.buffer("rare")), QUEUE_GRID.into()),
+        Over::Large => return counted(queue(), QUEUE_GRID.into()),
+        Over::Listing => return counted(queue(), QUEUE_LISTING.into()),
+        Over::Covered => return covered(COVERED_GRID),
+        Over::CoveredEights => return covered(COVERED_GRID_OF_EIGHTS),
+        Over::Once => return Ok(Grid::Of((1, 1))),
+        Over::Slots(_) => of_page.map_or(0, |page| page.slots),
+        Over::Batches => of_page.map_or(0, |page| page.batches()),
+        Over::Occlusion => plan.bands[band].tiles,
+        Over::Tiles => {
+            let rows = plan.bands[band].rows.div_ceil(tiles::rows(&plan.needs));
+            u64::from(plan.width.div_ceil(TILE_WIDTH)) * u64::from(rows) * u64::from(TILE_WIDTH)
+        }
+    };
+    Ok(Grid::Of(grid(gpu, invocations)?))
+}

@@ -1,0 +1,67 @@
+//! A frame as a list of steps: the papers' passes in their order.
+
+use crate::passes::{accumulate, cull, project, raster, resolve, tiles, visibility};
+use crate::plan::Plan;
+use crate::plan::known::Listed;
+use crate::plan::steps::{Look, Part, Step};
+
+/// The steps of a frame by `plan`.
+pub fn steps(plan: &Plan) -> Vec<Step> {
+    let mut steps = Vec::new();
+    if plan.needs.raster.is_some() {
+        steps.push(Step::Stage(project::steps(plan, Part::All)));
+        steps.push(raster::STEP);
+    }
+    for band in 0..plan.bands.len() {
+        if plan.needs.raster.is_none() {
+            nearest(plan, band, &mut steps);
+            sums(plan, band, &mut steps);
+        }
+        if !plan.needs.gather {
+            steps.push(Step::Stage(resolve::steps(plan, band)));
+        }
+        steps.push(Step::ReadBack(band));
+    }
+    steps
+}
+
+/// Splats, which bands share, and the nearest depth of each pixel of a band.
+fn nearest(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
+    for &part in plan.parts() {
+        if band == 0 {
+            if plan.needs.cull {
+                steps.push(Step::Stage(cull::steps(band, part)));
+                steps.extend(plan.looks_for_slots.then_some(Step::Look(Look::Slots(part))));
+            }
+            steps.push(Step::Stage(project::steps(plan, part)));
+        }
+        steps.push(Step::Stage(visibility::steps(plan, band, part)));
+        if part == Part::Near {
+            steps.push(Step::Stage(visibility::occlude(band, part)));
+        }
+    }
+    if plan.looks_for_lists[Listed::Large as usize] && band == 0 {
+        steps.push(tiles::look(plan, Listed::Large));
+    }
+    if plan.large_by_tiles {
+        steps.extend(tiles::visibility(plan, band).into_iter().map(Step::Stage));
+    } else {
+        steps.push(Step::Stage(visibility::large(band)));
+    }
+    steps.push(Step::Stage(visibility::occlude(band, Part::All)));
+}
+
+/// The sums of each pixel of a band; by tiles that gather, its image too.
+fn sums(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
+    if plan.needs.gather {
+        steps.extend(plan.looks_for_lists[Listed::Small as usize].then(|| tiles::look(plan, Listed::Small)));
+        steps.extend(tiles::resolve(plan, band).into_iter().map(Step::Stage));
+        return;
+    }
+    steps.push(Step::Stage(accumulate::steps(plan, band)));
+    if plan.large_by_tiles {
+        steps.extend(tiles::accumulate(plan, band).into_iter().map(Step::Stage));
+    } else {
+        steps.push(Step::Stage(accumulate::large(band)));
+    }
+}

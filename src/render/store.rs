@@ -1,0 +1,271 @@
+//! The buffers of a scene and its frames, by their names in WGSL: nothing else allocates on the device.
+
+use std::collections::BTreeMap;
+
+use super::targets::Targets;
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::gpu::buffers::{Buffer, Readback};
+use crate::gpu::layout::{BATCH, Band as BandUniform, Filter, LIST_START, QUEUE_START, Splat, View, WORKGROUP};
+use crate::passes::tiles::{list_name, list_words};
+use crate::passes::upload::{self, Uploaded};
+use crate::passes::{covered, visibility};
+use crate::plan::known::Listed;
+use crate::plan::{Band, Known, Plan, Raster, SceneNeeds};
+use crate::scene::LowPass;
+
+/// Names in WGSL of buffers that have another one where kernels write them.
+const ALIASES: [(&str, &str); 7] = [
+    ("projected", "splats"),
+    ("queued", "queue"),
+    ("listed", "rare"),
+    ("projected_filters", "filters"),
+    ("surviving", "drawn"),
+    ("visible", "nearest"),
+    ("added", "sums"),
+];
+
+/// The name under which a buffer is kept.
+fn kept(name: &str) -> &str {
+    ALIASES.iter().find(|(alias, _)| *alias == name).map_or(name, |(_, kept)| kept)
+}
+
+/// Buffers by name.
+type Named = BTreeMap<&'static str, Buffer<u32>>;
+
+fn bytes(named: &Named) -> u64 {
+    named.values().map(Buffer::bytes).sum()
+}
+
+/// One page: its surfels, and slots for splats of all of them, in their order, or, where batches are left out, of as many batches as
+/// there are to be drawn, one after the other ([`cull`](crate::passes::cull)).
+pub struct Page {
+    buffers: Named,
+    /// Surfels in it.
+    pub surfels: u64,
+    /// Surfels that they stand for together.
+    pub stand_for: u64,
+    /// Splats that there is room for.
+    pub slots: u64,
+}
+
+impl Page {
+    fn new(gpu: &Gpu, uploaded: upload::Page, low_pass: LowPass) -> Result<Self> {
+        let upload::Page { buffers, surfels, stand_for } = uploaded;
+        let mut buffers = Named::from_iter(buffers);
+        let batches = surfels.div_ceil(BATCH.into());
+        let drawn = Buffer::indirect(gpu, "batches that are drawn", batches + u64::from(LIST_START))?;
+        // A row of a grid is a batch.
+        gpu.queue.write_buffer(&drawn.raw, 0, bytemuck::cast_slice(&[[BATCH / WORKGROUP, 0, 1]; 2]));
+        buffers.insert("drawn", drawn);
+        buffers.insert("rest", Buffer::storage(gpu, "batches that may be drawn", batches + 1)?);
+        buffers.insert("splats", Buffer::<Splat>::storage(gpu, "splats", 0)?.words());
+        for (name, what) in [("queue", "queue of large splats"), ("rare", "list of rare splats")] {
+            buffers.insert(name, Buffer::indirect(gpu, what, QUEUE_START.into())?);
+        }
+        if low_pass != LowPass::None {
+            buffers.insert("filters", Buffer::<Filter>::storage(gpu, "low-pass filters", 0)?.words());
+        }
+        Ok(Self { buffers, surfels, stand_for, slots: 0 })
+    }
+
+    /// Batches of surfels.
+    pub fn batches(&self) -> u64 {
+        self.surfels.div_ceil(BATCH.into())
+    }
+
+    /// The buffer of a name.
+    pub fn buffer(&self, name: &str) -> Option<&Buffer<u32>> {
+        self.buffers.get(kept(name))
+    }
+
+    /// Makes room for at least `slots` splats, and keeps all that is stored.
+    pub fn grow(&mut self, gpu: &Gpu, slots: u64) -> Result<()> {
+        if self.slots >= slots {
+            return Ok(());
+        }
+        let words = |bytes: usize| slots * bytes as u64 / 4;
+        let list = slots + u64::from(QUEUE_START);
+        for (name, what, words) in [
+            ("splats", "splats", words(size_of::<Splat>())),
+            ("queue", "queue of large splats", list),
+            ("rare", "list of rare splats", list),
+            ("filters", "low-pass filters", words(size_of::<Filter>())),
+        ] {
+            if let Some(buffer) = self.buffers.get_mut(name) {
+                buffer.grow(gpu, what, words)?;
+            }
+        }
+        self.slots = slots;
+        Ok(())
+    }
+}
+
+/// What the buffers of a frame's pixels are made for.
+#[derive(Clone, PartialEq)]
+struct Made {
+    width: u32,
+    bands: Vec<Band>,
+    sum_words: u32,
+    image_words: u32,
+    raster: Option<(Raster, u32)>,
+}
+
+/// All buffers.
+pub struct Store {
+    /// The scene's pages.
+    pub pages: Vec<Page>,
+    /// Surfels that are the same are one.
+    copies: bool,
+    shared: Named,
+    made: Option<Made>,
+    /// Of the pixels of a band.
+    frame: Named,
+    bands: Vec<Buffer<BandUniform>>,
+    /// Entries of the lists of large and of small splats that there is room for.
+    entries: [u64; 2],
+    readback: Option<Readback>,
+    /// The rasteriser's textures.
+    pub targets: Option<Targets>,
+}
+
+impl Store {
+    /// The scene's buffers, which were `uploaded` for a render with `needs`; none for pixels yet.
+    pub fn new(gpu: &Gpu, uploaded: Uploaded, needs: &SceneNeeds) -> Result<Self> {
+        let pages = uploaded.pages.into_iter().map(|page| Page::new(gpu, page, needs.low_pass));
+        Ok(Self {
+            copies: needs.copies,
+            pages: pages.collect::<Result<_>>()?,
+            shared: Named::from_iter(uploaded.shared),
+            made: None,
+            frame: Named::new(),
+            bands: Vec::new(),
+            entries: [0; 2],
+            readback: None,
+            targets: None,
+        })
+    }
+
+    /// Whether the scene was uploaded for a render with such needs: options do not change, but whether copies are drawn once depends
+    /// on the accumulator.
+    pub fn serves(&self, needs: &SceneNeeds) -> bool {
+        self.copies == needs.copies
+    }
+
+    /// Makes the buffers that `plan` asks for.
+    pub fn fit(&mut self, gpu: &Gpu, plan: &Plan, known: &Known) -> Result<()> {
+        if !plan.needs.cull {
+            self.pages.iter_mut().try_for_each(|page| page.grow(gpu, page.surfels))?;
+        }
+        let raster = plan.needs.raster.map(|raster| (raster, plan.pixel.targets()));
+        let (width, bands) = (plan.width, plan.bands.clone());
+        let made = Made { width, bands, sum_words: plan.sum_words, image_words: plan.pixel.image_words, raster };
+        if self.made.as_ref() != Some(&made) {
+            // The old ones make room first.
+            (self.made, self.targets, self.readback) = (None, None, None);
+            self.frame.clear();
+            self.make_pixels(gpu, plan)?;
+            self.made = Some(made);
+        }
+        for of in [Listed::Large, Listed::Small] {
+            let wanted = match of {
+                Listed::Large => plan.large_by_tiles,
+                Listed::Small => plan.needs.gather,
+            };
+            if wanted && !self.frame.contains_key(list_name(of)) {
+                self.make_lists(gpu, plan, of, known.entries_of(of).unwrap_or(0))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn make_pixels(&mut self, gpu: &Gpu, plan: &Plan) -> Result<()> {
+        let most = |words: &dyn Fn(&Band) -> u64| plan.bands.iter().map(words).max().unwrap_or(0);
+        let pixels = most(&|band| band.pixels);
+        let uniform = |band: &Band| {
+            let value = BandUniform { first_row: band.first, rows: band.rows, padding_0: 0, padding_1: 0 };
+            Buffer::uniform(gpu, "band", &value)
+        };
+        self.bands = plan.bands.iter().map(uniform).collect::<Result<_>>()?;
+        let nearest = match plan.needs.raster {
+            None => Buffer::indirect(gpu, "nearest depths", most(&visibility::nearest_words))?,
+            Some(raster) => {
+                self.targets = Some(Targets::new(gpu, raster, plan)?);
+                Buffer::indirect(gpu, "covered tiles", most(&covered::words))?
+            }
+        };
+        self.frame.insert("nearest", nearest);
+        if plan.sum_words > 0 {
+            let sums = Buffer::storage(gpu, "weighted sums", pixels * u64::from(plan.sum_words))?;
+            self.frame.insert("sums", sums);
+            self.frame.insert("overflows", Buffer::storage(gpu, "overflow count", 2)?);
+        }
+        let record = u64::from(plan.pixel.image_words);
+        let image = Buffer::readable(gpu, "image", pixels * record)?;
+        self.readback = Some(Readback::new(gpu, &image, pixels * record * 4, record * 4));
+        self.frame.insert("image", image);
+        let view = Buffer::<View>::uniform(gpu, "view", &bytemuck::Zeroable::zeroed())?;
+        self.frame.insert("view", view.words());
+        Ok(())
+    }
+
+    /// Makes lists of a kind with room for `entries` in place of those there are.
+    pub fn make_lists(&mut self, gpu: &Gpu, plan: &Plan, of: Listed, entries: u64) -> Result<()> {
+        self.frame.remove(list_name(of));
+        let lists = Buffer::storage(gpu, "lists of splats", self.list_words(plan, of) + entries)?;
+        self.frame.insert(list_name(of), lists);
+        self.entries[of as usize] = entries;
+        Ok(())
+    }
+
+    /// Words of the lists of a kind before their entries.
+    pub fn list_words(&self, plan: &Plan, of: Listed) -> u64 {
+        plan.bands.iter().map(|band| list_words(plan, of, band)).max().unwrap_or(0)
+    }
+
+    /// Entries of lists that there is room for.
+    pub fn entries(&self, of: Listed) -> u64 {
+        self.entries[of as usize]
+    }
+
+    /// Sets the view.
+    pub fn set_view(&self, gpu: &Gpu, view: &View) {
+        if let Some(buffer) = self.frame.get("view") {
+            gpu.queue.write_buffer(&buffer.raw, 0, bytemuck::bytes_of(view));
+        }
+    }
+
+    /// A buffer that pages share.
+    pub fn buffer(&self, name: &str) -> Option<&Buffer<u32>> {
+        let name = kept(name);
+        self.frame.get(name).or_else(|| self.shared.get(name))
+    }
+
+    /// Whether each page has a buffer of its own of this name.
+    pub fn is_paged(&self, name: &str) -> bool {
+        self.pages.first().is_some_and(|page| page.buffer(name).is_some())
+    }
+
+    /// What a variable of a kernel is bound to, for a page and a band.
+    pub fn binding(&self, name: &str, page: usize, band: usize) -> Option<wgpu::BindingResource<'_>> {
+        if name == "band" {
+            return self.bands.get(band).map(Buffer::bound);
+        }
+        let paged = || self.pages.get(page)?.buffer(name);
+        let buffer = paged().or_else(|| self.buffer(name)).map(Buffer::bound);
+        buffer.or_else(|| self.targets.as_ref()?.binding(name))
+    }
+
+    /// The image and what it is read through.
+    pub fn image(&self) -> Option<(&Buffer<u32>, &Readback)> {
+        self.buffer("image").zip(self.readback.as_ref())
+    }
+
+    /// Device memory of surfels and splats, and of pixels, bytes.
+    pub fn bytes(&self) -> (u64, u64) {
+        let splats = self.pages.iter().map(|page| bytes(&page.buffers)).sum::<u64>() + bytes(&self.shared);
+        let bands = self.bands.iter().map(Buffer::bytes).sum::<u64>();
+        let others = self.readback.as_ref().map_or(0, Readback::bytes) + self.targets.as_ref().map_or(0, |t| t.bytes);
+        (splats, bytes(&self.frame) + bands + others)
+    }
+}

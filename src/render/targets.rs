@@ -1,0 +1,55 @@
+//! The rasteriser's textures: a depth buffer and blended sums, of the whole image.
+
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::passes::raster::{DEPTH_FORMAT, SUM_NAMES, texture_format};
+use crate::plan::{Plan, Raster};
+
+/// The textures.
+pub struct Targets {
+    /// Nearest depths.
+    pub depth: wgpu::TextureView,
+    /// Four channels each.
+    pub sums: Vec<wgpu::TextureView>,
+    /// Device memory, bytes.
+    pub bytes: u64,
+}
+
+impl Targets {
+    /// For the image of `plan`.
+    pub fn new(gpu: &Gpu, raster: Raster, plan: &Plan) -> Result<Self> {
+        let height = plan.bands.iter().map(|band| band.rows).sum();
+        let mut bytes = 0;
+        let guard = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let mut view = |label, format: wgpu::TextureFormat| {
+            let pixels = u64::from(plan.width) * u64::from(height);
+            bytes += u64::from(format.block_copy_size(None).unwrap_or(4)) * pixels;
+            let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size: wgpu::Extent3d { width: plan.width, height, depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+                view_formats: &[],
+            });
+            texture.create_view(&Default::default())
+        };
+        let depth = view("nearest depths", DEPTH_FORMAT);
+        let format = texture_format(raster.format);
+        let sums = SUM_NAMES.iter().take(plan.pixel.targets() as usize).map(|name| view(name, format)).collect();
+        if pollster::block_on(guard.pop()).is_some() {
+            return Err(gpu.error("out of memory for the blended sums: choose a smaller image"));
+        }
+        gpu.check()?;
+        Ok(Self { depth, sums, bytes })
+    }
+
+    /// The texture that a variable of WGSL is bound to.
+    pub fn binding(&self, name: &str) -> Option<wgpu::BindingResource<'_>> {
+        let sums = SUM_NAMES.iter().zip(&self.sums).find(|(sums, _)| **sums == name).map(|(_, view)| view);
+        let view = sums.or((name == "nearest_depth").then_some(&self.depth))?;
+        Some(wgpu::BindingResource::TextureView(view))
+    }
+}

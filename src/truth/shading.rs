@@ -1,0 +1,43 @@
+//! The light that a point of a surface sends to the eye, by its own formulas: a fault of the renderer's shading shows in errors
+//! against the truth.
+
+use glam::{DVec3, DVec4};
+
+use crate::plan::RenderOptions;
+use crate::scene::options::HIGHLIGHT;
+use crate::scene::{Light, Shading};
+
+/// The linear colour of a point of colour `albedo` and unit `normal`, seen along the ray of direction `ray`.
+///
+/// A light of intensity I from the unit direction l lights it by `E = I max(0, n . l)`, a headlight, at the eye, by `I |n . l|`.
+/// Lambert: `albedo E`. Phong: that and [`HIGHLIGHT`]` E max(0, m . v)^shininess`, where v is the direction to the eye and
+/// `m = 2 (n . l) n - l` the mirrored light.
+pub(super) fn sent(albedo: DVec3, normal: DVec3, ray: DVec3, options: &RenderOptions) -> DVec3 {
+    if options.shading == Shading::Unlit {
+        return albedo;
+    }
+    let eye = -ray / ray.length();
+    let mut sent = DVec3::ZERO;
+    for light in &options.lights {
+        let (direction, received) = match *light {
+            Light::Headlight { intensity } => (eye, f64::from(intensity) * normal.dot(eye).abs()),
+            Light::Directional { toward, intensity } => {
+                (toward.as_dvec3(), f64::from(intensity) * normal.dot(toward.as_dvec3()).max(0.0))
+            }
+        };
+        sent += albedo * received;
+        if options.shading == Shading::Phong {
+            let mirrored = normal * (2.0 * normal.dot(direction)) - direction;
+            sent += HIGHLIGHT * received * mirrored.dot(eye).max(0.0).powf(options.shininess.into());
+        }
+    }
+    sent
+}
+
+/// A colour of premultiplied `light` and `alpha` in front of the straight `background`; straight.
+pub(super) fn in_front(light: DVec3, alpha: f64, background: [f32; 4]) -> [f32; 4] {
+    let [r, g, b, opacity] = background.map(f64::from);
+    let through = (1.0 - alpha) * opacity;
+    let sum = light.extend(alpha) + DVec4::new(r, g, b, 1.0) * through;
+    if sum.w > 0.0 { (sum.truncate() / sum.w).extend(sum.w).to_array().map(|c| c as f32) } else { [0.0; 4] }
+}

@@ -1,0 +1,258 @@
+//! Plans of typical renders, step by step, where there is no adapter: what a frame does is known before a device is asked.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use common::scenes::{sphere, sphere_camera};
+use epsplat::gpu::AdapterDescription;
+use epsplat::plan::known::Listed;
+use epsplat::plan::steps::{Look, Over, Stage, Step};
+use epsplat::plan::{Accumulator, Facts, Known, Optimisation, Organisation, Plan, Raster, RenderOptions, page_surfels};
+use epsplat::render::sequence::steps;
+use epsplat::scene::{Camera, Colors, LowPass, Maps, Projection, Scene, Shading};
+
+/// A software adapter with all optional features, as Mesa's is.
+fn software() -> AdapterDescription {
+    AdapterDescription {
+        kind: "software",
+        atomics_u64: true,
+        integers_u64: true,
+        subgroups: true,
+        ..AdapterDescription::core()
+    }
+}
+
+fn planned(scene: &Scene, size: u32, adapter: &AdapterDescription, options: &RenderOptions, known: &Known) -> Plan {
+    Plan::of(&Facts::of(scene), adapter, &camera(size), options, known).unwrap()
+}
+
+fn camera(size: u32) -> Camera {
+    sphere_camera(size, Projection::Pinhole)
+}
+
+/// A stage in a line: its pass, its kernels and what they go over, and its page and band where they are not the only ones.
+fn line(stage: &Stage) -> String {
+    let runs: Vec<_> = stage
+        .runs
+        .iter()
+        .map(|run| match run.over {
+            Over::Once => run.kernel.name.to_owned(),
+            over => format!("{}/{over:?}", run.kernel.name),
+        })
+        .collect();
+    let place = stage.page.map_or_else(String::new, |page| format!(" page {page}"));
+    let band = if stage.band > 0 { format!(" band {}", stage.band) } else { String::new() };
+    format!("{}: {}{place}{band}", stage.pass, runs.join(", "))
+}
+
+fn lines(plan: &Plan) -> Vec<String> {
+    let step = |step: &Step| match step {
+        Step::Stage(stage) => line(stage),
+        Step::Look(Look::Slots(part)) => format!("look for slots of {part:?}"),
+        Step::Look(Look::Lists(of, _)) => format!("look for lists of {of:?}"),
+        Step::Draw => "draw".to_owned(),
+        Step::ReadBack(band) => format!("read back {band}"),
+    };
+    steps(plan).iter().map(step).collect()
+}
+
+const PROJECT: &str = "project: project/Slots(All), arrange_rare, project_rare/Rare, arrange";
+const RESOLVE: &str = "resolve: list_covered/Occlusion, arrange_covered, resolve/Covered";
+
+/// What scatter does.
+fn scattered() -> [&'static str; 8] {
+    [
+        PROJECT,
+        "visibility: visibility/Slots(All)",
+        "visibility: visibility_large/Large",
+        "visibility: occlude/Occlusion",
+        "accumulate: accumulate/Slots(All)",
+        "accumulate: accumulate_large/Large",
+        RESOLVE,
+        "read back 0",
+    ]
+}
+
+#[test]
+fn few_surfels_on_core_webgpu_look_for_large_ones_once() {
+    let (scene, core) = (sphere(1000, 1.5), AdapterDescription::core());
+    let first = planned(&scene, 256, &core, &RenderOptions::default(), &Known::default());
+    assert_eq!(
+        lines(&first),
+        [
+            PROJECT,
+            "visibility: visibility/Slots(All)",
+            "look for lists of Large",
+            "bin: bin_count_large/Listing, bin_scan_large, bin_place_large/Listing page 0",
+            "visibility: tile_visibility/Tiles page 0",
+            "visibility: occlude/Occlusion",
+            "accumulate: accumulate/Slots(All)",
+            "accumulate: tile_accumulate/Tiles page 0",
+            RESOLVE,
+            "read back 0",
+        ]
+    );
+    // What the first frame showed: there are none.
+    let known = Known { large: Some(false), ..Known::default() };
+    assert_eq!(lines(&planned(&scene, 256, &core, &RenderOptions::default(), &known)), scattered());
+    // There are some, of which room for 100 entries was made.
+    let known = Known { large: Some(true), entries: [Some(100), None], ..Known::default() };
+    let second = lines(&planned(&scene, 256, &core, &RenderOptions::default(), &known));
+    let looked: Vec<_> = lines(&first).into_iter().filter(|line| !line.starts_with("look")).collect();
+    assert_eq!(second, looked);
+    // More than lists hold.
+    let known = Known { crowded_large: true, ..Known::default() };
+    assert_eq!(lines(&planned(&scene, 256, &core, &RenderOptions::default(), &known)), scattered());
+}
+
+#[test]
+fn other_accumulators_and_scatter_have_no_tiles() {
+    let (scene, software) = (sphere(1000, 1.5), software());
+    let options = [
+        RenderOptions { accumulator: Accumulator::Fixed32, ..RenderOptions::default() },
+        RenderOptions { accumulator: Accumulator::Fixed64, ..RenderOptions::default() },
+        RenderOptions { organisation: Organisation::Scatter, low_pass: LowPass::Ewa, ..RenderOptions::default() },
+    ];
+    for options in options {
+        assert_eq!(lines(&planned(&scene, 256, &software, &options, &Known::default())), scattered());
+    }
+}
+
+#[test]
+fn many_surfels_are_drawn_near_ones_first() {
+    let (scene, core) = (sphere(20_000, 1.5), AdapterDescription::core());
+    let options = RenderOptions { organisation: Organisation::Scatter, ..RenderOptions::default() };
+    let culled = planned(&scene, 128, &core, &options, &Known::default());
+    assert_eq!(
+        lines(&culled)[..11],
+        [
+            "project: cull_near/Batches",
+            "look for slots of Near",
+            "project: project/Slots(Near), arrange_rare, project_rare/Rare, arrange",
+            "visibility: visibility/Slots(Near)",
+            "visibility: occlude_open/Occlusion",
+            "project: cull_far/Batches",
+            "look for slots of Far",
+            "project: project/Slots(Far), arrange_rare, project_rare/Rare, arrange",
+            "visibility: visibility/Slots(Far)",
+            "visibility: visibility_large/Large",
+            "visibility: occlude/Occlusion",
+        ]
+    );
+    let known = Known { slots: true, ..Known::default() };
+    assert!(!lines(&planned(&scene, 128, &core, &options, &known)).iter().any(|line| line.starts_with("look")));
+    // A surfel for more than six pixels is not worth a look at what hides.
+    assert!(!planned(&scene, 512, &core, &options, &Known::default()).needs.cull);
+    let without = RenderOptions { without: vec![Optimisation::Culling], ..options };
+    assert_eq!(lines(&planned(&scene, 128, &core, &without, &Known::default())), scattered());
+}
+
+#[test]
+fn tiles_of_a_software_adapter_gather_splats_that_are_not_tiny() {
+    let (scene, options) = (sphere(1000, 1.5), RenderOptions::default());
+    let known = Known { touched_tiles: 3.0, ..Known::default() };
+    let gathered = planned(&scene, 256, &software(), &options, &known);
+    assert!(gathered.needs.gather && gathered.sum_words == 0);
+    assert_eq!(
+        lines(&gathered)[6..],
+        [
+            "look for lists of Small",
+            "bin: bin_count/Slots(All), bin_scan, bin_place/Slots(All) page 0",
+            "accumulate: list_covered/Occlusion, arrange_covered, tile_resolve/CoveredEights",
+            "read back 0",
+        ]
+    );
+    let tiny = Known { touched_tiles: 1.2, ..Known::default() };
+    let crowded = Known { crowded: true, ..known };
+    let card = AdapterDescription { kind: "discrete", ..software() };
+    assert!(!planned(&scene, 256, &software(), &options, &tiny).needs.gather);
+    assert!(!planned(&scene, 256, &software(), &options, &crowded).needs.gather);
+    assert!(!planned(&scene, 256, &card, &options, &known).needs.gather);
+    let tile = RenderOptions { organisation: Organisation::Tile, ..options };
+    assert!(planned(&scene, 256, &card, &tile, &tiny).needs.gather);
+}
+
+#[test]
+fn small_buffers_make_bands_and_pages() {
+    let scene = sphere(3000, 1.5);
+    let small = AdapterDescription { max_storage_buffer_binding_size: 100_000, ..AdapterDescription::core() };
+    let options = RenderOptions { maps: Maps { depth: true, normal: true, ..Maps::default() }, ..Default::default() };
+    let known = Known { large: Some(true), entries: [Some(10), None], ..Known::default() };
+    let plan = planned(&scene, 64, &small, &options, &known);
+    assert_eq!((plan.bands.len(), plan.pages), (3, 3000_u64.div_ceil(page_surfels(&small)) as usize));
+    assert!(plan.pages > 1 && !plan.needs.cull && !plan.needs.gather);
+    assert_eq!(plan.bands.iter().map(|band| band.rows).sum::<u32>(), 64);
+    let lines = lines(&plan);
+    // Bands share their splats; pages share the lists, which are made for one after the other, and again for the second pass.
+    assert_eq!(lines.iter().filter(|line| line.starts_with("project")).count(), 1);
+    assert_eq!(lines.iter().filter(|line| line.starts_with("bin")).count(), 2 * plan.bands.len() * plan.pages);
+    assert_eq!(lines.iter().filter(|line| line.starts_with("read back")).count(), 3);
+    // A row that does not fit.
+    let tiny = AdapterDescription { max_storage_buffer_binding_size: 1000, ..AdapterDescription::core() };
+    let error = Plan::of(&Facts::of(&scene), &tiny, &camera(64), &options, &known).unwrap_err();
+    assert!(error.to_string().contains("narrower image"), "{error}");
+}
+
+#[test]
+fn copies_are_drawn_once_and_without_tiles() {
+    let mut scene = sphere(10, 1.5);
+    scene.surfels = vec![scene.surfels[0]; 5000];
+    scene.colors = Colors::Constant([1.0; 4]);
+    let plan = planned(&scene, 64, &software(), &RenderOptions::default(), &Known::default());
+    assert!(plan.needs.copies && !plan.needs.tiles && !plan.needs.cull && !plan.needs.atomics_u64);
+    assert_eq!(lines(&plan), scattered());
+    let tile = RenderOptions { organisation: Organisation::Tile, ..RenderOptions::default() };
+    assert!(!planned(&scene, 64, &software(), &tile, &Known::default()).needs.copies);
+}
+
+#[test]
+fn the_rasteriser_projects_draws_and_resolves() {
+    let scene = sphere(1000, 1.5);
+    let options = RenderOptions { raster: Some(Raster::default()), ..RenderOptions::default() };
+    let plan = planned(&scene, 64, &AdapterDescription::core(), &options, &Known::default());
+    assert_eq!(lines(&plan), [PROJECT, "draw", RESOLVE, "read back 0"]);
+    assert!(plan.needs.triangles && plan.sum_words == 0);
+}
+
+#[test]
+fn sums_that_wrapped_are_fixed_from_then_on() {
+    let options = RenderOptions { accumulator: Accumulator::Fixed32, ..RenderOptions::default() };
+    let of = |known| planned(&sphere(1000, 1.5), 64, &software(), &options, &known).needs;
+    assert_eq!(of(Known::default()).accumulator, Accumulator::Fixed32);
+    let known = Known { overflows: 3, ..Known::default() };
+    assert_eq!((of(known).accumulator, of(known).tiles), (Accumulator::Fixed, true));
+}
+
+#[test]
+fn what_does_not_go_together_is_refused_by_one_rule() {
+    let (scene, core) = (sphere(1000, 1.5), AdapterDescription::core());
+    let refused = |options: RenderOptions| {
+        let known = Known::default();
+        let facts = Facts::of(&scene);
+        let error = Plan::of(&facts, &core, &camera(64), &options, &known).unwrap_err();
+        error.to_string()
+    };
+    for (accumulator, what) in [(Accumulator::Packed64, "64-bit atomics"), (Accumulator::Float, "f32 atomic add")] {
+        assert!(refused(RenderOptions { accumulator, ..RenderOptions::default() }).contains(what));
+    }
+    let raster = Raster { format: "rgba32float".parse().unwrap(), ..Raster::default() };
+    assert!(refused(RenderOptions { raster: Some(raster), ..RenderOptions::default() }).contains("32-bit floats"));
+    let check = |options: RenderOptions| epsplat::plan::check::options(&options, false).map_err(|e| e.to_string());
+    assert_eq!(check(RenderOptions::default()), Ok(()));
+    let tile = RenderOptions { organisation: Organisation::Tile, ..RenderOptions::default() };
+    assert_eq!(check(tile.clone()), Ok(()));
+    assert!(check(RenderOptions { accumulator: Accumulator::Cas, ..tile }).unwrap_err().contains("fixed only"));
+    let phong = RenderOptions { shading: Shading::Phong, shininess: 1e6, ..RenderOptions::default() };
+    assert!(check(phong).unwrap_err().contains("shininess"));
+    let maps = Maps { decision: true, ..Maps::default() };
+    assert!(check(RenderOptions { maps, ..RenderOptions::default() }).unwrap_err().contains("reference"));
+}
+
+#[test]
+fn knowledge_of_an_image_is_forgotten_with_its_size() {
+    let mut known = Known { slots: true, large: Some(true), entries: [Some(3), Some(4)], ..Known::default() };
+    assert_eq!(known.entries_of(Listed::Small), Some(4));
+    known.forget_image();
+    assert_eq!(known, Known { slots: true, ..Known::default() });
+}

@@ -56,8 +56,8 @@ pub struct Report {
     pub adapter: String,
     /// How sums were kept: an accumulator, the rasteriser's format, or the reference's `f64`.
     pub accumulator: &'static str,
-    /// Fragments that made a sum of the accumulator that was asked for wrap. If any, that frame was rendered again with `fixed`,
-    /// its `total_ms` holds both, and later ones have `fixed` at once.
+    /// Fragments that made a sum of the accumulator that was asked for wrap. If any, the frame was rendered again with `fixed`,
+    /// and `total_ms` holds both.
     pub overflows: u64,
     /// Surfels in the scene.
     pub surfels: u64,
@@ -122,7 +122,7 @@ impl<'a> Renderer<'a> {
     pub fn new(scene: &'a Scene, options: &'a RenderOptions, backend: &'a Backend) -> Result<Self> {
         check::options(options, matches!(backend, Backend::Reference))?;
         let facts = Facts::of(scene);
-        check::scene(&facts, options)?;
+        check::scene(&facts, options, matches!(backend, Backend::Reference))?;
         let known = Known::default();
         Ok(Self { scene, options, backend, facts, known, size: None, kernels: None, store: None })
     }
@@ -148,17 +148,13 @@ impl<'a> Renderer<'a> {
     }
 
     /// Tries until what is known of the view is enough.
-    fn on_gpu(
-        &mut self,
-        gpu: &Gpu,
-        sources: &Sources,
-        camera: &Camera,
-        progress: &dyn Progress,
-    ) -> Result<(Frame, Report)> {
+    fn on_gpu(&mut self, gpu: &Gpu, sources: &Sources, camera: &Camera, bar: &dyn Progress) -> Result<(Frame, Report)> {
         self.look_at(gpu, camera);
         let mut total_ms = 0.0;
         for number in 0..MOST_TRIES {
             let plan = Plan::of(&self.facts, &gpu.adapter, camera, self.options, &self.known)?;
+            // A second try adds nothing to the bar.
+            let progress = if number == 0 { bar } else { &() };
             self.prepare(gpu, sources, &plan, progress)?;
             let (Some(kernels), Some(store)) = (&self.kernels, &mut self.store) else { continue };
             if number == 0 {
@@ -168,7 +164,7 @@ impl<'a> Renderer<'a> {
             store.set_view(gpu, &View::new(&self.facts, camera, self.options));
             let mut run = Run::new(gpu, &plan, kernels, store, &mut self.known);
             let mut frame = Frame::new(camera, &self.options.maps);
-            let all = run.steps(&sequence::steps(&plan), &mut frame, if number == 0 { progress } else { &() })?;
+            let all = run.steps(&sequence::steps(&plan), &mut frame, progress)?;
             let spent = start.elapsed();
             total_ms += spent.as_secs_f64() * 1e3;
             if !all {
@@ -176,19 +172,20 @@ impl<'a> Renderer<'a> {
             }
             let tally = run.tally()?;
             if tally.complete {
-                progress.end();
+                bar.end();
                 let clock = if run.timing.on_device() { "timestamps" } else { "wall" };
                 let passes = run.timing.finish(gpu)?;
                 let report = self.report(gpu, &plan, camera, (tally.drawn, clock, passes, total_ms));
                 return Ok((frame, report));
             }
         }
-        progress.end();
+        bar.end();
         Err(Run::never_fits(gpu))
     }
 
     /// Forgets what held for another size of image, and looks at how large splats are.
     fn look_at(&mut self, gpu: &Gpu, camera: &Camera) {
+        self.known.forget_view();
         let size = Some((camera.width, camera.height));
         if self.size != size {
             self.known.forget_image();

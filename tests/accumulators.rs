@@ -14,10 +14,11 @@ use epsplat::gpu::layout::View;
 use epsplat::gpu::{Gpu, Sources};
 use epsplat::hardcases::precision::E;
 use epsplat::passes::project::reference_all;
-use epsplat::plan::{Accumulator, AccumulatorRow, Facts, RenderOptions};
-use epsplat::render::{Backend, render};
+use epsplat::plan::{Accumulator, AccumulatorRow, Facts, Organisation, RenderOptions};
+use epsplat::render::{Backend, Renderer, render};
 use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Maps, Projection, Scene, Shading, Surfel};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
+
 const KERNELS: [&str; 5] = ["gaussian", "ellipse:6,3", "ellipse:6,3,smooth", "hat", "constant"];
 const EPSILONS: [Epsilon; 3] = [Epsilon::Relative(0.02), Epsilon::Absolute(0.05), Epsilon::Radius(0.4)];
 
@@ -245,5 +246,41 @@ fn sums_that_do_not_fit_are_noticed_and_made_again() {
                 assert!(apart <= bound + own, "{name}: {apart:e} over {bound:e}");
             }
         }
+    }
+}
+
+/// What wrapped in one view is not held against the next.
+#[test]
+fn a_view_whose_sums_fit_is_rendered_as_asked_after_one_whose_do_not() {
+    let Some(gpu) = common::gpu() else { return };
+    let backend = Backend::gpu(gpu);
+    let (scene, camera) = stack(300, 0.3);
+    let options = RenderOptions {
+        kernel: Kernel::Constant,
+        maps: Maps::ON_DEVICE,
+        accumulator: Accumulator::Fixed32,
+        ..RenderOptions::default()
+    };
+    let aside = Camera { eye: DVec3::new(15.0, 0.0, 0.0), near: 10.0, ..camera.clone() };
+    let (alone, _) = render(&scene, &aside, &options, &backend, &()).unwrap();
+    let mut renderer = Renderer::new(&scene, &options, &backend).unwrap();
+    let views = [&camera, &aside, &camera, &aside].map(|view| renderer.frame(view, &()).unwrap());
+    let told = views.each_ref().map(|(_, report)| (report.accumulator, report.overflows > 0));
+    assert_eq!(told, [("fixed", true), ("fixed32", false), ("fixed", true), ("fixed32", false)]);
+    assert!(bits(&views[1].0) == bits(&alone) && bits(&views[3].0) == bits(&alone));
+    assert!(bits(&views[0].0) == bits(&views[2].0));
+}
+
+#[test]
+fn a_scene_without_surfels_is_its_background() {
+    let Some(gpu) = common::gpu() else { return };
+    let backend = Backend::gpu(gpu);
+    let (full, camera) = stack(1, 0.3);
+    let empty = Scene { surfels: vec![], colors: Colors::Constant([1.0; 4]), ..full };
+    for organisation in [Organisation::Auto, Organisation::Scatter, Organisation::Tile] {
+        let options = RenderOptions { organisation, background: [0.1, 0.2, 0.3, 1.0], ..RenderOptions::default() };
+        let (frame, report) = render(&empty, &camera, &options, &backend, &()).unwrap();
+        assert!(frame.color.iter().all(|color| *color == options.background), "{organisation:?}");
+        assert_eq!((report.surfels, report.splats_drawn), (0, 0));
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::definition::{BackendName, Config, Definition, Making, OneOrMany, SceneEntry};
 use crate::error::{Error, Result};
-use crate::plan::Accumulator;
+use crate::plan::check;
 use crate::scene::camera::check_size;
 
 impl Definition {
@@ -148,8 +148,8 @@ impl Config {
         if self.backend != BackendName::Gpu && self.accumulator.is_some() {
             return Err("accumulator: only the backend gpu has one".into());
         }
-        if self.organisation.is_some() && self.accumulator() != Some(Accumulator::Fixed) {
-            return Err("organisation: only the accumulator fixed of the backend gpu has more than one".into());
+        if self.backend != BackendName::Gpu && self.organisation.is_some() {
+            return Err("organisation: only the backend gpu has more than one".into());
         }
         if self.backend != BackendName::Gpu && !self.without.is_empty() {
             return Err("without: only the backend gpu has what it names".into());
@@ -157,6 +157,8 @@ impl Config {
         if self.backend != BackendName::Raster && (self.blend_format.is_some() || self.raster_depth.is_some()) {
             return Err("blend_format, raster_depth: only the backend raster has them".into());
         }
+        let reference = self.backend == BackendName::Reference;
+        check::options(&self.options(None), reference).map_err(|error| error.to_string())?;
         match self.error_limit {
             Some(limit) if limit.is_nan() || limit < 0.0 => Err(format!("error_limit: it must not be {limit}")),
             _ => Ok(()),
@@ -182,6 +184,7 @@ fn located(text: &str, error: &toml::de::Error) -> String {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::plan::Accumulator;
     use crate::scene::{Epsilon, LowPass, Shading};
 
     const HEAD: &str = "name = \"n\"\nabout = \"a\"\n";
@@ -266,7 +269,7 @@ mod tests {
             ),
             ("[[config]]\nname = \"d\"\nbackend = \"raster\"\naccumulator = \"fixed\"\n", &["accumulator:", "gpu"]),
             ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nerror_limit = -1\n", &["error_limit:"]),
-            ("[[config]]\nname = \"d\"\nbackend = \"raster\"\norganisation = \"tile\"\n", &["organisation:", "fixed"]),
+            ("[[config]]\nname = \"d\"\nbackend = \"raster\"\norganisation = \"tile\"\n", &["organisation:", "gpu"]),
             ("[[config]]\nname = \"d\"\nbackend = \"raster\"\nwithout = [\"order\"]\n", &["without:", "gpu"]),
             ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nwithout = [\"x\"]\n", &["line 6, without:", "culling"]),
             ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nmaps = [\"decision\"]\n", &["maps", "depth"]),

@@ -123,11 +123,14 @@ impl<'a> Case<'a> {
             .begin(&format!("timing {}", self.entry.name), plans.len() as u64 * u64::from(1 + self.definition.runs));
         let mut runners = Vec::new();
         for (config, options) in plans {
-            let mut renderer = Renderer::new(&self.staged.scene, options, self.backend(config))?;
-            let warm_up = self.check(config, options).and_then(|()| self.turn(&mut renderer));
+            let renderer = Renderer::new(&self.staged.scene, options, self.backend(config)).map_err(Unfit::Adapter);
+            let warm_up = renderer.and_then(|mut renderer| {
+                self.check(config, options)?;
+                Ok((self.turn(&mut renderer)?, renderer))
+            });
             progress.advance(1);
-            let lap = match warm_up {
-                Ok(lap) => lap,
+            let (lap, renderer) = match warm_up {
+                Ok((lap, renderer)) => (lap, renderer),
                 Err(Unfit::Adapter(why)) => {
                     notes.push(format!("{} was left out: {why}", self.named(config)));
                     continue;

@@ -10,10 +10,8 @@ use clap::{Args, ValueEnum};
 use epsplat::gpu::Gpu;
 use epsplat::io::Texture;
 use epsplat::passes::unseen::{Unseen, is_empty};
-use epsplat::plan::{Accumulator, BlendFormat, Organisation, Raster, RasterDepth, RenderOptions};
+use epsplat::plan::{Accumulator, BlendFormat, Organisation, Raster, RasterDepth, RenderOptions, check};
 use epsplat::render::{Backend, render};
-use epsplat::scene::light::MAX_LIGHTS;
-use epsplat::scene::options::SHININESS_RANGE;
 use epsplat::scene::{Camera, Epsilon, Kernel, Light, LowPass, Maps, Scene, Shading};
 use epsplat::{Error, Result, surfels};
 use glam::DVec3;
@@ -266,14 +264,8 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
     if maps != Maps::default() && format == Format::Png {
         return Err(Error::Usage("a PNG holds no maps: give --aov with an .exr output".into()));
     }
-    if maps.decision && arguments.backend != BackendName::Reference {
-        return Err(Error::Usage("--aov decision is made by --backend reference only".into()));
-    }
-    if arguments.lights.len() > MAX_LIGHTS {
-        return Err(Error::Usage(format!("at most {MAX_LIGHTS} lights shine, not {}", arguments.lights.len())));
-    }
     let default = RenderOptions::default();
-    Ok(RenderOptions {
+    let options = RenderOptions {
         epsilon: arguments.epsilon,
         kernel: arguments.kernel,
         low_pass: match arguments.lowpass {
@@ -294,35 +286,29 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
         background: arguments.background.unwrap_or(default.background),
         maps,
         without: default.without,
-    })
+    };
+    check::options(&options, arguments.backend == BackendName::Reference)?;
+    if arguments.texture.is_some() {
+        check::textured(&options, arguments.backend == BackendName::Reference)?;
+    }
+    Ok(options)
 }
 
 /// The exponent of highlights, if there are any.
 fn shininess(arguments: &Arguments) -> Result<Option<f32>> {
-    let (least, most) = SHININESS_RANGE;
     match arguments.shininess {
         Some(_) if arguments.shading != ShadingName::Phong => {
             Err(Error::Usage("--shininess is of highlights: give it with --shading phong".into()))
-        }
-        Some(exponent) if !(least..=most).contains(&exponent) => {
-            Err(Error::Usage(format!("--shininess is {least} to {most}, not {exponent}")))
         }
         chosen => Ok(chosen),
     }
 }
 
-/// How the compute kernels draw splats, of which only `fixed` has a choice.
+/// How the compute kernels draw splats.
 fn organisation(arguments: &Arguments) -> Result<Organisation> {
     let kernels = matches!(arguments.backend, BackendName::Auto | BackendName::Gpu);
-    let fixed = arguments.accumulator.unwrap_or_default() == Accumulator::Fixed;
     match arguments.organisation {
         Some(_) if !kernels => Err(Error::Usage("--organisation is a choice of --backend gpu: leave it out".into())),
-        Some(Organisation::Tile) if !fixed => {
-            Err(Error::Usage("--organisation tile needs the accumulator fixed: leave one of them out".into()))
-        }
-        Some(Organisation::Tile) if arguments.texture.is_some() => {
-            Err(Error::Usage("--organisation tile draws no textures: leave it or --texture out".into()))
-        }
         chosen => Ok(chosen.unwrap_or_default()),
     }
 }
@@ -335,9 +321,6 @@ fn raster(arguments: &Arguments) -> Result<Option<Raster>> {
             true => Err(Error::Usage("--blend-format and --raster-depth need --backend raster".into())),
             false => Ok(None),
         };
-    }
-    if arguments.texture.is_some() {
-        return Err(Error::Usage("--backend raster blends no texture coordinates: leave --texture out".into()));
     }
     if arguments.accumulator.is_some() {
         return Err(Error::Usage("--backend raster adds in --blend-format: leave --accumulator out".into()));

@@ -1,5 +1,5 @@
 //! Stages 2 to 4 by tiles of the image: the same minima, sums and pixels as [`visibility`](super::visibility),
-//! [`accumulate`](super::accumulate) and [`resolve`](super::resolve) make, to the bit.
+//! [`accumulate`] and [`resolve`](super::resolve) make, to the bit.
 //!
 //! Scatter, an invocation a splat, adds each fragment to memory by atomics. A tile has a list of the splats that may touch it,
 //! made by count, scan and place, and keeps its pixels' nearest depths, and then their sums, in registers. A splat costs each
@@ -113,17 +113,13 @@ fn bin(plan: &Plan, of: Listed, (band, page): (usize, usize), fresh: bool, place
     };
     let runs = kernels.into_iter().zip([over, Over::Once, over]).map(|(kernel, over)| Run { kernel, over });
     let stage = Stage::new("bin", band, runs.take(if places { 3 } else { 2 }).collect());
-    Stage { page: Some(page), of_large: of == Listed::Large && !plan.needs.gather, ..stage }.after(vec![Clear::of(
-        list_name(of),
-        first,
-        most - first,
-    )])
+    Stage { page: Some(page), ..stage }.after(vec![Clear::of(list_name(of), first, most - first)])
 }
 
 /// Counts the entries of all lists of a kind.
 pub fn look(plan: &Plan, of: Listed) -> Step {
     let cuts = (0..plan.bands.len()).flat_map(|band| (0..plan.pages).map(move |page| (band, page)));
-    let count = |(number, cut)| Stage { of_large: false, ..bin(plan, of, cut, number == 0, false) };
+    let count = |(number, cut)| bin(plan, of, cut, number == 0, false);
     Step::Look(Look::Lists(of, cuts.enumerate().map(count).collect()))
 }
 
@@ -131,7 +127,7 @@ pub fn look(plan: &Plan, of: Listed) -> Step {
 pub fn visibility(plan: &Plan, band: usize) -> Vec<Stage> {
     let draw = |page| {
         let stage = Stage::new("visibility", band, vec![Run { kernel: VISIBILITY, over: Over::Tiles }]);
-        Stage { page: Some(page), of_large: !plan.needs.gather, ..stage }
+        Stage { page: Some(page), ..stage }
     };
     let fresh = |page| band == 0 && page == 0;
     (0..plan.pages).flat_map(|page| [bin(plan, Listed::Large, (band, page), fresh(page), true), draw(page)]).collect()
@@ -141,7 +137,7 @@ pub fn visibility(plan: &Plan, band: usize) -> Vec<Stage> {
 pub fn accumulate(plan: &Plan, band: usize) -> Vec<Stage> {
     let draw = |page| {
         let stage = Stage::new("accumulate", band, vec![Run { kernel: ACCUMULATE, over: Over::Tiles }]);
-        Stage { page: Some(page), of_large: true, ..stage }
+        Stage { page: Some(page), ..stage }
     };
     // Of one page the lists stay from the first pass to the second.
     let again = |page| (plan.pages > 1).then(|| bin(plan, Listed::Large, (band, page), false, true));

@@ -11,7 +11,7 @@ fn usage(what: impl Into<String>) -> Result<()> {
     Err(Error::Usage(what.into()))
 }
 
-/// Fails for options that go together on no adapter; `reference` renders by the twins instead.
+/// Fails for options that go together on no adapter. What only a device chooses, the `reference` ignores.
 ///
 /// # Errors
 /// [`Error::Usage`].
@@ -21,40 +21,48 @@ pub fn options(options: &RenderOptions, reference: bool) -> Result<()> {
         return usage(format!("a render has at most {MAX_LIGHTS} lights, not {}", options.lights.len()));
     }
     if options.shading == Shading::Phong && !(least..=most).contains(&options.shininess) {
-        return usage(format!("a shininess is {least} to {most}, not {}", options.shininess));
+        return usage(format!("the shininess is {least} to {most}, not {}", options.shininess));
     }
-    if options.maps.decision && !reference {
+    if reference {
+        return Ok(());
+    }
+    if options.maps.decision {
         return usage("the decision map is made by the reference backend only");
-    }
-    if options.organisation == Organisation::Tile && options.accumulator != Accumulator::Fixed {
-        return usage("tiles sum with the accumulator fixed only: leave the organisation or the accumulator out");
     }
     match options.raster {
         Some(raster) if raster.format == BlendFormat::Rgba8Unorm && options.maps.count => {
             usage("an 8-bit target cannot count fragments: leave count out, or take rgba16float")
         }
+        None if options.organisation == Organisation::Tile && options.accumulator != Accumulator::Fixed => {
+            usage("the organisation tile needs the accumulator fixed: leave one of them out")
+        }
         _ => Ok(()),
     }
+}
+
+/// Fails for options that a texture does not go with. What only a device chooses, the `reference` ignores.
+///
+/// # Errors
+/// [`Error::Usage`].
+pub fn textured(options: &RenderOptions, reference: bool) -> Result<()> {
+    if options.raster.is_some() && !reference {
+        return usage("the rasteriser blends no texture coordinates: leave the texture out, or render by compute");
+    }
+    if options.organisation == Organisation::Tile && !reference {
+        return usage("the organisation tile draws no textures: leave one of them out");
+    }
+    Ok(())
 }
 
 /// Fails for options that do not go with the scene that `facts` are of.
 ///
 /// # Errors
 /// [`Error::Usage`].
-pub fn scene(facts: &Facts, options: &RenderOptions) -> Result<()> {
+pub fn scene(facts: &Facts, options: &RenderOptions, reference: bool) -> Result<()> {
     if u32::try_from(facts.surfels).is_err() {
         return usage(format!("a scene has at most 2^32 - 1 surfels, not {}", facts.surfels));
     }
-    if facts.colors != ColorNeed::Textured {
-        return Ok(());
-    }
-    if options.raster.is_some() {
-        return usage("the rasteriser blends no texture coordinates: leave the texture out, or render by compute");
-    }
-    if options.organisation == Organisation::Tile {
-        return usage("tiles draw no textures: leave the organisation or the texture out");
-    }
-    Ok(())
+    if facts.colors == ColorNeed::Textured { textured(options, reference) } else { Ok(()) }
 }
 
 /// Fails if `adapter` lacks what `needs` ask for.

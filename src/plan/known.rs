@@ -27,9 +27,7 @@ pub struct Known {
     pub entries: [Option<u64>; 2],
     /// There are more splats than tiles can list, so that their sums are stored.
     pub crowded: bool,
-    /// There are more large splats than tiles can list, so that each is drawn by a workgroup.
-    pub crowded_large: bool,
-    /// Fragments that made a sum of the accumulator that was asked for wrap.
+    /// Fragments of this view that made a sum of the accumulator that was asked for wrap.
     pub overflows: u64,
 }
 
@@ -37,6 +35,11 @@ impl Known {
     /// Entries of these lists that there is room for.
     pub fn entries_of(&self, of: Listed) -> Option<u64> {
         self.entries[of as usize]
+    }
+
+    /// Forgets what holds for one view.
+    pub fn forget_view(&mut self) {
+        self.overflows = 0;
     }
 
     /// Forgets what buffers have room for.

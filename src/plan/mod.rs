@@ -88,7 +88,7 @@ impl Plan {
         let gather = needs.tiles
             && gathers
             && one_band
-            && facts.surfels <= page
+            && (1..=page).contains(&facts.surfels)
             && !known.crowded
             && options.has(Optimisation::Gathering);
         // What is drawn first hides what is drawn later in the same band alone. The rasteriser draws every splat.
@@ -101,7 +101,7 @@ impl Plan {
         let needs = SceneNeeds { gather, cull, ..needs };
         let looks = [Listed::Large, Listed::Small].map(|of| {
             let wanted = match of {
-                Listed::Large => needs.tiles && !known.crowded_large && (gather || known.large != Some(false)),
+                Listed::Large => needs.tiles && (gather || known.large != Some(false)),
                 Listed::Small => gather,
             };
             wanted && known.entries_of(of).is_none()
@@ -112,12 +112,10 @@ impl Plan {
             sum_words: if gather { 0 } else { sum_words },
             width: camera.width,
             bands,
-            pages: facts.surfels.div_ceil(page).max(1) as usize,
+            pages: facts.surfels.div_ceil(page) as usize,
             lists_empty: options.shows_where_nothing_is(),
             looks_for_slots: cull && !known.slots,
-            large_by_tiles: needs.tiles
-                && !known.crowded_large
-                && (looks[0] || known.entries_of(Listed::Large).is_some()),
+            large_by_tiles: needs.tiles && (looks[0] || known.entries_of(Listed::Large).is_some()),
             looks_for_lists: looks,
         })
     }

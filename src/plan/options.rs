@@ -42,7 +42,7 @@ pub struct RenderOptions {
     pub low_pass: LowPass,
     /// How the device keeps sums.
     pub accumulator: Accumulator,
-    /// How the device draws splats; accumulators other than `fixed` scatter.
+    /// How the device draws splats; other accumulators than `fixed`, and textures, are scattered.
     pub organisation: Organisation,
     /// Sums by the rasteriser instead, on a GPU.
     pub raster: Option<Raster>,

@@ -104,8 +104,6 @@ pub struct Stage {
     pub band: usize,
     /// One page, or all.
     pub page: Option<usize>,
-    /// It is not run where a look has shown no large splats.
-    pub of_large: bool,
     /// What is cleared before.
     pub clears: Vec<Clear>,
     /// The dispatches.
@@ -115,7 +113,7 @@ pub struct Stage {
 impl Stage {
     /// One of `pass` over all pages in `band`, without clears.
     pub fn new(pass: &'static str, band: usize, runs: Vec<Run>) -> Self {
-        Self { pass, band, page: None, of_large: false, clears: Vec::new(), runs }
+        Self { pass, band, page: None, clears: Vec::new(), runs }
     }
 
     /// The same after `clears`.
@@ -140,6 +138,13 @@ pub enum Step {
     Stage(Stage),
     /// Makes room by what is there.
     Look(Look),
+    /// Large splats, after a look at them: by tiles if there are any and lists hold them, else by a workgroup each.
+    Large {
+        /// With lists.
+        by_tiles: Vec<Stage>,
+        /// Without.
+        by_workgroups: Stage,
+    },
     /// The rasteriser's visibility and attribute pass.
     Draw,
     /// Rows of the image go to the host.

@@ -70,7 +70,7 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
     // A slot for each surfel, and sums of two words in storage.
     let mut without = options.without.clone();
     without.extend([Optimisation::Culling, Optimisation::Copies, Optimisation::Pairs]);
-    let options = &RenderOptions { organisation: Organisation::Scatter, without, ..options.clone() };
+    let options = &RenderOptions { organisation: Organisation::Scatter, raster: None, without, ..options.clone() };
     let facts = Facts::of(scene);
     let mut known = Known::default();
     let plan = Plan::of(&facts, &gpu.adapter, camera, options, &known)?;

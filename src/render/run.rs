@@ -41,14 +41,14 @@ pub struct Run<'a> {
     pub known: &'a mut Known,
     /// Time by pass.
     pub timing: Timing,
-    /// This view was seen to have no large splats.
-    none_large: bool,
+    /// Large splats are drawn by tiles.
+    by_tiles: bool,
 }
 
 impl<'a> Run<'a> {
     /// A try that has not begun.
     pub fn new(gpu: &'a Gpu, plan: &'a Plan, kernels: &'a Kernels, store: &'a mut Store, known: &'a mut Known) -> Self {
-        Self { gpu, plan, kernels, store, known, timing: Timing::new(gpu), none_large: false }
+        Self { gpu, plan, kernels, store, known, timing: Timing::new(gpu), by_tiles: plan.large_by_tiles }
     }
 
     /// Runs `steps` into `frame`; false if there is too little room for the rest, of which `known` now tells.
@@ -56,6 +56,10 @@ impl<'a> Run<'a> {
         for step in steps {
             match step {
                 Step::Stage(stage) => self.stage(stage)?,
+                Step::Large { by_tiles, .. } if self.by_tiles => {
+                    by_tiles.iter().try_for_each(|stage| self.stage(stage))?;
+                }
+                Step::Large { by_workgroups, .. } => self.stage(by_workgroups)?,
                 Step::Draw => self.draw()?,
                 Step::ReadBack(band) => {
                     self.read_back(*band, frame)?;
@@ -75,7 +79,7 @@ impl<'a> Run<'a> {
     /// What the device counted.
     pub fn tally(&mut self) -> Result<Tally> {
         let wanted = |name: &'static str| self.store.buffer(name);
-        let large = self.plan.large_by_tiles.then(|| wanted("large_lists")).flatten();
+        let large = self.by_tiles.then(|| wanted("large_lists")).flatten();
         let small = self.plan.needs.gather.then(|| wanted("small_lists")).flatten();
         let sums = wanted("overflows");
         let of_pages = self.store.pages.iter().flat_map(|page| [page.buffer("queue"), page.buffer("drawn")]);
@@ -100,23 +104,21 @@ impl<'a> Run<'a> {
         if !lists {
             self.known.entries = [None; 2];
         }
-        if overflows > 0 {
-            self.known.overflows = overflows.into();
+        // Where splats are missing, sums are those of others.
+        if slots && lists {
+            self.known.overflows = self.known.overflows.max(overflows.into());
         }
         tally.complete = slots && lists && overflows == 0;
         Ok(tally)
     }
 
     fn stage(&mut self, stage: &Stage) -> Result<()> {
-        if stage.of_large && self.none_large {
-            return Ok(());
-        }
         let (gpu, plan, store, kernels) = (self.gpu, self.plan, &*self.store, self.kernels);
         let clears = |encoder: &mut wgpu::CommandEncoder| stage.clears.iter().for_each(|c| clear(store, encoder, c));
         self.timing.pass(gpu, stage.pass, clears, |pass| {
             for run in &stage.runs {
                 let program = kernels.of(gpu, &run.kernel)?;
-                let paged = program.variables(run.kernel.name).iter().any(|(name, _)| store.is_paged(name));
+                let paged = program.variables(run.kernel.name).iter().any(|(name, _)| Store::is_paged(name));
                 let pages = match stage.page {
                     Some(page) => page..page + 1,
                     None if paged => 0..store.pages.len(),
@@ -189,14 +191,14 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Makes room for the lists of a kind, whose entries `stages` count, and a quarter more for the next view; false if there are more
-    /// than a binding or a list holds.
+    /// Makes room for the lists of a kind, whose entries `stages` count, and a quarter more for the next view. Where there are more than
+    /// a binding or a list holds, large splats are drawn without; false if tiles were to gather all.
     fn look_for_lists(&mut self, of: Listed, stages: &[Stage]) -> Result<bool> {
         let gathers = self.plan.needs.gather;
         if of == Listed::Large && !gathers {
             let queues: Vec<_> = self.store.pages.iter().filter_map(|page| page.buffer("queue")).collect();
             let large = counts(self.gpu, &queues)?.iter().any(|[large, _]| *large > 0);
-            self.none_large = !large;
+            self.by_tiles = large;
             if !large {
                 return Ok(true);
             }
@@ -207,9 +209,9 @@ impl<'a> Run<'a> {
         let entries = entries + entries / 4;
         let most = (self.gpu.buffer_limit() / 4).saturating_sub(self.store.list_words(self.plan, of));
         if entries > most || longest > LONGEST {
-            self.known.crowded_large |= of == Listed::Large;
+            self.by_tiles = false;
             self.known.crowded |= gathers;
-            return Ok(false);
+            return Ok(!gathers);
         }
         self.store.make_lists(self.gpu, self.plan, of, entries)?;
         self.known.entries[of as usize] = Some(entries);
@@ -226,7 +228,7 @@ fn clear(store: &Store, encoder: &mut wgpu::CommandEncoder, clear: &Clear) {
     let words = |buffer: &Buffer<u32>, encoder: &mut wgpu::CommandEncoder| {
         encoder.clear_buffer(&buffer.raw, clear.first * 4, clear.count.map(|words| words * 4));
     };
-    if store.is_paged(clear.buffer) {
+    if Store::is_paged(clear.buffer) {
         store.pages.iter().filter_map(|page| page.buffer(clear.buffer)).for_each(|buffer| words(buffer, encoder));
     } else if let Some(buffer) = store.buffer(clear.buffer) {
         words(buffer, encoder);

@@ -3,7 +3,7 @@
 use crate::passes::{accumulate, cull, project, raster, resolve, tiles, visibility};
 use crate::plan::Plan;
 use crate::plan::known::Listed;
-use crate::plan::steps::{Look, Part, Step};
+use crate::plan::steps::{Look, Part, Stage, Step};
 
 /// The steps of a frame by `plan`.
 pub fn steps(plan: &Plan) -> Vec<Step> {
@@ -43,11 +43,7 @@ fn nearest(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
     if plan.looks_for_lists[Listed::Large as usize] && band == 0 {
         steps.push(tiles::look(plan, Listed::Large));
     }
-    if plan.large_by_tiles {
-        steps.extend(tiles::visibility(plan, band).into_iter().map(Step::Stage));
-    } else {
-        steps.push(Step::Stage(visibility::large(band)));
-    }
+    large(plan, (tiles::visibility(plan, band), visibility::large(band)), steps);
     steps.push(Step::Stage(visibility::occlude(band, Part::All)));
 }
 
@@ -59,9 +55,16 @@ fn sums(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
         return;
     }
     steps.push(Step::Stage(accumulate::steps(plan, band)));
-    if plan.large_by_tiles {
-        steps.extend(tiles::accumulate(plan, band).into_iter().map(Step::Stage));
-    } else {
-        steps.push(Step::Stage(accumulate::large(band)));
+    large(plan, (tiles::accumulate(plan, band), accumulate::large(band)), steps);
+}
+
+/// The large splats, in the way that the plan knows or that a look will show.
+fn large(plan: &Plan, (by_tiles, by_workgroups): (Vec<Stage>, Stage), steps: &mut Vec<Step>) {
+    // Tiles that gather have lists, or the frame is tried again without them.
+    let looks = plan.looks_for_lists[Listed::Large as usize] && !plan.needs.gather;
+    match plan.large_by_tiles {
+        true if looks => steps.push(Step::Large { by_tiles, by_workgroups }),
+        true => steps.extend(by_tiles.into_iter().map(Step::Stage)),
+        false => steps.push(Step::Stage(by_workgroups)),
     }
 }

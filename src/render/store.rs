@@ -25,6 +25,10 @@ const ALIASES: [(&str, &str); 7] = [
     ("added", "sums"),
 ];
 
+/// Names of buffers that each page has.
+const PAGED: [&str; 11] =
+    ["balls", "centers_low", "colors", "copies", "drawn", "filters", "queue", "rare", "rest", "splats", "surfels"];
+
 /// The name under which a buffer is kept.
 fn kept(name: &str) -> &str {
     ALIASES.iter().find(|(alias, _)| *alias == name).map_or(name, |(_, kept)| kept)
@@ -154,16 +158,19 @@ impl Store {
 
     /// Makes the buffers that `plan` asks for.
     pub fn fit(&mut self, gpu: &Gpu, plan: &Plan, known: &Known) -> Result<()> {
-        if !plan.needs.cull {
-            self.pages.iter_mut().try_for_each(|page| page.grow(gpu, page.surfels))?;
-        }
         let raster = plan.needs.raster.map(|raster| (raster, plan.pixel.targets()));
         let (width, bands) = (plan.width, plan.bands.clone());
         let made = Made { width, bands, sum_words: plan.sum_words, image_words: plan.pixel.image_words, raster };
-        if self.made.as_ref() != Some(&made) {
+        let fresh = self.made.as_ref() != Some(&made);
+        if fresh {
             // The old ones make room first.
             (self.made, self.targets, self.readback) = (None, None, None);
             self.frame.clear();
+        }
+        if !plan.needs.cull {
+            self.pages.iter_mut().try_for_each(|page| page.grow(gpu, page.surfels))?;
+        }
+        if fresh {
             self.make_pixels(gpu, plan)?;
             self.made = Some(made);
         }
@@ -242,8 +249,8 @@ impl Store {
     }
 
     /// Whether each page has a buffer of its own of this name.
-    pub fn is_paged(&self, name: &str) -> bool {
-        self.pages.first().is_some_and(|page| page.buffer(name).is_some())
+    pub fn is_paged(name: &str) -> bool {
+        PAGED.contains(&kept(name))
     }
 
     /// What a variable of a kernel is bound to, for a page and a band.

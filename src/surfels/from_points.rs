@@ -171,7 +171,7 @@ fn drop_outliers(
 /// Turns the `normals` of positions to one side; the connected parts of the surface, if they were looked for.
 fn oriented(
     (distinct, graph): (&DistinctPositions, &NeighbourGraph),
-    normals: &mut Vec<[f32; 3]>,
+    normals: &mut [[f32; 3]],
     given: Option<&[Option<[f32; 3]>]>,
     (orientation, up, origin): (&Orientation, DVec3, DVec3),
     progress: &dyn Progress,

@@ -245,7 +245,7 @@ fn what_does_not_go_together_is_refused_by_one_rule() {
     assert_eq!(check(RenderOptions::default()), Ok(()));
     let tile = RenderOptions { organisation: Organisation::Tile, ..RenderOptions::default() };
     assert_eq!(check(tile.clone()), Ok(()));
-    assert!(check(RenderOptions { accumulator: Accumulator::Cas, ..tile }).unwrap_err().contains("fixed only"));
+    assert!(check(RenderOptions { accumulator: Accumulator::Cas, ..tile }).unwrap_err().contains("accumulator fixed"));
     let phong = RenderOptions { shading: Shading::Phong, shininess: 1e6, ..RenderOptions::default() };
     assert!(check(phong).unwrap_err().contains("shininess"));
     let maps = Maps { decision: true, ..Maps::default() };

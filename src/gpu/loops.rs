@@ -105,5 +105,7 @@ mod tests {
         let changed = built_in.replace("visibility.wgsl", "at.x++;", "at.x--;").unwrap();
         assert!(!changed.all_end(&["layout.wgsl", "visibility.wgsl"]));
         assert!(changed.all_end(&["layout.wgsl"]));
+        // Whoever leaves the optimisation out has every loop counted.
+        assert!(!Sources::default().with_counted_loops().all_end(&["layout.wgsl", "visibility.wgsl"]));
     }
 }

@@ -84,7 +84,6 @@ pub struct Truth {
     pub pixels: Vec<bounds::Pixel>,
 }
 
-/// Every map.
 impl HardCase {
     /// Renders the reference and derives the bounds.
     ///

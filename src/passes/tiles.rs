@@ -1,5 +1,5 @@
 //! Stages 2 to 4 by tiles of the image: the same minima, sums and pixels as [`visibility`](super::visibility),
-//! [`accumulate`] and [`resolve`](super::resolve) make, to the bit.
+//! [`accumulate`](mod@super::accumulate) and [`resolve`](mod@super::resolve) make, to the bit.
 //!
 //! Scatter, an invocation a splat, adds each fragment to memory by atomics. A tile has a list of the splats that may touch it,
 //! made by count, scan and place, and keeps its pixels' nearest depths, and then their sums, in registers. A splat costs each

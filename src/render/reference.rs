@@ -25,7 +25,6 @@ pub(super) fn frame(
     options: &RenderOptions,
     progress: &dyn Progress,
 ) -> (Frame, Report) {
-    let needs = SceneNeeds::of_picture(facts, camera, options);
     let start = Instant::now();
     let splats = project::reference_all(scene, camera, options);
     let project_ms = start.elapsed().as_secs_f64() * 1e3;
@@ -64,26 +63,37 @@ pub(super) fn frame(
         strips.into_iter().for_each(|strip| frame.append(strip));
     }
     progress.end();
-    let threads = rayon::current_num_threads();
+    let drawn = splats.iter().map(|splat| u64::from(splat.copies)).sum();
+    let threads = rayon::current_num_threads() as f64;
     let mut passes = BTreeMap::from([("project_ms".to_owned(), project_ms)]);
     for (stage, spent) in ["visibility_ms", "accumulate_ms", "resolve_ms"].into_iter().zip(&spent) {
-        passes.insert(stage.to_owned(), spent.load(Ordering::Relaxed) as f64 * 1e-6 / threads as f64);
+        passes.insert(stage.to_owned(), spent.load(Ordering::Relaxed) as f64 * 1e-6 / threads);
     }
-    let report = Report {
+    let needs = SceneNeeds::of_picture(facts, camera, options);
+    (frame, report(camera, needs, (facts.surfels, drawn), passes, start.elapsed().as_secs_f64() * 1e3))
+}
+
+fn report(
+    camera: &Camera,
+    needs: SceneNeeds,
+    (surfels, splats_drawn): (u64, u64),
+    passes: BTreeMap<String, f64>,
+    total_ms: f64,
+) -> Report {
+    Report {
         backend: "reference",
-        adapter: format!("{threads} processor threads"),
+        adapter: format!("{} processor threads", rayon::current_num_threads()),
         accumulator: "f64",
         overflows: 0,
-        surfels: scene.surfels.len() as u64,
-        splats_drawn: splats.iter().map(|splat| u64::from(splat.copies)).sum(),
+        surfels,
+        splats_drawn,
         width: camera.width,
         height: camera.height,
         passes,
         clock: "wall",
-        total_ms: start.elapsed().as_secs_f64() * 1e3,
+        total_ms,
         needs: needs.names(),
-    };
-    (frame, report)
+    }
 }
 
 /// The splats of each band of rows, by count, scan, place: `members[starts[b]..starts[b + 1]]` are band b's, in order.

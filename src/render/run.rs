@@ -78,6 +78,7 @@ impl<'a> Run<'a> {
 
     /// What the device counted.
     pub fn tally(&mut self) -> Result<Tally> {
+        self.timing.flush(self.gpu)?;
         let wanted = |name: &'static str| self.store.buffer(name);
         let large = self.by_tiles.then(|| wanted("large_lists")).flatten();
         let small = self.plan.needs.gather.then(|| wanted("small_lists")).flatten();
@@ -165,7 +166,8 @@ impl<'a> Run<'a> {
         self.timing.draw(gpu, "accumulate", &sums, depth, |pass| draw(pass, "accumulate"))
     }
 
-    fn read_back(&self, band: usize, frame: &mut Frame) -> Result<()> {
+    fn read_back(&mut self, band: usize, frame: &mut Frame) -> Result<()> {
+        self.timing.flush(self.gpu)?;
         let Some((image, readback)) = self.store.image() else { return Ok(()) };
         let (layout, band) = (&self.plan.pixel, &self.plan.bands[band]);
         let record = u64::from(layout.image_words) * 4;
@@ -177,6 +179,7 @@ impl<'a> Run<'a> {
 
     /// Makes room for the splats of the batches that are listed, and an eighth more for the next view.
     fn look_for_slots(&mut self, part: Part) -> Result<()> {
+        self.timing.flush(self.gpu)?;
         let lists: Vec<_> = self.store.pages.iter().filter_map(|page| page.buffer("drawn")).collect();
         let listed = counts(self.gpu, &lists)?;
         for (page, [_, batches]) in self.store.pages.iter_mut().zip(listed) {
@@ -194,6 +197,7 @@ impl<'a> Run<'a> {
     /// Makes room for the lists of a kind, whose entries `stages` count, and a quarter more for the next view. Where there are more than
     /// a binding or a list holds, large splats are drawn without; false if tiles were to gather all.
     fn look_for_lists(&mut self, of: Listed, stages: &[Stage]) -> Result<bool> {
+        self.timing.flush(self.gpu)?;
         let gathers = self.plan.needs.gather;
         if of == Listed::Large && !gathers {
             let queues: Vec<_> = self.store.pages.iter().filter_map(|page| page.buffer("queue")).collect();
@@ -204,6 +208,7 @@ impl<'a> Run<'a> {
             }
         }
         stages.iter().try_for_each(|stage| self.stage(stage))?;
+        self.timing.flush(self.gpu)?;
         let Some(lists) = self.store.buffer(list_name(of)) else { return Ok(true) };
         let [entries, longest] = counts(self.gpu, &[lists])?.first().copied().unwrap_or_default().map(u64::from);
         let entries = entries + entries / 4;

@@ -13,6 +13,7 @@
 mod common;
 
 use std::fmt::Write;
+use std::sync::Arc;
 
 use common::bits;
 use common::scenes::{Case, cases, crowded, sphere, sphere_camera};
@@ -20,7 +21,7 @@ use epsplat::frame::Frame;
 use epsplat::gpu::Gpu;
 use epsplat::io::{Points, Texture};
 use epsplat::plan::{Accumulator, Features, Optimisation, Organisation, RenderOptions};
-use epsplat::render::{Backend, Renderer};
+use epsplat::render::{Backend, Renderer, render};
 use epsplat::scene::{Camera, Colors, Epsilon, Light, LowPass, Maps, Projection, Scene, Shading, Surfel};
 use epsplat::surfels::build_textured;
 use glam::{DVec3, Vec3};
@@ -285,6 +286,18 @@ fn core_webgpu_makes_the_same_frames() {
         }
     }
     assert!(compared >= 75, "{compared}");
+}
+
+/// A renderer that owns what it renders can be kept by whoever has no lifetimes, and used on another thread.
+#[test]
+fn a_renderer_can_own_its_scene() {
+    let Some(gpu) = common::gpu() else { return };
+    let (scenes, backend) = (scenes(), Arc::new(Backend::gpu(gpu)));
+    let (scene, camera) = scenes.sphere;
+    let (expected, _) = render(&scene, &camera, &with_maps(), &backend, &()).unwrap();
+    let mut renderer = Renderer::new(Arc::new(scene), &with_maps(), backend).unwrap();
+    let frame = std::thread::spawn(move || renderer.frame(&camera, &()).unwrap().0).join().unwrap();
+    assert_eq!(hash(&frame), hash(&expected));
 }
 
 /// Why an adapter does not render a row: what it lacks.

@@ -191,6 +191,16 @@ fn small_buffers_make_bands_and_pages() {
     assert_eq!(lines.iter().filter(|line| line.starts_with("project")).count(), 1);
     assert_eq!(lines.iter().filter(|line| line.starts_with("bin")).count(), 2 * plan.bands.len() * plan.pages);
     assert_eq!(lines.iter().filter(|line| line.starts_with("read back")).count(), 3);
+    // A limit of Mesa's processor is no card's: 16 million pixels of 16 bytes.
+    let large = AdapterDescription { max_storage_buffer_binding_size: 1 << 30, ..AdapterDescription::core() };
+    let large = AdapterDescription { max_buffer_size: 1 << 30, ..large };
+    let bands_of = |kind| {
+        let adapter = AdapterDescription { kind, ..large.clone() };
+        planned(&scene, 4096, &adapter, &RenderOptions { shading: Shading::Unlit, ..Default::default() }, &known)
+            .bands
+            .len()
+    };
+    assert_eq!((bands_of("discrete"), bands_of("software")), (1, 2));
     // A row that does not fit.
     let tiny = AdapterDescription { max_storage_buffer_binding_size: 1000, ..AdapterDescription::core() };
     let error = Plan::of(&Facts::of(&scene), &tiny, &camera(64), &options, &known).unwrap_err();

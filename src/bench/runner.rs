@@ -14,7 +14,7 @@ use crate::plan::{Facts, RenderOptions, SceneNeeds, check};
 use crate::progress::Progress;
 use crate::render::{Backend, Renderer};
 use crate::report::{Measurement, Study, Summary};
-use crate::scene::Camera;
+use crate::scene::{Camera, Scene};
 
 /// What a study gave.
 #[derive(Debug)]
@@ -184,7 +184,7 @@ impl<'a> Case<'a> {
     }
 
     /// A frame from each camera.
-    fn turn(&self, renderer: &mut Renderer<'_>) -> Result<Lap, Unfit> {
+    fn turn(&self, renderer: &mut Renderer<&Scene, &Backend>) -> Result<Lap, Unfit> {
         let cameras: &[Camera] = &self.staged.cameras;
         let mut lap = Lap::default();
         let share = 1.0 / cameras.len() as f64;

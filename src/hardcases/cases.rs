@@ -7,6 +7,7 @@ use glam::DVec3;
 use super::HardCase;
 use super::staging::{BOTH, Entry, Filling, Stage, build, fraction};
 use crate::error::Result;
+use crate::scene::Projection;
 
 /// What the bound of a case is made of, where nothing else dominates.
 pub const FRAGMENTS: &str =
@@ -151,7 +152,7 @@ fn edge_on_exactly(stage: &Stage) -> Filling {
         let (center, side) = if k % 2 == 0 { (down * along, down) } else { (across * along, across) };
         surfels.push(stage.surfel(center + DVec3::Z * z, side * 0.5, DVec3::Z * 0.5));
     }
-    Filling::of(surfels, (1.0, 1.0))
+    Filling::of(surfels, (1.0, 1.0)).with_lone_rims()
 }
 
 /// A disk of radius 0.5 at the centre of pixel (x, y), tilted by `tilt` from the plane that holds the view ray and the
@@ -185,7 +186,7 @@ fn edge_on_askew(stage: &Stage) -> Filling {
         surfels.push(standing(stage, x, y, 2.0 + fraction(k, 2), tilt));
     }
     // As above: twelve of twenty columns.
-    Filling { excused: 0.08, ..Filling::of(surfels, (1.0, 1.0)) }
+    Filling { excused: 0.08, ..Filling::of(surfels, (1.0, 1.0)).with_lone_rims() }
 }
 
 fn through_the_camera_plane(stage: &Stage) -> Filling {
@@ -199,7 +200,7 @@ fn through_the_camera_plane(stage: &Stage) -> Filling {
         let normal = DVec3::new(fraction(k, 3) - 0.5, fraction(k, 4) - 0.5, fraction(k, 5) - 0.5);
         surfels.push(stage.disk(center, normal, 0.2 + fraction(k, 1)));
     }
-    Filling::of(surfels, (0.7, 1.0))
+    stage.rims_in(Projection::Orthographic, Filling::of(surfels, (0.7, 1.0)))
 }
 
 fn across_the_near_depth(stage: &Stage) -> Filling {
@@ -209,7 +210,7 @@ fn across_the_near_depth(stage: &Stage) -> Filling {
         // Most of them reach across: the half extent in depth is the radius times the sine of the slant.
         stage.disk(center, normal, 0.1 + 0.3 * fraction(k, 5))
     };
-    Filling::of((0..100).map(disk).collect(), (0.3, 1.0))
+    Filling::of((0..100).map(disk).collect(), (0.3, 1.0)).with_lone_rims()
 }
 
 fn around_the_camera(stage: &Stage) -> Filling {
@@ -267,13 +268,13 @@ fn needles(stage: &Stage) -> Filling {
         let (length, width) = if k % 50 == 0 { (1000.0, 1.0) } else { (20.0, 0.02) };
         surfels.push(stage.surfel(center, long * length * stage.pixel(z), short * width * stage.pixel(z)));
     }
-    Filling { excused: 0.02, ..Filling::of(surfels, (0.3, 1.0)) }
+    Filling { excused: 0.02, ..Filling::of(surfels, (0.3, 1.0)).with_lone_rims() }
 }
 
 fn intersecting(stage: &Stage) -> Filling {
     let mut surfels = stage.sheet(4.0, 0.2, |x, _| 3.0 + 0.6 * (x - 32.0) / 32.0);
     surfels.extend(stage.sheet(4.0, 0.2, |x, y| 3.0 - 0.5 * (x - 32.0) / 32.0 + 0.1 * (y - 24.0) / 24.0));
-    Filling::of(surfels, (1.0, 1.0))
+    Filling::of(surfels, (1.0, 1.0)).with_lone_rims()
 }
 
 fn edges(stage: &Stage) -> Filling {
@@ -302,5 +303,5 @@ fn edges(stage: &Stage) -> Filling {
             _ => put(width + outside, along * height, radius),
         }
     }
-    Filling::of(surfels, (0.2, 0.9))
+    Filling::of(surfels, (0.2, 0.9)).with_lone_rims()
 }

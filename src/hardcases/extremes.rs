@@ -171,8 +171,8 @@ const LIST: &[Entry] = &[
         Stage::askew,
         thin_alpha
     ),
-    entry!("one pixel", "An image of one pixel.", FRAGMENTS, (1, 1), Stage::askew, rough),
-    entry!("17 by 3 pixels", "An image that fills no workgroup.", FRAGMENTS, (17, 3), Stage::askew, rough),
+    entry!("one pixel", "An image of one pixel.", FRAGMENTS, (1, 1), Stage::askew, without_rims),
+    entry!("17 by 3 pixels", "An image that fills no workgroup.", FRAGMENTS, (17, 3), Stage::askew, without_rims),
     entry!(
         "4097 by 1 pixels",
         "One row, wider than a power of two; a pinhole sees its ends at a slant of 1:2000.",
@@ -198,13 +198,19 @@ fn depth_ratio(stage: &Stage) -> Filling {
     let near = 2.0 * super::staging::NEAR;
     Filling {
         excused: 0.02,
-        ..Filling::of(stage.sheet(4.0, 0.3, |x, _| near * 10f64.powf(7.0 * x / 64.0)), (0.9, 1.0))
+        ..Filling::of(stage.sheet(4.0, 0.3, |x, _| near * 10f64.powf(7.0 * x / 64.0)), (0.9, 1.0)).with_lone_rims()
     }
+}
+
+/// The same in an image too small to see a rim alone.
+fn without_rims(stage: &Stage) -> Filling {
+    Filling { expected: Vec::new(), ..rough(stage) }
 }
 
 /// A wavy sheet.
 fn rough(stage: &Stage) -> Filling {
     Filling::of(stage.sheet(4.0, 0.4, |x, y| 3.0 + 0.1 * (0.3 * x).sin() * (0.2 * y).cos()), (0.99, 1.0))
+        .with_lone_rims()
 }
 
 /// A colour for each disk of [`rough`].
@@ -226,7 +232,7 @@ fn equal_depths(stage: &Stage) -> Filling {
         let center = stage.at(48.0 * fraction(k, 0), 48.0 * fraction(k, 1), 2.0);
         stage.surfel(center, DVec3::X * (0.1 + 0.3 * fraction(k, 2)), DVec3::NEG_Y * (0.1 + 0.3 * fraction(k, 3)))
     };
-    Filling::of((0..200).map(disk).collect(), (0.9, 1.0))
+    stage.rims_in(Projection::Orthographic, Filling::of((0..200).map(disk).collect(), (0.9, 1.0)))
 }
 
 fn unbounded(stage: &Stage) -> Filling {
@@ -248,7 +254,7 @@ fn tail(stage: &Stage, kernel: Kernel) -> Filling {
         let normal = DVec3::NEG_Z;
         surfels.push(stage.disk(center, normal, 0.49 * stage.pixel(3.0)));
     }
-    Filling::of(surfels, (1.0, 1.0)).kernel(kernel)
+    Filling::of(surfels, (1.0, 1.0)).kernel(kernel).with_lone_rims()
 }
 
 fn high_dynamic_range(stage: &Stage) -> Filling {

@@ -155,7 +155,7 @@ pub struct Filling {
     pub smallest: Option<f64>,
 }
 
-/// What one-word sums cannot do, in any image with a pixel that only a disk's rim reaches.
+/// What one-word sums cannot do in an image with a pixel that only a disk's rim reaches.
 const BITS: &str = "24 fraction bits, all that one word leaves where hundreds of fragments may meet, keep 16 of a weight \
                     of 1/400 at a disk's rim";
 
@@ -168,16 +168,12 @@ pub fn options() -> RenderOptions {
 impl Filling {
     /// Of `surfels` that cover a share of the image between these.
     pub fn of(surfels: Vec<Surfel>, covered: (f64, f64)) -> Self {
-        let filling = Self {
-            surfels,
-            colors: None,
-            options: options(),
-            covered,
-            excused: 0.01,
-            expected: Vec::new(),
-            smallest: None,
-        };
-        filling.expect(&[Accumulator::Fixed32, Accumulator::Packed64], BITS)
+        Self { surfels, colors: None, options: options(), covered, excused: 0.01, expected: Vec::new(), smallest: None }
+    }
+
+    /// Some pixel is reached by disks' rims alone, where sums of one word keep too few bits.
+    pub fn with_lone_rims(self) -> Self {
+        self.expect(&[Accumulator::Fixed32, Accumulator::Packed64], BITS)
     }
 
     /// With another kernel.
@@ -190,6 +186,13 @@ impl Filling {
     pub fn expect(mut self, accumulators: &[Accumulator], reason: &'static str) -> Self {
         self.expected.extend(accumulators.iter().map(|&accumulator| Expected { accumulator, reason }));
         self
+    }
+}
+
+impl Stage {
+    /// `filling`, of which this projection alone sees pixels that only rims reach.
+    pub fn rims_in(&self, projection: Projection, filling: Filling) -> Filling {
+        if self.camera.projection == projection { filling.with_lone_rims() } else { filling }
     }
 }
 

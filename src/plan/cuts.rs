@@ -34,9 +34,10 @@ pub fn bands(adapter: &AdapterDescription, camera: &Camera, words: u32) -> Resul
             what: format!("for one row of {} pixels; choose a narrower image", camera.width),
         });
     }
-    // A workgroup that draws a splat over the whole band must not tire its invocations.
-    let most_pixels = u64::from(MOST_ROUNDS * TILE * TILE);
-    let rows = rows.min(most_pixels / u64::from(camera.width)).min(camera.height.into()).max(1) as u32;
+    // A workgroup that draws a splat over the whole band must not tire the invocations of a processor: Mesa's llvmpipe ends loops
+    // after 65,535 rounds; of cards none is known to.
+    let untiring = if adapter.is_software() { MOST_ROUNDS * TILE * TILE } else { u32::MAX };
+    let rows = rows.min(u64::from(untiring / camera.width)).min(camera.height.into()).max(1) as u32;
     let band = |first: u32| {
         let rows = rows.min(camera.height - first);
         let [across, down] = [camera.width, rows].map(|side| u64::from(side.div_ceil(OCCLUSION_TILE)));

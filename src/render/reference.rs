@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::Report;
+use super::report::Report;
 use crate::frame::Frame;
 use crate::passes::splat::Splat;
 use crate::passes::{accumulate, project, resolve, visibility};

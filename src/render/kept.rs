@@ -1,0 +1,153 @@
+//! What stays of a scene from frame to frame on a device, and how a frame is tried until enough is known of it.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use super::kernels::Kernels;
+use super::report::{DeviceBytes, Report};
+use super::run::Run;
+use super::sequence;
+use super::store::Store;
+use crate::error::Result;
+use crate::frame::Frame;
+use crate::gpu::layout::View;
+use crate::gpu::{Gpu, Sources};
+use crate::passes::tiles;
+use crate::passes::upload::upload;
+use crate::plan::known::MOST_TRIES;
+use crate::plan::{Facts, Known, Optimisation, Organisation, Plan, RenderOptions, tuning};
+use crate::progress::Progress;
+use crate::scene::{Camera, Scene};
+
+/// The facts of a scene, what is known of its frames, and what is on the device.
+pub(super) struct Kept {
+    pub(super) facts: Facts,
+    pub(super) options: RenderOptions,
+    known: Known,
+    /// Width and height of the last frame.
+    size: Option<(u32, u32)>,
+    kernels: Option<Kernels>,
+    store: Option<Store>,
+}
+
+impl Kept {
+    /// Nothing is on the device yet.
+    pub(super) fn new(facts: Facts, options: RenderOptions) -> Self {
+        Self { facts, options, known: Known::default(), size: None, kernels: None, store: None }
+    }
+
+    /// Device memory that the last frame was rendered with.
+    pub(super) fn device_bytes(&self) -> DeviceBytes {
+        let (splats, pixels) = self.store.as_ref().map_or((0, 0), Store::bytes);
+        DeviceBytes { splats, pixels }
+    }
+
+    /// Tries until what is known of the view is enough.
+    pub(super) fn frame(
+        &mut self,
+        (gpu, sources): (&Gpu, &Sources),
+        scene: &Scene,
+        camera: &Camera,
+        bar: &dyn Progress,
+    ) -> Result<(Frame, Report)> {
+        self.look_at(gpu, camera);
+        let mut total_ms = 0.0;
+        for number in 0..MOST_TRIES {
+            let plan = Plan::of(&self.facts, &gpu.adapter, camera, &self.options, &self.known)?;
+            // A second try adds nothing to the bar.
+            let progress = if number == 0 { bar } else { &() };
+            self.prepare((gpu, sources), scene, &plan, progress)?;
+            let (Some(kernels), Some(store)) = (&self.kernels, &mut self.store) else { continue };
+            if number == 0 {
+                progress.begin("rendering rows", camera.height.into());
+            }
+            let start = Instant::now();
+            store.set_view(gpu, &View::new(&self.facts, camera, &self.options));
+            let mut run = Run::new(gpu, &plan, kernels, store, &mut self.known);
+            let mut frame = Frame::new(camera, &self.options.maps);
+            let all = run.steps(&sequence::steps(&plan), &mut frame, progress)?;
+            let spent = start.elapsed();
+            total_ms += spent.as_secs_f64() * 1e3;
+            if !all {
+                continue;
+            }
+            let tally = run.tally()?;
+            if tally.complete {
+                bar.end();
+                let clock = if run.timing.on_device() { "timestamps" } else { "wall" };
+                let passes = run.timing.finish(gpu)?;
+                let report = self.report(gpu, &plan, camera, (tally.drawn, clock, passes, total_ms));
+                return Ok((frame, report));
+            }
+        }
+        bar.end();
+        Err(Run::never_fits(gpu))
+    }
+
+    /// Forgets what held for another size of image, and looks at how large splats are.
+    fn look_at(&mut self, gpu: &Gpu, camera: &Camera) {
+        self.known.forget_view();
+        let size = Some((camera.width, camera.height));
+        if self.size != size {
+            self.known.forget_image();
+            self.size = size;
+        }
+        let options = &self.options;
+        let matters = options.organisation == Organisation::Auto && tuning::shares(&gpu.adapter);
+        if matters && options.has(Optimisation::Gathering) && options.has(Optimisation::Sharing) {
+            self.known.touched_tiles = tiles::touched(&self.facts, camera, options);
+        }
+    }
+
+    /// Compiles the kernels and makes the buffers of `plan`, as far as they are not there.
+    fn prepare(
+        &mut self,
+        (gpu, sources): (&Gpu, &Sources),
+        scene: &Scene,
+        plan: &Plan,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let surfels = self.facts.surfels;
+        if !self.kernels.as_ref().is_some_and(|kernels| kernels.serve(plan, &self.options, surfels)) {
+            self.kernels = Some(Kernels::new(gpu, sources, plan, &self.options, surfels)?);
+        }
+        if self.store.as_ref().is_some_and(|store| !store.serves(&plan.needs)) {
+            // The old ones make room first.
+            self.store = None;
+            self.known.forget_buffers();
+        }
+        let store = match &mut self.store {
+            Some(store) => store,
+            empty => {
+                let core = self.options.has(Optimisation::Order).then_some(&self.facts.core);
+                let uploaded = upload(gpu, scene, &plan.needs, core, progress)?;
+                empty.insert(Store::new(gpu, uploaded, &plan.needs)?)
+            }
+        };
+        store.fit(gpu, plan, &self.known)
+    }
+
+    fn report(
+        &self,
+        gpu: &Gpu,
+        plan: &Plan,
+        camera: &Camera,
+        (splats_drawn, clock, passes, total_ms): (u64, &'static str, BTreeMap<&'static str, f64>, f64),
+    ) -> Report {
+        let raster = plan.needs.raster;
+        Report {
+            backend: if raster.is_some() { "raster" } else { "gpu" },
+            adapter: gpu.adapter.name.clone(),
+            accumulator: raster.map_or(plan.needs.accumulator.name(), |raster| raster.format.name()),
+            overflows: self.known.overflows,
+            surfels: self.facts.surfels,
+            splats_drawn,
+            width: camera.width,
+            height: camera.height,
+            passes: passes.into_iter().map(|(stage, ms)| (format!("{stage}_ms"), ms)).collect(),
+            clock,
+            total_ms,
+            needs: plan.needs.names(),
+        }
+    }
+}

@@ -1,6 +1,9 @@
 //! The result of a render: colour and maps, row by row from the top.
 
-use crate::scene::{Camera, Maps};
+use std::collections::BTreeMap;
+
+use crate::scene::Camera;
+use crate::scene::maps::{Map, Maps};
 
 /// An image with its maps. Pixels without an accepted fragment are background: depth +inf, normal 0, weight 0.
 #[derive(Clone, Debug, PartialEq)]
@@ -11,60 +14,72 @@ pub struct Frame {
     pub height: u32,
     /// Linear RGB, straight alpha.
     pub color: Vec<[f32; 4]>,
-    /// Camera-space z, world units.
-    pub depth: Option<Vec<f32>>,
-    /// World space, unit.
-    pub normal: Option<Vec<[f32; 3]>>,
-    /// Sum of weights.
-    pub weight: Option<Vec<f32>>,
-    /// Accepted fragments.
-    pub count: Option<Vec<f32>>,
-    /// Smallest relative distance to a decision (reference only).
-    pub decision: Option<Vec<f32>>,
+    /// [`Map::width`] values a pixel.
+    maps: BTreeMap<Map, Vec<f32>>,
 }
 
 impl Frame {
     /// An empty frame with room for `maps`.
-    pub fn new(camera: &Camera, maps: &Maps) -> Self {
+    pub fn new(camera: &Camera, maps: Maps) -> Self {
         let pixels = camera.pixels();
-        let map = |wanted: bool| wanted.then(|| vec![0.0; pixels]);
-        Self {
-            width: camera.width,
-            height: camera.height,
-            color: vec![[0.0; 4]; pixels],
-            depth: map(maps.depth),
-            normal: maps.normal.then(|| vec![[0.0; 3]; pixels]),
-            weight: map(maps.weight),
-            count: map(maps.count),
-            decision: map(maps.decision),
-        }
+        let maps = maps.iter().map(|map| (map, vec![0.0; pixels * map.width()])).collect();
+        Self { width: camera.width, height: camera.height, color: vec![[0.0; 4]; pixels], maps }
     }
 
     /// A frame of no rows, to [`append`](Self::append) to.
-    pub fn empty(camera: &Camera, maps: &Maps) -> Self {
+    pub fn empty(camera: &Camera, maps: Maps) -> Self {
         let mut frame = Self::new(&Camera { height: 0, ..camera.clone() }, maps);
         let pixels = camera.pixels();
         frame.color.reserve_exact(pixels);
-        for map in [&mut frame.depth, &mut frame.weight, &mut frame.count, &mut frame.decision].into_iter().flatten() {
-            map.reserve_exact(pixels);
-        }
-        frame.normal.iter_mut().for_each(|map| map.reserve_exact(pixels));
+        frame.maps.iter_mut().for_each(|(map, values)| values.reserve_exact(pixels * map.width()));
         frame
+    }
+
+    /// An image of linear RGB and straight alpha without maps.
+    pub fn of_colors(width: u32, height: u32, color: Vec<[f32; 4]>) -> Self {
+        Self { width, height, color, maps: BTreeMap::new() }
+    }
+
+    /// The same with a map of [`Map::width`] `values` a pixel.
+    pub fn with(mut self, map: Map, values: Vec<f32>) -> Self {
+        self.maps.insert(map, values);
+        self
+    }
+
+    /// The same without a map.
+    pub fn without(mut self, map: Map) -> Self {
+        self.maps.remove(&map);
+        self
+    }
+
+    /// The maps that there are.
+    pub fn maps(&self) -> Maps {
+        self.maps.keys().fold(Maps::NONE, |maps, map| maps.and(&[*map]))
+    }
+
+    /// A map's values, [`Map::width`] of them a pixel.
+    pub fn map(&self, map: Map) -> Option<&[f32]> {
+        self.maps.get(&map).map(Vec::as_slice)
+    }
+
+    /// The same, to be changed.
+    pub fn map_mut(&mut self, map: Map) -> Option<&mut [f32]> {
+        self.maps.get_mut(&map).map(Vec::as_mut_slice)
+    }
+
+    /// The values of the map of normals, pixel by pixel.
+    pub fn normals(&self) -> Option<&[[f32; 3]]> {
+        self.map(Map::Normal).map(bytemuck::cast_slice)
     }
 
     /// Puts the rows of `below` under these; both have the same width and maps.
     pub fn append(&mut self, below: Self) {
-        fn join<T>(above: &mut Option<Vec<T>>, below: Option<Vec<T>>) {
-            if let (Some(above), Some(below)) = (above, below) {
-                above.extend(below);
-            }
-        }
         self.height += below.height;
         self.color.extend(below.color);
-        join(&mut self.depth, below.depth);
-        join(&mut self.normal, below.normal);
-        join(&mut self.weight, below.weight);
-        join(&mut self.count, below.count);
-        join(&mut self.decision, below.decision);
+        for (map, values) in below.maps {
+            if let Some(above) = self.maps.get_mut(&map) {
+                above.extend(values);
+            }
+        }
     }
 }

@@ -16,7 +16,7 @@ use epsplat::hardcases::precision::E;
 use epsplat::passes::project::reference_all;
 use epsplat::plan::{Accumulator, AccumulatorRow, Facts, Organisation, RenderOptions};
 use epsplat::render::{Backend, Renderer, render};
-use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Maps, Projection, Scene, Shading, Surfel};
+use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Map, Maps, Projection, Scene, Shading, Surfel};
 use glam::{DVec3, Vec3};
 
 const KERNELS: [&str; 5] = ["gaussian", "ellipse:6,3", "ellipse:6,3,smooth", "hat", "constant"];
@@ -83,19 +83,19 @@ fn compare(case: &Case, row: &AccumulatorRow, device: &Frame) -> Findings {
     let mut findings = Findings::default();
     let (low, high) = case.scene.color_range();
     let fraction_bits = row.fraction_bits(case.scene.surfels.len() as u64);
-    let map = |map: &Option<Vec<f32>>, pixel: usize| f64::from(map.as_ref().unwrap()[pixel]);
+    let map = |map: Option<&[f32]>, pixel: usize| f64::from(map.as_ref().unwrap()[pixel]);
     for (pixel, known) in case.enclosure.iter().enumerate() {
         let twin = &case.reference;
-        let (n, weight) = (map(&twin.count, pixel), map(&twin.weight, pixel));
+        let (n, weight) = (map(twin.map(Map::Count), pixel), map(twin.map(Map::Weight), pixel));
         if !known.decided() {
             findings.open += 1;
             continue;
         }
-        if (map(&device.count, pixel), n) != (f64::from(known.count.0), f64::from(known.count.0)) {
-            findings.wrong.push(format!("count {} not {n} at {pixel}", map(&device.count, pixel)));
+        if (map(device.map(Map::Count), pixel), n) != (f64::from(known.count.0), f64::from(known.count.0)) {
+            findings.wrong.push(format!("count {} not {n} at {pixel}", map(device.map(Map::Count), pixel)));
         }
         if n == 0.0 {
-            if device.color[pixel] != [0.0; 4] || map(&device.weight, pixel) != 0.0 {
+            if device.color[pixel] != [0.0; 4] || map(device.map(Map::Weight), pixel) != 0.0 {
                 findings.wrong.push(format!("{:?} where nothing is, at {pixel}", device.color[pixel]));
             }
             continue;
@@ -119,16 +119,16 @@ fn compare(case: &Case, row: &AccumulatorRow, device: &Frame) -> Findings {
             check(0, (a - b).abs(), range * mean + 4.0 * E * b);
         }
         let front = known.nearest.low;
-        let depth = (map(&device.depth, pixel), map(&twin.depth, pixel));
+        let depth = (map(device.map(Map::Depth), pixel), map(twin.map(Map::Depth), pixel));
         let behind = common::depth_span(&case.view, front);
         check(1, (depth.0 - depth.1).abs(), behind * mean + depth.1 * (known.depth_error + 4.0 * E));
-        let normals = [device, twin].map(|f| Vec3::from_array(f.normal.as_ref().unwrap()[pixel]).as_dvec3());
+        let normals = [device, twin].map(|f| Vec3::from_array(f.normals().unwrap()[pixel]).as_dvec3());
         // Components have a range of 2; the mean is normalised, and a short one magnifies its error.
         if known.normal.iter().any(|sum| (2.0 * sum.low / known.weight.high - 1.0).abs() > 0.6) {
             check(2, (normals[0] - normals[1]).length(), 2.0 * 3f64.sqrt() * mean / 0.6 + 4.0 * E);
         }
         let width = known.weight.high - known.weight.low;
-        check(3, (map(&device.weight, pixel) - weight).abs(), width + weight * sums);
+        check(3, (map(device.map(Map::Weight), pixel) - weight).abs(), width + weight * sums);
     }
     findings
 }
@@ -220,8 +220,8 @@ fn sums_that_do_not_fit_are_noticed_and_made_again() {
         let (scene, camera) = stack(disks, 0.3);
         let (expected, report) = render(&scene, &camera, &with(exact), &backend, &()).unwrap();
         assert_eq!((report.accumulator, report.overflows), (exact.name(), 0));
-        assert!(expected.count.as_ref().unwrap().iter().all(|count| *count == disks as f32));
-        assert!(expected.weight.as_ref().unwrap().iter().all(|weight| *weight == disks as f32));
+        assert!(expected.map(Map::Count).unwrap().iter().all(|count| *count == disks as f32));
+        assert!(expected.map(Map::Weight).unwrap().iter().all(|weight| *weight == disks as f32));
         for row in &all {
             let (frame, report) = render(&scene, &camera, &with(row.of), &backend, &()).unwrap();
             let name = format!("{}, {disks} disks", row.name);
@@ -236,7 +236,11 @@ fn sums_that_do_not_fit_are_noticed_and_made_again() {
                 assert!(bits(&frame) != bits(&expected), "{name}: an overflow does not show");
             } else {
                 assert_eq!((report.accumulator, report.overflows), (row.name, 0), "{name}");
-                assert!(frame.count == expected.count && frame.weight == expected.weight, "{name}");
+                assert!(
+                    frame.map(Map::Count) == expected.map(Map::Count)
+                        && frame.map(Map::Weight) == expected.map(Map::Weight),
+                    "{name}"
+                );
                 let n = disks as f64;
                 // Every term is the same, so float's sums, of exact weights, err by what the sum of one colour does.
                 let bound = (row.error_bound)(n, n, row.fraction_bits(scene.surfels.len() as u64)) + 2.0 * E;

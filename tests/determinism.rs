@@ -14,7 +14,7 @@ use epsplat::hardcases::cases;
 use epsplat::inspect::stages;
 use epsplat::plan::{Accumulator, AccumulatorRow, RenderOptions};
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Lens, LowPass, Maps, Scene, Shading, Surfel, Up};
+use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Lens, LowPass, Map, Maps, Scene, Shading, Surfel, Up};
 use glam::{DVec3, Vec3};
 
 /// Half a unit in the last place of 1 in f32.
@@ -269,7 +269,7 @@ fn sums_that_show_the_order_stay_within_their_bounds() {
         ..options(accumulator)
     };
     let exact = frame(&scene, &camera, &with(Accumulator::Fixed), &backend);
-    let (counts, weights) = (exact.count.as_ref().unwrap(), exact.weight.as_ref().unwrap());
+    let (counts, weights) = (exact.map(Map::Count).unwrap(), exact.map(Map::Weight).unwrap());
     let fewest = counts.iter().copied().fold(f32::INFINITY, f32::min);
     assert!(fewest > 1000.0, "only {fewest} fragments on a pixel");
     for row in all.into_iter().filter(|row| !row.deterministic) {
@@ -281,7 +281,7 @@ fn sums_that_show_the_order_stay_within_their_bounds() {
         eprintln!("{}: repeated runs {}, reordered ones {}", row.name, words(repeated), words(reordered));
         let mut used = 0f64;
         for run in &runs {
-            assert_eq!(run.count, exact.count, "{}", row.name);
+            assert_eq!(run.map(Map::Count), exact.map(Map::Count), "{}", row.name);
             for pixel in 0..camera.pixels() {
                 let (n, w) = (counts[pixel].into(), weights[pixel].into());
                 // Both sides err, and both map back to a range of at most 1 in f32.
@@ -291,7 +291,7 @@ fn sums_that_show_the_order_stay_within_their_bounds() {
                     used = used.max(difference / bound);
                     assert!(difference <= bound, "{}: {difference:e} over {bound:e} at {pixel}", row.name);
                 }
-                let weight = f64::from((run.weight.as_ref().unwrap()[pixel] - weights[pixel]).abs());
+                let weight = f64::from((run.map(Map::Weight).unwrap()[pixel] - weights[pixel]).abs());
                 assert!(weight <= w * (n + 2.0) * E, "{}: weight at {pixel}", row.name);
             }
         }

@@ -8,7 +8,7 @@ use epsplat::io::Points;
 use epsplat::metrics::compare;
 use epsplat::plan::RenderOptions;
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Epsilon, Lens, Maps, Scene, Up};
+use epsplat::scene::{Camera, Epsilon, Lens, Map, Maps, Scene, Up};
 use epsplat::surfels::analytic::{Shape, generate};
 use epsplat::surfels::build;
 use glam::DVec3;
@@ -36,7 +36,7 @@ fn check(name: &str, scene: &Scene, camera: &Camera, epsilon: Epsilon) {
     let Some(gpu) = common::gpu() else { return };
     let maps = Maps::ON_DEVICE;
     let options = RenderOptions { epsilon, maps, ..RenderOptions::default() };
-    let with_decision = RenderOptions { maps: Maps { decision: true, ..maps }, ..options.clone() };
+    let with_decision = RenderOptions { maps: maps.and(&[Map::Decision]), ..options.clone() };
     let (reference, _) = render(scene, camera, &with_decision, &Backend::Reference, &()).unwrap();
     let (frame, _) = render(scene, camera, &options, &Backend::gpu(gpu), &()).unwrap();
     let share = reference.color.iter().filter(|c| c[3] > 0.0).count() as f64 / camera.pixels() as f64;

@@ -16,7 +16,7 @@ use epsplat::plan::{AccumulatorRow, COLOR_CHANNEL, RenderOptions};
 use epsplat::render::{Backend, render};
 use epsplat::scene::camera::Lens;
 use epsplat::scene::options::HIGHLIGHT;
-use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Maps, Projection, Scene, Shading, Surfel, Up};
+use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Map, Maps, Projection, Scene, Shading, Surfel, Up};
 use glam::{DVec3, Vec3};
 
 const E: f64 = 1.0 / 16_777_216.0;
@@ -63,9 +63,12 @@ fn check_plane(row: &AccumulatorRow, backend: &Backend) {
         let frame = frame(&scene, &camera, &options, backend);
         let name = row.name;
         assert!(frame.color.iter().all(|pixel| *pixel == expected), "{name}: {:?} is not {expected:?}", frame.color[0]);
-        assert!(frame.depth.unwrap().iter().all(|depth| (depth - 5.0).abs() <= 5.0 * 4.0 * E as f32), "{name}");
-        let (counts, weights) = (frame.count.unwrap(), frame.weight.unwrap());
-        for (pixel, n) in frame.normal.unwrap().into_iter().enumerate() {
+        assert!(
+            frame.map(Map::Depth).unwrap().iter().all(|depth| (depth - 5.0).abs() <= 5.0 * 4.0 * E as f32),
+            "{name}"
+        );
+        let (counts, weights) = (frame.map(Map::Count).unwrap(), frame.map(Map::Weight).unwrap());
+        for (pixel, n) in frame.normals().unwrap().iter().enumerate() {
             let bits = row.fraction_bits(scene.surfels.len() as u64);
             let bound = 2.0 * (row.error_bound)(counts[pixel].into(), weights[pixel].into(), bits) as f32;
             assert!(n[0].abs() < bound && n[1].abs() < bound && (n[2] + 1.0).abs() < bound, "{name}: {n:?} at {pixel}");
@@ -96,7 +99,7 @@ fn check_two_colours(row: &AccumulatorRow, backend: &Backend) {
     let options = RenderOptions { shading: Shading::Unlit, accumulator: row.of, ..options() };
     let fraction_bits = row.fraction_bits(scene.surfels.len() as u64);
     let frame = frame(&scene, &camera, &options, backend);
-    let (weights, counts) = (frame.weight.unwrap(), frame.count.unwrap());
+    let (weights, counts) = (frame.map(Map::Weight).unwrap(), frame.map(Map::Count).unwrap());
     for (pixel, color) in frame.color.iter().enumerate() {
         for k in 0..4 {
             let range = f64::from((seen[k] - hidden[k]).abs());
@@ -147,7 +150,7 @@ fn resolve_matches_its_twin_on_the_devices_own_sums() {
             }
             let device = frame(&scene, &camera, &options, &backend);
             let sums = unmapped(&scene, &camera, &options, gpu);
-            let mut twin = Frame::new(&camera, &Maps::ON_DEVICE);
+            let mut twin = Frame::new(&camera, Maps::ON_DEVICE);
             resolve::reference(&sums, &scene, &camera, &options, 0, &mut twin);
             // Of the largest colour; of one; of the depth; of the weight.
             let largest = scene.color_range().1.map(f64::from).into_iter().fold(1.0, f64::max);
@@ -161,15 +164,15 @@ fn resolve_matches_its_twin_on_the_devices_own_sums() {
                 let apart = |a: &[f32], b: &[f32]| {
                     a.iter().zip(b).map(|(a, b)| f64::from((a - b).abs())).fold(0.0, f64::max) * mean.clamp(0.05, 1.0)
                 };
-                let (near, far) = (device.depth.as_ref().unwrap()[pixel], twin.depth.as_ref().unwrap()[pixel]);
-                let (light, heavy) = (device.weight.as_ref().unwrap()[pixel], twin.weight.as_ref().unwrap()[pixel]);
+                let (near, far) = (device.map(Map::Depth).unwrap()[pixel], twin.map(Map::Depth).unwrap()[pixel]);
+                let (light, heavy) = (device.map(Map::Weight).unwrap()[pixel], twin.map(Map::Weight).unwrap()[pixel]);
                 let now = [
                     apart(&device.color[pixel], &twin.color[pixel]) / largest * alpha.clamp(0.05, 1.0),
-                    apart(&device.normal.as_ref().unwrap()[pixel], &twin.normal.as_ref().unwrap()[pixel]),
+                    apart(&device.normals().unwrap()[pixel], &twin.normals().unwrap()[pixel]),
                     if near == far { 0.0 } else { f64::from((near - far).abs() / far) },
                     if light == heavy { 0.0 } else { f64::from((light - heavy).abs() / heavy) },
                 ];
-                assert_eq!(device.count.as_ref().unwrap()[pixel], twin.count.as_ref().unwrap()[pixel]);
+                assert_eq!(device.map(Map::Count).unwrap()[pixel], twin.map(Map::Count).unwrap()[pixel]);
                 for (worst, now) in worst.iter_mut().zip(now) {
                     *worst = if now.is_nan() { f64::INFINITY } else { worst.max(now) };
                 }
@@ -250,7 +253,7 @@ fn a_spheres_depth_is_the_analytic_one_at_disk_centres() {
     for lens in [Lens::Fov(20.0), Lens::OrthographicHeight(0.9)] {
         let camera = sphere_camera_with(512, lens);
         let pinhole = camera.projection == Projection::Pinhole;
-        let depths = frame(&scene, &camera, &options(), &backend).depth.unwrap();
+        let depths = frame(&scene, &camera, &options(), &backend).map(Map::Depth).unwrap().to_vec();
         let mut seen = 0;
         for surfel in &scene.surfels {
             let center = Vec3::from_array(surfel.center).as_dvec3();

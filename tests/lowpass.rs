@@ -10,7 +10,7 @@ use epsplat::metrics::{Reconstruction, compare, reconstruction};
 use epsplat::passes::lowpass::RADIUS;
 use epsplat::plan::RenderOptions;
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, Kernel, Lens, LowPass, Maps, Scene, Shading, Surfel, Up};
+use epsplat::scene::{Camera, Colors, Kernel, Lens, LowPass, Map, Maps, Scene, Shading, Surfel, Up};
 use epsplat::surfels::analytic::{Shape, generate};
 use epsplat::surfels::build;
 use epsplat::truth::{DEFAULT_GRID, Surface, Truth};
@@ -104,7 +104,7 @@ fn depth_is_continuous_where_the_filter_takes_over() {
     .unwrap();
     for low_pass in [LowPass::Max, LowPass::Ewa] {
         let (frame, _) = render(&scene, &camera, &options(low_pass), &Backend::Reference, &()).unwrap();
-        let depth = frame.depth.unwrap();
+        let depth = frame.map(Map::Depth).unwrap();
         let (mut covered, mut worst) = (0, 0f64);
         for y in 0..200 {
             let z = f64::from(depth[y * 8 + 4]);
@@ -138,8 +138,7 @@ fn the_device_filters_as_the_reference_does() {
             for lens in [Lens::Fov(45.0), Lens::OrthographicHeight(3.0)] {
                 let near = Camera::default_near(scene);
                 let camera = Camera::framing((120, 90), lens, scene, near).unwrap();
-                let with_decision =
-                    RenderOptions { maps: Maps { decision: true, ..Maps::ON_DEVICE }, ..options(low_pass) };
+                let with_decision = RenderOptions { maps: Maps::ON_DEVICE.and(&[Map::Decision]), ..options(low_pass) };
                 let (reference, _) = render(scene, &camera, &with_decision, &Backend::Reference, &()).unwrap();
                 let (frame, _) = render(scene, &camera, &options(low_pass), backend, &()).unwrap();
                 let comparison = compare(&frame, &reference).unwrap();

@@ -10,7 +10,7 @@ use epsplat::plan::known::Listed;
 use epsplat::plan::steps::{Look, Over, Stage, Step};
 use epsplat::plan::{Accumulator, Facts, Known, Optimisation, Organisation, Plan, Raster, RenderOptions, page_surfels};
 use epsplat::render::sequence::steps;
-use epsplat::scene::{Camera, Colors, LowPass, Maps, Projection, Scene, Shading};
+use epsplat::scene::{Camera, Colors, LowPass, Map, Maps, Projection, Scene, Shading};
 
 /// A software adapter with all optional features, as Mesa's is.
 fn software() -> AdapterDescription {
@@ -180,7 +180,7 @@ fn tiles_of_a_software_adapter_gather_splats_that_are_not_tiny() {
 fn small_buffers_make_bands_and_pages() {
     let scene = sphere(3000, 1.5);
     let small = AdapterDescription { max_storage_buffer_binding_size: 100_000, ..AdapterDescription::core() };
-    let options = RenderOptions { maps: Maps { depth: true, normal: true, ..Maps::default() }, ..Default::default() };
+    let options = RenderOptions { maps: Maps::of(&[Map::Depth, Map::Normal]), ..Default::default() };
     let known = Known { large: Some(true), entries: [Some(10), None], ..Known::default() };
     let plan = planned(&scene, 64, &small, &options, &known);
     assert_eq!((plan.bands.len(), plan.pages), (3, 3000_u64.div_ceil(page_surfels(&small)) as usize));
@@ -258,7 +258,7 @@ fn what_does_not_go_together_is_refused_by_one_rule() {
     assert!(check(RenderOptions { accumulator: Accumulator::Cas, ..tile }).unwrap_err().contains("accumulator fixed"));
     let phong = RenderOptions { shading: Shading::Phong, shininess: 1e6, ..RenderOptions::default() };
     assert!(check(phong).unwrap_err().contains("shininess"));
-    let maps = Maps { decision: true, ..Maps::default() };
+    let maps = Maps::of(&[Map::Decision]);
     assert!(check(RenderOptions { maps, ..RenderOptions::default() }).unwrap_err().contains("reference"));
 }
 

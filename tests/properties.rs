@@ -12,7 +12,7 @@ use epsplat::gpu::Sources;
 use epsplat::hardcases::{HardCase, judge};
 use epsplat::plan::{ACCUMULATORS, RenderOptions, check};
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Lens, Light, Maps, Scene, Shading, Surfel, Up};
+use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Lens, Light, Map, Maps, Scene, Shading, Surfel, Up};
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
@@ -79,8 +79,8 @@ fn options() -> impl Strategy<Value = RenderOptions> {
 
 /// Depth, weight, count and normal exist exactly where a fragment was accepted, and nothing is NaN.
 fn check_maps(frame: &Frame) -> Result<(), TestCaseError> {
-    let (depth, weight) = (frame.depth.as_ref().unwrap(), frame.weight.as_ref().unwrap());
-    let (count, normal) = (frame.count.as_ref().unwrap(), frame.normal.as_ref().unwrap());
+    let (depth, weight) = (frame.map(Map::Depth).unwrap(), frame.map(Map::Weight).unwrap());
+    let (count, normal) = (frame.map(Map::Count).unwrap(), frame.normals().unwrap());
     for pixel in 0..frame.color.len() {
         let covered = weight[pixel] > 0.0;
         prop_assert_eq!(covered, depth[pixel].is_finite());
@@ -112,7 +112,7 @@ fn dealt(scene: &Scene) -> Scene {
 /// nine products and sums, the cosine has three more, and each light one.
 fn lit(unlit: &Frame, camera: &Camera, lights: &[Light], pixel: usize) -> ([f64; 3], [f64; 3]) {
     let (x, y) = (pixel % unlit.width as usize, pixel / unlit.width as usize);
-    let normal = Vec3::from_array(unlit.normal.as_ref().unwrap()[pixel]).as_dvec3();
+    let normal = Vec3::from_array(unlit.normals().unwrap()[pixel]).as_dvec3();
     let toward_eye = -camera.ray(x as f64 + 0.5, y as f64 + 0.5).normalize();
     let (mut irradiance, mut intensities) = (0.0, 0.0);
     for light in lights {

@@ -9,7 +9,7 @@ use epsplat::gpu::{Gpu, Sources};
 use epsplat::hardcases::{HardCase, Row, Truth, cases, judge};
 use epsplat::plan::{Accumulator, AccumulatorRow, BlendFormat, Features, Raster, RasterDepth, RenderOptions};
 use epsplat::render::{Backend, Report, render};
-use epsplat::scene::{Camera, Maps, Shading};
+use epsplat::scene::{Camera, Map, Maps, Shading};
 
 /// Cases with every kind of footprint and attribute, and depths of many magnitudes.
 const CASES: [&str; 6] = [
@@ -29,7 +29,7 @@ fn all_cases() -> Vec<(HardCase, Truth)> {
 }
 
 fn options(case: &HardCase, format: BlendFormat, depth: RasterDepth) -> RenderOptions {
-    let maps = Maps { count: format != BlendFormat::Rgba8Unorm, ..Maps::ON_DEVICE };
+    let maps = if format == BlendFormat::Rgba8Unorm { Maps::ON_DEVICE.but(&[Map::Count]) } else { Maps::ON_DEVICE };
     RenderOptions { raster: Some(Raster { format, depth }), maps, ..case.options.clone() }
 }
 
@@ -129,7 +129,10 @@ fn the_classic_depth_test_accepts_nearly_the_same_fragments() {
     let backend = Backend::gpu(gpu);
     for name in ["intersecting sheets", "intersecting sheets, orthographic", "UTM, a kilometre off"] {
         let case = cases().unwrap().into_iter().find(|case| case.name == name).unwrap();
-        let count = |depth| frame(&case, &options(&case, BlendFormat::Rgba16Float, depth), &backend).0.count.unwrap();
+        let count = |depth| {
+            let frame = frame(&case, &options(&case, BlendFormat::Rgba16Float, depth), &backend).0;
+            frame.map(Map::Count).unwrap().to_vec()
+        };
         let exact = count(RasterDepth::Exact);
         let covered = exact.iter().filter(|count| **count > 0.0).count();
         for depth in [RasterDepth::Offset, RasterDepth::Ray] {
@@ -171,13 +174,13 @@ fn lit_pictures_are_computes() {
         let plain = RenderOptions::default();
         assert_eq!(plain.shading, Shading::Lambert);
         let lit = RenderOptions { shading: plain.shading, lights: plain.lights, ..case.options.clone() };
-        let lit = RenderOptions { maps: Maps { count: true, ..lit.maps }, ..lit };
+        let lit = RenderOptions { maps: lit.maps.and(&[Map::Count]), ..lit };
         let (compute, _) = frame(case, &lit, &backend);
         let raster = RenderOptions { raster: Some(Raster::default()), ..lit.clone() };
         let (raster, _) = frame(case, &raster, &backend);
         let largest = case.scene.colors.clone();
         let range = (0..case.scene.surfels.len()).flat_map(|k| largest.linear(k)).fold(1.0, f32::max);
-        let counts = compute.count.as_ref().unwrap();
+        let counts = compute.map(Map::Count).unwrap();
         let pixels = compute.color.iter().zip(&raster.color).zip(counts);
         let used = pixels.flat_map(|((a, b), n)| {
             let bound = range * (1.0 + 4.0) * 2.0 * n.max(1.0) / 2048.0;

@@ -39,16 +39,7 @@ fn frame(size: u32, error: f64) -> Frame {
         let noise = if dice > inside { error * (8.0 * (dice - 0.7)).exp() } else { 0.0 };
         [0.9 * light, 0.55 * light + noise, 0.3 * light, 1.0].map(|c| c as f32)
     };
-    Frame {
-        width: size,
-        height: size,
-        color: (0..size * size).map(pixel).collect(),
-        depth: None,
-        normal: None,
-        weight: None,
-        count: None,
-        decision: None,
-    }
+    Frame::of_colors(size, size, (0..size * size).map(pixel).collect())
 }
 
 /// A study as the runner would fill it: two scenes, one of them at four sizes, and pictures of the other.

@@ -14,7 +14,7 @@ use epsplat::gpu::sources::FILES;
 use epsplat::passes;
 use epsplat::plan::pass::Making;
 use epsplat::plan::{Accumulator, COLOR_CHANNEL, ColorNeed, Features, PixelLayout, RenderOptions, color_channels};
-use epsplat::scene::{Kernel, KernelShape};
+use epsplat::scene::{Kernel, KernelShape, MAPS, Map};
 use naga::AddressSpace;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use rayon::prelude::*;
@@ -175,17 +175,13 @@ fn the_channels_of_a_pixel_do_not_overlap() {
             (0, 1),
             (COLOR_CHANNEL, color_channels(&needs)),
             (pixel.normal_channel, of(needs.normal, 3)),
-            (pixel.depth_channel, of(needs.depth, 1)),
-            (pixel.count_channel, of(needs.count, 1)),
+            (pixel.depth_channel, of(needs.maps.has(Map::Depth), 1)),
+            (pixel.count_channel, of(needs.maps.has(Map::Count), 1)),
             (pixel.place_channel, of(needs.color == ColorNeed::Textured, 4)),
         ]);
-        let image: Vec<u32> = ranges(&[
-            (0, 4),
-            (pixel.normal_image, of(needs.normal_map, 3)),
-            (pixel.depth_image, of(needs.depth, 1)),
-            (pixel.weight_image, of(needs.weight_map, 1)),
-            (pixel.count_image, of(needs.count, 1)),
-        ]);
+        let maps = MAPS.iter().zip(pixel.map_words).filter(|(row, _)| needs.maps.has(row.map));
+        let maps = maps.map(|(row, word)| (word, row.map.width() as u32));
+        let image: Vec<u32> = ranges(&[(0, 4)].into_iter().chain(maps).collect::<Vec<_>>());
         for (places, room) in [(&sums, pixel.channels), (&image, pixel.image_words)] {
             assert!(places.iter().all(|place| *place < room), "{places:?} of {room}, {:?}", needs.names());
             assert_eq!(places.iter().collect::<BTreeSet<_>>().len(), places.len(), "{:?}", needs.names());

@@ -11,7 +11,7 @@ use epsplat::io::Points;
 use epsplat::metrics::{Comparison, compare};
 use epsplat::plan::{Organisation, RenderOptions};
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Lens, LowPass, Maps, Scene, Texture, Up};
+use epsplat::scene::{Camera, Lens, LowPass, Map, Maps, Scene, Texture, Up};
 use epsplat::surfels::analytic::{Shape, generate};
 use epsplat::surfels::{Preparation, build, build_textured};
 use glam::DVec3;
@@ -59,7 +59,7 @@ fn against_alone(scene: &Scene, center: DVec3, away: f64, options: &RenderOption
     let gpu = common::gpu()?;
     let maps = Maps::ON_DEVICE;
     let options = RenderOptions { maps, ..options.clone() };
-    let decided = RenderOptions { maps: Maps { decision: true, ..maps }, ..options.clone() };
+    let decided = RenderOptions { maps: maps.and(&[Map::Decision]), ..options.clone() };
     let (alone, _) = self::scene(&[DVec3::ZERO], &[]);
     let (expected, _) = render(&alone, &camera(DVec3::ZERO, away), &decided, &Backend::Reference, &()).unwrap();
     let (frame, _) = render(scene, &camera(center, away), &options, &Backend::gpu(gpu), &()).unwrap();
@@ -152,7 +152,7 @@ fn a_texture_far_away_is_where_it_is_near_zero() {
     let texels = (0..64 * 64).map(|k: u32| [(k % 64 * 4) as u8, (k / 64 * 4) as u8, 128, 255]).collect();
     let texture = Texture::new(64, 64, texels).unwrap();
     let painted = |centers: &[DVec3]| build_textured(vec![points(centers, &[])], texture.clone(), &()).unwrap().0;
-    let options = RenderOptions { maps: Maps { decision: true, ..Maps::default() }, ..RenderOptions::default() };
+    let options = RenderOptions { maps: Maps::of(&[Map::Decision]), ..RenderOptions::default() };
     let expected =
         render(&painted(&[DVec3::ZERO]), &camera(DVec3::ZERO, 1.0), &options, &Backend::Reference, &()).unwrap().0;
     let other = MAP + DVec3::new(3e5, -2e5, 1e3);

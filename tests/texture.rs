@@ -15,7 +15,7 @@ use epsplat::passes::project::reference_all;
 use epsplat::passes::{accumulate, visibility};
 use epsplat::plan::{Accumulator, RenderOptions};
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, Lens, LowPass, Maps, Place, Projection, Scene, Shading, Textured, Up};
+use epsplat::scene::{Camera, Colors, Lens, LowPass, Map, Place, Projection, Scene, Shading, Textured, Up};
 use epsplat::surfels::build_textured;
 use glam::{DVec3, Vec3};
 
@@ -76,7 +76,7 @@ fn beyond_bounds(scene: &Scene, camera: &Camera, accumulator: Accumulator, sourc
     let fraction_bits = row.fraction_bits(scene.surfels.len() as u64);
     let backend = Backend::Gpu { gpu: Box::new(gpu), sources: sources.clone() };
     let (device, _) = render(scene, camera, &options, &backend, &()).unwrap();
-    let exact = RenderOptions { maps: Maps { decision: true, normal: true, ..options.maps }, ..options };
+    let exact = RenderOptions { maps: options.maps.and(&[Map::Decision, Map::Normal]), ..options };
     let (twin, _) = render(scene, camera, &exact, &Backend::Reference, &()).unwrap();
     let splats = reference_all(scene, camera, &exact);
     let nearest = visibility::reference(splats.iter(), camera, LowPass::None, 0, camera.height);
@@ -88,7 +88,7 @@ fn beyond_bounds(scene: &Scene, camera: &Camera, accumulator: Accumulator, sourc
     let (mut found, mut worst) = ([0; 4], 0f64);
     for (pixel, sum) in sums.iter().enumerate().filter(|(_, sum)| sum.weight > 0.0) {
         found[1] += 1;
-        if twin.decision.as_ref().unwrap()[pixel] < 1e-5 {
+        if twin.map(Map::Decision).unwrap()[pixel] < 1e-5 {
             found[2] += 1;
             continue;
         }
@@ -100,7 +100,7 @@ fn beyond_bounds(scene: &Scene, camera: &Camera, accumulator: Accumulator, sourc
         let apart = variance.max(0.0).sqrt() + reach_2.sqrt();
         // A fragment's point errs by a few roundings of its distance, which is about 3, and along the surface by more the more
         // that is tilted; the coordinates gain less than 0.4 for a unit.
-        let normal = Vec3::from_array(twin.normal.as_ref().unwrap()[pixel]).as_dvec3();
+        let normal = Vec3::from_array(twin.normals().unwrap()[pixel]).as_dvec3();
         let (x, y) = (pixel as u32 % camera.width, pixel as u32 / camera.width);
         let cosine = normal.dot(camera.ray(f64::from(x) + 0.5, f64::from(y) + 0.5).normalize()).abs();
         let of_point = 4.0 * (-24f64).exp2() * 3.0 * 0.4 / (cosine * cosine).max(1e-4);

@@ -10,7 +10,7 @@ use epsplat::frame::Frame;
 use epsplat::gpu::{Gpu, Sources};
 use epsplat::plan::{Optimisation, Organisation, RenderOptions};
 use epsplat::render::{Backend, Renderer, Report, render};
-use epsplat::scene::{Camera, Colors, Epsilon, Kernel, LowPass, Maps, Projection, Scene, Shading, Surfel, Up};
+use epsplat::scene::{Camera, Colors, Epsilon, Kernel, LowPass, Map, Maps, Projection, Scene, Shading, Surfel, Up};
 use glam::{DVec3, Vec3};
 
 /// Kernels that take splats of more than `pixels` pixels for large.
@@ -37,7 +37,7 @@ fn drawn() -> Vec<(&'static str, Scene, Camera, RenderOptions)> {
     let camera = common::scenes::sphere_camera(71, Projection::Pinhole);
     let globe = sphere(900, 2.5);
     let mut unlit = plain.clone();
-    (unlit.shading, unlit.maps) = (Shading::Unlit, Maps::default());
+    (unlit.shading, unlit.maps) = (Shading::Unlit, Maps::NONE);
     all.push(("unlit", globe.clone(), camera.clone(), unlit.clone()));
     let constant = Scene { colors: Colors::Constant([0.2, 0.4, 0.6, 1.0]), ..globe.clone() };
     all.push(("constant", constant, camera.clone(), unlit));
@@ -205,7 +205,7 @@ fn the_longest_lists_are_drawn_to_their_end() {
         };
         let camera = front(16);
         let (frame, report) = frame(&scene, &camera, &options, &backend);
-        let counts = frame.count.unwrap();
+        let counts = frame.map(Map::Count).unwrap();
         assert!(report.needs.contains(&"gather"));
         let (middle, corner) = (counts[7 * 16 + 7] as usize, counts[0] as usize);
         assert_eq!((middle, corner), (2 * LONGEST, LONGEST), "subgroups: {subgroups}");
@@ -233,7 +233,7 @@ fn long_lists_are_drawn_to_their_end() {
         let options = RenderOptions { organisation, ..options.clone() };
         let (frame, report) = frame(&scene, &camera, &options, &backend);
         assert!(!report.needs.contains(&"gather"));
-        let counts = frame.count.unwrap();
+        let counts = frame.map(Map::Count).unwrap();
         assert!(counts.iter().all(|&count| count == 30_000.0), "{counts:?}");
     }
 }

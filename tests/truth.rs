@@ -12,7 +12,7 @@ use epsplat::metrics::{Reconstruction, reconstruction};
 use epsplat::plan::RenderOptions;
 use epsplat::render::{Backend, render};
 use epsplat::scene::options::HIGHLIGHT;
-use epsplat::scene::{Camera, Colors, Lens, Light, Maps, Shading, Up};
+use epsplat::scene::{Camera, Colors, Lens, Light, Map, Maps, Shading, Up};
 use epsplat::surfels::analytic::Shape;
 use epsplat::truth::{DEFAULT_GRID, Surface, Truth};
 use glam::DVec3;
@@ -27,7 +27,7 @@ fn cast(surface: &Surface, camera: &Camera) -> Truth {
 }
 
 fn depth(truth: &Truth, pixel: usize) -> f64 {
-    truth.frame.depth.as_ref().unwrap()[pixel].into()
+    truth.frame.map(Map::Depth).unwrap()[pixel].into()
 }
 
 /// Pixels that the surface covers, as an area.
@@ -54,10 +54,10 @@ fn a_sphere_has_the_outline_and_depths_of_its_formula() {
     for truth in [&seen, &flat] {
         assert_eq!(depth(truth, center), 4.0);
         assert_eq!(truth.second_depth[center], 6.0);
-        assert_eq!(truth.frame.normal.as_ref().unwrap()[center], [0.0, 0.0, 1.0]);
+        assert_eq!(truth.frame.normals().unwrap()[center], [0.0, 0.0, 1.0]);
         assert_eq!((depth(truth, 0), truth.second_depth[0]), (f64::INFINITY, f32::INFINITY));
         assert_eq!((truth.frame.color[0], truth.coverage[0]), ([0.0; 4], 0.0));
-        assert_eq!(truth.frame.normal.as_ref().unwrap()[0], [0.0; 3]);
+        assert_eq!(truth.frame.normals().unwrap()[0], [0.0; 3]);
     }
     let mut met = 0;
     for pixel in 0..flat.coverage.len() {
@@ -110,7 +110,7 @@ fn highlights_are_phongs() {
     };
     let (diffuse, both) = (cast(Shading::Lambert, &lights), cast(Shading::Phong, &lights));
     let (mut seen, mut brightest) = (0, (0.0, 0));
-    for pixel in (0..diffuse.color.len()).filter(|pixel| diffuse.depth.as_ref().unwrap()[*pixel].is_finite()) {
+    for pixel in (0..diffuse.color.len()).filter(|pixel| diffuse.map(Map::Depth).unwrap()[*pixel].is_finite()) {
         let [x, y] = [pixel % 65, pixel / 65].map(|k| (k as f64 - 32.0) / camera.fx);
         let toward_eye = DVec3::new(-x, y, 1.0).normalize();
         // The headlight's own direction comes back by twice its angle; the other's is mirrored at z.
@@ -276,9 +276,9 @@ fn obj_files_keep_their_normals_and_colors() {
         Truth::cast(&Surface::read(&path, &()).unwrap(), &camera, &unlit, DEFAULT_GRID, &()).unwrap()
     };
     let center = 16 * 33 + 16;
-    assert_eq!(read("f 1 2 3 4").frame.normal.unwrap()[center], [0.0, 0.0, 1.0]);
+    assert_eq!(read("f 1 2 3 4").frame.normals().unwrap()[center], [0.0, 0.0, 1.0]);
     let smooth = read("f 1//1 2//1 3//1 4//1").frame;
-    assert_eq!(smooth.normal.unwrap()[center], [0.0, 0.6, 0.8]);
+    assert_eq!(smooth.normals().unwrap()[center], [0.0, 0.6, 0.8]);
     // Half way from red to blue, in linear light.
     let [r, g, b, alpha] = smooth.color[center];
     assert!((r - 0.5).abs() < 1e-6 && g == 0.0 && (b - 0.5).abs() < 1e-6 && alpha == 1.0, "{:?}", smooth.color[center]);
@@ -298,7 +298,7 @@ fn the_bunny_of_surfels_is_the_bunny_of_triangles() {
     assert_eq!((mesh.positions.len(), mesh.triangles.len()), (1839, 3674));
     let (scene, _) = epsplat::surfels::build(vec![points.clone()], &()).unwrap();
     let camera = Camera::framing((200, 200), Lens::Fov(45.0), &scene, Camera::default_near(&scene)).unwrap();
-    let maps = Maps { depth: true, normal: true, ..Maps::default() };
+    let maps = Maps::of(&[Map::Depth, Map::Normal]);
     let options = RenderOptions { maps, ..RenderOptions::default() };
     let (frame, _) = render(&scene, &camera, &options, &Backend::Reference, &()).unwrap();
     let error = |surface: &Surface| {

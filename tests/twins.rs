@@ -19,7 +19,7 @@ use epsplat::passes::{accumulate, visibility};
 use epsplat::plan::{Accumulator, COLOR_CHANNEL, RenderOptions};
 use epsplat::render::{Backend, render};
 use epsplat::scene::options::HIGHLIGHT;
-use epsplat::scene::{Epsilon, Kernel, LowPass, Maps, Projection, Shading};
+use epsplat::scene::{Epsilon, Kernel, LowPass, Map, Maps, Projection, Shading};
 
 fn options(kernel: Kernel) -> RenderOptions {
     RenderOptions { kernel, epsilon: Epsilon::Relative(0.02), maps: Maps::ON_DEVICE, ..Default::default() }
@@ -329,20 +329,20 @@ fn the_frame_of_the_device_is_the_frame_of_the_twins() {
             let (scene, camera) = (sphere(3000, 1.5), sphere_camera(256, projection));
             let mut options = RenderOptions { shading, ..options(DEFAULT_KERNEL) };
             let (device, _) = render(&scene, &camera, &options, &backend, &()).unwrap();
-            options.maps.decision = true;
+            options.maps = options.maps.and(&[Map::Decision]);
             let (twin, _) = render(&scene, &camera, &options, &Backend::Reference, &()).unwrap();
             let (mut open, mut covered) = (0, 0);
             for pixel in 0..camera.pixels() {
-                covered += usize::from(twin.weight.as_ref().unwrap()[pixel] > 0.0);
-                if twin.decision.as_ref().unwrap()[pixel] < 1e-5 {
+                covered += usize::from(twin.map(Map::Weight).unwrap()[pixel] > 0.0);
+                if twin.map(Map::Decision).unwrap()[pixel] < 1e-5 {
                     open += 1;
                     continue;
                 }
                 let difference =
                     (0..4).map(|k| (device.color[pixel][k] - twin.color[pixel][k]).abs()).fold(0.0, f32::max);
                 // The documented bound of the sums, of ranges of 1 (colour) and 2 (normal), and a few units of f32.
-                let weight = twin.weight.as_ref().unwrap()[pixel];
-                let count = twin.count.as_ref().unwrap()[pixel];
+                let weight = twin.map(Map::Weight).unwrap()[pixel];
+                let count = twin.map(Map::Count).unwrap()[pixel];
                 let bound = Accumulator::Fixed.row().error_bound;
                 let sums = bound(count.max(1.0).into(), weight.max(1e-3).into(), 24) as f32;
                 let limit = 3.0 * sums + 1e-5;
@@ -353,11 +353,11 @@ fn the_frame_of_the_device_is_the_frame_of_the_twins() {
                     difference < of_color,
                     "colour {difference:e} over {of_color:e} at {pixel}, {shading:?} {projection:?}"
                 );
-                let (near, far) = (device.depth.as_ref().unwrap()[pixel], twin.depth.as_ref().unwrap()[pixel]);
+                let (near, far) = (device.map(Map::Depth).unwrap()[pixel], twin.map(Map::Depth).unwrap()[pixel]);
                 assert!(near == far || (near - far).abs() < 2e-6 * far, "depth {near} {far} at {pixel}");
-                let (m, n) = (device.normal.as_ref().unwrap()[pixel], twin.normal.as_ref().unwrap()[pixel]);
+                let (m, n) = (device.normals().unwrap()[pixel], twin.normals().unwrap()[pixel]);
                 assert!((0..3).all(|k| (m[k] - n[k]).abs() < limit), "normal {m:?} {n:?} at {pixel}");
-                assert_eq!(device.count.as_ref().unwrap()[pixel], twin.count.as_ref().unwrap()[pixel]);
+                assert_eq!(device.map(Map::Count).unwrap()[pixel], twin.map(Map::Count).unwrap()[pixel]);
             }
             assert!(covered > 20_000 && open < covered / 100, "{open} of {covered} pixels are open");
         }

@@ -56,7 +56,7 @@ fn sphere(count: u64, scale: f32) -> Result<Scene> {
 /// The RMSE of `found` over the pixels that `expected` covers too, and the share of pixels that only one of them covers.
 fn error(found: &Frame, expected: &Frame) -> Result<[f64; 2]> {
     let both: Vec<_> = found.color.iter().zip(&expected.color).filter(|(a, b)| a[3] > 0.0 && b[3] > 0.0).collect();
-    let row = |color: Vec<[f32; 4]>| Frame { width: color.len() as u32, height: 1, color, ..expected.clone() };
+    let row = |color: Vec<[f32; 4]>| Frame::of_colors(color.len() as u32, 1, color);
     let [a, b] = [both.iter().map(|(a, _)| **a).collect(), both.iter().map(|(_, b)| **b).collect()].map(row);
     Ok([compare(&a, &b)?.rmse, compare(found, expected)?.coverage_mismatch])
 }

@@ -320,7 +320,7 @@ impl Program {
     /// The image, and the milliseconds of each pass.
     pub fn frame(&mut self, camera: &Camera, view: &View) -> (Frame, [f64; 4]) {
         let start = Instant::now();
-        let mut frame = Frame::new(camera, &Default::default());
+        let mut frame = Frame::new(camera, Default::default());
         let share = self.surfels.len().div_ceil(THREADS).max(1);
         std::thread::scope(|scope| {
             for (surfels, buckets) in self.surfels.chunks(share).zip(&mut self.buckets) {

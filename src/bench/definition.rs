@@ -7,8 +7,10 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 
 use crate::error::{Error, Result};
-use crate::plan::{Accumulator, BlendFormat, Optimisation, Organisation, Raster, RasterDepth, RenderOptions};
-use crate::scene::{Epsilon, Kernel, LowPass, Maps, Shading};
+use crate::plan::{
+    Accumulator, BackendName, BlendFormat, Optimisation, Organisation, Raster, RasterDepth, RenderOptions,
+};
+use crate::scene::{Epsilon, Kernel, LowPass, Map, Maps, Shading};
 use crate::surfels::analytic::Shape;
 
 /// A study: every configuration on every scene.
@@ -148,6 +150,7 @@ pub struct Config {
     /// Its name.
     pub name: String,
     /// Who renders.
+    #[serde(deserialize_with = "named")]
     pub backend: BackendName,
     /// How the compute kernels keep sums.
     #[serde(default, deserialize_with = "parsed")]
@@ -175,36 +178,13 @@ pub struct Config {
     /// Shading; else the scene's, else Lambert.
     pub shading: Option<Shading>,
     /// Maps that are rendered too.
-    #[serde(default)]
-    pub maps: Vec<MapName>,
+    #[serde(default, deserialize_with = "all_parsed")]
+    pub maps: Vec<Map>,
     /// The largest RMSE against the f64 reference that is allowed.
     pub error_limit: Option<f64>,
     /// Whether a quick run has it.
     #[serde(default = "yes")]
     pub quick: bool,
-}
-
-/// Who renders.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum BackendName {
-    /// Compute kernels.
-    Gpu,
-    /// Fixed-function blending.
-    Raster,
-    /// f64 on the processor.
-    Reference,
-}
-
-/// A map beside the colour.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-#[allow(missing_docs)]
-pub enum MapName {
-    Depth,
-    Normal,
-    Weight,
-    Count,
 }
 
 /// A value, or the values of a sweep.
@@ -243,8 +223,12 @@ fn yes() -> bool {
     true
 }
 
+fn named<'de, D: Deserializer<'de>, T: FromStr<Err = Error>>(text: D) -> Result<T, D::Error> {
+    String::deserialize(text)?.parse().map_err(D::Error::custom)
+}
+
 fn parsed<'de, D: Deserializer<'de>, T: FromStr<Err = Error>>(text: D) -> Result<Option<T>, D::Error> {
-    String::deserialize(text)?.parse().map(Some).map_err(D::Error::custom)
+    named(text).map(Some)
 }
 
 fn all_parsed<'de, D: Deserializer<'de>, T: FromStr<Err = Error>>(texts: D) -> Result<Vec<T>, D::Error> {
@@ -256,7 +240,6 @@ impl Config {
     /// The options of a render, on a scene whose own shading is `shading`.
     pub fn options(&self, shading: Option<Shading>) -> RenderOptions {
         let default = RenderOptions::default();
-        let wanted = |map| self.maps.contains(&map);
         let raster = Raster::default();
         RenderOptions {
             epsilon: self.epsilon.unwrap_or(default.epsilon),
@@ -270,13 +253,7 @@ impl Config {
                 depth: self.raster_depth.unwrap_or(raster.depth),
             }),
             shading: self.shading.or(shading).unwrap_or(default.shading),
-            maps: Maps {
-                depth: wanted(MapName::Depth),
-                normal: wanted(MapName::Normal),
-                weight: wanted(MapName::Weight),
-                count: wanted(MapName::Count),
-                decision: false,
-            },
+            maps: Maps::of(&self.maps),
             ..default
         }
     }

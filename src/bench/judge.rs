@@ -10,7 +10,7 @@ use crate::plan::RenderOptions;
 use crate::progress::Progress;
 use crate::render::{Backend, Renderer, render};
 use crate::report::{ImageSet, Measurement, Numeric};
-use crate::scene::Maps;
+use crate::scene::{Map, Maps};
 use crate::truth::{DEFAULT_GRID, Truth};
 
 /// The side that pictures for the page are kept at, pixels.
@@ -41,7 +41,7 @@ fn grouped<K: PartialEq>(keys: impl Iterator<Item = K>) -> Vec<(K, Vec<usize>)> 
 /// Compares all with the reference, which renders once what differs in nothing but how sums are kept.
 pub(super) fn against_reference(case: &Case<'_>, timed: &[Timed<'_>], progress: &dyn Progress) -> Result<Vec<Errors>> {
     let default = RenderOptions::default();
-    let maps = Maps { count: true, decision: true, ..Maps::default() };
+    let maps = Maps::of(&[Map::Count, Map::Decision]);
     let key = |timed: &Timed<'_>| RenderOptions {
         accumulator: default.accumulator,
         raster: None,
@@ -62,7 +62,8 @@ pub(super) fn against_reference(case: &Case<'_>, timed: &[Timed<'_>], progress: 
     for (options, members) in grouped(timed.iter().map(key)) {
         for (view, camera) in case.staged.cameras.iter().enumerate() {
             let (reference, _) = render(&case.staged.scene, camera, &options, &Backend::Reference, progress)?;
-            let fragments: f64 = reference.count.iter().flatten().map(|count| f64::from(*count)).sum();
+            let fragments: f64 =
+                reference.map(Map::Count).unwrap_or_default().iter().map(|count| f64::from(*count)).sum();
             for &member in &members {
                 let timed = &timed[member];
                 let comparison = compare(&timed.frames[view], &reference)?;
@@ -98,7 +99,7 @@ pub(super) fn against_truth(
         let truths: Vec<Truth> = case.staged.cameras.iter().map(cast).collect::<Result<_>>()?;
         for member in members {
             let timed = &timed[member];
-            let maps = Maps { depth: true, normal: true, ..timed.options.maps };
+            let maps = timed.options.maps.and(&[Map::Depth, Map::Normal]);
             let with_maps = RenderOptions { maps, ..timed.options.clone() };
             let mut renderer = Renderer::new(&case.staged.scene, &with_maps, case.backend(timed.config))?;
             for (camera, truth) in case.staged.cameras.iter().zip(&truths) {
@@ -167,15 +168,12 @@ fn small_pair(image: &Frame, reference: &Frame) -> (Frame, Frame) {
             kept.push(block.fold(middle, |most, pixel| if differs(pixel) > differs(most) { pixel } else { most }));
         }
     }
-    let small = |frame: &Frame| Frame {
-        width: width.div_ceil(factor) as u32,
-        height: height.div_ceil(factor) as u32,
-        color: kept.iter().map(|pixel| frame.color[*pixel]).collect(),
-        depth: None,
-        normal: None,
-        weight: None,
-        count: None,
-        decision: None,
+    let small = |frame: &Frame| {
+        Frame::of_colors(
+            width.div_ceil(factor) as u32,
+            height.div_ceil(factor) as u32,
+            kept.iter().map(|pixel| frame.color[*pixel]).collect(),
+        )
     };
     (small(image), small(reference))
 }
@@ -212,16 +210,7 @@ mod tests {
     #[test]
     fn a_small_picture_keeps_the_largest_difference() {
         let size = 2 * PICTURE_SIDE as u32 - 1;
-        let plain = Frame {
-            width: size,
-            height: 3,
-            color: vec![[0.5; 4]; 3 * size as usize],
-            depth: None,
-            normal: None,
-            weight: None,
-            count: None,
-            decision: None,
-        };
+        let plain = Frame::of_colors(size, 3, vec![[0.5; 4]; 3 * size as usize]);
         let mut other = plain.clone();
         other.color[size as usize + 1] = [1.0; 4];
         let (image, reference) = small_pair(&other, &plain);

@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::definition::{BackendName, Config, Definition, Making, OneOrMany, SceneEntry};
+use super::definition::{Config, Definition, Making, OneOrMany, SceneEntry};
 use crate::error::{Error, Result};
-use crate::plan::check;
+use crate::plan::{BackendName, check};
 use crate::scene::camera::check_size;
 
 impl Definition {
@@ -185,7 +185,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::plan::Accumulator;
-    use crate::scene::{Epsilon, LowPass, Shading};
+    use crate::scene::{Epsilon, LowPass, Map, Shading};
 
     const HEAD: &str = "name = \"n\"\nabout = \"a\"\n";
     const SCENE: &str = "[[scene]]\nname = \"s\"\nshape = \"sphere\"\ncount = 10\n";
@@ -217,7 +217,11 @@ mod tests {
         let study = parse(text).unwrap();
         let options = study.configs[0].options(None);
         assert_eq!((options.epsilon, options.low_pass), (Epsilon::Absolute(2.0), LowPass::Ewa));
-        assert!(options.accumulator == Accumulator::Fixed64 && options.maps.depth && !options.maps.normal);
+        assert!(
+            options.accumulator == Accumulator::Fixed64
+                && options.maps.has(Map::Depth)
+                && !options.maps.has(Map::Normal)
+        );
         assert_eq!(study.scenes[0].configs, None);
         assert_eq!(study.scenes[1].configs, Some(vec!["r".to_owned()]));
         assert!(study.configs[0].deterministic() && !study.configs[1].deterministic());

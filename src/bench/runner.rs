@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use super::case::{Case, Timed};
-use super::definition::{BackendName, Config, Definition};
+use super::definition::{Config, Definition};
 use super::judge;
 use super::machine::machine;
 use super::staging::{points, stage};
 use crate::error::{Error, Result};
 use crate::frame::Frame;
+use crate::plan::BackendName;
 use crate::plan::{Facts, RenderOptions, SceneNeeds, check};
 use crate::progress::Progress;
 use crate::render::{Backend, Renderer};
@@ -231,12 +232,7 @@ impl<'a> Case<'a> {
             study: self.definition.name.clone(),
             scene: self.entry.name.clone(),
             config: config.name.clone(),
-            backend: match config.backend {
-                BackendName::Gpu => "gpu",
-                BackendName::Raster => "raster",
-                BackendName::Reference => "reference",
-            }
-            .to_owned(),
+            backend: config.backend.name().to_owned(),
             accumulator: config.sums().to_owned(),
             surfels: self.surfels(),
             footprint_px: self.staged.footprint_px,
@@ -287,7 +283,6 @@ fn fingerprint(frame: &Frame) -> u64 {
     let mut hasher = DefaultHasher::new();
     let mut add = |values: &[f32]| bytemuck::cast_slice::<f32, u8>(values).hash(&mut hasher);
     add(bytemuck::cast_slice(&frame.color));
-    frame.normal.iter().for_each(|map| add(bytemuck::cast_slice(map)));
-    [&frame.depth, &frame.weight, &frame.count].into_iter().flatten().for_each(|map| add(map));
+    frame.maps().iter().filter_map(|map| frame.map(map)).for_each(add);
     hasher.finish()
 }

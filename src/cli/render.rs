@@ -6,13 +6,14 @@ mod views;
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use epsplat::gpu::Gpu;
 use epsplat::io::Texture;
 use epsplat::passes::unseen::{Unseen, is_empty};
-use epsplat::plan::{Accumulator, BlendFormat, Organisation, Raster, RasterDepth, RenderOptions, check};
+use epsplat::plan::{Accumulator, BackendName, BlendFormat, Organisation, Raster, RasterDepth, RenderOptions, check};
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Epsilon, Kernel, Light, LowPass, Maps, Scene, Shading};
+use epsplat::scene::{Camera, Epsilon, Kernel, Light, LowPass, MAPS, Map, Maps, Scene, Shading};
 use epsplat::{Error, Result, surfels};
 use glam::DVec3;
 
@@ -49,9 +50,11 @@ pub struct Arguments {
     /// Image size in pixels [default: 1024x1024, or the camera file's]
     #[arg(long, value_parser = parse_size)]
     size: Option<(u32, u32)>,
-    /// Who renders
-    #[arg(long, value_enum, default_value_t = BackendName::Auto)]
-    backend: BackendName,
+    /// Who renders: gpu (compute kernels on an adapter), raster (the adapter's rasteriser and blender, for comparison), reference
+    /// (the kernels' f64 twins on the processor) or auto (gpu on the best adapter, or the reference where there is none)
+    /// [default: auto]
+    #[arg(long, value_parser = backend_parser(), default_value = "auto", hide_default_value = true)]
+    backend: Chosen,
     /// An API (vulkan, gl, metal, dx12) or part of an adapter's name, as `epsplat adapters` lists them
     #[arg(long)]
     adapter: Option<String>,
@@ -132,23 +135,23 @@ pub struct Arguments {
     #[arg(long, value_name = "R,G,B[,A]", value_parser = parse_color)]
     background: Option<[f32; 4]>,
     /// Maps beside the colour, in an EXR; decision is the reference's distance to the nearest yes-or-no
-    #[arg(long, value_enum, value_delimiter = ',')]
-    aov: Vec<MapName>,
+    #[arg(long, value_name = "MAPS", value_delimiter = ',', value_parser = map_parser())]
+    aov: Vec<Map>,
     /// Times, counts and adapter as JSON, to a file or - for stdout
     #[arg(long, value_name = "FILE|-")]
     json: Option<PathBuf>,
 }
 
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-enum BackendName {
-    /// The best adapter, or the reference where there is none
-    Auto,
-    /// Compute kernels on an adapter
-    Gpu,
-    /// The adapter's rasteriser and blender, for comparison
-    Raster,
-    /// The kernels' f64 twins on the processor
-    Reference,
+/// A backend, or none for the best that there is.
+#[derive(Clone, Copy, PartialEq)]
+struct Chosen(Option<BackendName>);
+
+fn backend_parser() -> impl TypedValueParser<Value = Chosen> {
+    PossibleValuesParser::new(["auto", "gpu", "raster", "reference"]).map(|name| Chosen(name.parse().ok()))
+}
+
+fn map_parser() -> impl TypedValueParser<Value = Map> {
+    PossibleValuesParser::new(MAPS.each_ref().map(|row| row.name)).try_map(|name| name.parse::<Map>())
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -169,15 +172,6 @@ enum ShadingName {
     Lambert,
     /// The same, and white highlights
     Phong,
-}
-
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-enum MapName {
-    Depth,
-    Normal,
-    Weight,
-    Count,
-    Decision,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
@@ -253,15 +247,8 @@ fn scene(arguments: &Arguments, bars: &Bars) -> Result<Scene> {
 }
 
 fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
-    let wanted = |map| arguments.aov.contains(&map);
-    let maps = Maps {
-        depth: wanted(MapName::Depth),
-        normal: wanted(MapName::Normal),
-        weight: wanted(MapName::Weight),
-        count: wanted(MapName::Count),
-        decision: wanted(MapName::Decision),
-    };
-    if maps != Maps::default() && format == Format::Png {
+    let maps = Maps::of(&arguments.aov);
+    if !maps.is_empty() && format == Format::Png {
         return Err(Error::Usage("a PNG holds no maps: give --aov with an .exr output".into()));
     }
     let default = RenderOptions::default();
@@ -287,9 +274,9 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
         maps,
         without: default.without,
     };
-    check::options(&options, arguments.backend == BackendName::Reference)?;
+    check::options(&options, arguments.backend.0 == Some(BackendName::Reference))?;
     if arguments.texture.is_some() {
-        check::textured(&options, arguments.backend == BackendName::Reference)?;
+        check::textured(&options, arguments.backend.0 == Some(BackendName::Reference))?;
     }
     Ok(options)
 }
@@ -306,7 +293,7 @@ fn shininess(arguments: &Arguments) -> Result<Option<f32>> {
 
 /// How the compute kernels draw splats.
 fn organisation(arguments: &Arguments) -> Result<Organisation> {
-    let kernels = matches!(arguments.backend, BackendName::Auto | BackendName::Gpu);
+    let kernels = matches!(arguments.backend.0, None | Some(BackendName::Gpu));
     match arguments.organisation {
         Some(_) if !kernels => Err(Error::Usage("--organisation is a choice of --backend gpu: leave it out".into())),
         chosen => Ok(chosen.unwrap_or_default()),
@@ -316,7 +303,7 @@ fn organisation(arguments: &Arguments) -> Result<Organisation> {
 /// The rasteriser's options, if it renders.
 fn raster(arguments: &Arguments) -> Result<Option<Raster>> {
     let chosen = arguments.blend_format.is_some() || arguments.raster_depth.is_some();
-    if arguments.backend != BackendName::Raster {
+    if arguments.backend.0 != Some(BackendName::Raster) {
         return match chosen {
             true => Err(Error::Usage("--blend-format and --raster-depth need --backend raster".into())),
             false => Ok(None),
@@ -333,7 +320,7 @@ fn raster(arguments: &Arguments) -> Result<Option<Raster>> {
 }
 
 fn backend(arguments: &Arguments) -> Result<Backend> {
-    if arguments.backend == BackendName::Reference {
+    if arguments.backend.0 == Some(BackendName::Reference) {
         if arguments.accumulator.is_some() {
             return Err(Error::Usage("--backend reference adds in f64: leave --accumulator out".into()));
         }
@@ -347,7 +334,7 @@ fn backend(arguments: &Arguments) -> Result<Backend> {
             note(&format!("rendering on {} ({}, {})", gpu.adapter.name, gpu.adapter.api, gpu.adapter.kind));
             Ok(Backend::gpu(gpu))
         }
-        Err(Error::NoAdapter(why)) if arguments.backend == BackendName::Auto && arguments.adapter.is_none() => {
+        Err(Error::NoAdapter(why)) if arguments.backend.0.is_none() && arguments.adapter.is_none() => {
             note(&format!("rendering with the f64 reference on the processor: {why}"));
             Ok(Backend::Reference)
         }

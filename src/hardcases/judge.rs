@@ -8,6 +8,7 @@ use crate::frame::Frame;
 use crate::metrics::DECISION_MARGIN;
 use crate::plan::{Accumulator, AccumulatorRow};
 use crate::render::Report;
+use crate::scene::Map;
 
 /// How a row ends.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -181,7 +182,7 @@ pub fn judge(case: &HardCase, truth: &Truth, accumulator: &AccumulatorRow, frame
         let (Some(here), Some(there)) = (Values::at(frame, index), Values::at(&truth.frame, index)) else { continue };
         nan += here.all().iter().filter(|value| value.is_nan()).count();
         covered += usize::from(there.weight > 0.0);
-        let decision = truth.frame.decision.as_ref().and_then(|map| map.get(index)).copied().unwrap_or(0.0);
+        let decision = truth.frame.map(Map::Decision).and_then(|map| map.get(index)).copied().unwrap_or(0.0);
         if known.open || decision < DECISION_MARGIN {
             excused += 1;
             continue;
@@ -246,13 +247,13 @@ struct Values {
 
 impl Values {
     fn at(frame: &Frame, index: usize) -> Option<Self> {
-        let scalar = |map: &Option<Vec<f32>>| map.as_ref()?.get(index).copied();
+        let scalar = |map| frame.map(map)?.get(index).copied();
         Some(Self {
             color: *frame.color.get(index)?,
-            depth: scalar(&frame.depth)?,
-            normal: *frame.normal.as_ref()?.get(index)?,
-            weight: scalar(&frame.weight)?,
-            count: scalar(&frame.count)?,
+            depth: scalar(Map::Depth)?,
+            normal: *frame.normals()?.get(index)?,
+            weight: scalar(Map::Weight)?,
+            count: scalar(Map::Count)?,
         })
     }
 
@@ -351,10 +352,10 @@ mod tests {
             other => panic!("{word}: {other:?}"),
         };
         fails(&|f| f.color[decided][1] = f32::NAN, "NaN");
-        fails(&|f| f.weight.as_mut().unwrap()[decided] = 0.0, "1 pixels lost");
+        fails(&|f| f.map_mut(Map::Weight).unwrap()[decided] = 0.0, "1 pixels lost");
         fails(&|f| f.color[decided][0] += 1e-3, "color");
-        fails(&|f| f.depth.as_mut().unwrap()[decided] *= 1.0001, "depth");
-        fails(&|f| f.count.as_mut().unwrap()[decided] += 1.0, "count");
+        fails(&|f| f.map_mut(Map::Depth).unwrap()[decided] *= 1.0001, "depth");
+        fails(&|f| f.map_mut(Map::Count).unwrap()[decided] += 1.0, "count");
         // A failure is expected of one word, but within its own bound only.
         assert!(matches!(verdict(&|f| f.color[decided][0] += 1e-2, one_word), Verdict::Fail(_)));
         let bits = one_word.fraction_bits(case.scene.surfels.len() as u64);

@@ -30,7 +30,7 @@ use crate::frame::Frame;
 use crate::plan::{ACCUMULATORS, Accumulator, AccumulatorRow, RenderOptions, check};
 use crate::progress::Progress;
 use crate::render::{Backend, render};
-use crate::scene::{Camera, Maps, Scene};
+use crate::scene::{Camera, Map, Maps, Scene};
 
 /// An accumulator that is expected to exceed a case's bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -90,7 +90,7 @@ impl HardCase {
     /// # Errors
     /// Those of [`render`].
     pub fn truth(&self) -> Result<Truth> {
-        let options = RenderOptions { maps: Maps { decision: true, ..Maps::ON_DEVICE }, ..self.options.clone() };
+        let options = RenderOptions { maps: Maps::ON_DEVICE.and(&[Map::Decision]), ..self.options.clone() };
         let (frame, _) = render(&self.scene, &self.camera, &options, &Backend::Reference, &())?;
         Ok(Truth { frame, pixels: bounds::pixels(&self.scene, &self.camera, &self.options) })
     }

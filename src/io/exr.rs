@@ -16,6 +16,7 @@ use super::atomic::write_whole;
 use super::image::check;
 use crate::error::Error as EpsplatError;
 use crate::frame::Frame;
+use crate::scene::Map;
 
 type Outcome<T> = crate::error::Result<T>;
 
@@ -35,17 +36,11 @@ pub fn write(path: &Path, frame: &Frame) -> Outcome<()> {
         "color",
         vec![channel("R", plane(0)), channel("G", plane(1)), channel("B", plane(2)), channel("A", plane(3))],
     )];
-    if let Some(depth) = &frame.depth {
-        layers.push(layer("depth", vec![channel("Z", depth.clone())]));
-    }
-    if let Some(normal) = &frame.normal {
-        let plane = |k: usize| normal.iter().map(|n| n[k]).collect::<Vec<_>>();
-        layers.push(layer("normal", vec![channel("X", plane(0)), channel("Y", plane(1)), channel("Z", plane(2))]));
-    }
-    for (name, map) in [("weight", &frame.weight), ("count", &frame.count), ("decision", &frame.decision)] {
-        if let Some(map) = map {
-            layers.push(layer(name, vec![channel("Y", map.clone())]));
-        }
+    for map in frame.maps().iter() {
+        let values = frame.map(map).unwrap_or_default();
+        let plane = |k: usize| values.iter().skip(k).step_by(map.width()).copied().collect::<Vec<_>>();
+        let channels = map.row().channels.iter().enumerate().map(|(k, name)| channel(name, plane(k)));
+        layers.push(layer(map.row().name, channels.collect()));
     }
     let bounds = IntegerBounds::from_dimensions(size);
     let image = Image::from_layers(ImageAttributes::new(bounds), layers);
@@ -67,16 +62,7 @@ pub fn read(path: &Path) -> Outcome<Frame> {
     let image = read_all_flat_layers_from_file(path).map_err(unreadable)?;
     let size = image.attributes.display_window.size;
     let pixels = size.0 * size.1;
-    let mut frame = Frame {
-        width: size.0 as u32,
-        height: size.1 as u32,
-        color: Vec::new(),
-        depth: None,
-        normal: None,
-        weight: None,
-        count: None,
-        decision: None,
-    };
+    let mut frame = Frame::of_colors(size.0 as u32, size.1 as u32, Vec::new());
     for layer in &image.layer_data {
         if layer.size != size {
             return Err(EpsplatError::malformed(path, "its layers differ in size"));
@@ -86,25 +72,19 @@ pub fn read(path: &Path) -> Outcome<Frame> {
             Some(channel.sample_data.values_as_f32().collect())
         };
         let name = layer.attributes.layer_name.as_ref().map(ToString::to_string).unwrap_or_default();
-        match name.as_str() {
-            "depth" => frame.depth = channel("Z"),
-            "normal" => {
-                if let (Some(x), Some(y), Some(z)) = (channel("X"), channel("Y"), channel("Z")) {
-                    frame.normal = Some((0..pixels).map(|i| [x[i], y[i], z[i]]).collect());
-                }
+        if let Ok(map) = name.parse::<Map>() {
+            if let Some(planes) = map.row().channels.iter().map(|name| channel(name)).collect::<Option<Vec<_>>>() {
+                let values = (0..pixels).flat_map(|pixel| planes.iter().map(move |plane| plane[pixel]));
+                frame = frame.with(map, values.collect());
             }
-            "weight" => frame.weight = channel("Y"),
-            "count" => frame.count = channel("Y"),
-            "decision" => frame.decision = channel("Y"),
-            name => {
-                if name != "color" && !frame.color.is_empty() {
-                    continue;
-                }
-                if let (Some(r), Some(g), Some(b)) = (channel("R"), channel("G"), channel("B")) {
-                    let a = channel("A").unwrap_or_else(|| vec![1.0; pixels]);
-                    frame.color = (0..pixels).map(|i| [r[i], g[i], b[i], a[i]]).collect();
-                }
-            }
+            continue;
+        }
+        if name != "color" && !frame.color.is_empty() {
+            continue;
+        }
+        if let (Some(r), Some(g), Some(b)) = (channel("R"), channel("G"), channel("B")) {
+            let a = channel("A").unwrap_or_else(|| vec![1.0; pixels]);
+            frame.color = (0..pixels).map(|i| [r[i], g[i], b[i], a[i]]).collect();
         }
     }
     if frame.color.len() != pixels {
@@ -117,6 +97,7 @@ pub fn read(path: &Path) -> Outcome<Frame> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::scene::MAPS;
 
     #[test]
     fn every_map_comes_back_and_equal_frames_make_equal_files() {
@@ -124,16 +105,10 @@ mod tests {
         let n = 7 * 5;
         let mut depth = ramp(n, 0.1);
         depth[3] = f32::INFINITY;
-        let frame = Frame {
-            width: 7,
-            height: 5,
-            color: ramp(n, 0.01).into_iter().map(|v| [v, 1.0 - v, -v, 0.5]).collect(),
-            depth: Some(depth),
-            normal: Some(ramp(n, 0.02).into_iter().map(|v| [v, 0.0, 1.0]).collect()),
-            weight: Some(ramp(n, 3.0)),
-            count: Some(ramp(n, 1.0)),
-            decision: Some(ramp(n, 1e-7)),
-        };
+        let color = ramp(n, 0.01).into_iter().map(|v| [v, 1.0 - v, -v, 0.5]).collect();
+        let maps = MAPS.iter().map(|row| (row.map, ramp(n * row.map.width(), 1e-7)));
+        let frame = maps.fold(Frame::of_colors(7, 5, color), |frame, (map, values)| frame.with(map, values));
+        let frame = frame.with(Map::Depth, depth);
         let folder = tempfile::tempdir().unwrap();
         let (a, b) = (folder.path().join("a.exr"), folder.path().join("b.exr"));
         write(&a, &frame).unwrap();

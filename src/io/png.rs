@@ -44,14 +44,5 @@ pub fn read(path: &Path) -> Result<Frame> {
         let [r, g, b, a] = pixel.0.map(|v| f64::from(v) / 65535.0);
         [srgb_to_linear(r) as f32, srgb_to_linear(g) as f32, srgb_to_linear(b) as f32, a as f32]
     });
-    Ok(Frame {
-        width: picture.width(),
-        height: picture.height(),
-        color: color.collect(),
-        depth: None,
-        normal: None,
-        weight: None,
-        count: None,
-        decision: None,
-    })
+    Ok(Frame::of_colors(picture.width(), picture.height(), color.collect()))
 }

@@ -79,6 +79,6 @@ fn difference<T: Into<f64>>(a: T, b: T) -> f64 {
     if difference.is_finite() { difference } else { f32::MAX.into() }
 }
 
-pub(crate) fn largest_difference<T: Copy + Into<f64>, const N: usize>(a: &[T; N], b: &[T; N]) -> f64 {
+pub(crate) fn largest_difference<T: Copy + Into<f64>>(a: &[T], b: &[T]) -> f64 {
     a.iter().zip(b).map(|(a, b)| difference(*a, *b)).fold(0.0, f64::max)
 }

@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::{ColorError, largest_difference, same_size};
 use crate::error::Result;
 use crate::frame::Frame;
+use crate::scene::{MAPS, Map};
 
 /// Fragments nearer than this (relative) to a decision may rightly be decided otherwise in f32; their pixels are
 /// excused in [`Comparison::rmse_decided`] and [`Comparison::max_abs_decided`].
@@ -73,28 +74,22 @@ pub fn compare(a: &Frame, b: &Frame) -> Result<Comparison> {
     let color = ColorError::of(colors.clone());
     let uncovered = a.color.iter().zip(&b.color).filter(|(a, b)| (a[3] > 0.0) != (b[3] > 0.0)).count();
 
-    let decision = b.decision.as_ref().or(a.decision.as_ref());
+    let decision = b.map(Map::Decision).or(a.map(Map::Decision));
     let excused: Option<Vec<bool>> = decision.map(|map| map.iter().map(|d| *d < DECISION_MARGIN).collect());
     let decided = excused.as_ref().map(|excused| {
         let kept = colors.zip(excused).filter(|(_, excused)| !**excused);
         ColorError::of(kept.map(|(pair, _)| pair))
     });
     let excused = excused.as_deref();
-    let rgb = |frame: &Frame, pixel: usize| frame.color[pixel].first_chunk::<3>().copied().unwrap_or_default();
     let mut maps = vec![
-        map_error("color", pixels, |pixel| (rgb(a, pixel), rgb(b, pixel)), excused),
-        map_error("alpha", pixels, |pixel| ([a.color[pixel][3]], [b.color[pixel][3]]), excused),
+        map_error("color", pixels, |pixel| (&a.color[pixel][..3], &b.color[pixel][..3]), excused),
+        map_error("alpha", pixels, |pixel| (&a.color[pixel][3..], &b.color[pixel][3..]), excused),
     ];
-    let scalar = |map: &'static str, a: &Option<Vec<f32>>, b: &Option<Vec<f32>>| {
-        let (a, b) = (a.as_ref()?, b.as_ref()?);
-        Some(map_error(map, pixels, |pixel| ([a[pixel]], [b[pixel]]), excused))
-    };
-    maps.extend(scalar("depth", &a.depth, &b.depth));
-    if let (Some(a), Some(b)) = (&a.normal, &b.normal) {
-        maps.push(map_error("normal", pixels, |pixel| (a[pixel], b[pixel]), excused));
+    for row in MAPS.iter().filter(|row| row.compared) {
+        let Some((a, b)) = a.map(row.map).zip(b.map(row.map)) else { continue };
+        let of = |pixel: usize| pixel * row.map.width()..(pixel + 1) * row.map.width();
+        maps.push(map_error(row.name, pixels, |pixel| (&a[of(pixel)], &b[of(pixel)]), excused));
     }
-    maps.extend(scalar("weight", &a.weight, &b.weight));
-    maps.extend(scalar("count", &a.count, &b.count));
     Ok(Comparison {
         max_abs: color.max_abs,
         rmse: color.rmse,
@@ -112,35 +107,30 @@ pub fn compare(a: &Frame, b: &Frame) -> Result<Comparison> {
 
 /// The maps beside the colour that `a` has and `b` lacks.
 fn only_in(a: &Frame, b: &Frame) -> Vec<&'static str> {
-    let has = |frame: &Frame| {
-        let Frame { depth, normal, weight, count, decision, .. } = frame;
-        [depth.is_some(), normal.is_some(), weight.is_some(), count.is_some(), decision.is_some()]
-    };
-    let both = has(a).into_iter().zip(has(b)).zip(["depth", "normal", "weight", "count", "decision"]);
-    both.filter(|((a, b), _)| *a && !b).map(|(_, map)| map).collect()
+    a.maps().iter().filter(|map| !b.maps().has(*map)).map(|map| map.row().name).collect()
 }
 
 /// The error of a map of which `at` gives the values of A and of B in each of the `pixels`.
-fn map_error<const N: usize>(
+fn map_error<'a>(
     map: &'static str,
     pixels: usize,
-    at: impl Fn(usize) -> ([f32; N], [f32; N]),
+    at: impl Fn(usize) -> (&'a [f32], &'a [f32]),
     excused: Option<&[bool]>,
 ) -> MapError {
     let (mut low, mut high, mut not_finite) = (f32::INFINITY, f32::NEG_INFINITY, 0);
     let (mut max_abs, mut max_decided) = (0f64, 0f64);
     for pixel in 0..pixels {
         let (a, b) = at(pixel);
-        for value in b.into_iter().filter(|value| value.is_finite()) {
+        for &value in b.iter().filter(|value| value.is_finite()) {
             (low, high) = (low.min(value), high.max(value));
         }
         // Infinite depth marks the background; whether the two agree on it is what the coverage says.
-        if map == "depth" && a.iter().chain(&b).any(|v| *v == f32::INFINITY) {
+        if map == "depth" && a.iter().chain(b).any(|v| *v == f32::INFINITY) {
             continue;
         }
         let other = |(a, b): (&f32, &f32)| a != b && !(a.is_finite() && b.is_finite());
-        not_finite += u64::from(a.iter().zip(&b).any(other));
-        let difference = largest_difference(&a, &b);
+        not_finite += u64::from(a.iter().zip(b).any(other));
+        let difference = largest_difference(a, b);
         max_abs = max_abs.max(difference);
         if excused.is_some_and(|excused| !excused[pixel]) {
             max_decided = max_decided.max(difference);
@@ -167,16 +157,7 @@ mod tests {
     use super::*;
 
     fn frame(values: &[f32]) -> Frame {
-        Frame {
-            width: values.len() as u32,
-            height: 1,
-            color: values.iter().map(|v| [*v, 0.0, 0.0, 1.0]).collect(),
-            depth: None,
-            normal: None,
-            weight: None,
-            count: None,
-            decision: None,
-        }
+        Frame::of_colors(values.len() as u32, 1, values.iter().map(|v| [*v, 0.0, 0.0, 1.0]).collect())
     }
 
     #[test]
@@ -204,21 +185,21 @@ mod tests {
         b.color[1][3] = 0.0;
         assert_eq!(compare(&a, &b).unwrap().coverage_mismatch, 0.5);
         let a = frame(&[0.0, 0.5, 0.5]);
-        let mut b = frame(&[1.0, 0.5, 0.0]);
-        b.decision = Some(vec![1.0, 1.0, 1e-8]);
+        let b = frame(&[1.0, 0.5, 0.0]);
+        let b = b.with(Map::Decision, vec![1.0, 1.0, 1e-8]);
         let c = compare(&a, &b).unwrap();
         assert_eq!(c.excused, Some(1.0 / 3.0));
         assert_eq!(c.maps[0].max_of_range_decided, Some(1.0));
-        b.decision = Some(vec![1e-8, 1.0, 1.0]);
+        let b = b.with(Map::Decision, vec![1e-8, 1.0, 1.0]);
         let c = compare(&a, &b).unwrap();
         assert_eq!(c.maps[0].max_of_range_decided, Some(0.5));
         // One value of the eight in two pixels differs by one half; over all three the first pixel counts too.
         assert_eq!((c.max_abs, c.max_abs_decided), (1.0, Some(0.5)));
         assert!((c.rmse_decided.unwrap() - (0.25f64 / 8.0).sqrt()).abs() < 1e-12 && c.rmse > 0.3);
-        b.decision = Some(vec![1e-8; 3]);
+        let b = b.with(Map::Decision, vec![1e-8; 3]);
         let c = compare(&a, &b).unwrap();
         assert_eq!((c.excused, c.rmse_decided, c.max_abs_decided), (Some(1.0), Some(0.0), Some(0.0)));
-        b.decision = None;
+        let b = b.without(Map::Decision);
         let c = compare(&a, &b).unwrap();
         assert_eq!((c.rmse_decided, c.max_abs_decided), (None, None));
         assert!(!serde_json::to_string(&c).unwrap().contains("decided"));
@@ -228,8 +209,8 @@ mod tests {
     #[test]
     fn maps_of_one_image_are_named_and_a_map_without_range_has_a_finite_error() {
         let (mut a, mut b) = (frame(&[0.5, 0.5]), frame(&[0.5, 0.25]));
-        (a.depth, a.weight) = (Some(vec![1.0, f32::INFINITY]), Some(vec![2.0, 2.0]));
-        (b.depth, b.count) = (Some(vec![1.5, 1.5]), Some(vec![1.0, 1.0]));
+        a = a.with(Map::Depth, vec![1.0, f32::INFINITY]).with(Map::Weight, vec![2.0, 2.0]);
+        b = b.with(Map::Depth, vec![1.5, 1.5]).with(Map::Count, vec![1.0, 1.0]);
         let c = compare(&a, &b).unwrap();
         assert_eq!((c.only_in_a, c.only_in_b), (vec!["weight"], vec!["count"]));
         // The background counts for the coverage, not for the depth; all depths of B are one.

@@ -8,6 +8,7 @@ use super::ssim::mean_ssim;
 use super::{ColorError, Sorted, same_size};
 use crate::error::{Error, Result};
 use crate::frame::Frame;
+use crate::scene::Map;
 use crate::scene::color::linear_to_srgb;
 use crate::truth::Truth;
 
@@ -75,8 +76,8 @@ pub struct NormalError {
 /// [`Error::Usage`] if it lacks one, or the truth does, or the two differ in size.
 pub fn reconstruction(frame: &Frame, truth: &Truth) -> Result<Reconstruction> {
     same_size(frame, &truth.frame)?;
-    let maps = |frame: &Frame, whose: &str| match (&frame.depth, &frame.normal) {
-        (Some(depth), Some(normal)) => Ok((depth.clone(), normal.clone())),
+    let maps = |frame: &Frame, whose: &str| match (frame.map(Map::Depth), frame.normals()) {
+        (Some(depth), Some(normal)) => Ok((depth.to_vec(), normal.to_vec())),
         _ => Err(Error::Usage(format!("{whose} lacks the maps of depth and normal that its error is measured by"))),
     };
     let (depth, normal) = maps(frame, "the render")?;
@@ -182,16 +183,16 @@ mod tests {
         let mut frame = truth.frame.clone();
         fault(&mut frame, &truth);
         let inside = truth.coverage.iter().filter(|share| **share == 1.0).count();
-        let covered = truth.frame.depth.iter().flatten().filter(|depth| depth.is_finite()).count();
+        let covered = truth.frame.map(Map::Depth).unwrap().iter().filter(|depth| depth.is_finite()).count();
         (reconstruction(&frame, &truth).unwrap(), inside as f64, covered as f64)
     }
 
     fn depths(frame: &mut Frame) -> &mut [f32] {
-        frame.depth.as_mut().unwrap()
+        frame.map_mut(Map::Depth).unwrap()
     }
 
     fn normals(frame: &mut Frame) -> &mut [[f32; 3]] {
-        frame.normal.as_mut().unwrap()
+        bytemuck::cast_slice_mut(frame.map_mut(Map::Normal).unwrap())
     }
 
     const NO_DEPTH_ERROR: Option<DepthError> = Some(DepthError { mean: 0.0, rmse: 0.0, percentile_99: 0.0 });
@@ -311,7 +312,7 @@ mod tests {
         truth.frame.color[0] = [1.0, 0.0, 0.0, 0.0];
         frame.color[0] = [0.0, 1.0, 0.0, 0.0];
         assert_eq!(reconstruction(&frame, &truth).unwrap().psnr_db, None);
-        frame.depth = None;
+        let mut frame = frame.without(Map::Depth);
         assert!(reconstruction(&frame, &truth).unwrap_err().to_string().contains("depth"));
         frame.width = 32;
         assert!(reconstruction(&frame, &truth).unwrap_err().to_string().contains("size"));

@@ -37,7 +37,7 @@ use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage};
 use crate::plan::{Accumulator, Plan, RenderOptions, SceneNeeds};
 use crate::scene::options::LEAST_FILTERED_WEIGHT;
-use crate::scene::{Camera, Colors, Scene};
+use crate::scene::{Camera, Colors, Map, Scene};
 
 /// The file that keeps the sums of `fixed`, by whether terms may reach past a word, because weights may be small
 /// ([`SceneNeeds::wide_sums`]) or one surfel stands for its copies ([`SceneNeeds::copies`]), and whether the adapter adds 64 bits at
@@ -92,7 +92,7 @@ pub struct PixelSums {
     pub place: [f64; 4],
     /// Accepted fragments.
     pub count: u32,
-    /// The smallest relative distance of a fragment to a decision; see [`crate::scene::Maps::decision`].
+    /// The smallest relative distance of a fragment to a decision; see [`Map::Decision`].
     pub decision: f64,
 }
 
@@ -141,7 +141,7 @@ pub fn reference<'a>(
                 let pixel = row + x as usize;
                 let back = nearest[pixel] * (1.0 + relative) + epsilon;
                 let sum = &mut sums[pixel];
-                if options.maps.decision {
+                if options.maps.has(Map::Decision) {
                     sum.decision = sum.decision.min(decision(at.rho2.sqrt(), at.depth, back, camera.near));
                 }
                 if !(at.hit(camera) && at.depth <= back) {

@@ -3,6 +3,7 @@
 
 use crate::plan::pass::Pass;
 use crate::plan::{ColorNeed, PixelLayout, RasterDepth, color_channels};
+use crate::scene::Map;
 
 /// The files and constants.
 pub const PASS: Pass = Pass {
@@ -12,8 +13,8 @@ pub const PASS: Pass = Pass {
         let whole = needs.raster.is_some_and(|raster| raster.depth != RasterDepth::Exact);
         let mut files = vec![
             pick(needs.normal, "normal.wgsl", "normal_absent.wgsl"),
-            pick(needs.count, "count.wgsl", "count_absent.wgsl"),
-            pick(needs.depth, pick(whole, "depth_whole.wgsl", "depth.wgsl"), "depth_absent.wgsl"),
+            pick(needs.maps.has(Map::Count), "count.wgsl", "count_absent.wgsl"),
+            pick(needs.maps.has(Map::Depth), pick(whole, "depth_whole.wgsl", "depth.wgsl"), "depth_absent.wgsl"),
             pick(needs.color == ColorNeed::Textured, "texture.wgsl", "texture_absent.wgsl"),
         ];
         files.extend(match needs.color {

@@ -10,7 +10,7 @@ use crate::plan::pass::Pass;
 use crate::plan::steps::{Kernel, Over, Run, Stage};
 use crate::plan::{PixelLayout, Plan, RenderOptions};
 use crate::scene::options::HIGHLIGHT;
-use crate::scene::{Camera, Colors, Light, Scene, Shading};
+use crate::scene::{Camera, Colors, Light, MAPS, Map, Scene, Shading};
 
 /// The twin: resolves `sums`, which start at row `first_row` of the image, into `frame`, which holds just their rows.
 pub fn reference(
@@ -39,18 +39,15 @@ pub fn reference(
             depth = sum.depth / sum.weight;
         }
         frame.color[pixel] = color.map(|c| c as f32);
-        let set = |map: &mut Option<Vec<f32>>, value: f64| {
-            if let Some(map) = map {
-                map[pixel] = value as f32;
-            }
+        let mut set = |map: Map, values: &[f64]| {
+            let of_pixel = frame.map_mut(map).and_then(|all| all.chunks_exact_mut(map.width()).nth(pixel));
+            of_pixel.into_iter().flatten().zip(values).for_each(|(into, value)| *into = *value as f32);
         };
-        set(&mut frame.depth, depth);
-        set(&mut frame.weight, sum.weight);
-        set(&mut frame.count, f64::from(sum.count));
-        set(&mut frame.decision, sum.decision);
-        if let Some(map) = &mut frame.normal {
-            map[pixel] = normal.as_vec3().to_array();
-        }
+        set(Map::Depth, &[depth]);
+        set(Map::Normal, &normal.to_array());
+        set(Map::Weight, &[sum.weight]);
+        set(Map::Count, &[f64::from(sum.count)]);
+        set(Map::Decision, &[sum.decision]);
     }
 }
 
@@ -110,12 +107,11 @@ pub const PASS: Pass = Pass {
     name: "resolve",
     files: |needs| {
         let pick = |needed, file, absent| if needed { file } else { absent };
-        let has_maps = needs.normal_map || needs.depth || needs.weight_map || needs.count;
         vec![
             "resolve.wgsl",
-            pick(has_maps, "image_maps.wgsl", "image_color.wgsl"),
-            pick(needs.normal_map, "normal_map.wgsl", "normal_map_absent.wgsl"),
-            pick(needs.weight_map, "weight_map.wgsl", "weight_map_absent.wgsl"),
+            pick(!needs.maps.is_empty(), "image_maps.wgsl", "image_color.wgsl"),
+            pick(needs.maps.has(Map::Normal), "normal_map.wgsl", "normal_map_absent.wgsl"),
+            pick(needs.maps.has(Map::Weight), "weight_map.wgsl", "weight_map_absent.wgsl"),
             match needs.shading {
                 Shading::Unlit => "shade_unlit.wgsl",
                 Shading::Lambert => "shade_lambert.wgsl",
@@ -126,14 +122,10 @@ pub const PASS: Pass = Pass {
     kernels: |needs| if needs.gather { Vec::new() } else { vec![RESOLVE] },
     constants: |making| {
         let layout = PixelLayout::of(making.needs);
-        let mut constants = vec![
-            ("LIGHTS", making.options.lights.len() as f64),
-            ("IMAGE_WORDS", layout.image_words.into()),
-            ("NORMAL_IMAGE", layout.normal_image.into()),
-            ("DEPTH_IMAGE", layout.depth_image.into()),
-            ("WEIGHT_IMAGE", layout.weight_image.into()),
-            ("COUNT_IMAGE", layout.count_image.into()),
-        ];
+        let mut constants =
+            vec![("LIGHTS", making.options.lights.len() as f64), ("IMAGE_WORDS", layout.image_words.into())];
+        let words = MAPS.iter().zip(layout.map_words);
+        constants.extend(words.filter_map(|(row, word)| Some((row.image_word?, f64::from(word)))));
         if making.needs.shading == Shading::Phong {
             constants.push(("SHININESS", making.options.shininess.into()));
         }
@@ -153,7 +145,7 @@ pub fn steps(plan: &Plan, band: usize) -> Stage {
 /// Puts `bytes` of resolved pixels into `frame`, from its pixel `first` on.
 pub fn unpack(layout: &PixelLayout, bytes: &[u8], first: usize, frame: &mut Frame) {
     let record = layout.image_words as usize * 4;
-    // Word `word` of each pixel on, in a map of N values a pixel.
+    // The N words of each pixel from `word` on.
     fn copy<const N: usize>(map: &mut [[f32; N]], bytes: &[u8], record: usize, word: u32) {
         let at = word as usize * 4;
         map.par_iter_mut().zip(bytes.par_chunks_exact(record)).with_min_len(1 << 14).for_each(|(value, bytes)| {
@@ -162,17 +154,14 @@ pub fn unpack(layout: &PixelLayout, bytes: &[u8], first: usize, frame: &mut Fram
     }
     let range = first..first + bytes.len() / record;
     copy(&mut frame.color[range.clone()], bytes, record, 0);
-    if let Some(map) = &mut frame.normal {
-        copy(&mut map[range.clone()], bytes, record, layout.normal_image);
-    }
-    let maps = [
-        (&mut frame.depth, layout.depth_image),
-        (&mut frame.weight, layout.weight_image),
-        (&mut frame.count, layout.count_image),
-    ];
-    for (map, word) in maps {
-        if let Some(map) = map {
-            copy(bytemuck::cast_slice_mut::<f32, [f32; 1]>(&mut map[range.clone()]), bytes, record, word);
+    for (row, word) in MAPS.iter().zip(layout.map_words).filter(|(row, _)| row.image_word.is_some()) {
+        let width = row.map.width();
+        let Some(map) = frame.map_mut(row.map) else { continue };
+        let map = &mut map[range.start * width..range.end * width];
+        match width {
+            1 => copy::<1>(bytemuck::cast_slice_mut(map), bytes, record, word),
+            2 => copy::<2>(bytemuck::cast_slice_mut(map), bytes, record, word),
+            _ => copy::<3>(bytemuck::cast_slice_mut(map), bytes, record, word),
         }
     }
 }

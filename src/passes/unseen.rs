@@ -80,7 +80,7 @@ mod tests {
         let scene = Scene { origin: DVec3::ZERO, surfels, low: vec![], colors, oriented: true, up: Up::Y };
         let camera = Camera::look_at((32, 32), Lens::Fov(45.0), DVec3::ZERO, DVec3::Z, None, Up::Y, 0.1).unwrap();
         let options = RenderOptions::default();
-        let mut frame = Frame::new(&camera, &options.maps);
+        let mut frame = Frame::new(&camera, options.maps);
         let unseen = Unseen::of(&scene, &camera, &options);
         assert_eq!(unseen, Unseen { behind: 1, outside: 2, between: 3, over: 0 });
         assert!(unseen.sentence().contains("of 6 surfels 1 lie behind the camera"), "{}", unseen.sentence());

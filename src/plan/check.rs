@@ -5,7 +5,7 @@ use super::{RenderOptions, SceneNeeds};
 use crate::error::{Error, Result};
 use crate::gpu::adapter::AdapterDescription;
 use crate::scene::light::MAX_LIGHTS;
-use crate::scene::{Camera, Shading, options::SHININESS_RANGE};
+use crate::scene::{Camera, Map, Shading, options::SHININESS_RANGE};
 
 fn usage(what: impl Into<String>) -> Result<()> {
     Err(Error::Usage(what.into()))
@@ -26,11 +26,11 @@ pub fn options(options: &RenderOptions, reference: bool) -> Result<()> {
     if reference {
         return Ok(());
     }
-    if options.maps.decision {
+    if options.maps.has(Map::Decision) {
         return usage("the decision map is made by the reference backend only");
     }
     match options.raster {
-        Some(raster) if raster.format == BlendFormat::Rgba8Unorm && options.maps.count => {
+        Some(raster) if raster.format == BlendFormat::Rgba8Unorm && options.maps.has(Map::Count) => {
             usage("an 8-bit target cannot count fragments: leave count out, or take rgba16float")
         }
         None if options.organisation == Organisation::Tile && options.accumulator != Accumulator::Fixed => {

@@ -22,7 +22,7 @@ pub use facts::{ColorNeed, Facts};
 pub use known::Known;
 pub use needs::{SMALL_WEIGHT, SceneNeeds};
 pub use optimisation::Optimisation;
-pub use options::{Organisation, RenderOptions};
+pub use options::{BackendName, Organisation, RenderOptions};
 pub use pixel::{COLOR_CHANNEL, PixelLayout, color_channels};
 pub use raster::{BlendFormat, Raster, RasterDepth};
 pub use view::device_unit;

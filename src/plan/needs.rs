@@ -2,7 +2,7 @@
 
 use super::{Accumulator, ColorNeed, Facts, Optimisation, Organisation, Raster, RasterDepth, RenderOptions, tuning};
 use crate::gpu::adapter::AdapterDescription;
-use crate::scene::{Camera, Epsilon, KernelShape, LowPass, Projection, Shading};
+use crate::scene::{Camera, Epsilon, KernelShape, LowPass, Map, Maps, Projection, Shading};
 
 /// What exists in this render: it chooses the WGSL files that are joined, and so the bindings, buffers and sums.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -51,18 +51,10 @@ pub struct SceneNeeds {
     pub normal: bool,
     /// Normals have no consistent side and are turned toward the viewer before they are blended.
     pub turn_normals: bool,
-    /// Depth is accumulated: a depth map.
-    pub depth: bool,
-    /// Fragments are counted.
-    pub count: bool,
     /// How pixels are lit.
     pub shading: Shading,
-    /// A normal map is written.
-    pub normal_map: bool,
-    /// A weight map is written.
-    pub weight_map: bool,
-    /// The reference records distances to decisions.
-    pub decision: bool,
+    /// Maps that are written; depths are accumulated for theirs, and fragments counted.
+    pub maps: Maps,
 }
 
 /// Terms of at least this weight keep 23 of the 32 bits that `fixed` has, as f32 would.
@@ -98,14 +90,10 @@ impl SceneNeeds {
             epsilon_radius: matches!(options.epsilon, Epsilon::Radius(_)),
             color: facts.colors,
             alpha: low[3] != high[3],
-            normal: lit || options.maps.normal,
-            turn_normals: !facts.oriented && (lit || options.maps.normal),
-            depth: options.maps.depth,
-            count: options.maps.count,
+            normal: lit || options.maps.has(Map::Normal),
+            turn_normals: !facts.oriented && (lit || options.maps.has(Map::Normal)),
             shading: options.shading,
-            normal_map: options.maps.normal,
-            weight_map: options.maps.weight,
-            decision: options.maps.decision,
+            maps: options.maps,
         }
     }
 
@@ -164,18 +152,14 @@ impl SceneNeeds {
             (self.alpha, "alpha"),
             (self.normal, "normal"),
             (self.turn_normals, "turn-normals"),
-            (self.depth, "depth"),
-            (self.count, "count"),
             (self.shading == Shading::Lambert, "lambert"),
             (self.shading == Shading::Phong, "phong"),
-            (self.normal_map, "normal-map"),
-            (self.weight_map, "weight-map"),
-            (self.decision, "decision"),
         ];
         [projection, kernel, color]
             .into_iter()
             .chain(raster)
             .chain(flags.into_iter().filter(|(on, _)| *on).map(|(_, name)| name))
+            .chain(self.maps.iter().map(|map| map.row().need))
             .collect()
     }
 }

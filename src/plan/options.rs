@@ -4,7 +4,38 @@ use std::str::FromStr;
 
 use super::{Accumulator, Optimisation, Raster};
 use crate::error::Error;
-use crate::scene::{Epsilon, Kernel, Light, LowPass, Maps, Shading};
+use crate::scene::{Epsilon, Kernel, Light, LowPass, Map, Maps, Shading};
+
+/// Who renders.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BackendName {
+    /// Compute kernels on an adapter.
+    Gpu,
+    /// The adapter's rasteriser and blender, for comparison.
+    Raster,
+    /// The kernels' f64 twins on the processor.
+    Reference,
+}
+
+impl BackendName {
+    /// As options, studies and reports have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gpu => "gpu",
+            Self::Raster => "raster",
+            Self::Reference => "reference",
+        }
+    }
+}
+
+impl FromStr for BackendName {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        let named = [Self::Gpu, Self::Raster, Self::Reference].into_iter().find(|backend| backend.name() == text);
+        named.ok_or_else(|| Error::Usage(format!("there is no backend {text:?}: take gpu, raster or reference")))
+    }
+}
 
 /// How the compute kernels draw splats. The image is the same to the bit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -68,7 +99,7 @@ impl RenderOptions {
 
     /// Whether a pixel of the image differs from 0 where nothing is.
     pub fn shows_where_nothing_is(&self) -> bool {
-        self.maps.depth || self.background.iter().any(|value| value.to_bits() != 0)
+        self.maps.has(Map::Depth) || self.background.iter().any(|value| value.to_bits() != 0)
     }
 
     /// Whether an optimisation is not left out.
@@ -90,7 +121,7 @@ impl Default for RenderOptions {
             shininess: 32.0,
             lights: vec![Light::Headlight { intensity: 1.0 }],
             background: [0.0; 4],
-            maps: Maps::default(),
+            maps: Maps::NONE,
             without: Vec::new(),
         }
     }

@@ -1,6 +1,7 @@
 //! The room that a pixel takes.
 
 use super::{ColorNeed, SceneNeeds};
+use crate::scene::{MAPS, Map};
 
 /// Where a pixel's values lie, in the sums (by channel) and in the image (by word). What is not needed takes no room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,18 +18,15 @@ pub struct PixelLayout {
     pub place_channel: u32,
     /// Words of a pixel in the image; the colour's four come first.
     pub image_words: u32,
-    /// Word of the normal map's x in the image.
-    pub normal_image: u32,
-    /// Word of the depth in the image.
-    pub depth_image: u32,
-    /// Word of the weight in the image.
-    pub weight_image: u32,
-    /// Word of the count in the image.
-    pub count_image: u32,
+    /// The first word of each map in the image, in the order of [`MAPS`].
+    pub map_words: [u32; MAPS.len()],
 }
 
 /// The first colour channel: next to the weight's, so that the two make a pair.
 pub const COLOR_CHANNEL: u32 = 1;
+
+/// Words of a pixel's colour in the image.
+const COLOR_WORDS: u32 = 4;
 
 impl PixelLayout {
     /// The layout for `needs`.
@@ -37,23 +35,22 @@ impl PixelLayout {
         // The normal's x and y are a pair, and pairs start at even channels.
         let normal_channel = (COLOR_CHANNEL + color_channels(needs)).next_multiple_of(2);
         let depth_channel = normal_channel + channels(needs.normal, 3);
-        let count_channel = depth_channel + channels(needs.depth, 1);
-        let place_channel = (count_channel + channels(needs.count, 1)).next_multiple_of(2);
-        let normal_image = 4;
-        let depth_image = normal_image + channels(needs.normal_map, 3);
-        let weight_image = depth_image + channels(needs.depth, 1);
-        let count_image = weight_image + channels(needs.weight_map, 1);
+        let count_channel = depth_channel + channels(needs.maps.has(Map::Depth), 1);
+        let place_channel = (count_channel + channels(needs.maps.has(Map::Count), 1)).next_multiple_of(2);
+        let mut image_words = COLOR_WORDS;
+        let map_words = MAPS.each_ref().map(|row| {
+            let first = image_words;
+            image_words += channels(needs.maps.has(row.map) && row.image_word.is_some(), row.map.width() as u32);
+            first
+        });
         Self {
             channels: place_channel + channels(needs.color == ColorNeed::Textured, 4),
             normal_channel,
             depth_channel,
             count_channel,
             place_channel,
-            image_words: count_image + channels(needs.count, 1),
-            normal_image,
-            depth_image,
-            weight_image,
-            count_image,
+            image_words,
+            map_words,
         }
     }
 

@@ -92,7 +92,7 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
     let mut run = Run::new(gpu, &plan, &kernels, &mut store, &mut known);
     let resolves = |step: &Step| matches!(step, Step::Stage(Stage { pass: "resolve", .. }));
     let steps: Vec<_> = sequence::steps(&plan).into_iter().take_while(|step| !resolves(step)).collect();
-    run.steps(&steps, &mut Frame::empty(camera, &options.maps), &())?;
+    run.steps(&steps, &mut Frame::empty(camera, options.maps), &())?;
     run.timing.flush(gpu)?;
     let words = |name: &str, len: u64| match store.buffer(name) {
         Some(buffer) => buffer.read(gpu, len),

@@ -49,14 +49,14 @@ pub(super) fn frame(
         let sums = accumulate::reference(splats(), scene, camera, options, first_row, &nearest);
         let summed = lap(1, seen);
         let strip = Camera { height: rows, ..camera.clone() };
-        let mut frame = Frame::new(&strip, &options.maps);
+        let mut frame = Frame::new(&strip, options.maps);
         resolve::reference(&sums, scene, camera, options, first_row, &mut frame);
         lap(2, summed);
         progress.advance(rows.into());
         frame
     };
     // A few strips at a time: all of them beside the frame would double its memory.
-    let mut frame = Frame::empty(camera, &options.maps);
+    let mut frame = Frame::empty(camera, options.maps);
     let group = 8 * rayon::current_num_threads() as u32;
     for first in (0..bands).step_by(group as usize) {
         let strips: Vec<Frame> = (first..bands.min(first + group)).into_par_iter().map(strip).collect();

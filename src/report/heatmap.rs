@@ -187,16 +187,7 @@ mod tests {
     #[test]
     fn a_map_shows_each_pixel_and_sizes_must_match() {
         let frame = |width: u32, height: u32, last: f32| {
-            let mut frame = Frame {
-                width,
-                height,
-                color: vec![[0.5; 4]; (width * height) as usize],
-                depth: None,
-                normal: None,
-                weight: None,
-                count: None,
-                decision: None,
-            };
+            let mut frame = Frame::of_colors(width, height, vec![[0.5; 4]; (width * height) as usize]);
             frame.color.last_mut().unwrap()[2] = last;
             frame
         };

@@ -6,6 +6,7 @@ pub mod color;
 mod copies;
 pub mod framing;
 pub mod light;
+pub mod maps;
 pub mod options;
 #[expect(clippy::module_inception, reason = "the file is named for the type it holds")]
 pub mod scene;
@@ -18,7 +19,8 @@ pub use camera::{Camera, Lens, Projection};
 pub use color::Colors;
 pub(crate) use copies::{copies, has_copies};
 pub use light::Light;
-pub use options::{Epsilon, Kernel, KernelShape, LowPass, Maps, Shading};
+pub use maps::{MAPS, Map, Maps};
+pub use options::{Epsilon, Kernel, KernelShape, LowPass, Shading};
 pub use scene::{Bounds, Scene, Up};
 pub use surfel::Surfel;
 pub use texture::{Place, Texture, Textured};

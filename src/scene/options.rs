@@ -1,4 +1,4 @@
-//! What a picture is: which fragments are one surface, how they are blended, lit and filtered, and which maps there are.
+//! What a picture is: which fragments are one surface, how they are blended, lit and filtered.
 
 use std::str::FromStr;
 
@@ -195,28 +195,6 @@ pub const HIGHLIGHT: f64 = 0.3;
 
 /// Exponents that [`RenderOptions::shininess`](crate::plan::RenderOptions::shininess) may have: with more, the cosine's rounding in f32 would show.
 pub const SHININESS_RANGE: (f32, f32) = (1.0, 1000.0);
-
-/// Maps beside the colour. Every one is normalised by the weight sum; all but `decision` exist on every backend.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Maps {
-    /// Camera-space z, world units; +inf where nothing is.
-    pub depth: bool,
-    /// Unit normal in world space; 0 where nothing is. Normals that were estimated have no side of their own and are
-    /// turned toward the viewer; given ones stay as they are.
-    pub normal: bool,
-    /// The sum of weights; 0 where nothing is.
-    pub weight: bool,
-    /// Accepted fragments.
-    pub count: bool,
-    /// Reference only: the smallest relative distance of any fragment of the pixel to a yes-or-no decision (disk rim,
-    /// epsilon, near depth). Where it is tiny, f32 may rightly decide otherwise.
-    pub decision: bool,
-}
-
-impl Maps {
-    /// All that a device makes.
-    pub const ON_DEVICE: Self = Self { depth: true, normal: true, weight: true, count: true, decision: false };
-}
 
 #[cfg(test)]
 mod tests {

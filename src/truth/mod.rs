@@ -21,8 +21,8 @@ use crate::frame::Frame;
 use crate::io::{self, Mesh};
 use crate::plan::RenderOptions;
 use crate::progress::Progress;
-use crate::scene::Camera;
 use crate::scene::color::SRGB8_TO_LINEAR;
+use crate::scene::{Camera, Map};
 use crate::surfels::analytic::{Shape, depth_along_ray};
 
 /// A surface that rays can meet.
@@ -151,16 +151,10 @@ impl Truth {
         };
         let pixels: Vec<Pixel> = (0..camera.height).into_par_iter().flat_map_iter(row).collect();
         progress.end();
-        let frame = Frame {
-            width: camera.width,
-            height: camera.height,
-            color: pixels.iter().map(|pixel| pixel.color).collect(),
-            depth: Some(pixels.iter().map(|pixel| pixel.depth).collect()),
-            normal: Some(pixels.iter().map(|pixel| pixel.normal).collect()),
-            weight: None,
-            count: None,
-            decision: None,
-        };
+        let color = pixels.iter().map(|pixel| pixel.color).collect();
+        let frame = Frame::of_colors(camera.width, camera.height, color)
+            .with(Map::Depth, pixels.iter().map(|pixel| pixel.depth).collect())
+            .with(Map::Normal, pixels.iter().flat_map(|pixel| pixel.normal).collect());
         Ok(Self {
             frame,
             coverage: pixels.iter().map(|pixel| pixel.coverage).collect(),

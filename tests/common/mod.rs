@@ -18,7 +18,7 @@ use epsplat::plan::{
     ACCUMULATORS, Accumulator, AccumulatorRow, BlendFormat, ColorNeed, Facts, Raster, RasterDepth, RenderOptions,
     SceneNeeds, check,
 };
-use epsplat::scene::{KernelShape, LowPass, Projection, Shading};
+use epsplat::scene::{KernelShape, LowPass, Map, Maps, Projection, Shading};
 
 /// What one unit in a sum of the accumulator `fixed` is of a full weight.
 pub const UNIT: f64 = 1.0 / ONE as f64;
@@ -140,7 +140,8 @@ fn base_needs() -> Vec<SceneNeeds> {
                 continue;
             }
             let projection = if bit(4) { Projection::Pinhole } else { Projection::Orthographic };
-            let (depth, count, weight_map) = (bit(5), bit(6), bit(7));
+            let wanted = [(1, Map::Normal), (5, Map::Depth), (6, Map::Count), (7, Map::Weight)];
+            let wanted: Vec<Map> = wanted.into_iter().filter(|(k, _)| bit(*k)).map(|(_, map)| map).collect();
             all.push(SceneNeeds {
                 projection,
                 accumulator: Accumulator::Fixed,
@@ -161,11 +162,8 @@ fn base_needs() -> Vec<SceneNeeds> {
                 alpha,
                 normal,
                 turn_normals,
-                depth,
-                count,
                 shading,
-                normal_map,
-                weight_map,
+                maps: Maps::of(&wanted),
                 ..plain
             });
         }
@@ -175,9 +173,8 @@ fn base_needs() -> Vec<SceneNeeds> {
 
 /// The frame's bits: equality of floats would take -0 for 0 and no NaN for itself.
 pub fn bits(frame: &Frame) -> Vec<u32> {
-    let maps = [&frame.depth, &frame.weight, &frame.count].into_iter().flatten().flatten();
-    let vectors = frame.color.iter().flatten().chain(frame.normal.iter().flatten().flatten());
-    vectors.chain(maps).map(|value| value.to_bits()).collect()
+    let maps = [Map::Normal, Map::Depth, Map::Weight, Map::Count].into_iter().filter_map(|map| frame.map(map));
+    frame.color.iter().flatten().chain(maps.flatten()).map(|value| value.to_bits()).collect()
 }
 
 /// The length of the interval behind the nearest depth `front` in which the device measures depths, world units.

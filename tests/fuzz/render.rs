@@ -6,7 +6,7 @@ use epsplat::frame::Frame;
 use epsplat::io::Points;
 use epsplat::plan::RenderOptions;
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, Lens, Maps, Scene, Shading};
+use epsplat::scene::{Camera, Colors, Lens, Map, Maps, Scene, Shading};
 use epsplat::surfels::{LARGEST_COORDINATE, build};
 use epsplat::{Error, io};
 use std::path::Path;
@@ -87,7 +87,7 @@ fn check_lengths(points: &Points) -> Result<(), String> {
 
 /// Draws `scene` with the reference and looks at each pixel of each map.
 pub fn draw(scene: &Scene, camera: &Camera, shading: Shading) -> Result<Outcome, String> {
-    let maps = Maps { depth: true, normal: true, weight: true, count: true, decision: true };
+    let maps = Maps::ON_DEVICE.and(&[Map::Decision]);
     let options = RenderOptions { maps, shading, ..RenderOptions::default() };
     let (frame, _) = render(scene, camera, &options, &Backend::Reference, &())
         .map_err(|error| format!("the scene cannot be drawn: {error}"))?;
@@ -96,11 +96,11 @@ pub fn draw(scene: &Scene, camera: &Camera, shading: Shading) -> Result<Outcome,
 
 fn check(frame: &Frame) -> Result<(), String> {
     let missing = || "a map is missing".to_owned();
-    let depth = frame.depth.as_ref().ok_or_else(missing)?;
-    let normal = frame.normal.as_ref().ok_or_else(missing)?;
-    let weight = frame.weight.as_ref().ok_or_else(missing)?;
-    let count = frame.count.as_ref().ok_or_else(missing)?;
-    let decision = frame.decision.as_ref().ok_or_else(missing)?;
+    let depth = frame.map(Map::Depth).ok_or_else(missing)?;
+    let normal = frame.normals().ok_or_else(missing)?;
+    let weight = frame.map(Map::Weight).ok_or_else(missing)?;
+    let count = frame.map(Map::Count).ok_or_else(missing)?;
+    let decision = frame.map(Map::Decision).ok_or_else(missing)?;
     for (pixel, color) in frame.color.iter().enumerate() {
         let (depth, normal) = (depth[pixel], normal[pixel]);
         let (weight, count) = (weight[pixel], count[pixel]);

@@ -2,6 +2,7 @@
 
 use super::common::command::{Folder, fails, ply, succeeds, text};
 use epsplat::frame::Frame;
+use epsplat::scene::Map;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -30,16 +31,7 @@ fn crc32(bytes: &[u8]) -> u32 {
 /// An EXR whose header says so large.
 fn exr(folder: &Folder, name: &str, width: u32, height: u32) -> PathBuf {
     let path = folder.path(name);
-    let frame = Frame {
-        width: 3,
-        height: 2,
-        color: vec![[0.5; 4]; 6],
-        depth: None,
-        normal: None,
-        weight: None,
-        count: None,
-        decision: None,
-    };
+    let frame = Frame::of_colors(3, 2, vec![[0.5; 4]; 6]);
     epsplat::io::exr::write(&path, &frame).unwrap();
     let mut bytes = std::fs::read(&path).unwrap();
     for window in [&b"dataWindow\0box2i\0"[..], b"displayWindow\0box2i\0"] {
@@ -113,15 +105,11 @@ fn what_the_system_has_no_room_for_is_said() {
 #[test]
 fn compare_names_what_only_one_image_has_and_prints_no_largest_number() {
     let folder = Folder::new();
-    let frame = |depth: Option<Vec<f32>>, weight: Option<Vec<f32>>, alpha: f32| Frame {
-        width: 2,
-        height: 1,
-        color: vec![[0.5, 0.5, 0.5, alpha]; 2],
-        depth,
-        normal: None,
-        weight,
-        count: None,
-        decision: None,
+    let frame = |depth: Option<Vec<f32>>, weight: Option<Vec<f32>>, alpha: f32| {
+        let maps = [(Map::Depth, depth), (Map::Weight, weight)].into_iter();
+        let colors = Frame::of_colors(2, 1, vec![[0.5, 0.5, 0.5, alpha]; 2]);
+        maps.filter_map(|(map, values)| Some((map, values?)))
+            .fold(colors, |frame, (map, values)| frame.with(map, values))
     };
     let written = |name: &str, frame: &Frame| {
         let path = folder.path(name);

@@ -92,16 +92,7 @@ fn faces_that_cannot_be_are_said() {
 #[test]
 fn materials_textures_and_what_of_them_is_missing() {
     let folder = Folder::new();
-    let image = epsplat::frame::Frame {
-        width: 1,
-        height: 1,
-        color: vec![[0.0, 1.0, 0.0, 1.0]],
-        depth: None,
-        normal: None,
-        weight: None,
-        count: None,
-        decision: None,
-    };
+    let image = epsplat::frame::Frame::of_colors(1, 1, vec![[0.0, 1.0, 0.0, 1.0]]);
     io::png::write(&folder.path("a green.png"), &image).unwrap();
     let library = "newmtl red\nKd 0.5 0 0\nd 0.25\n\nnewmtl painted\nKd 1 0.5 1\nmap_Kd a green.png\nnewmtl lost\nmap_Kd none.png\n";
     std::fs::write(folder.path("my colours.mtl"), library).unwrap();

@@ -62,7 +62,7 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
     let scene = scene(arguments, &bars)?;
     let near = Camera::default_near(&scene);
     let largest = views.iter().map(|(_, view)| view.pixels()).max().unwrap_or(1);
-    let writers = writers(largest, &options.maps);
+    let writers = writers(largest, options.maps);
     let mut renderer = Renderer::new(&scene, &options, &backend)?;
     let start = Instant::now();
     bars.begin("rendering views", views.len() as u64);
@@ -178,10 +178,9 @@ fn check_folder(output: &Path, cameras: &Path) -> Result<()> {
 }
 
 /// How many threads write frames of so many pixels.
-fn writers(pixels: u64, maps: &Maps) -> NonZeroUsize {
+fn writers(pixels: u64, maps: Maps) -> NonZeroUsize {
     let threads = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
-    let planes = [maps.depth, maps.normal, maps.weight, maps.count, maps.decision];
-    let frame = pixels * (PIXEL + MAP * planes.into_iter().filter(|map| *map).count() as u64);
+    let frame = pixels * (PIXEL + MAP * maps.len() as u64);
     let most = usize::try_from(MOST_WAITING / frame.max(1)).unwrap_or(usize::MAX);
     NonZeroUsize::new(threads.min(most)).unwrap_or(NonZeroUsize::MIN)
 }

@@ -1,0 +1,167 @@
+//! What an image may hold beside its colour. A map is a row of [`MAPS`]: from it follow the words of a pixel on the device, the layer
+//! of an EXR, and the names that command line and studies know.
+
+use std::str::FromStr;
+
+use crate::error::Error;
+
+/// A map beside the colour. Every one is normalised by the weight sum.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Map {
+    /// Camera-space z, world units; +inf where nothing is.
+    Depth,
+    /// Unit normal in world space; 0 where nothing is. Normals that were estimated have no side of their own and are
+    /// turned toward the viewer; given ones stay as they are.
+    Normal,
+    /// The sum of weights; 0 where nothing is.
+    Weight,
+    /// Accepted fragments.
+    Count,
+    /// Reference only: the smallest relative distance of any fragment of the pixel to a yes-or-no decision (disk rim,
+    /// epsilon, near depth). Where it is tiny, f32 may rightly decide otherwise.
+    Decision,
+}
+
+/// How one map is named and kept.
+#[derive(Debug)]
+pub struct MapRow {
+    /// Which.
+    pub map: Map,
+    /// Its name in options and studies, and of its layer in an EXR.
+    pub name: &'static str,
+    /// Its channels in an EXR, each a value of a pixel.
+    pub channels: &'static [&'static str],
+    /// What asks for it in reports ([`SceneNeeds::names`](crate::plan::SceneNeeds::names)).
+    pub need: &'static str,
+    /// The overridable constant of WGSL that says which word of a pixel's image is its first. None of a map that the reference alone makes.
+    pub image_word: Option<&'static str>,
+    /// Two images are compared in it.
+    pub compared: bool,
+}
+
+/// The maps, in the order of [`Map`].
+pub const MAPS: [MapRow; 5] = [
+    row(Map::Depth, "depth", &["Z"], "depth", Some("DEPTH_IMAGE")),
+    row(Map::Normal, "normal", &["X", "Y", "Z"], "normal-map", Some("NORMAL_IMAGE")),
+    row(Map::Weight, "weight", &["Y"], "weight-map", Some("WEIGHT_IMAGE")),
+    row(Map::Count, "count", &["Y"], "count", Some("COUNT_IMAGE")),
+    MapRow { compared: false, ..row(Map::Decision, "decision", &["Y"], "decision", None) },
+];
+
+const fn row(
+    map: Map,
+    name: &'static str,
+    channels: &'static [&'static str],
+    need: &'static str,
+    image_word: Option<&'static str>,
+) -> MapRow {
+    MapRow { map, name, channels, need, image_word, compared: true }
+}
+
+impl Map {
+    /// Its row.
+    pub fn row(self) -> &'static MapRow {
+        &MAPS[self as usize]
+    }
+
+    /// Values of a pixel.
+    pub fn width(self) -> usize {
+        self.row().channels.len()
+    }
+}
+
+impl FromStr for Map {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        let row = MAPS.iter().find(|row| row.name == text);
+        row.map(|row| row.map).ok_or_else(|| {
+            let names = MAPS.iter().map(|row| row.name).collect::<Vec<_>>().join(", ");
+            Error::Usage(format!("there is no map {text:?}: take some of {names}"))
+        })
+    }
+}
+
+/// A set of maps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Maps(u32);
+
+impl Maps {
+    /// No map.
+    pub const NONE: Self = Self(0);
+
+    /// All that a device makes.
+    pub const ON_DEVICE: Self = {
+        let (mut set, mut row) = (0, 0);
+        while row < MAPS.len() {
+            if MAPS[row].image_word.is_some() {
+                set |= 1 << row;
+            }
+            row += 1;
+        }
+        Self(set)
+    };
+
+    /// Those of `maps`.
+    pub const fn of(maps: &[Map]) -> Self {
+        let (mut set, mut k) = (0, 0);
+        while k < maps.len() {
+            set |= 1 << maps[k] as u32;
+            k += 1;
+        }
+        Self(set)
+    }
+
+    /// Whether `map` is one of them.
+    pub const fn has(self, map: Map) -> bool {
+        self.0 >> map as u32 & 1 == 1
+    }
+
+    /// These and those.
+    pub const fn and(self, others: &[Map]) -> Self {
+        Self(self.0 | Self::of(others).0)
+    }
+
+    /// These but `others`.
+    pub const fn but(self, others: &[Map]) -> Self {
+        Self(self.0 & !Self::of(others).0)
+    }
+
+    /// Each of them, in the order of [`MAPS`].
+    pub fn iter(self) -> impl Iterator<Item = Map> {
+        MAPS.iter().map(|row| row.map).filter(move |map| self.has(*map))
+    }
+
+    /// How many.
+    pub fn len(self) -> usize {
+        self.0.count_ones() as usize
+    }
+
+    /// There is none.
+    pub fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_found_by_their_maps_and_names() {
+        for (number, row) in MAPS.iter().enumerate() {
+            assert_eq!((row.map as usize, row.name.parse::<Map>().unwrap()), (number, row.map));
+        }
+        assert!("colour".parse::<Map>().unwrap_err().to_string().contains("depth, normal"));
+    }
+
+    #[test]
+    fn a_set_has_what_it_was_made_of() {
+        let set = Maps::of(&[Map::Depth, Map::Count]).and(&[Map::Decision]);
+        assert_eq!(set.iter().collect::<Vec<_>>(), [Map::Depth, Map::Count, Map::Decision]);
+        assert_eq!((set.len(), Maps::NONE.len()), (3, 0));
+        assert!(!Maps::ON_DEVICE.has(Map::Decision) && Maps::ON_DEVICE.has(Map::Count));
+        assert_eq!(set.but(&[Map::Depth]), Maps::of(&[Map::Count, Map::Decision]));
+    }
+}

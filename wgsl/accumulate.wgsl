@@ -2,6 +2,7 @@
 // splat, one workgroup a large splat. Each fragment's terms are quantised before they are added, so the sums do not
 // depend on the order.
 // Twin: src/passes/accumulate.rs.
+// All loops end, by 2, 4 of src/gpu/loops.rs: 0x9e179abdd3183d73
 
 @group(0) @binding(7) var<storage, read> visible: array<u32>;
 

@@ -1,5 +1,6 @@
 // Sums of terms.wgsl in fixed point: a term fills a word, a sum has two (low, high) with an exact carry.
 // Error bound: src/passes/accumulate.rs.
+// All loops end, by 3 of src/gpu/loops.rs: 0xeda3c87029d68b8f
 
 override CHANNELS: u32;
 

@@ -2,6 +2,7 @@
 // of one u64, so that a fragment makes half as many additions. What wraps in the low half runs into the high one; both
 // halves' carries are counted in a u64 of their own, which follows, so that it can be taken out again.
 // Error bound: src/passes/accumulate.rs.
+// All loops end, by 1, 3 of src/gpu/loops.rs: 0xa09ce6213cc6de43
 
 override CHANNELS: u32;
 

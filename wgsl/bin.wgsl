@@ -1,6 +1,7 @@
 // Between stages 2 and 3, for tiles: each cell of the image gets a list of the splats that may touch it, by count, scan and
 // place. A small splat's cells are the tiles; a large one's are blocks of them, as it touches many. The order within a list
 // depends on the schedule, but no minimum or sum does. Host side: src/passes/tiles.rs.
+// All loops end, by 1 of src/gpu/loops.rs: 0x037d1952d178818c
 
 // Words 0 and 1 say how long all lists together, and the longest, were at most. For cell t, word LIST_ENDS + t + 1 is at first
 // its count, then where its list starts, and at last where it ends, and word LIST_ENDS is 0; the lists follow from

@@ -1,4 +1,5 @@
 // A surfel's centre as a camera sees it. Its f32 centre is all there is of it. Same interface as center_doubled.wgsl.
+// All loops end, by 1 of src/gpu/loops.rs: 0xc26f8c1eed595583
 
 // Relative to the eye, device units.
 fn relative_center(index: u32, surfel: Surfel) -> array<Double, 3> {

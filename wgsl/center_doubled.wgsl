@@ -1,5 +1,6 @@
 // A surfel's centre as a camera sees it, in a scene so wide for its disks that an f32 has no room for a centre's last digits:
 // two distant clusters, say. These come in a buffer of their own. Twin: Scene::center in src/scene/scene.rs.
+// All loops end, by 1 of src/gpu/loops.rs: 0x6d77f8cd2040089e
 
 // World units, three a surfel.
 @group(0) @binding(39) var<storage, read> centers_low: array<f32>;

@@ -1,5 +1,6 @@
 // Premultiplied linear colour, each channel mapped from the scene's range to [0, 1] before it is summed. Channels: weight
 // and red, green and blue, alpha where it varies. Twin: src/passes/accumulate.rs, src/passes/resolve.rs.
+// All loops end, by 1 of src/gpu/loops.rs: 0x02c0f2e90c770e8a
 
 const COLOR_CHANNEL: u32 = 1u;
 // 3, or 4 where alpha varies.

@@ -1,5 +1,6 @@
 // Stage 4, its start: which tiles of the image have anything. The others stay as the image was cleared, and no invocation
 // looks at their pixels. Host side: src/passes/covered.rs.
+// All loops end, by 1 of src/gpu/loops.rs: 0xaff6575ade4c8e39
 
 // Pixels of a tile, across and down.
 const TILE_WIDTH: u32 = 8u;

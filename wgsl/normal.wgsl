@@ -1,5 +1,6 @@
 // Normals, mapped from [-1, 1] to [0, 1] before they are summed.
 // Twin: src/passes/accumulate.rs, src/passes/resolve.rs.
+// All loops end, by 1 of src/gpu/loops.rs: 0x0099a1626ba547a0
 
 override NORMAL_CHANNEL: u32;
 // Normals have no consistent side, so each is turned toward the viewer before blending.

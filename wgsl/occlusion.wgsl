@@ -1,6 +1,7 @@
 // Stage 2, its end: the farthest of the nearest depths in each tile of pixels, by which stage 3 tells splats that are
 // hidden altogether without a look at their pixels. No image depends on it.
 // Host side: src/passes/visibility.rs.
+// All loops end, by 1 of src/gpu/loops.rs: 0x8cebd33d7b32f738
 
 const OCCLUSION_TILE: u32 = 8u;
 

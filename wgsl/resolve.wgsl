@@ -1,5 +1,6 @@
 // Stage 4: sums become the image: divide by the weight, shade, put over the background. One invocation a pixel of a covered
 // tile. Twin: src/passes/resolve.rs.
+// All loops end, by 1 of src/gpu/loops.rs: 0xe1c75122e1e62e05
 
 // Words of a pixel in the image (image_*.wgsl); the colour's four come first.
 override IMAGE_WORDS: u32;

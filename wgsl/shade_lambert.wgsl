@@ -1,5 +1,6 @@
 // color * sum of intensity * cosine over the lights. The headlight lights both sides of a surface, n . toward_eye in
 // absolute value; a directional light the side its normal is on. Twin: src/passes/resolve.rs.
+// All loops end, by 1 of src/gpu/loops.rs: 0xba5d86d8f582c54d
 
 // A constant, as some drivers compile a kernel whose loops end by a uniform again for every frame (Mesa's lavapipe).
 override LIGHTS: u32;

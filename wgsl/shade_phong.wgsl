@@ -1,5 +1,6 @@
 // Lambert's term as in shade_lambert.wgsl, and beside it white highlights where the eye is near a light's mirrored
 // direction r = 2 (n . l) n - l: sum of intensity * (n . l) * max(0, r . v)^SHININESS. Twin: src/passes/resolve.rs.
+// All loops end, by 1 of src/gpu/loops.rs: 0x042b711b629bafdc
 
 override SHININESS: f32;
 // As in shade_lambert.wgsl.

@@ -1,5 +1,6 @@
 // Surfels that are painted by a texture: what is summed of their places in it, and its lookup at the mean of these.
 // Twin: src/scene/texture.rs.
+// All loops end, by 1 of src/gpu/loops.rs: 0x4d41d4fed7c0fa23
 
 override PLACE_CHANNEL: u32;
 

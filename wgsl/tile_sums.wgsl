@@ -1,4 +1,5 @@
 // The registers of tile.wgsl's sums: of sixteen pixels and at most twelve channels, low and high word.
+// All loops end, by 1 of src/gpu/loops.rs: 0xa79ad67f78e78da1
 
 override CHANNELS: u32;
 

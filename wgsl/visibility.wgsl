@@ -1,5 +1,6 @@
 // Stage 2: the nearest depth at every pixel. One invocation a splat, one workgroup a large splat. Twin: src/passes/visibility.rs.
 // The least depth is the greatest kept one (layout.wgsl).
+// All loops end, by 1, 2 of src/gpu/loops.rs: 0x22ff933efae40a56
 
 @group(0) @binding(5) var<storage, read> projected: array<SplatRecord>;
 @group(0) @binding(6) var<storage, read_write> nearest: array<atomic<u32>>;

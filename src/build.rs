@@ -1,0 +1,21 @@
+//! Lists the kernels of `wgsl/`, so that a new one is a file and nothing else.
+
+use std::fmt::Write;
+use std::path::Path;
+use std::{env, fs, io};
+
+fn main() -> io::Result<()> {
+    let variable = |name: &str| env::var(name).map_err(io::Error::other);
+    let folder = Path::new(&variable("CARGO_MANIFEST_DIR")?).join("wgsl");
+    println!("cargo::rerun-if-changed=wgsl");
+    let mut paths = fs::read_dir(&folder)?.map(|entry| Ok(entry?.path())).collect::<io::Result<Vec<_>>>()?;
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == "wgsl"));
+    paths.sort();
+    let mut list = String::from("/// Every file of `wgsl/`: name and text.\npub const FILES: &[(&str, &str)] = &[\n");
+    for path in &paths {
+        let Some(name) = path.file_name() else { continue };
+        writeln!(list, "    ({name:?}, include_str!({path:?})),").map_err(io::Error::other)?;
+    }
+    list.push_str("];\n");
+    fs::write(Path::new(&variable("OUT_DIR")?).join("kernels.rs"), list)
+}

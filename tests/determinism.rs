@@ -250,8 +250,15 @@ fn pile() -> (Scene, Camera) {
         surfels.push(Surfel::disk(center, normal, 18.0 + at(8.0)));
         colors.push([0.5 + at(0.5), 0.5 + at(0.5), 0.5 + at(0.5), 1.0]);
     }
-    let scene =
-        Scene { origin: DVec3::ZERO, surfels, low: vec![], colors: Colors::Linear(colors), oriented: true, up: Up::Y };
+    let scene = Scene {
+        origin: DVec3::ZERO,
+        surfels,
+        low: vec![],
+        colors: Colors::Linear(colors),
+        oriented: true,
+        up: Up::Y,
+        provenance: Default::default(),
+    };
     (scene, front(16))
 }
 

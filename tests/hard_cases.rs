@@ -16,7 +16,15 @@ use glam::{DVec3, Vec3};
 fn check(name: &str, surfels: Vec<Surfel>, camera: &Camera, covered: f64) {
     let Some(gpu) = common::gpu() else { return };
     let colors = Colors::Srgb8((0..surfels.len()).map(|i| [40 * (i as u8 % 6), 90, 200, 255]).collect());
-    let scene = Scene { origin: DVec3::ZERO, surfels, low: vec![], colors, oriented: true, up: Up::Y };
+    let scene = Scene {
+        origin: DVec3::ZERO,
+        surfels,
+        low: vec![],
+        colors,
+        oriented: true,
+        up: Up::Y,
+        provenance: Default::default(),
+    };
     let maps = Maps::ON_DEVICE;
     let options = RenderOptions { maps, ..RenderOptions::default() };
     let with_decision = RenderOptions { maps: maps.and(&[Map::Decision]), ..options.clone() };

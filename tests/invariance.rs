@@ -58,8 +58,15 @@ fn check_plane(row: &AccumulatorRow, backend: &Backend) {
         (Colors::Linear(vec![color; surfels.len()]), color),
         (Colors::Srgb8(vec![code; surfels.len()]), decoded),
     ] {
-        let scene =
-            Scene { origin: DVec3::ZERO, surfels: surfels.clone(), low: vec![], colors, oriented: true, up: Up::Y };
+        let scene = Scene {
+            origin: DVec3::ZERO,
+            surfels: surfels.clone(),
+            low: vec![],
+            colors,
+            oriented: true,
+            up: Up::Y,
+            provenance: Default::default(),
+        };
         let frame = frame(&scene, &camera, &options, backend);
         let name = row.name;
         assert!(frame.color.iter().all(|pixel| *pixel == expected), "{name}: {:?} is not {expected:?}", frame.color[0]);
@@ -94,8 +101,15 @@ fn check_two_colours(row: &AccumulatorRow, backend: &Backend) {
     surfels.extend(plane(64, 50.0));
     let (seen, hidden) = ([0.25, 0.5, 0.625, 1.0], [4.0, -3.0, 0.0, 1.0]);
     let colors = (0..surfels.len()).map(|k| if k < near { seen } else { hidden }).collect();
-    let scene =
-        Scene { origin: DVec3::ZERO, surfels, low: vec![], colors: Colors::Linear(colors), oriented: true, up: Up::Y };
+    let scene = Scene {
+        origin: DVec3::ZERO,
+        surfels,
+        low: vec![],
+        colors: Colors::Linear(colors),
+        oriented: true,
+        up: Up::Y,
+        provenance: Default::default(),
+    };
     let options = RenderOptions { shading: Shading::Unlit, accumulator: row.of, ..options() };
     let fraction_bits = row.fraction_bits(scene.surfels.len() as u64);
     let frame = frame(&scene, &camera, &options, backend);

@@ -46,7 +46,15 @@ fn scene() -> impl Strategy<Value = Scene> {
         } else {
             colors
         };
-        Scene { origin: DVec3::new(5e5, -3e6, 80.0), surfels, low: vec![], colors, oriented, up: Up::Z }
+        Scene {
+            origin: DVec3::new(5e5, -3e6, 80.0),
+            surfels,
+            low: vec![],
+            colors,
+            oriented,
+            up: Up::Z,
+            provenance: Default::default(),
+        }
     })
 }
 

@@ -276,7 +276,8 @@ mod tests {
             ("[[config]]\nname = \"d\"\nbackend = \"raster\"\norganisation = \"tile\"\n", &["organisation:", "gpu"]),
             ("[[config]]\nname = \"d\"\nbackend = \"raster\"\nwithout = [\"order\"]\n", &["without:", "gpu"]),
             ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nwithout = [\"x\"]\n", &["line 6, without:", "culling"]),
-            ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nmaps = [\"decision\"]\n", &["maps", "depth"]),
+            ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nmaps = [\"decision\"]\n", &["decision map", "reference"]),
+            ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nmaps = [\"colour\"]\n", &["line 6, maps:", "depth"]),
             ("size = [\n", &["line"]),
         ];
         for (wrong, words) in cases {

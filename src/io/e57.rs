@@ -145,6 +145,8 @@ struct Reading {
     wide: bool,
     /// 0 where there is none.
     intensities: Vec<f32>,
+    /// Numbers of points that are marked as invalid, over all scans.
+    left_out: Vec<u64>,
 }
 
 impl Reading {
@@ -177,6 +179,7 @@ impl Reading {
             }
             let marked = |at: Option<usize>| at.map_or(Ok(false), |at| Ok::<_, Fault>(number(at)? != 0.0));
             if marked(place.invalid)? {
+                self.left_out.push((self.positions.len() + self.left_out.len()) as u64);
                 continue;
             }
             let [a, b, c] = [number(place.axes[0])?, number(place.axes[1])?, number(place.axes[2])?];
@@ -227,7 +230,14 @@ impl Reading {
             };
             Some(Colors::Srgb8(self.colors.into_iter().map(color).collect()))
         };
-        Points { positions: self.positions, normals: self.normals, colors, up: Some(Up::Z), ..Points::default() }
+        Points {
+            positions: self.positions,
+            normals: self.normals,
+            colors,
+            up: Some(Up::Z),
+            left_out: self.left_out,
+            ..Points::default()
+        }
     }
 }
 

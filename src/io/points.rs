@@ -28,4 +28,6 @@ pub struct Points {
     pub of_mesh: bool,
     /// Points that the file holds and that were left out, as it marks them as withheld, which is deleted.
     pub withheld: u64,
+    /// The numbers, in order, of all points that the file holds and that were left out; they start at 0.
+    pub left_out: Vec<u64>,
 }

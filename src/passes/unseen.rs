@@ -77,7 +77,15 @@ mod tests {
         ];
         let surfels: Vec<Surfel> = at.iter().map(|(center, radius)| Surfel::disk(*center, Vec3::Z, *radius)).collect();
         let colors = Colors::Constant([1.0; 4]);
-        let scene = Scene { origin: DVec3::ZERO, surfels, low: vec![], colors, oriented: true, up: Up::Y };
+        let scene = Scene {
+            origin: DVec3::ZERO,
+            surfels,
+            low: vec![],
+            colors,
+            oriented: true,
+            up: Up::Y,
+            provenance: Default::default(),
+        };
         let camera = Camera::look_at((32, 32), Lens::Fov(45.0), DVec3::ZERO, DVec3::Z, None, Up::Y, 0.1).unwrap();
         let options = RenderOptions::default();
         let mut frame = Frame::new(&camera, options.maps);

@@ -8,6 +8,7 @@ pub mod framing;
 pub mod light;
 pub mod maps;
 pub mod options;
+mod provenance;
 #[expect(clippy::module_inception, reason = "the file is named for the type it holds")]
 pub mod scene;
 mod srgb;
@@ -21,6 +22,8 @@ pub(crate) use copies::{copies, has_copies};
 pub use light::Light;
 pub use maps::{MAPS, Map, Maps};
 pub use options::{Epsilon, Kernel, KernelShape, LowPass, Shading};
+pub use provenance::Provenance;
+pub(crate) use provenance::number;
 pub use scene::{Bounds, Scene, Up};
 pub use surfel::Surfel;
 pub use texture::{Place, Texture, Textured};

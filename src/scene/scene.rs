@@ -3,7 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{Colors, Surfel};
+use super::{Colors, Provenance, Surfel};
 
 /// The world axis that points up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,6 +51,8 @@ pub struct Scene {
     pub oriented: bool,
     /// The axis a camera without instructions takes as up.
     pub up: Up,
+    /// Which points of which inputs the surfels are.
+    pub provenance: Provenance,
 }
 
 /// Surfels that [`Scene::core`] looks at, at most.
@@ -212,7 +214,15 @@ mod tests {
         let surfels = (0..1000)
             .map(|i| Surfel::disk(Vec3::new(i as f32, -(i as f32), 0.5), Vec3::Z, 0.25 + (i == 700) as u8 as f32))
             .collect();
-        Scene { origin: DVec3::new(6e6, 0.0, 0.0), surfels, low: vec![], colors, oriented: true, up: Up::Z }
+        Scene {
+            origin: DVec3::new(6e6, 0.0, 0.0),
+            surfels,
+            low: vec![],
+            colors,
+            oriented: true,
+            up: Up::Z,
+            provenance: Default::default(),
+        }
     }
 
     #[test]

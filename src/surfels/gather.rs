@@ -3,7 +3,7 @@
 use super::colors::ColorGatherer;
 use super::{LARGEST_COORDINATE, Preparation};
 use crate::io::{Points, Up};
-use crate::scene::Colors;
+use crate::scene::{Colors, Provenance, number};
 use crate::{Error, Result};
 
 /// The usable points of all inputs, in order.
@@ -22,6 +22,8 @@ pub(crate) struct Gathered {
     pub colors: Option<Colors>,
     /// What the inputs say.
     pub up: Option<Up>,
+    /// Which they are.
+    pub provenance: Provenance,
     /// The counts so far.
     pub preparation: Preparation,
 }
@@ -32,7 +34,7 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
     let mut positions = Vec::new();
     let (mut normals, mut radii, mut axes, mut texture) = (None, None, None, None);
     let mut colors = ColorGatherer::new();
-    let mut up = None;
+    let (mut up, mut provenance) = (None, Provenance::default());
     let input_count = inputs.len();
     for mut input in inputs {
         let read = input.positions.len();
@@ -50,6 +52,7 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
             input.colors.iter_mut().for_each(|all| retain_colors(all, &keep));
         }
         let before = positions.len();
+        provenance.push(before as u64, left_out(input.left_out, &keep));
         append(&mut normals, before, input.normals, kept);
         append(&mut radii, before, input.radii, kept);
         append(&mut axes, before, input.axes, kept);
@@ -86,7 +89,16 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
         *coordinate += 0.0;
     }
     preparation.replaced_colors = colors.replaced;
-    Ok(Gathered { positions, normals, radii, axes, texture, colors: colors.finish(), up, preparation })
+    Ok(Gathered { positions, normals, radii, axes, texture, colors: colors.finish(), up, provenance, preparation })
+}
+
+/// The numbers of those points of a file that its reader `left_out`, and of those it read that are not kept.
+fn left_out(mut left_out: Vec<u64>, keep: &[bool]) -> Vec<u64> {
+    let dropped = keep.iter().enumerate().filter(|(_, keep)| !**keep);
+    let dropped: Vec<u64> = dropped.map(|(read, _)| number(&left_out, read as u64)).collect();
+    left_out.extend(dropped);
+    left_out.sort_unstable();
+    left_out
 }
 
 impl Gathered {

@@ -145,7 +145,7 @@ pub fn build_textured(inputs: Vec<Points>, texture: Texture, progress: &dyn Prog
 }
 
 fn built(gathered: Gathered, progress: &dyn Progress) -> Result<(Scene, Preparation)> {
-    let Gathered { positions, normals, radii, axes, colors, up, mut preparation, .. } = gathered;
+    let Gathered { positions, normals, radii, axes, colors, up, provenance, mut preparation, .. } = gathered;
     let colors = colors::folded(colors);
     let bounds = Bounds::of(positions.par_iter().map(|position| DVec3::from_array(*position)));
     let (body, _) = body(positions.len(), |index| DVec3::from_array(positions[index]));
@@ -206,7 +206,7 @@ fn built(gathered: Gathered, progress: &dyn Progress) -> Result<(Scene, Preparat
     let low = low_parts(&surfels, relative);
     preparation.rounding = rounding(&surfels, &low, relative);
     let oriented = preparation.estimated_normals == 0;
-    let scene = Scene { origin, surfels, low, colors, oriented, up };
+    let scene = Scene { origin, surfels, low, colors, oriented, up, provenance };
     // As the default view sees it.
     preparation.strays = scene.body().1;
     Ok((scene, preparation))

@@ -232,7 +232,15 @@ mod tests {
         surfels[7].center[0] = f32::NAN;
         (surfels[8].s, surfels[8].t) = ([0.0; 3], [0.0; 3]);
         let origin = DVec3::new(6e5, 5e6, 0.0);
-        Scene { origin, surfels, low: vec![], colors: Colors::Constant([1.0; 4]), oriented: true, up: Up::Y }
+        Scene {
+            origin,
+            surfels,
+            low: vec![],
+            colors: Colors::Constant([1.0; 4]),
+            oriented: true,
+            up: Up::Y,
+            provenance: Default::default(),
+        }
     }
 
     #[test]

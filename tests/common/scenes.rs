@@ -120,7 +120,15 @@ fn scene(kinds: &[(Kind, usize)], camera: &Camera, origin: DVec3, length: f64, n
     let mut channel = |low, high| random.between(low, high) as f32;
     let colors =
         surfels.iter().map(|_| [channel(-0.5, 3.0), channel(0.0, 1.0), channel(0.2, 0.9), channel(0.1, 1.0)]).collect();
-    Scene { origin, surfels, low: vec![], colors: Colors::Linear(colors), oriented: seed.is_multiple_of(2), up: Up::Z }
+    Scene {
+        origin,
+        surfels,
+        low: vec![],
+        colors: Colors::Linear(colors),
+        oriented: seed.is_multiple_of(2),
+        up: Up::Z,
+        provenance: Default::default(),
+    }
 }
 
 const MIXED: &[(Kind, usize)] = &[
@@ -176,6 +184,7 @@ pub fn sphere(count: usize, radius: f64) -> Scene {
         colors: Colors::Srgb8(points.iter().map(|p| [code(p.x), code(p.y), code(p.z), 255]).collect()),
         oriented: true,
         up: Up::Y,
+        provenance: Default::default(),
     }
 }
 
@@ -232,8 +241,15 @@ pub fn stack(count: usize, value: f32) -> (Scene, Camera) {
         surfels.push(Surfel::disk(Vec3::new(0.0, 0.0, 90.0), Vec3::NEG_Z, 1.0));
         colors.push([end, end, end, 1.0]);
     }
-    let scene =
-        Scene { origin: DVec3::ZERO, surfels, low: vec![], colors: Colors::Linear(colors), oriented: true, up: Up::Y };
+    let scene = Scene {
+        origin: DVec3::ZERO,
+        surfels,
+        low: vec![],
+        colors: Colors::Linear(colors),
+        oriented: true,
+        up: Up::Y,
+        provenance: Default::default(),
+    };
     (scene, front(4))
 }
 

@@ -109,7 +109,7 @@ fn decode(
     reserve(&mut positions, capacity)?;
     let mut codes: Vec<[u16; 3]> = Vec::new();
     let mut intensities = Vec::new();
-    let (mut read, mut left_out) = (0, 0);
+    let (mut read, mut left_out) = (0, Vec::new());
     while read < promised {
         let count = reader.fill_points(block_points, &mut block).map_err(|error| match early(of_las(error)) {
             Fault::Malformed(what) => Fault::Malformed(format!(
@@ -120,9 +120,9 @@ fn decode(
         if count == 0 {
             return Err(Fault::Malformed(format!("the header promises {promised} points, the file ends after {read}")));
         }
-        read += count;
         let kept = || withheld(&block).map(|withheld| keep_withheld || !withheld);
-        left_out += kept().filter(|kept| !kept).count() as u64;
+        left_out.extend(kept().zip(read..).filter(|(kept, _)| !kept).map(|(_, number)| number));
+        read += count;
         let coordinates = block.x().zip(block.y()).zip(block.z()).map(|((x, y), z)| [x, y, z]);
         positions.extend(coordinates.zip(kept()).filter_map(|(position, kept)| kept.then_some(position)));
         if let Some(rgb) = block.rgb() {
@@ -133,7 +133,7 @@ fn decode(
         progress.advance(count);
     }
     let colors = if format.has_color { color::from_rgb(codes) } else { intensity::grey(&intensities) };
-    Ok(Points { positions, colors, up: Some(Up::Z), withheld: left_out, ..Points::default() })
+    Ok(Points { positions, colors, up: Some(Up::Z), withheld: left_out.len() as u64, left_out, ..Points::default() })
 }
 
 /// Whether each point of a block is marked as deleted: bit 7 of the classification byte, in the extended formats bit 2

@@ -123,7 +123,18 @@ pub(super) fn scene(
     let deviations = Deviations { max, mean: moment / area };
     let surfels: Vec<_> = chosen.iter().map(|chosen| chosen.surfel).collect();
     let low = low_parts(&surfels, |index| chosen[index].center);
-    (Scene { origin: scene.origin, surfels, low, colors, oriented: scene.oriented, up: scene.up }, deviations)
+    (
+        Scene {
+            origin: scene.origin,
+            surfels,
+            low,
+            colors,
+            oriented: scene.oriented,
+            up: scene.up,
+            provenance: Default::default(),
+        },
+        deviations,
+    )
 }
 
 /// The nearest 8-bit codes: a file that came with such colours keeps them.

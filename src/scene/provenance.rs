@@ -1,0 +1,67 @@
+//! Which point of which input a surfel is.
+
+/// Where the surfels of a scene come from: inputs one after the other, each without the points that were left out. A scene that nobody
+/// read says nothing and counts as one input.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Provenance(Vec<Input>);
+
+#[derive(Clone, Debug, PartialEq)]
+struct Input {
+    /// Surfels of the inputs before it.
+    first: u64,
+    /// Numbers of the points that are no surfels, in order.
+    left_out: Vec<u64>,
+}
+
+impl Provenance {
+    /// Another input follows, whose first surfel would be number `first` of the scene; `left_out` are the numbers, in order, of those of
+    /// its points that become none.
+    pub fn push(&mut self, first: u64, left_out: Vec<u64>) {
+        self.0.push(Input { first, left_out });
+    }
+
+    /// The number of the input that surfel `index` comes from, and of the point in it; both start at 0.
+    pub fn of(&self, index: u64) -> (u64, u64) {
+        let after = self.0.partition_point(|input| input.first <= index);
+        let Some(input) = after.checked_sub(1).and_then(|input| self.0.get(input)) else { return (0, index) };
+        (after as u64 - 1, number(&input.left_out, index - input.first))
+    }
+}
+
+/// The number of the `kept`th point (from 0) that is none of `left_out`, which are in order.
+pub(crate) fn number(left_out: &[u64], kept: u64) -> u64 {
+    // As many of the kept ones lie before the kth that is left out as its number exceeds k.
+    let (mut low, mut high) = (0, left_out.len());
+    while low < high {
+        let middle = low.midpoint(high);
+        if left_out[middle] - middle as u64 <= kept { low = middle + 1 } else { high = middle }
+    }
+    kept + low as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_are_numbered_as_their_files_hold_them() {
+        let mut provenance = Provenance::default();
+        assert_eq!(provenance.of(7), (0, 7));
+        provenance.push(0, vec![0, 3, 4]);
+        provenance.push(3, vec![]);
+        // An input without a surfel.
+        provenance.push(5, vec![0, 1]);
+        provenance.push(5, vec![1]);
+        let all: Vec<_> = (0..8).map(|index| provenance.of(index)).collect();
+        assert_eq!(all, [(0, 1), (0, 2), (0, 5), (1, 0), (1, 1), (3, 0), (3, 2), (3, 3)]);
+    }
+
+    #[test]
+    fn numbers_are_those_that_counting_gives() {
+        for mask in 0..1u32 << 10 {
+            let left_out: Vec<u64> = (0..10).filter(|bit| mask >> bit & 1 == 1).collect();
+            let kept = (0..20u64).filter(|n| !left_out.contains(n));
+            assert!(kept.enumerate().all(|(k, n)| number(&left_out, k as u64) == n), "{left_out:?}");
+        }
+    }
+}

@@ -72,6 +72,11 @@ impl Frame {
         self.map(Map::Normal).map(bytemuck::cast_slice)
     }
 
+    /// The values of a map of whole numbers, [`Map::width`] of them a pixel.
+    pub fn numbers(&self, map: Map) -> Option<&[u32]> {
+        self.map(map).filter(|_| map.row().numbers).map(bytemuck::cast_slice)
+    }
+
     /// Puts the rows of `below` under these; both have the same width and maps.
     pub fn append(&mut self, below: Self) {
         self.height += below.height;

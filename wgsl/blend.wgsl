@@ -26,9 +26,13 @@ fn attributes_without_place(color: vec4<f32>, normal: vec3<f32>, radius: f32) ->
     return Attributes(color, normal, radius, nowhere);
 }
 
-fn weight_of(fragment: Fragment) -> Term {
+fn fragment_weight(fragment: Fragment) -> f32 {
     let unfiltered = clamp(kernel_weight(fragment.rho2), LEAST_WEIGHT, 1.0);
-    return quantise(max(fragment.gain * unfiltered, LEAST_FILTERED_WEIGHT));
+    return max(fragment.gain * unfiltered, LEAST_FILTERED_WEIGHT);
+}
+
+fn weight_of(fragment: Fragment) -> Term {
+    return quantise(fragment_weight(fragment));
 }
 
 fn blend(pixel: u32, fragment: Fragment, front: f32, attributes: Attributes) {

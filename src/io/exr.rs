@@ -6,6 +6,8 @@
 //! | `depth` | Z, world units, +inf where nothing is |
 //! | `normal` | X Y Z, world space |
 //! | `weight`, `count`, `decision` | Y |
+//!
+//! Layers follow from [`MAPS`](crate::scene::MAPS).
 
 use std::path::Path;
 
@@ -37,9 +39,14 @@ pub fn write(path: &Path, frame: &Frame) -> Outcome<()> {
         vec![channel("R", plane(0)), channel("G", plane(1)), channel("B", plane(2)), channel("A", plane(3))],
     )];
     for map in frame.maps().iter() {
-        let values = frame.map(map).unwrap_or_default();
-        let plane = |k: usize| values.iter().skip(k).step_by(map.width()).copied().collect::<Vec<_>>();
-        let channels = map.row().channels.iter().enumerate().map(|(k, name)| channel(name, plane(k)));
+        let plane = |k: usize| match (frame.numbers(map), frame.map(map)) {
+            (Some(numbers), _) => FlatSamples::U32(numbers.iter().skip(k).step_by(map.width()).copied().collect()),
+            (None, values) => {
+                FlatSamples::F32(values.into_iter().flatten().skip(k).step_by(map.width()).copied().collect())
+            }
+        };
+        let channels = map.row().channels.iter().enumerate();
+        let channels = channels.map(|(k, name)| AnyChannel::new(Text::new_or_panic(name), plane(k)));
         layers.push(layer(map.row().name, channels.collect()));
     }
     let bounds = IntegerBounds::from_dimensions(size);
@@ -67,11 +74,16 @@ pub fn read(path: &Path) -> Outcome<Frame> {
         if layer.size != size {
             return Err(EpsplatError::malformed(path, "its layers differ in size"));
         }
+        let name = layer.attributes.layer_name.as_ref().map(ToString::to_string).unwrap_or_default();
+        let is_whole = name.parse::<Map>().is_ok_and(|map| map.row().numbers);
         let channel = |name: &str| -> Option<Vec<f32>> {
             let channel = layer.channel_data.list.iter().find(|c| c.name.eq_case_insensitive(name))?;
-            Some(channel.sample_data.values_as_f32().collect())
+            Some(match &channel.sample_data {
+                // As a frame keeps them.
+                FlatSamples::U32(numbers) if is_whole => numbers.iter().copied().map(f32::from_bits).collect(),
+                samples => samples.values_as_f32().collect(),
+            })
         };
-        let name = layer.attributes.layer_name.as_ref().map(ToString::to_string).unwrap_or_default();
         if let Ok(map) = name.parse::<Map>() {
             if let Some(planes) = map.row().channels.iter().map(|name| channel(name)).collect::<Option<Vec<_>>>() {
                 let values = (0..pixels).flat_map(|pixel| planes.iter().map(move |plane| plane[pixel]));

@@ -34,7 +34,7 @@ use super::footprint::footprint;
 use super::splat::Splat;
 use crate::gpu::layout::TILE;
 use crate::plan::pass::Pass;
-use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage};
+use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
 use crate::plan::{Accumulator, Plan, RenderOptions, SceneNeeds};
 use crate::scene::options::LEAST_FILTERED_WEIGHT;
 use crate::scene::{Camera, Colors, Map, Scene};
@@ -210,7 +210,8 @@ pub fn steps(plan: &Plan, band: usize) -> Stage {
     if band == 0 {
         clears.push(Clear { buffer: "overflows", first: 0, count: None });
     }
-    Stage::new("accumulate", band, vec![Run { kernel: ACCUMULATE, over: Over::Slots(Part::All) }]).after(clears)
+    let runs = vec![Run { kernel: ACCUMULATE, over: Over::Slots(Part::All) }];
+    Stage::new("accumulate", band, runs).after(clears).as_twin(Twin::Accumulate)
 }
 
 /// The pass of the large splats, a workgroup each.

@@ -36,8 +36,72 @@ pub mod unseen;
 pub mod upload;
 pub mod visibility;
 
-use crate::plan::SceneNeeds;
+use crate::frame::Frame;
 use crate::plan::pass::{Making, Module, Pass};
+use crate::plan::steps::{Stage, Twin};
+use crate::plan::{Plan, RenderOptions, SceneNeeds};
+use crate::scene::{Camera, Map, Scene};
+use splat::Splat;
+
+/// What a strip of the reference has for the twin of a pass.
+pub struct Strip<'a> {
+    /// What is rendered.
+    pub scene: &'a Scene,
+    /// The whole image's.
+    pub camera: &'a Camera,
+    /// How.
+    pub options: &'a RenderOptions,
+    /// Those that may touch its rows.
+    pub splats: Vec<&'a Splat>,
+    /// The place of each surfel in the [`order`] in which a device stores them, where a map asks for it.
+    pub ranks: Option<&'a [u32]>,
+    /// Its first row.
+    pub first_row: u32,
+    /// How many it has.
+    pub rows: u32,
+}
+
+/// A map that a pass of its own makes, from splats and nearest depths, in words of the image that [`resolve`] leaves alone.
+pub struct MapPass {
+    /// The map.
+    pub map: Map,
+    /// Its name is the map's.
+    pub pass: Pass,
+    /// After the image of a band is resolved.
+    pub runs: fn(&Plan, usize) -> Stage,
+    /// What the host makes of a pixel's words, of the scene and the surfels in the order in which they are stored.
+    pub finish: fn(&mut [f32], &Scene, &[u32]),
+    /// The twin, of nearest depths.
+    pub reference: fn(&Strip<'_>, &[f64], &mut Frame),
+}
+
+/// Those maps.
+pub const MAP_PASSES: [&MapPass; 0] = [];
+
+/// Those that `needs` ask for.
+fn own_maps(needs: &SceneNeeds) -> impl Iterator<Item = &'static MapPass> {
+    let maps = needs.maps;
+    MAP_PASSES.into_iter().filter(move |own| maps.has(own.map))
+}
+
+/// The stages of such maps in a band.
+pub fn of_maps(plan: &Plan, band: usize) -> impl Iterator<Item = Stage> {
+    own_maps(&plan.needs).map(move |own| (own.runs)(plan, band).as_twin(Twin::Map(own.map)))
+}
+
+/// Whether a map asks for the order in which surfels are stored.
+pub fn asks_for_order(needs: &SceneNeeds) -> bool {
+    own_maps(needs).next().is_some()
+}
+
+/// Makes of `frame`, as it was read back, what a user is given.
+pub fn finish(frame: &mut Frame, needs: &SceneNeeds, scene: &Scene, order: &[u32]) {
+    for own in own_maps(needs) {
+        if let Some(words) = frame.map_mut(own.map) {
+            (own.finish)(words, scene, order);
+        }
+    }
+}
 
 /// The passes whose files every module has.
 const PASSES: [&Pass; 11] = [
@@ -54,18 +118,24 @@ const PASSES: [&Pass; 11] = [
     &raster::PASS,
 ];
 
+/// The passes of a render with `needs`.
+fn passes(needs: &SceneNeeds) -> impl Iterator<Item = &'static Pass> {
+    PASSES.into_iter().chain(own_maps(needs).map(|own| &own.pass))
+}
+
 /// The modules that a render with `needs` is made of: the first, and that of the tiles, if there are any.
 pub fn modules(needs: &SceneNeeds) -> Vec<Module> {
-    let with = |own: &Pass| PASSES.iter().flat_map(|pass| (pass.files)(needs)).chain((own.files)(needs)).collect();
+    let with = |own: &Pass| PASSES.iter().flat_map(|pass| (pass.files)(needs)).chain((own.files)(needs));
+    let of_maps = own_maps(needs).flat_map(|own| (own.pass.files)(needs));
     let first = Module {
-        files: with(&accumulate::SUMS),
-        kernels: PASSES.iter().flat_map(|pass| (pass.kernels)(needs)).collect(),
+        files: with(&accumulate::SUMS).chain(of_maps).collect(),
+        kernels: passes(needs).flat_map(|pass| (pass.kernels)(needs)).collect(),
     };
-    let tiles = || Module { files: with(&tiles::PASS), kernels: (tiles::PASS.kernels)(needs) };
+    let tiles = || Module { files: with(&tiles::PASS).collect(), kernels: (tiles::PASS.kernels)(needs) };
     std::iter::once(first).chain(needs.tiles.then(tiles)).collect()
 }
 
 /// The overridable constants of a render, by name.
 pub fn constants(making: &Making<'_>) -> Vec<(&'static str, f64)> {
-    PASSES.iter().flat_map(|pass| (pass.constants)(making)).collect()
+    passes(making.needs).flat_map(|pass| (pass.constants)(making)).collect()
 }

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::gpu::layout::BATCH;
 use crate::morton;
-use crate::scene::{Bounds, Surfel};
+use crate::scene::{Bounds, Scene, Surfel};
 
 /// Surfels of a run: whole batches. Of 64, 512 and 4096 the middle gave the shortest frames on a software adapter.
 const RUN: usize = 512;
@@ -22,25 +22,38 @@ const BITS: u32 = 10;
 /// The last cell along each axis.
 const LAST: u32 = (1 << BITS) - 1;
 
-/// The indices of `surfels`, of which `core` holds nearly all, in the order in which they are stored. There are fewer than 2^32.
-/// Those outside are in the outermost cells, so that they make no cell larger.
-pub fn order(surfels: &[Surfel], core: &Bounds) -> Vec<u32> {
+/// The indices of the surfels of `scene`, of which `core` holds nearly all, in the order in which they are stored. There are fewer
+/// than 2^32. Those outside are in the outermost cells, so that they make no cell larger.
+///
+/// Within a cell what a surfel is decides, so that the device sees one scene whatever order its surfels came in; only of those that
+/// are the same in everything the index decides.
+pub fn order(scene: &Scene, core: &Bounds) -> Vec<u32> {
+    let surfels = &scene.surfels;
     let low = core.min.as_vec3();
     let extent = core.extent().max_element() as f32;
     // Without an extent every surfel is in one cell.
     let cells = if extent > 0.0 { LAST as f32 / extent } else { 0.0 };
-    // The index breaks ties, so that the order is the same each time.
     let place = |(index, surfel): (usize, &Surfel)| {
         let cell = std::array::from_fn(|k| (((surfel.center[k] - low[k]) * cells) as u32).min(LAST).into());
         morton::code(cell) << 32 | index as u64
     };
     let mut along: Vec<u64> = surfels.par_iter().enumerate().map(place).collect();
-    along.par_sort_unstable();
+    let content = |place: u64| content(scene, place as u32 as usize);
+    along.par_sort_unstable_by(|a, b| {
+        (a >> 32).cmp(&(b >> 32)).then_with(|| content(*a).cmp(&content(*b))).then_with(|| a.cmp(b))
+    });
     // What is left of the last run stays last, so that each run is stored as one batch.
     let (runs, rest) = along.as_chunks::<RUN>();
     let stride = dealing(runs.len());
     let dealt = (0..runs.len()).flat_map(|turn| &runs[turn * stride % runs.len()]);
     dealt.chain(rest).map(|place| *place as u32).collect()
+}
+
+/// The bits of a surfel and its colour.
+fn content(scene: &Scene, index: usize) -> ([[u32; 3]; 4], [u32; 4]) {
+    let Surfel { center, s, t } = scene.surfels[index];
+    let low = scene.low.get(index).copied().unwrap_or_default();
+    ([center, low, s, t].map(|part| part.map(f32::to_bits)), scene.colors.linear(index).map(f32::to_bits))
 }
 
 /// A step near the golden ratio of `runs` that comes to each of them once.
@@ -61,31 +74,50 @@ fn dealing(runs: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::{Colors, Up};
     use crate::surfels::analytic::{Shape, generate};
     use glam::{DVec3, Vec3};
 
-    fn sphere(count: u64) -> (Vec<Surfel>, Bounds) {
+    fn scene(surfels: Vec<Surfel>) -> Scene {
+        let (origin, colors) = (DVec3::ZERO, Colors::Constant([1.0; 4]));
+        Scene { origin, surfels, low: vec![], colors, oriented: true, up: Up::Y, provenance: Default::default() }
+    }
+
+    fn sphere(count: u64) -> (Scene, Bounds) {
         let center = |position: [f64; 3]| DVec3::from_array(position).as_vec3();
         let surfels: Vec<_> =
             generate(Shape::Sphere, count).map(|s| Surfel::disk(center(s.position), Vec3::Z, 0.1)).collect();
-        (surfels, Bounds { min: DVec3::splat(-1.0), max: DVec3::splat(1.0) })
+        (scene(surfels), Bounds { min: DVec3::splat(-1.0), max: DVec3::splat(1.0) })
     }
 
     #[test]
     fn every_surfel_is_stored_once() {
         for count in [1, 2, 511, 512, 513, 5000, 100_000] {
-            let (surfels, bounds) = sphere(count);
-            let mut indices = order(&surfels, &bounds);
+            let (scene, bounds) = sphere(count);
+            let mut indices = order(&scene, &bounds);
             indices.sort_unstable();
             assert!(indices.iter().copied().eq(0..count as u32), "{count}");
         }
-        assert!(order(&[], &Bounds::EMPTY).is_empty());
-        let one = [Surfel::disk(Vec3::ZERO, Vec3::Z, 1.0); 3];
-        assert_eq!(order(&one, &Bounds { min: DVec3::ZERO, max: DVec3::ZERO }), [0, 1, 2]);
+        assert!(order(&scene(vec![]), &Bounds::EMPTY).is_empty());
+        let one = vec![Surfel::disk(Vec3::ZERO, Vec3::Z, 1.0); 3];
+        assert_eq!(order(&scene(one), &Bounds { min: DVec3::ZERO, max: DVec3::ZERO }), [0, 1, 2]);
+    }
+
+    #[test]
+    fn the_same_surfels_in_any_order_are_stored_in_one() {
+        let (first, core) = sphere(5000);
+        // Several in a cell, as their neighbours are copies that lie elsewhere by less than one.
+        let beside = first.surfels.iter().map(|s| Surfel { center: s.center.map(|c| c + 1e-7), ..*s });
+        let first = scene(first.surfels.iter().copied().chain(beside).collect());
+        let stored = |scene: &Scene| -> Vec<Surfel> {
+            order(scene, &core).into_iter().map(|index| scene.surfels[index as usize]).collect()
+        };
+        let turned = scene(first.surfels.iter().rev().copied().collect());
+        assert!(stored(&first) == stored(&turned));
     }
 
     /// The mean distance between surfels that are `step` apart in `order`.
-    fn mean(surfels: &[Surfel], step: usize, order: &[u32]) -> f64 {
+    fn mean(Scene { surfels, .. }: &Scene, step: usize, order: &[u32]) -> f64 {
         let center = |index: u32| Vec3::from_array(surfels[index as usize].center);
         let pairs = order.iter().zip(&order[step..]).step_by(RUN);
         pairs.clone().map(|(a, b)| f64::from(center(*a).distance(center(*b)))).sum::<f64>() / pairs.count() as f64
@@ -93,25 +125,25 @@ mod tests {
 
     #[test]
     fn neighbours_in_memory_are_neighbours_in_space_and_runs_are_not() {
-        let (surfels, bounds) = sphere(100_000);
-        let stored = order(&surfels, &bounds);
-        let given: Vec<u32> = (0..surfels.len() as u32).collect();
-        assert!(mean(&surfels, 1, &stored) < 0.03, "{}", mean(&surfels, 1, &stored));
-        assert!(mean(&surfels, 1, &given) > 0.5, "the generator's order is already local");
-        assert!(mean(&surfels, RUN, &stored) > 0.5, "{}", mean(&surfels, RUN, &stored));
+        let (scene, bounds) = sphere(100_000);
+        let stored = order(&scene, &bounds);
+        let given: Vec<u32> = (0..scene.surfels.len() as u32).collect();
+        assert!(mean(&scene, 1, &stored) < 0.03, "{}", mean(&scene, 1, &stored));
+        assert!(mean(&scene, 1, &given) > 0.5, "the generator's order is already local");
+        assert!(mean(&scene, RUN, &stored) > 0.5, "{}", mean(&scene, RUN, &stored));
     }
 
     #[test]
     fn a_surfel_outside_the_core_spoils_no_neighbourhood() {
-        let (mut surfels, core) = sphere(100_000);
+        let (mut scene, core) = sphere(100_000);
         // Not in the first cells again, past the last one, but at the end of the curve, which is stored last.
-        surfels.push(Surfel::disk(Vec3::splat(1.5), Vec3::Z, 0.1));
-        assert_eq!(order(&surfels, &core).last(), Some(&100_000));
+        scene.surfels.push(Surfel::disk(Vec3::splat(1.5), Vec3::Z, 0.1));
+        assert_eq!(order(&scene, &core).last(), Some(&100_000));
         let stray = DVec3::splat(500.0);
-        surfels[100_000].center = stray.as_vec3().to_array();
+        scene.surfels[100_000].center = stray.as_vec3().to_array();
         let near = |bounds: &Bounds| {
-            let stored: Vec<u32> = order(&surfels, bounds).into_iter().filter(|index| *index < 100_000).collect();
-            mean(&surfels, 1, &stored)
+            let stored: Vec<u32> = order(&scene, bounds).into_iter().filter(|index| *index < 100_000).collect();
+            mean(&scene, 1, &stored)
         };
         assert!(near(&core) < 0.03, "{}", near(&core));
         assert!(near(&core.with_point(stray)) > 0.1, "bounds would do: {}", near(&core.with_point(stray)));

@@ -12,7 +12,7 @@ use super::splat::Splat;
 use crate::gpu::layout::QUEUE_START;
 use crate::plan::RenderOptions;
 use crate::plan::pass::{Making, Pass};
-use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage};
+use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
 use crate::plan::{Organisation, Plan, tuning};
 use crate::scene::{Camera, LowPass, Scene, Surfel, copies, has_copies};
 
@@ -135,5 +135,5 @@ pub fn steps(plan: &Plan, part: Part) -> Stage {
         run(PROJECT_RARE, Over::Rare),
         run(ARRANGE, Over::Once),
     ];
-    Stage::new("project", 0, runs).after(clears)
+    Stage::new("project", 0, runs).after(clears).as_twin(Twin::Project)
 }

@@ -7,7 +7,7 @@ use super::accumulate::PixelSums;
 use super::covered;
 use crate::frame::Frame;
 use crate::plan::pass::Pass;
-use crate::plan::steps::{Kernel, Over, Run, Stage};
+use crate::plan::steps::{Kernel, Over, Run, Stage, Twin};
 use crate::plan::{PixelLayout, Plan, RenderOptions};
 use crate::scene::options::HIGHLIGHT;
 use crate::scene::{Camera, Colors, Light, MAPS, Map, Scene, Shading};
@@ -139,7 +139,7 @@ const RESOLVE: Kernel = Kernel::new("resolve");
 pub fn steps(plan: &Plan, band: usize) -> Stage {
     let mut runs = covered::runs().to_vec();
     runs.push(Run { kernel: RESOLVE, over: Over::Covered });
-    Stage::new("resolve", band, runs).after(covered::clears(plan, band))
+    Stage::new("resolve", band, runs).after(covered::clears(plan, band)).as_twin(Twin::Resolve)
 }
 
 /// Puts `bytes` of resolved pixels into `frame`, from its pixel `first` on.

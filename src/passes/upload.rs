@@ -26,6 +26,8 @@ pub struct Uploaded {
     pub pages: Vec<Page>,
     /// What is there once: the table that decodes 8-bit sRGB, the texture.
     pub shared: Named,
+    /// The surfels of all pages, as indices in the scene.
+    pub order: Vec<u32>,
 }
 
 /// One page of a scene.
@@ -49,7 +51,7 @@ pub fn upload(
 ) -> Result<Uploaded> {
     progress.begin("uploading surfels", scene.surfels.len() as u64);
     let given = || (0..scene.surfels.len() as u32).collect();
-    let mut order = core.map_or_else(given, |core| order(&scene.surfels, core));
+    let mut order = core.map_or_else(given, |core| order(scene, core));
     let copies = needs.copies.then(|| copies(scene));
     if let Some(copies) = &copies {
         order.retain(|&index| copies[index as usize] > 0);
@@ -59,7 +61,7 @@ pub fn upload(
     let pages = pages.collect::<Result<_>>()?;
     let shared = shared(gpu, scene, needs)?;
     progress.end();
-    Ok(Uploaded { pages, shared })
+    Ok(Uploaded { pages, shared, order })
 }
 
 /// The page of the surfels at `indices`, of which each stands for its `copies`.

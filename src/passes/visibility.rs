@@ -10,7 +10,7 @@ use super::footprint::footprint;
 use super::splat::Splat;
 use crate::gpu::layout::TILE;
 use crate::plan::pass::Pass;
-use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage};
+use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
 use crate::plan::{Band, Optimisation, Plan};
 use crate::scene::{Camera, LowPass};
 
@@ -64,7 +64,9 @@ pub fn steps(plan: &Plan, band: usize, part: Part) -> Stage {
     let stage = Stage::new("visibility", band, vec![Run { kernel: VISIBILITY, over: Over::Slots(part) }]);
     match part {
         Part::Far => stage,
-        Part::All | Part::Near => stage.after(vec![Clear::of("nearest", 0, plan.bands[band].pixels)]),
+        Part::All | Part::Near => {
+            stage.after(vec![Clear::of("nearest", 0, plan.bands[band].pixels)]).as_twin(Twin::Visibility)
+        }
     }
 }
 

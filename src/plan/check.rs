@@ -26,8 +26,13 @@ pub fn options(options: &RenderOptions, reference: bool) -> Result<()> {
     if reference {
         return Ok(());
     }
-    if options.maps.has(Map::Decision) {
-        return usage("the decision map is made by the reference backend only");
+    for map in options.maps.iter().map(Map::row) {
+        if map.image_word.is_none() {
+            return usage(format!("the {} map is made by the reference backend only", map.name));
+        }
+        if options.raster.is_some() && !map.raster {
+            return usage(format!("the rasteriser makes no {} map: leave it out, or render by compute", map.name));
+        }
     }
     match options.raster {
         Some(raster) if raster.format == BlendFormat::Rgba8Unorm && options.maps.has(Map::Count) => {

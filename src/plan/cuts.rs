@@ -37,13 +37,17 @@ pub fn bands(adapter: &AdapterDescription, camera: &Camera, words: u32) -> Resul
     // A workgroup that draws a splat over the whole band must not tire the invocations of a processor: Mesa's llvmpipe ends loops
     // after 65,535 rounds; of cards none is known to.
     let untiring = if adapter.is_software() { MOST_ROUNDS * TILE * TILE } else { u32::MAX };
-    let rows = rows.min(u64::from(untiring / camera.width)).min(camera.height.into()).max(1) as u32;
+    Ok(strips(camera, rows.min(u64::from(untiring / camera.width)).min(camera.height.into()).max(1) as u32))
+}
+
+/// The image in bands of `rows` each, the last of what is left.
+pub fn strips(camera: &Camera, rows: u32) -> Vec<Band> {
     let band = |first: u32| {
         let rows = rows.min(camera.height - first);
         let [across, down] = [camera.width, rows].map(|side| u64::from(side.div_ceil(OCCLUSION_TILE)));
         Band { first, rows, pixels: u64::from(rows) * u64::from(camera.width), tiles: across * down }
     };
-    Ok((0..camera.height).step_by(rows as usize).map(band).collect())
+    (0..camera.height).step_by(rows as usize).map(band).collect()
 }
 
 /// Surfels of a page: whole batches, unless one is too large; each batch is a row of a dispatch, of which every adapter grants so

@@ -120,6 +120,24 @@ impl Plan {
         })
     }
 
+    /// The plan of the f64 reference, which draws strips of rows: no device is asked for anything, and nothing is left out.
+    pub fn of_reference(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Self {
+        let needs = SceneNeeds::of_picture(facts, camera, options);
+        Self {
+            // What a device draws in another way, the twins draw as all else.
+            needs: SceneNeeds { raster: None, tiles: false, ..needs },
+            pixel: PixelLayout::of(&needs),
+            sum_words: 0,
+            width: camera.width,
+            bands: cuts::strips(camera, tuning::REFERENCE_ROWS),
+            pages: 1,
+            lists_empty: options.shows_where_nothing_is(),
+            looks_for_slots: false,
+            large_by_tiles: false,
+            looks_for_lists: [false; 2],
+        }
+    }
+
     /// The parts that are drawn one after the other.
     pub fn parts(&self) -> &'static [Part] {
         if self.needs.cull { &[Part::Near, Part::Far] } else { &[Part::All] }

@@ -3,6 +3,7 @@
 
 use super::known::Listed;
 use crate::gpu::layout::WORKGROUP;
+use crate::scene::Map;
 
 /// A kernel: an entry point of WGSL, and the invocations of its workgroup.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,6 +96,34 @@ impl Clear {
     }
 }
 
+/// What the f64 reference does in one go.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Twin {
+    /// [`project`](crate::passes::project): splats.
+    Project,
+    /// [`visibility`](crate::passes::visibility): nearest depths.
+    Visibility,
+    /// [`accumulate`](mod@crate::passes::accumulate): sums.
+    Accumulate,
+    /// [`resolve`](crate::passes::resolve): the image.
+    Resolve,
+    /// A map that has a pass of its own.
+    Map(Map),
+}
+
+impl Twin {
+    /// The pass whose it is.
+    pub fn pass(self) -> &'static str {
+        match self {
+            Self::Project => "project",
+            Self::Visibility => "visibility",
+            Self::Accumulate => "accumulate",
+            Self::Resolve => "resolve",
+            Self::Map(map) => map.row().name,
+        }
+    }
+}
+
 /// Dispatches that are timed together.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stage {
@@ -108,17 +137,24 @@ pub struct Stage {
     pub clears: Vec<Clear>,
     /// The dispatches.
     pub runs: Vec<Run>,
+    /// What the reference does here; nothing in a stage that does a part of another's work, or none that shows.
+    pub twin: Option<Twin>,
 }
 
 impl Stage {
     /// One of `pass` over all pages in `band`, without clears.
     pub fn new(pass: &'static str, band: usize, runs: Vec<Run>) -> Self {
-        Self { pass, band, page: None, clears: Vec::new(), runs }
+        Self { pass, band, page: None, clears: Vec::new(), runs, twin: None }
     }
 
     /// The same after `clears`.
     pub fn after(self, clears: Vec<Clear>) -> Self {
         Self { clears, ..self }
+    }
+
+    /// The same, in whose place the reference has `twin`.
+    pub fn as_twin(self, twin: Twin) -> Self {
+        Self { twin: Some(twin), ..self }
     }
 }
 

@@ -23,6 +23,9 @@ pub const LARGE_BY_TILES: u32 = 256;
 /// Where there are no tiles, splats whose bounds hold more pixels than this get a workgroup each instead of an invocation.
 pub const LARGE_BY_WORKGROUPS: u32 = 1024;
 
+/// Rows that one thread of the f64 reference works on at a time.
+pub const REFERENCE_ROWS: u32 = 8;
+
 /// Whether the invocations of a tile share what they fetch: a processor would else fetch it for each of them. A card has caches for
 /// that, on which it has not been measured.
 pub fn shares(adapter: &AdapterDescription) -> bool {

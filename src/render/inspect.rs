@@ -13,9 +13,8 @@ use crate::gpu::buffers::Buffer;
 use crate::gpu::kernel::{grid, reflect};
 use crate::gpu::layout::{ONE, ONE_WIDE, Splat, View};
 use crate::gpu::{Gpu, Sources};
-use crate::passes::order::order;
 use crate::passes::upload::upload;
-use crate::plan::steps::{Stage, Step};
+use crate::plan::steps::{Stage, Step, Twin};
 use crate::plan::{Facts, Known, Optimisation, Organisation, PixelLayout, Plan, RenderOptions};
 use crate::scene::{Camera, Scene};
 
@@ -85,12 +84,14 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
         )));
     };
     let kernels = Kernels::new(gpu, sources, &plan, options, facts.surfels)?;
-    let mut store = Store::new(gpu, upload(gpu, scene, &plan.needs, Some(&facts.core), &())?, &plan.needs)?;
+    let uploaded = upload(gpu, scene, &plan.needs, Some(&facts.core), &())?;
+    let order = uploaded.order.clone();
+    let mut store = Store::new(gpu, uploaded, &plan.needs)?;
     store.fit(gpu, &plan, &known)?;
     let view = View::new(&facts, camera, options);
     store.set_view(gpu, &view);
     let mut run = Run::new(gpu, &plan, &kernels, &mut store, &mut known);
-    let resolves = |step: &Step| matches!(step, Step::Stage(Stage { pass: "resolve", .. }));
+    let resolves = |step: &Step| matches!(step, Step::Stage(Stage { twin: Some(Twin::Resolve), .. }));
     let steps: Vec<_> = sequence::steps(&plan).into_iter().take_while(|step| !resolves(step)).collect();
     run.steps(&steps, &mut Frame::empty(camera, options.maps), &())?;
     run.timing.flush(gpu)?;
@@ -99,7 +100,7 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
         None => Ok(Vec::new()),
     };
     Ok(Stages {
-        splats: splats(gpu, scene, &facts, &store)?,
+        splats: splats(gpu, &order, &store)?,
         nearest: words("nearest", band.pixels)?,
         sums: words("sums", band.pixels * u64::from(plan.sum_words))?,
         pixel: plan.pixel,
@@ -109,15 +110,15 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
 }
 
 /// The record of each surfel, in the order of the scene.
-fn splats(gpu: &Gpu, scene: &Scene, facts: &Facts, store: &Store) -> Result<Vec<Splat>> {
-    let mut splats = vec![Splat::zeroed(); scene.surfels.len()];
-    let mut order = order(&scene.surfels, &facts.core).into_iter();
+fn splats(gpu: &Gpu, order: &[u32], store: &Store) -> Result<Vec<Splat>> {
+    let mut splats = vec![Splat::zeroed(); order.len()];
+    let mut order = order.iter();
     let words = (size_of::<Splat>() / 4) as u64;
     for page in &store.pages {
         let Some(stored) = page.buffer("splats") else { continue };
         let stored = stored.read(gpu, page.slots * words)?;
         for (splat, index) in bytemuck::cast_slice(&stored).iter().zip(&mut order) {
-            splats[index as usize] = *splat;
+            splats[*index as usize] = *splat;
         }
     }
     Ok(splats)

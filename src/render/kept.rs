@@ -12,8 +12,8 @@ use crate::error::Result;
 use crate::frame::Frame;
 use crate::gpu::layout::View;
 use crate::gpu::{Gpu, Sources};
-use crate::passes::tiles;
 use crate::passes::upload::upload;
+use crate::passes::{asks_for_order, finish, tiles};
 use crate::plan::known::MOST_TRIES;
 use crate::plan::{Facts, Known, Optimisation, Organisation, Plan, RenderOptions, tuning};
 use crate::progress::Progress;
@@ -73,6 +73,7 @@ impl Kept {
             }
             let tally = run.tally()?;
             if tally.complete {
+                finish(&mut frame, &plan.needs, scene, &run.store.order);
                 bar.end();
                 let clock = if run.timing.on_device() { "timestamps" } else { "wall" };
                 let passes = run.timing.finish(gpu)?;
@@ -119,7 +120,8 @@ impl Kept {
         let store = match &mut self.store {
             Some(store) => store,
             empty => {
-                let core = self.options.has(Optimisation::Order).then_some(&self.facts.core);
+                let ordered = self.options.has(Optimisation::Order) || asks_for_order(&plan.needs);
+                let core = ordered.then_some(&self.facts.core);
                 let uploaded = upload(gpu, scene, &plan.needs, core, progress)?;
                 empty.insert(Store::new(gpu, uploaded, &plan.needs)?)
             }

@@ -1,21 +1,22 @@
-//! The sequence in f64 on the processor's threads: what the twins make of a scene, strip by strip.
+//! The sequence in f64 on the processor's threads: what the twins make of a scene, strip by strip of the image, by the steps of a plan
+//! that no device makes.
 
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use rayon::prelude::*;
 
 use super::report::Report;
+use super::sequence;
 use crate::frame::Frame;
+use crate::passes::order::order;
 use crate::passes::splat::Splat;
-use crate::passes::{accumulate, project, resolve, visibility};
-use crate::plan::{Facts, RenderOptions, SceneNeeds};
+use crate::passes::{MAP_PASSES, Strip, accumulate, project, resolve, visibility};
+use crate::plan::steps::{Step, Twin};
+use crate::plan::{Facts, Plan, RenderOptions, SceneNeeds};
 use crate::progress::Progress;
 use crate::scene::{Camera, Scene};
-
-/// Rows that one thread of the reference works on at a time.
-const REFERENCE_ROWS: u32 = 8;
 
 /// Renders `scene`.
 pub(super) fn frame(
@@ -26,51 +27,102 @@ pub(super) fn frame(
     progress: &dyn Progress,
 ) -> (Frame, Report) {
     let start = Instant::now();
-    let splats = project::reference_all(scene, camera, options);
-    let project_ms = start.elapsed().as_secs_f64() * 1e3;
-
-    let bands = camera.height.div_ceil(REFERENCE_ROWS);
-    let (starts, members) = bin(&splats, bands as usize);
+    let plan = Plan::of_reference(facts, camera, options);
+    let (before, of_bands) = twins(&plan);
+    let spent = Spent::default();
+    let mut splats = Vec::new();
+    if before.contains(&Twin::Project) {
+        splats = spent.timed("project", 1, || project::reference_all(scene, camera, options));
+    }
+    let (starts, members) = bin(&splats, &plan);
+    let ranks = MAP_PASSES.iter().any(|own| plan.needs.maps.has(own.map)).then(|| ranks(scene, facts));
     progress.begin("rendering rows", camera.height.into());
-    let spent: [AtomicU64; 3] = Default::default();
-    let strip = |band: u32| {
-        let first_row = band * REFERENCE_ROWS;
-        let rows = REFERENCE_ROWS.min(camera.height - first_row);
-        let range = starts[band as usize]..starts[band as usize + 1];
-        let splats = || members[range.clone()].iter().map(|&index| &splats[index as usize]);
-        let clock = Instant::now();
-        let lap = |stage: usize, from: f64| {
-            let now = clock.elapsed().as_secs_f64();
-            spent[stage].fetch_add(((now - from) * 1e9) as u64, Ordering::Relaxed);
-            now
-        };
-        let nearest = visibility::reference(splats(), camera, options.low_pass, first_row, rows);
-        let seen = lap(0, 0.0);
-        let sums = accumulate::reference(splats(), scene, camera, options, first_row, &nearest);
-        let summed = lap(1, seen);
-        let strip = Camera { height: rows, ..camera.clone() };
-        let mut frame = Frame::new(&strip, options.maps);
-        resolve::reference(&sums, scene, camera, options, first_row, &mut frame);
-        lap(2, summed);
+    let one = |band: usize| {
+        let (first_row, rows) = (plan.bands[band].first, plan.bands[band].rows);
+        let splats: Vec<&Splat> =
+            members[starts[band]..starts[band + 1]].iter().map(|&index| &splats[index as usize]).collect();
+        let strip = Strip { scene, camera, options, splats, ranks: ranks.as_deref(), first_row, rows };
+        let frame = strip_by(&strip, &of_bands[band], &spent);
         progress.advance(rows.into());
         frame
     };
     // A few strips at a time: all of them beside the frame would double its memory.
     let mut frame = Frame::empty(camera, options.maps);
-    let group = 8 * rayon::current_num_threads() as u32;
-    for first in (0..bands).step_by(group as usize) {
-        let strips: Vec<Frame> = (first..bands.min(first + group)).into_par_iter().map(strip).collect();
+    let bands: Vec<usize> = (0..plan.bands.len()).collect();
+    for group in bands.chunks(8 * rayon::current_num_threads()) {
+        let strips: Vec<Frame> = group.par_iter().map(|band| one(*band)).collect();
         strips.into_iter().for_each(|strip| frame.append(strip));
     }
     progress.end();
     let drawn = splats.iter().map(|splat| u64::from(splat.copies)).sum();
-    let threads = rayon::current_num_threads() as f64;
-    let mut passes = BTreeMap::from([("project_ms".to_owned(), project_ms)]);
-    for (stage, spent) in ["visibility_ms", "accumulate_ms", "resolve_ms"].into_iter().zip(&spent) {
-        passes.insert(stage.to_owned(), spent.load(Ordering::Relaxed) as f64 * 1e-6 / threads);
+    (frame, report(camera, plan.needs, (facts.surfels, drawn), spent.passes(), start.elapsed().as_secs_f64() * 1e3))
+}
+
+/// What the steps of `plan` have twins for: before there are bands, and in each of them.
+fn twins(plan: &Plan) -> (Vec<Twin>, Vec<Vec<Twin>>) {
+    let (mut before, mut of_bands) = (Vec::new(), vec![Vec::new(); plan.bands.len()]);
+    for step in sequence::steps(plan) {
+        let Step::Stage(stage) = step else { continue };
+        match stage.twin {
+            Some(Twin::Project) => before.push(Twin::Project),
+            Some(twin) => of_bands[stage.band].push(twin),
+            None => {}
+        }
     }
-    let needs = SceneNeeds::of_picture(facts, camera, options);
-    (frame, report(camera, needs, (facts.surfels, drawn), passes, start.elapsed().as_secs_f64() * 1e3))
+    (before, of_bands)
+}
+
+/// The rows of a strip by its `twins`.
+fn strip_by(strip: &Strip<'_>, twins: &[Twin], spent: &Spent) -> Frame {
+    let Strip { scene, camera, options, first_row, rows, .. } = *strip;
+    let splats = || strip.splats.iter().copied();
+    let (mut nearest, mut sums) = (Vec::new(), Vec::new());
+    let mut frame = Frame::new(&Camera { height: rows, ..camera.clone() }, options.maps);
+    for twin in twins {
+        spent.timed(twin.pass(), rayon::current_num_threads(), || match twin {
+            Twin::Project => {}
+            Twin::Visibility => nearest = visibility::reference(splats(), camera, options.low_pass, first_row, rows),
+            Twin::Accumulate => {
+                sums = accumulate::reference(splats(), scene, camera, options, first_row, &nearest);
+            }
+            Twin::Resolve => resolve::reference(&sums, scene, camera, options, first_row, &mut frame),
+            Twin::Map(map) => {
+                let own = MAP_PASSES.iter().filter(|own| own.map == *map);
+                own.for_each(|own| (own.reference)(strip, &nearest, &mut frame));
+            }
+        });
+    }
+    frame
+}
+
+/// The place of each surfel in the order in which a device stores them.
+fn ranks(scene: &Scene, facts: &Facts) -> Vec<u32> {
+    let mut ranks = vec![0; scene.surfels.len()];
+    for (rank, index) in order(scene, &facts.core).into_iter().enumerate() {
+        ranks[index as usize] = rank as u32;
+    }
+    ranks
+}
+
+/// Milliseconds by pass: what all threads took, over their number.
+#[derive(Default)]
+struct Spent(Mutex<BTreeMap<String, f64>>);
+
+impl Spent {
+    /// What `work` makes, by one of `threads` that do as much.
+    fn timed<T>(&self, pass: &str, threads: usize, work: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        let made = work();
+        let ms = start.elapsed().as_secs_f64() * 1e3 / threads as f64;
+        // Whoever panicked held nothing but a sum.
+        let mut passes = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        *passes.entry(format!("{pass}_ms")).or_default() += ms;
+        made
+    }
+
+    fn passes(self) -> BTreeMap<String, f64> {
+        self.0.into_inner().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 fn report(
@@ -96,9 +148,11 @@ fn report(
     }
 }
 
-/// The splats of each band of rows, by count, scan, place: `members[starts[b]..starts[b + 1]]` are band b's, in order.
-fn bin(splats: &[Splat], bands: usize) -> (Vec<usize>, Vec<u32>) {
-    let range = |splat: &Splat| (splat.first[1] / REFERENCE_ROWS) as usize..=(splat.last[1] / REFERENCE_ROWS) as usize;
+/// The splats of each band of `plan`, by count, scan, place: `members[starts[b]..starts[b + 1]]` are band b's, in order.
+fn bin(splats: &[Splat], plan: &Plan) -> (Vec<usize>, Vec<u32>) {
+    let bands = plan.bands.len();
+    let band_of = |row: u32| plan.bands.partition_point(|band| band.first <= row) - 1;
+    let range = |splat: &Splat| band_of(splat.first[1])..=band_of(splat.last[1]);
     let mut starts = vec![0; bands + 1];
     for splat in splats {
         range(splat).for_each(|band| starts[band + 1] += 1);

@@ -1,6 +1,6 @@
 //! A frame as a list of steps: the papers' passes in their order.
 
-use crate::passes::{accumulate, cull, project, raster, resolve, tiles, visibility};
+use crate::passes::{accumulate, cull, of_maps, project, raster, resolve, tiles, visibility};
 use crate::plan::Plan;
 use crate::plan::known::Listed;
 use crate::plan::steps::{Look, Part, Stage, Step};
@@ -20,6 +20,7 @@ pub fn steps(plan: &Plan) -> Vec<Step> {
         if !plan.needs.gather {
             steps.push(Step::Stage(resolve::steps(plan, band)));
         }
+        steps.extend(of_maps(plan, band).map(Step::Stage));
         steps.push(Step::ReadBack(band));
     }
     steps

@@ -9,7 +9,7 @@ use crate::gpu::buffers::{Buffer, Readback};
 use crate::gpu::layout::{BATCH, Band as BandUniform, Filter, LIST_START, QUEUE_START, Splat, View, WORKGROUP};
 use crate::passes::tiles::{list_name, list_words};
 use crate::passes::upload::{self, Uploaded};
-use crate::passes::{covered, visibility};
+use crate::passes::{asks_for_order, covered, visibility};
 use crate::plan::known::Listed;
 use crate::plan::{Band, Known, Plan, Raster, SceneNeeds};
 use crate::scene::LowPass;
@@ -131,6 +131,8 @@ pub struct Store {
     readback: Option<Readback>,
     /// The rasteriser's textures.
     pub targets: Option<Targets>,
+    /// The surfels of all pages, as indices in the scene; where a map asks for them.
+    pub order: Vec<u32>,
 }
 
 impl Store {
@@ -147,6 +149,7 @@ impl Store {
             entries: [0; 2],
             readback: None,
             targets: None,
+            order: if asks_for_order(needs) { uploaded.order } else { Vec::new() },
         })
     }
 

@@ -35,6 +35,10 @@ pub struct MapRow {
     pub need: &'static str,
     /// The overridable constant of WGSL that says which word of a pixel's image is its first. None of a map that the reference alone makes.
     pub image_word: Option<&'static str>,
+    /// The rasteriser makes it too.
+    pub raster: bool,
+    /// Its values are whole numbers, kept in the bits of an f32.
+    pub numbers: bool,
     /// Two images are compared in it.
     pub compared: bool,
 }
@@ -45,7 +49,7 @@ pub const MAPS: [MapRow; 5] = [
     row(Map::Normal, "normal", &["X", "Y", "Z"], "normal-map", Some("NORMAL_IMAGE")),
     row(Map::Weight, "weight", &["Y"], "weight-map", Some("WEIGHT_IMAGE")),
     row(Map::Count, "count", &["Y"], "count", Some("COUNT_IMAGE")),
-    MapRow { compared: false, ..row(Map::Decision, "decision", &["Y"], "decision", None) },
+    MapRow { raster: false, compared: false, ..row(Map::Decision, "decision", &["Y"], "decision", None) },
 ];
 
 const fn row(
@@ -55,7 +59,7 @@ const fn row(
     need: &'static str,
     image_word: Option<&'static str>,
 ) -> MapRow {
-    MapRow { map, name, channels, need, image_word, compared: true }
+    MapRow { map, name, channels, need, image_word, raster: true, numbers: false, compared: true }
 }
 
 impl Map {
@@ -90,11 +94,11 @@ impl Maps {
     /// No map.
     pub const NONE: Self = Self(0);
 
-    /// All that a device makes.
+    /// All that every device makes, by compute and by its rasteriser.
     pub const ON_DEVICE: Self = {
         let (mut set, mut row) = (0, 0);
         while row < MAPS.len() {
-            if MAPS[row].image_word.is_some() {
+            if MAPS[row].raster {
                 set |= 1 << row;
             }
             row += 1;

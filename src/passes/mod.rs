@@ -13,7 +13,7 @@
 //! | [`covered`] | nearest depths | the tiles that have anything |
 //! | [`resolve`] | sums | [`Frame`](crate::frame::Frame) |
 //!
-//! [`unseen`] says why none of them shows where none does.
+//! [`index`] makes a map of its own. [`unseen`] says why none of them shows where none does.
 //!
 //! [`footprint`] is evaluated inside visibility and accumulate, with the [`homography`] and the [`lowpass`] that [`project`] prepared,
 //! and the [`attributes`] that are blended; [`shared`] is what every kernel has.
@@ -24,6 +24,7 @@ pub mod covered;
 pub mod cull;
 pub mod footprint;
 pub mod homography;
+pub mod index;
 pub mod lowpass;
 pub mod order;
 pub mod project;
@@ -76,7 +77,7 @@ pub struct MapPass {
 }
 
 /// Those maps.
-pub const MAP_PASSES: [&MapPass; 0] = [];
+pub const MAP_PASSES: [&MapPass; 1] = [&index::MAP];
 
 /// Those that `needs` ask for.
 fn own_maps(needs: &SceneNeeds) -> impl Iterator<Item = &'static MapPass> {

@@ -15,7 +15,7 @@ use crate::plan::{Band, Known, Plan, Raster, SceneNeeds};
 use crate::scene::LowPass;
 
 /// Names in WGSL of buffers that have another one where kernels write them.
-const ALIASES: [(&str, &str); 7] = [
+const ALIASES: [(&str, &str); 8] = [
     ("projected", "splats"),
     ("queued", "queue"),
     ("listed", "rare"),
@@ -23,11 +23,24 @@ const ALIASES: [(&str, &str); 7] = [
     ("surviving", "drawn"),
     ("visible", "nearest"),
     ("added", "sums"),
+    ("indexed", "image"),
 ];
 
 /// Names of buffers that each page has.
-const PAGED: [&str; 11] =
-    ["balls", "centers_low", "colors", "copies", "drawn", "filters", "queue", "rare", "rest", "splats", "surfels"];
+const PAGED: [&str; 12] = [
+    "balls",
+    "centers_low",
+    "colors",
+    "copies",
+    "drawn",
+    "filters",
+    "page_first",
+    "queue",
+    "rare",
+    "rest",
+    "splats",
+    "surfels",
+];
 
 /// The name under which a buffer is kept.
 fn kept(name: &str) -> &str {
@@ -54,7 +67,7 @@ pub struct Page {
 }
 
 impl Page {
-    fn new(gpu: &Gpu, uploaded: upload::Page, low_pass: LowPass) -> Result<Self> {
+    fn new(gpu: &Gpu, uploaded: upload::Page, first: u32, low_pass: LowPass) -> Result<Self> {
         let upload::Page { buffers, surfels, stand_for } = uploaded;
         let mut buffers = Named::from_iter(buffers);
         let batches = surfels.div_ceil(BATCH.into());
@@ -67,6 +80,7 @@ impl Page {
         for (name, what) in [("queue", "queue of large splats"), ("rare", "list of rare splats")] {
             buffers.insert(name, Buffer::indirect(gpu, what, QUEUE_START.into())?);
         }
+        buffers.insert("page_first", Buffer::uniform(gpu, "page", &first)?);
         if low_pass != LowPass::None {
             buffers.insert("filters", Buffer::<Filter>::storage(gpu, "low-pass filters", 0)?.words());
         }
@@ -138,7 +152,13 @@ pub struct Store {
 impl Store {
     /// The scene's buffers, which were `uploaded` for a render with `needs`; none for pixels yet.
     pub fn new(gpu: &Gpu, uploaded: Uploaded, needs: &SceneNeeds) -> Result<Self> {
-        let pages = uploaded.pages.into_iter().map(|page| Page::new(gpu, page, needs.low_pass));
+        let mut first = 0;
+        let pages = uploaded.pages.into_iter().map(|page| {
+            let surfels = page.surfels as u32;
+            let page = Page::new(gpu, page, first, needs.low_pass);
+            first += surfels;
+            page
+        });
         Ok(Self {
             copies: needs.copies,
             pages: pages.collect::<Result<_>>()?,

@@ -20,6 +20,10 @@ pub enum Map {
     /// Reference only: the smallest relative distance of any fragment of the pixel to a yes-or-no decision (disk rim,
     /// epsilon, near depth). Where it is tiny, f32 may rightly decide otherwise.
     Decision,
+    /// The number of the input and of the point in it (both from 0, [`Scene::provenance`](super::Scene::provenance)) that the visible
+    /// surfel with the greatest weight is; of equal weights, by what the surfels are ([`index`](mod@crate::passes::index)).
+    /// [`NOTHING`](crate::passes::index::NOTHING) where nothing is.
+    Index,
 }
 
 /// How one map is named and kept.
@@ -44,12 +48,18 @@ pub struct MapRow {
 }
 
 /// The maps, in the order of [`Map`].
-pub const MAPS: [MapRow; 5] = [
+pub const MAPS: [MapRow; 6] = [
     row(Map::Depth, "depth", &["Z"], "depth", Some("DEPTH_IMAGE")),
     row(Map::Normal, "normal", &["X", "Y", "Z"], "normal-map", Some("NORMAL_IMAGE")),
     row(Map::Weight, "weight", &["Y"], "weight-map", Some("WEIGHT_IMAGE")),
     row(Map::Count, "count", &["Y"], "count", Some("COUNT_IMAGE")),
     MapRow { raster: false, compared: false, ..row(Map::Decision, "decision", &["Y"], "decision", None) },
+    MapRow {
+        raster: false,
+        numbers: true,
+        compared: false,
+        ..row(Map::Index, "index", &["input", "point"], "index", Some("INDEX_IMAGE"))
+    },
 ];
 
 const fn row(

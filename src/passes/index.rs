@@ -1,0 +1,88 @@
+//! A map of its own: at each pixel, which surfel has the greatest weight of those within epsilon of the nearest depth, by the number of
+//! its input and of its point there. Of equal weights (on a device: within four units in the last place of f32) the surfel that comes
+//! first in the [`order`](super::order) has it, which depends on what surfels are and not on where they stood in their files.
+//!
+//! Two sweeps over the fragments keep the greatest weight, then the first of those that have it, in the map's own words of the image.
+
+use super::footprint::footprint;
+use super::{MapPass, Strip};
+use crate::frame::Frame;
+use crate::gpu::layout::TILE;
+use crate::plan::Plan;
+use crate::plan::pass::Pass;
+use crate::plan::steps::{Kernel, Over, Part, Run, Stage};
+use crate::scene::options::LEAST_FILTERED_WEIGHT;
+use crate::scene::{Map, Scene};
+
+/// The map's row.
+pub const MAP: MapPass = MapPass {
+    map: Map::Index,
+    pass: Pass {
+        name: "index",
+        files: |_| vec!["index.wgsl"],
+        kernels: |_| vec![STRONGEST, STRONGEST_LARGE, NAME, NAME_LARGE],
+        constants: |_| Vec::new(),
+    },
+    runs,
+    finish,
+    reference,
+};
+
+const STRONGEST: Kernel = Kernel::new("strongest");
+const STRONGEST_LARGE: Kernel = Kernel::of("strongest_large", [TILE, TILE, 1]);
+const NAME: Kernel = Kernel::new("name_strongest");
+const NAME_LARGE: Kernel = Kernel::of("name_strongest_large", [TILE, TILE, 1]);
+
+/// The numbers of a pixel where nothing is.
+pub const NOTHING: u32 = u32::MAX;
+
+fn runs(_: &Plan, band: usize) -> Stage {
+    let run = |kernel, over| Run { kernel, over };
+    let (slots, large) = (Over::Slots(Part::All), Over::Large);
+    let runs = vec![run(STRONGEST, slots), run(STRONGEST_LARGE, large), run(NAME, slots), run(NAME_LARGE, large)];
+    Stage::new("index", band, runs)
+}
+
+/// Input and point of a surfel, as a pixel of a frame keeps them.
+fn named(scene: &Scene, surfel: Option<u32>) -> [f32; 2] {
+    let Some(surfel) = surfel else { return [f32::from_bits(NOTHING); 2] };
+    let (input, point) = scene.provenance.of(surfel.into());
+    [input, point].map(|number| f32::from_bits(u32::try_from(number).unwrap_or(NOTHING - 1)))
+}
+
+/// Of a weight and what a place lacks to the last number, input and point.
+fn finish(words: &mut [f32], scene: &Scene, order: &[u32]) {
+    for [weight, place] in words.as_chunks_mut().0 {
+        let surfel = order.get((u32::MAX - place.to_bits()) as usize);
+        [*weight, *place] = named(scene, surfel.copied());
+    }
+}
+
+/// The twin.
+fn reference(strip: &Strip<'_>, nearest: &[f64], frame: &mut Frame) {
+    let Strip { scene, camera, options, first_row, rows, .. } = *strip;
+    let (Some(ranks), Some(map)) = (strip.ranks, frame.map_mut(Map::Index)) else { return };
+    let (relative, absolute, of_radius) = options.epsilon.parts();
+    let mut strongest = vec![(0.0, NOTHING, NOTHING); nearest.len()];
+    for splat in &strip.splats {
+        let surfel = splat.surfel as usize;
+        let epsilon = absolute + of_radius * f64::from(scene.surfels[surfel].radius());
+        for y in splat.first[1].max(first_row)..=splat.last[1].min(first_row + rows - 1) {
+            for x in splat.first[0]..=splat.last[0] {
+                let pixel = ((y - first_row) * camera.width + x) as usize;
+                let Some((at, gain)) = footprint(splat, camera, options.low_pass, x, y) else { continue };
+                if !at.hit(camera) || at.depth > nearest[pixel] * (1.0 + relative) + epsilon {
+                    continue;
+                }
+                let weight = (gain * options.kernel.weight(at.rho2)).max(LEAST_FILTERED_WEIGHT);
+                let (most, rank, _) = strongest[pixel];
+                if weight > most || (weight == most && ranks[surfel] < rank) {
+                    strongest[pixel] = (weight, ranks[surfel], splat.surfel);
+                }
+            }
+        }
+    }
+    for (words, (_, _, surfel)) in map.as_chunks_mut().0.iter_mut().zip(strongest) {
+        *words = named(scene, (surfel != NOTHING).then_some(surfel));
+    }
+}

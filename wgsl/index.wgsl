@@ -1,0 +1,107 @@
+// The map of the strongest surfels, by the words of the image: of the fragments within epsilon of a pixel's nearest depth the greatest
+// weight, and then the place of the surfel that has it. Twin: src/passes/index.rs.
+// All loops end, by 1, 2 of src/gpu/loops.rs: 0x6c747a20c6736c7f
+
+// The image, of which these words are no one else's.
+@group(0) @binding(41) var<storage, read_write> indexed: array<atomic<u32>>;
+// Surfels of the pages before this one.
+@group(0) @binding(42) var<uniform> page_first: u32;
+
+override INDEX_IMAGE: u32;
+
+// Weights so near the greatest, in units in the last place, are as great: two kernels may round one differently.
+const AS_GREAT: u32 = 4u;
+
+// Positive weights order as their bits. Places are kept as what they lack to the last number, so that the first is the greatest, and
+// a cleared pixel has none.
+fn take(splat: Splat, filter_: Filter, surfel: u32, x: u32, y: u32, names: bool) {
+    let fragment = footprint(splat, filter_, x, y);
+    let pixel = pixel_index(x, y);
+    if (!fragment.hit || fragment.depth > farthest_accepted(front_at(pixel), radius_of(surfel))) {
+        return;
+    }
+    let weight = bitcast<u32>(fragment_weight(fragment));
+    let at = pixel * IMAGE_WORDS + INDEX_IMAGE;
+    if (!names) {
+        atomicMax(&indexed[at], weight);
+    } else if (weight + AS_GREAT >= atomicLoad(&indexed[at])) {
+        atomicMax(&indexed[at + 1u], 0xffffffffu - (page_first + surfel));
+    }
+}
+
+fn take_small(slot: u32, names: bool) {
+    if (slot >= arrayLength(&projected)) {
+        return;
+    }
+    let record = projected[slot];
+    let splat = splat_of(record);
+    let surfel = surfel_in(record, slot);
+    let filter_ = filter_of(slot);
+    let pixels = reach(splat);
+    if (is_large(splat) || hidden(splat, filter_, pixels, radius_of(surfel))) {
+        return;
+    }
+    var at = pixels.first;
+    while (at.y <= pixels.last.y) {
+        take(splat, filter_, surfel, at.x, at.y, names);
+        at.x++;
+        at = select(at, vec2<u32>(pixels.first.x, at.y + 1u), at.x > pixels.last.x);
+    }
+}
+
+fn take_large(place: u32, local: vec2<u32>, names: bool) {
+    let slot = large_splat(place);
+    if (slot >= arrayLength(&projected)) {
+        return;
+    }
+    let record = projected[slot];
+    let splat = splat_of(record);
+    let surfel = surfel_in(record, slot);
+    let filter_ = filter_of(slot);
+    let pixels = reach(splat);
+    for (var y = pixels.first.y + local.y; y <= pixels.last.y; y += TILE) {
+        for (var x = pixels.first.x + local.x; x <= pixels.last.x; x += TILE) {
+            take(splat, filter_, surfel, x, y, names);
+        }
+    }
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn strongest(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    hold();
+    take_small(slot_of(workgroup, workgroups, local), false);
+}
+
+@compute @workgroup_size(TILE, TILE)
+fn strongest_large(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_id) local: vec3<u32>,
+) {
+    hold();
+    take_large(workgroup.y * workgroups.x + workgroup.x, local.xy, false);
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn name_strongest(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    hold();
+    take_small(slot_of(workgroup, workgroups, local), true);
+}
+
+@compute @workgroup_size(TILE, TILE)
+fn name_strongest_large(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_id) local: vec3<u32>,
+) {
+    hold();
+    take_large(workgroup.y * workgroups.x + workgroup.x, local.xy, true);
+}

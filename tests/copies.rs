@@ -74,7 +74,7 @@ fn the_reference_multiplies_too() {
 #[test]
 fn a_wrong_number_shows() {
     for (file, from, to) in [
-        ("copies.wgsl", "times = copies[index];", "times = 1u;"),
+        ("copies.wgsl", "times = copies_of(index);", "times = 1u;"),
         ("copies.wgsl", "a_high * b_high + (one >> 16u)", "a_high * b_high"),
         ("accumulator_fixed_wide.wgsl", "select(0u, 1u, before + term.x < before)", "0u"),
     ] {

@@ -183,7 +183,7 @@ fn small_buffers_make_bands_and_pages() {
     let options = RenderOptions { maps: Maps::of(&[Map::Depth, Map::Normal]), ..Default::default() };
     let known = Known { large: Some(true), entries: [Some(10), None], ..Known::default() };
     let plan = planned(&scene, 64, &small, &options, &known);
-    assert_eq!((plan.bands.len(), plan.pages), (3, 3000_u64.div_ceil(page_surfels(&small)) as usize));
+    assert_eq!((plan.bands.len(), plan.pages), (3, 3000_u64.div_ceil(page_surfels(&small, &plan.needs)) as usize));
     assert!(plan.pages > 1 && !plan.needs.cull && !plan.needs.gather);
     assert_eq!(plan.bands.iter().map(|band| band.rows).sum::<u32>(), 64);
     let lines = lines(&plan);

@@ -13,7 +13,9 @@ use epsplat::gpu::kernel::reflect;
 use epsplat::gpu::sources::FILES;
 use epsplat::passes;
 use epsplat::plan::pass::Making;
-use epsplat::plan::{Accumulator, COLOR_CHANNEL, ColorNeed, Features, PixelLayout, RenderOptions, color_channels};
+use epsplat::plan::{
+    Accumulator, COLOR_CHANNEL, ColorNeed, Features, PixelLayout, RenderOptions, SceneNeeds, color_channels,
+};
 use epsplat::scene::{Kernel, KernelShape, MAPS, Map};
 use naga::AddressSpace;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
@@ -85,6 +87,43 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
     assert_eq!(without, BTreeSet::from(["fixed", "fixed64", "float", "packed64", "records", "tiles"]));
     // The default runs anywhere.
     assert_eq!(Accumulator::Fixed.row().features, Features::None);
+}
+
+/// Names of needs of which a render has one at most.
+const ALTERNATIVES: [&[&str]; 6] = [
+    &["pinhole", "orthographic"],
+    &["kernel-gaussian", "kernel-ellipse", "kernel-hat", "kernel-constant"],
+    &["color-constant", "color-srgb8", "color-linear", "color-textured"],
+    &["raster-exact", "raster-offset", "raster-ray"],
+    &["lowpass-max", "lowpass-ewa"],
+    &["lambert", "phong"],
+];
+
+/// Needs that no render has together (`src/plan/check.rs`, `src/plan/needs.rs`).
+const EXCLUSIVE: [(&str, &[&str]); 4] = [
+    ("color-textured", &["tiles", "gather", "copies", "raster-exact", "raster-offset", "raster-ray"]),
+    ("copies", &["tiles", "gather", "cull", "atomics-u64"]),
+    ("color-constant", &["alpha"]),
+    ("raster", &["wide-sums", "atomics-u64", "copies", "cull", "tiles", "gather", "index"]),
+];
+
+#[test]
+fn all_needs_that_go_together_meet() {
+    let all: Vec<_> = common::all_needs().iter().map(SceneNeeds::names).collect();
+    let names: BTreeSet<&str> = all.iter().flatten().copied().collect();
+    let apart = |a: &str, b: &str| {
+        let listed = |(of, others): &(&str, &[&str])| a.starts_with(of) && others.contains(&b);
+        ALTERNATIVES.iter().any(|group| group.contains(&a) && group.contains(&b)) || EXCLUSIVE.iter().any(listed)
+    };
+    let mut missing = Vec::new();
+    for (a, b) in names.iter().flat_map(|a| names.iter().map(move |b| (*a, *b))).filter(|(a, b)| a < b) {
+        let meet = all.iter().any(|needs| needs.contains(&a) && needs.contains(&b));
+        if meet == (apart(a, b) || apart(b, a)) {
+            missing.push((a, b, meet));
+        }
+    }
+    assert_eq!(missing, []);
+    assert!(names.len() >= 30, "{names:?}");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 // splat, one workgroup a large splat. Each fragment's terms are quantised before they are added, so the sums do not
 // depend on the order.
 // Twin: src/passes/accumulate.rs.
-// All loops end, by 2, 4 of src/gpu/loops.rs: 0x9e179abdd3183d73
+// All loops end, by 2, 4 of src/gpu/loops.rs: 0xdfa8c1a9482b34ad
 
 @group(0) @binding(7) var<storage, read> visible: array<u32>;
 
@@ -52,7 +52,7 @@ fn accumulate(
         let record = projected[slot];
         let splat = splat_of(record);
         let surfel = surfel_in(record, slot);
-        let filter_ = filter_of(slot);
+        let filter_ = filter_in(record);
         let pixels = reach(splat);
         if (!is_large(splat) && !hidden(splat, filter_, pixels, radius_of(surfel))) {
             accumulate_splat(surfel, splat, filter_, pixels, vec2<u32>(0u), 1u);
@@ -71,6 +71,6 @@ fn accumulate_large(
     if (slot < arrayLength(&projected)) {
         let record = projected[slot];
         let splat = splat_of(record);
-        accumulate_splat(surfel_in(record, slot), splat, filter_of(slot), reach(splat), local.xy, TILE);
+        accumulate_splat(surfel_in(record, slot), splat, filter_in(record), reach(splat), local.xy, TILE);
     }
 }

@@ -5,9 +5,9 @@
 override CHANNELS: u32;
 override FRACTION_BITS: u32;
 
+// Two words come first: how many fragments made a sum wrap, and none.
 @group(0) @binding(8) var<storage, read_write> sums: array<atomic<u32>>;
-// Fragments that made a sum wrap.
-@group(0) @binding(14) var<storage, read_write> overflows: atomic<u32>;
+const HEAD: u32 = 2u;
 
 // The fragment in work did.
 var<private> wrapped: bool;
@@ -29,14 +29,14 @@ fn term(weight: Term, value: f32) -> Term {
 }
 
 fn add(pixel: u32, channel: u32, value: Term) {
-    let before = atomicAdd(&sums[pixel * CHANNELS + channel], value);
+    let before = atomicAdd(&sums[HEAD + pixel * CHANNELS + channel], value);
     wrapped |= before + value < before;
 }
 
 // After a fragment's terms.
 fn settle(pixel: u32) {
     if (wrapped) {
-        atomicAdd(&overflows, 1u);
+        atomicAdd(&sums[0], 1u);
         wrapped = false;
     }
 }
@@ -49,7 +49,7 @@ fn add_pair(pixel: u32, channel: u32, first: Term, second: Term) {
 fn show(pixel: u32) {}
 
 fn sum_at(pixel: u32, channel: u32) -> f32 {
-    return f32(atomicLoad(&sums[pixel * CHANNELS + channel]));
+    return f32(atomicLoad(&sums[HEAD + pixel * CHANNELS + channel]));
 }
 
 fn weight_at(pixel: u32) -> f32 {

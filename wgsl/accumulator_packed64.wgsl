@@ -4,8 +4,9 @@
 override CHANNELS: u32;
 override FRACTION_BITS: u32;
 
+// One comes first: how many fragments made a sum wrap.
 @group(0) @binding(8) var<storage, read_write> sums: array<atomic<u64>>;
-@group(0) @binding(14) var<storage, read_write> overflows: atomic<u32>;
+const HEAD: u32 = 1u;
 
 // A sum wrapped under the fragment in work.
 var<private> wrapped: bool;
@@ -36,24 +37,24 @@ fn add_halves(pair: u32, low: Term, high: Term) {
 // After a fragment's terms.
 fn settle(pixel: u32) {
     if (wrapped) {
-        atomicAdd(&overflows, 1u);
+        atomicAdd(&sums[0], 1lu);
         wrapped = false;
     }
 }
 
 fn add(pixel: u32, channel: u32, value: Term) {
     let odd = (channel & 1u) == 1u;
-    add_halves((pixel * CHANNELS + channel) / 2u, select(value, 0u, odd), select(0u, value, odd));
+    add_halves(HEAD + (pixel * CHANNELS + channel) / 2u, select(value, 0u, odd), select(0u, value, odd));
 }
 
 fn add_pair(pixel: u32, channel: u32, first: Term, second: Term) {
-    add_halves((pixel * CHANNELS + channel) / 2u, first, second);
+    add_halves(HEAD + (pixel * CHANNELS + channel) / 2u, first, second);
 }
 
 fn show(pixel: u32) {}
 
 fn sum_at(pixel: u32, channel: u32) -> f32 {
-    let pair = atomicLoad(&sums[(pixel * CHANNELS + channel) / 2u]);
+    let pair = atomicLoad(&sums[HEAD + (pixel * CHANNELS + channel) / 2u]);
     return f32(select(u32(pair & 0xfffffffflu), u32(pair >> 32u), (channel & 1u) == 1u));
 }
 

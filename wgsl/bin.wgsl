@@ -1,7 +1,7 @@
 // Between stages 2 and 3, for tiles: each cell of the image gets a list of the splats that may touch it, by count, scan and
 // place. A small splat's cells are the tiles; a large one's are blocks of them, as it touches many. The order within a list
 // depends on the schedule, but no minimum or sum does. Host side: src/passes/tiles.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x037d1952d178818c
+// All loops end, by 1 of src/gpu/loops.rs: 0xce41422d9aa244b7
 
 // Words 0 and 1 say how long all lists together, and the longest, were at most. For cell t, word LIST_ENDS + t + 1 is at first
 // its count, then where its list starts, and at last where it ends, and word LIST_ENDS is 0; the lists follow from
@@ -83,7 +83,7 @@ fn bin_count(
     if (is_large(splat)) {
         return;
     }
-    if (hidden(splat, filter_of(slot), reach(splat), radius_of(surfel_in(record, slot)))) {
+    if (hidden(splat, filter_in(record), reach(splat), radius_of(surfel_in(record, slot)))) {
         splats[slot][0] = words(vec4<u32>(0u, 0u, 0xffffffffu, 0u));
     } else {
         list_in_cells(slot, splat, tile_size(), 0u, 1u, false);

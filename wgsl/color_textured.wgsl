@@ -1,10 +1,8 @@
 // A surfel's colour where its texture is not looked up: the texture's mean over its disk, as in color_linear.wgsl. The surfel's place
 // in the texture follows it, in three more (texture.wgsl), each of which has three numbers and a coordinate of what the surfel's centre leaves out.
 
-@group(0) @binding(11) var<storage, read> colors: array<Words>;
-
 fn color_part(index: u32, part: u32) -> vec4<f32> {
-    return bitcast<vec4<f32>>(each_word(colors[4u * index + part]));
+    return attribute_vector(index, 4u * part);
 }
 
 fn color_of(index: u32) -> vec4<f32> {

@@ -17,22 +17,20 @@ struct Filter {
     gain: f32,
 }
 
-@group(0) @binding(15) var<storage, read_write> filters: array<FilterRecord>;
-@group(0) @binding(16) var<storage, read> projected_filters: array<FilterRecord>;
+// It follows the splat in its record (records.wgsl).
+alias SplatRecord = array<Words, 6>;
 
-alias FilterRecord = array<Words, 2>;
-
-fn filter_record(filter_: Filter) -> FilterRecord {
-    return FilterRecord(
-        words(bitcast<vec4<u32>>(vec4<f32>(filter_.center_x, filter_.center_y, filter_.depth_low, filter_.depth_high))),
-        words(bitcast<vec4<u32>>(vec4<f32>(filter_.r_xx, filter_.r_xy, filter_.r_yy, filter_.gain))),
-    );
+fn with_filter(record: SplatRecord, filter_: Filter) -> SplatRecord {
+    var filtered_ = record;
+    let place = vec4<f32>(filter_.center_x, filter_.center_y, filter_.depth_low, filter_.depth_high);
+    filtered_[4] = words(bitcast<vec4<u32>>(place));
+    filtered_[5] = words(bitcast<vec4<u32>>(vec4<f32>(filter_.r_xx, filter_.r_xy, filter_.r_yy, filter_.gain)));
+    return filtered_;
 }
 
-fn filter_of(slot: u32) -> Filter {
-    let record = projected_filters[slot];
-    let place = bitcast<vec4<f32>>(each_word(record[0]));
-    let shape = bitcast<vec4<f32>>(each_word(record[1]));
+fn filter_in(record: SplatRecord) -> Filter {
+    let place = bitcast<vec4<f32>>(each_word(record[4]));
+    let shape = bitcast<vec4<f32>>(each_word(record[5]));
     return Filter(place.x, place.y, place.z, place.w, shape.x, shape.y, shape.z, shape.w);
 }
 

@@ -1,6 +1,6 @@
 // The map of the strongest surfels, by the words of the image: of the fragments within epsilon of a pixel's nearest depth the greatest
 // weight, and then the place of the surfel that has it. Twin: src/passes/index.rs.
-// All loops end, by 1, 2 of src/gpu/loops.rs: 0x6c747a20c6736c7f
+// All loops end, by 1, 2 of src/gpu/loops.rs: 0xe6c8e3b78a06f833
 
 // The image, of which these words are no one else's.
 @group(0) @binding(41) var<storage, read_write> indexed: array<atomic<u32>>;
@@ -36,7 +36,7 @@ fn take_small(slot: u32, names: bool) {
     let record = projected[slot];
     let splat = splat_of(record);
     let surfel = surfel_in(record, slot);
-    let filter_ = filter_of(slot);
+    let filter_ = filter_in(record);
     let pixels = reach(splat);
     if (is_large(splat) || hidden(splat, filter_, pixels, radius_of(surfel))) {
         return;
@@ -57,7 +57,7 @@ fn take_large(place: u32, local: vec2<u32>, names: bool) {
     let record = projected[slot];
     let splat = splat_of(record);
     let surfel = surfel_in(record, slot);
-    let filter_ = filter_of(slot);
+    let filter_ = filter_in(record);
     let pixels = reach(splat);
     for (var y = pixels.first.y + local.y; y <= pixels.last.y; y += TILE) {
         for (var x = pixels.first.x + local.x; x <= pixels.last.x; x += TILE) {

@@ -5,10 +5,9 @@
 // (pixel's sigma / kernel's sigma)^2, pixels^2.
 override FILTER_BLUR: f32;
 
-fn low_pass(slot: u32, h: ptr<function, Homography>) {
+fn low_pass(h: ptr<function, Homography>) -> Filter {
     if (!(*h).centered) {
-        filters[slot] = filter_record(Filter(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0));
-        return;
+        return Filter(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     }
     let s = (*h).s_image;
     let t = (*h).t_image;
@@ -25,7 +24,7 @@ fn low_pass(slot: u32, h: ptr<function, Homography>) {
     (*h).low = center - extent;
     (*h).high = center + extent;
     let low = max((*h).depth_low, held.near);
-    let filter_ = Filter(
+    return Filter(
         (*h).offset.x,
         (*h).offset.y,
         low,
@@ -36,7 +35,6 @@ fn low_pass(slot: u32, h: ptr<function, Homography>) {
         // Positive even edge-on: 0 says that there is no filter.
         max(abs(area) / sqrt(determinant), 1e-9),
     );
-    filters[slot] = filter_record(filter_);
 }
 
 fn filtered(fragment: Fragment, abc: vec3<f32>, filter_: Filter, d: vec2<f32>) -> Fragment {

@@ -4,10 +4,9 @@
 // The circle about a pixel's corners: a splat reaches the centre of the pixel it lies in. See RADIUS in the twin.
 const FILTER_RADIUS: f32 = 0.7072;
 
-fn low_pass(slot: u32, h: ptr<function, Homography>) {
+fn low_pass(h: ptr<function, Homography>) -> Filter {
     if (!(*h).centered) {
-        filters[slot] = filter_record(Filter(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0));
-        return;
+        return Filter(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     }
     let center = vec2<f32>((*h).anchor) + 0.5 + (*h).offset;
     (*h).low = min((*h).low, center - FILTER_RADIUS);
@@ -15,7 +14,7 @@ fn low_pass(slot: u32, h: ptr<function, Homography>) {
     let r = 1.0 / FILTER_RADIUS;
     let low = max((*h).depth_low, held.near);
     let high = max((*h).depth_high, low);
-    filters[slot] = filter_record(Filter((*h).offset.x, (*h).offset.y, low, high, r, 0.0, r, 1.0));
+    return Filter((*h).offset.x, (*h).offset.y, low, high, r, 0.0, r, 1.0);
 }
 
 fn filtered(fragment: Fragment, abc: vec3<f32>, filter_: Filter, d: vec2<f32>) -> Fragment {

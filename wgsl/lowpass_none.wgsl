@@ -6,11 +6,19 @@ struct Filter {
     nothing: u32,
 }
 
-fn filter_of(slot: u32) -> Filter {
+alias SplatRecord = array<Words, 4>;
+
+fn with_filter(record: SplatRecord, filter_: Filter) -> SplatRecord {
+    return record;
+}
+
+fn filter_in(record: SplatRecord) -> Filter {
     return Filter(0u);
 }
 
-fn low_pass(slot: u32, h: ptr<function, Homography>) {}
+fn low_pass(h: ptr<function, Homography>) -> Filter {
+    return Filter(0u);
+}
 
 fn least_filtered(filter_: Filter) -> f32 {
     return 3e38;

@@ -1,7 +1,7 @@
 // Stage 1: every surfel becomes a splat, once. One invocation a surfel; the rare ones that take longer (thin splats, disks
 // that reach the near depth, large splats) are listed and done together, so that the others of a subgroup need not wait.
 // Twin: src/passes/project.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x17d82a4dbc27e76a
+// All loops end, by 1 of src/gpu/loops.rs: 0x82b49e1e87eb831a
 
 @group(0) @binding(3) var<storage, read_write> splats: array<SplatRecord>;
 // Word 0 counts the large splats, word 1 all that are out of view; three words from QUEUE_GRID on are a grid with a workgroup
@@ -62,7 +62,7 @@ fn project_into(slot: u32, every: bool) -> u32 {
     if (h.rare) {
         return RARE;
     }
-    low_pass(slot, &h);
+    let filter_ = low_pass(&h);
 
     // Bounds are conservative: the margin covers the rounding of the extent, and `intersect` decides.
     let size = vec2<f32>(f32(held.width), f32(held.height));
@@ -89,7 +89,7 @@ fn project_into(slot: u32, every: bool) -> u32 {
         // Places depend on the schedule, but nothing later depends on places.
         atomicStore(&queue[QUEUE_START + atomicAdd(&queue[0], 1u)], slot);
     }
-    splats[slot] = splat_record(splat, index);
+    splats[slot] = splat_record(splat, index, filter_);
     return select(OUT_OF_VIEW, IN_VIEW, visible || !exists);
 }
 

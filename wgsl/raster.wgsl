@@ -118,7 +118,7 @@ fn fragment_of(corner: Corner) -> Fragment {
     splat.c = array<f32, 3>(corner.c.x, corner.c.y, corner.c.z);
     splat.a_low = array<f32, 3>(corner.a_low.x, corner.a_low.y, corner.a_low.z);
     let pixel = vec2<u32>(corner.position.xy);
-    return footprint(splat, filter_of(corner.index), pixel.x, pixel.y);
+    return footprint(splat, filter_in(projected[corner.index]), pixel.x, pixel.y);
 }
 
 fn carried(corner: Corner) -> Attributes {

@@ -1,14 +1,13 @@
-// A splat's record: sixteen words, which say of which surfel it is where that is not its slot (cull.wgsl).
+// A splat's record: sixteen words, which say of which surfel it is where that is not its slot (cull.wgsl), and those of its low-pass
+// where there is one (filter.wgsl, lowpass_none.wgsl).
 
-alias SplatRecord = array<Words, 4>;
-
-fn splat_record(splat: Splat, surfel: u32) -> SplatRecord {
-    return SplatRecord(
-        words(vec4<u32>(anchor_words(splat, surfel), splat.bounds_first, splat.bounds_last)),
-        words(bitcast<vec4<u32>>(vec4<f32>(splat.a[0], splat.a[1], splat.a[2], splat.b[0]))),
-        words(bitcast<vec4<u32>>(vec4<f32>(splat.b[1], splat.b[2], splat.c[0], splat.c[1]))),
-        words(bitcast<vec4<u32>>(vec4<f32>(splat.c[2], splat.a_low[0], splat.a_low[1], splat.a_low[2]))),
-    );
+fn splat_record(splat: Splat, surfel: u32, filter_: Filter) -> SplatRecord {
+    var record: SplatRecord;
+    record[0] = words(vec4<u32>(anchor_words(splat, surfel), splat.bounds_first, splat.bounds_last));
+    record[1] = words(bitcast<vec4<u32>>(vec4<f32>(splat.a[0], splat.a[1], splat.a[2], splat.b[0])));
+    record[2] = words(bitcast<vec4<u32>>(vec4<f32>(splat.b[1], splat.b[2], splat.c[0], splat.c[1])));
+    record[3] = words(bitcast<vec4<u32>>(vec4<f32>(splat.c[2], splat.a_low[0], splat.a_low[1], splat.a_low[2])));
+    return with_filter(record, filter_);
 }
 
 fn splat_of(record: SplatRecord) -> Splat {

@@ -3,7 +3,7 @@
 // eight rows are drawn apart, each by the splats that reach them. The footprint, and so every bit, is that of visibility.wgsl
 // and accumulate.wgsl.
 // Host side: src/passes/tiles.rs.
-// All loops end, by 1, 3 of src/gpu/loops.rs: 0xb53510fbf45e733f
+// All loops end, by 1, 3 of src/gpu/loops.rs: 0x1fb6d73af38222e4
 
 // The lists of the large splats.
 @group(0) @binding(27) var<storage, read> large_lists: array<u32>;
@@ -61,7 +61,7 @@ fn fetch(place: u32, listed: u32, column: Column, deepest: vec2<f32>) -> vec2<u3
         let record = projected[slot];
         own_surfel = surfel_in(record, slot);
         own_splat = splat_of(record);
-        own_filter = filter_of(slot);
+        own_filter = filter_in(record);
         wanted.x = reaches(own_splat, own_filter, column, 0u, deepest.x);
         wanted.y = TILE_ROWS > 8u && reaches(own_splat, own_filter, column, 8u, deepest.y);
     }

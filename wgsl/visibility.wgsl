@@ -1,6 +1,6 @@
 // Stage 2: the nearest depth at every pixel. One invocation a splat, one workgroup a large splat. Twin: src/passes/visibility.rs.
 // The least depth is the greatest kept one (layout.wgsl).
-// All loops end, by 1, 2 of src/gpu/loops.rs: 0x22ff933efae40a56
+// All loops end, by 1, 2 of src/gpu/loops.rs: 0x952f3bddeba0e554
 
 @group(0) @binding(5) var<storage, read> projected: array<SplatRecord>;
 @group(0) @binding(6) var<storage, read_write> nearest: array<atomic<u32>>;
@@ -23,12 +23,13 @@ fn visibility(
     if (slot >= arrayLength(&projected)) {
         return;
     }
-    let splat = splat_of(projected[slot]);
+    let record = projected[slot];
+    let splat = splat_of(record);
     if (is_large(splat)) {
         return;
     }
     let pixels = reach(splat);
-    let filter_ = filter_of(slot);
+    let filter_ = filter_in(record);
     var at = pixels.first;
     while (at.y <= pixels.last.y) {
         cover(splat, filter_, at.x, at.y);
@@ -48,9 +49,10 @@ fn visibility_large(
     if (slot >= arrayLength(&projected)) {
         return;
     }
-    let splat = splat_of(projected[slot]);
+    let record = projected[slot];
+    let splat = splat_of(record);
     let pixels = reach(splat);
-    let filter_ = filter_of(slot);
+    let filter_ = filter_in(record);
     for (var y = pixels.first.y + local.y; y <= pixels.last.y; y += TILE) {
         for (var x = pixels.first.x + local.x; x <= pixels.last.x; x += TILE) {
             cover(splat, filter_, x, y);

@@ -157,9 +157,8 @@ impl AdapterDescription {
     }
 }
 
-/// The most storage buffers a kernel uses (accumulate: splats, surfels, depths, sums, colours, the queue, filters, and the overflow
-/// count of some accumulators or the copies of another).
-pub const STORAGE_BUFFERS: u32 = 8;
+/// The most storage buffers a kernel uses (the tiles that gather: two lists, splats, surfels, their attributes, depths, the image).
+pub const STORAGE_BUFFERS: u32 = 7;
 
 #[cfg(test)]
 mod tests {

@@ -206,9 +206,11 @@ const ACCUMULATE_LARGE: Kernel = Kernel::of("accumulate_large", [TILE, TILE, 1])
 
 /// The pass of the small splats.
 pub fn steps(plan: &Plan, band: usize) -> Stage {
-    let mut clears = vec![Clear::of("sums", 0, plan.bands[band].pixels * u64::from(plan.sum_words))];
-    if band == 0 {
-        clears.push(Clear { buffer: "overflows", first: 0, count: None });
+    // What wrapped is counted over all bands, in the words before the sums.
+    let head = plan.needs.accumulator.row().head_words();
+    let mut clears = vec![Clear::of("sums", head, plan.bands[band].pixels * u64::from(plan.sum_words))];
+    if band == 0 && head > 0 {
+        clears.push(Clear::of("sums", 0, head));
     }
     let runs = vec![Run { kernel: ACCUMULATE, over: Over::Slots(Part::All) }];
     Stage::new("accumulate", band, runs).after(clears).as_twin(Twin::Accumulate)

@@ -2,7 +2,7 @@
 //! terms to a pixel's sums and one that resolves them, or an absent one.
 
 use crate::plan::pass::Pass;
-use crate::plan::{ColorNeed, PixelLayout, RasterDepth, color_channels};
+use crate::plan::{ColorNeed, PixelLayout, RasterDepth, SurfelLayout, color_channels};
 use crate::scene::Map;
 
 /// The files and constants.
@@ -17,6 +17,7 @@ pub const PASS: Pass = Pass {
             pick(needs.maps.has(Map::Depth), pick(whole, "depth_whole.wgsl", "depth.wgsl"), "depth_absent.wgsl"),
             pick(needs.color == ColorNeed::Textured, "texture.wgsl", "texture_absent.wgsl"),
         ];
+        files.push("attributes.wgsl");
         files.extend(match needs.color {
             ColorNeed::Constant => &["color_constant.wgsl"][..],
             ColorNeed::Srgb8 => &["color_srgb8.wgsl", "srgb.wgsl", "color_sums.wgsl"],
@@ -27,9 +28,12 @@ pub const PASS: Pass = Pass {
     },
     kernels: |_| Vec::new(),
     constants: |making| {
-        let layout = PixelLayout::of(making.needs);
+        let (layout, surfel) = (PixelLayout::of(making.needs), SurfelLayout::of(making.needs));
         vec![
             ("CHANNELS", layout.channels.into()),
+            ("ATTRIBUTE_WORDS", surfel.words.into()),
+            ("COPIES_WORD", surfel.copies.into()),
+            ("LOW_WORD", surfel.low.into()),
             ("COLOR_CHANNELS", color_channels(making.needs).into()),
             ("NORMAL_CHANNEL", layout.normal_channel.into()),
             ("TURN_NORMALS", u32::from(making.needs.turn_normals).into()),

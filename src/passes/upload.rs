@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::layout::BATCH;
-use crate::plan::{ColorNeed, SceneNeeds, page_surfels};
+use crate::plan::{ColorNeed, SceneNeeds, SurfelLayout, page_surfels};
 use crate::progress::Progress;
 use crate::scene::color::SRGB8_TO_LINEAR;
 use crate::scene::{Bounds, Colors, Scene, copies};
@@ -32,8 +32,7 @@ pub struct Uploaded {
 
 /// One page of a scene.
 pub struct Page {
-    /// Surfels, the trailing parts of their centres, how many each stands for, their colours, the bounding balls of their batches:
-    /// as far as the render needs them.
+    /// Surfels, their attributes as far as the render needs them, the bounding balls of their batches.
     pub buffers: Named,
     /// Surfels in it.
     pub surfels: u64,
@@ -56,7 +55,7 @@ pub fn upload(
     if let Some(copies) = &copies {
         order.retain(|&index| copies[index as usize] > 0);
     }
-    let pages = order.chunks(page_surfels(&gpu.adapter) as usize);
+    let pages = order.chunks(page_surfels(&gpu.adapter, needs) as usize);
     let pages = pages.map(|indices| page(gpu, scene, needs, (indices, copies.as_deref()), progress));
     let pages = pages.collect::<Result<_>>()?;
     let shared = shared(gpu, scene, needs)?;
@@ -75,13 +74,7 @@ fn page(
     let surfels = Buffer::storage(gpu, "surfels", indices.len() as u64)?;
     surfels.write(gpu, indices.len(), |range| taken(&scene.surfels, &indices[range]), progress)?;
     let mut buffers = vec![("surfels", surfels.words())];
-    if needs.doubled {
-        buffers.push(("centers_low", stored(gpu, "trailing parts of centres", &scene.low, indices)?));
-    }
-    if let Some(copies) = copies {
-        buffers.push(("copies", stored(gpu, "numbers of copies", copies, indices)?));
-    }
-    buffers.extend(colors(gpu, scene, needs.color, indices)?.map(|colors| ("colors", colors)));
+    buffers.extend(attributes(gpu, scene, needs, (indices, copies))?.map(|attributes| ("attributes", attributes)));
     let batches: Vec<_> = indices
         .par_chunks(BATCH as usize)
         .map(|batch| ball(batch.iter().map(|&i| (scene.center(i as usize), &scene.surfels[i as usize]))))
@@ -94,23 +87,52 @@ fn page(
     Ok(Page { buffers, surfels: all, stand_for })
 }
 
-/// The colours at `indices`, where surfels differ in them.
-fn colors(gpu: &Gpu, scene: &Scene, need: ColorNeed, indices: &[u32]) -> Result<Option<Buffer<u32>>> {
-    Ok(match (need, &scene.colors) {
-        (ColorNeed::Srgb8, Colors::Srgb8(codes)) => Some(stored(gpu, "colours", codes, indices)?),
-        (ColorNeed::Linear, Colors::Linear(colors)) => Some(stored(gpu, "colours", colors, indices)?),
-        (ColorNeed::Textured, Colors::Textured(textured)) => {
-            let buffer = Buffer::storage(gpu, "colours", indices.len() as u64)?;
-            let all = |&index: &u32| {
-                let [center, u_slope, v_slope] = textured.mapped(index as usize, scene.low.get(index as usize));
-                [textured.colors()[index as usize], center, u_slope, v_slope]
-            };
-            let values = |range: Range<usize>| indices[range].par_iter().map(all).collect::<Vec<_>>().into();
-            buffer.write(gpu, indices.len(), values, &())?;
-            Some(buffer.words())
+/// The attributes of the surfels at `indices`, where there are any.
+fn attributes(
+    gpu: &Gpu,
+    scene: &Scene,
+    needs: &SceneNeeds,
+    (indices, copies): (&[u32], Option<&[u32]>),
+) -> Result<Option<Buffer<u32>>> {
+    let layout = SurfelLayout::of(needs);
+    let words = layout.words as usize;
+    if words == 0 {
+        return Ok(None);
+    }
+    let bits = |vectors: &[[f32; 4]], into: &mut [u32]| {
+        vectors.iter().flatten().zip(into).for_each(|(value, into)| *into = value.to_bits());
+    };
+    let record = |index: usize, into: &mut [u32]| {
+        match (needs.color, &scene.colors) {
+            (ColorNeed::Srgb8, Colors::Srgb8(codes)) => into[0] = u32::from_le_bytes(codes[index]),
+            (ColorNeed::Linear, Colors::Linear(colors)) => bits(&[colors[index]], into),
+            (ColorNeed::Textured, Colors::Textured(textured)) => {
+                let [center, u_slope, v_slope] = textured.mapped(index, scene.low.get(index));
+                bits(&[textured.colors()[index], center, u_slope, v_slope], into);
+            }
+            _ => {}
         }
-        _ => None,
-    })
+        if let Some(copies) = copies {
+            into[layout.copies as usize] = copies[index];
+        }
+        if needs.doubled {
+            let into = &mut into[layout.low as usize..];
+            scene.low[index].iter().zip(into).for_each(|(value, into)| *into = value.to_bits());
+        }
+    };
+    let buffer = Buffer::storage(gpu, "attributes", (indices.len() * words) as u64)?;
+    // Of whole records, in which a range of words may start and end anywhere.
+    let values = |range: Range<usize>| {
+        let (first, last) = (range.start / words, range.end.div_ceil(words));
+        let mut values = vec![0; (last - first) * words];
+        let records = values.par_chunks_exact_mut(words).zip(&indices[first..last]);
+        records.for_each(|(into, index)| record(*index as usize, into));
+        values.drain(..range.start - first * words);
+        values.truncate(range.len());
+        Cow::Owned(values)
+    };
+    buffer.write(gpu, indices.len() * words, values, &())?;
+    Ok(Some(buffer))
 }
 
 /// The table that decodes 8-bit sRGB, where it is needed, and the texture.
@@ -127,13 +149,6 @@ fn shared(gpu: &Gpu, scene: &Scene, needs: &SceneNeeds) -> Result<Named> {
         shared.push(("texels", buffer.words()));
     }
     Ok(shared)
-}
-
-/// The `values` at `indices`; `what` names them in an error.
-fn stored<T: Pod + Send + Sync>(gpu: &Gpu, what: &str, values: &[T], indices: &[u32]) -> Result<Buffer<u32>> {
-    let buffer = Buffer::storage(gpu, what, indices.len() as u64)?;
-    buffer.write(gpu, indices.len(), |range| taken(values, &indices[range]), &())?;
-    Ok(buffer.words())
 }
 
 /// The values at `indices`.

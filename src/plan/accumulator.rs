@@ -154,6 +154,11 @@ pub const ACCUMULATORS: &[AccumulatorRow] = &[
 ];
 
 impl AccumulatorRow {
+    /// u32 words before the sums, in which those that wrapped are counted; of sums that cannot wrap none.
+    pub fn head_words(&self) -> u64 {
+        if matches!(self.of, Accumulator::Fixed32 | Accumulator::Packed64) { 2 } else { 0 }
+    }
+
     /// Fraction bits of the one-word accumulators in a scene of `surfels`: as many as the sums of all surfels, or of 255
     /// full weights, leave free.
     pub fn fraction_bits(&self, surfels: u64) -> u32 {

@@ -1,8 +1,9 @@
 //! Where images and scenes are cut, so that each piece fits a buffer: bands of rows, pages of surfels.
 
+use super::{SceneNeeds, SurfelLayout, splat_words};
 use crate::error::{Error, Result};
 use crate::gpu::adapter::AdapterDescription;
-use crate::gpu::layout::{BATCH, MOST_GROUPS, MOST_ROUNDS, OCCLUSION_TILE, Splat, TILE};
+use crate::gpu::layout::{BATCH, MOST_GROUPS, MOST_ROUNDS, OCCLUSION_TILE, TILE};
 use crate::scene::Camera;
 
 /// Rows of the image that buffers hold at a time.
@@ -18,13 +19,13 @@ pub struct Band {
     pub tiles: u64,
 }
 
-/// The image in bands of whole rows, for `words` u32 words a pixel in the largest buffer.
+/// The image in bands of whole rows, for `words` u32 words a pixel in the largest buffer, after `head` others.
 ///
 /// # Errors
 /// [`Error::Limit`] if one row is too long.
-pub fn bands(adapter: &AdapterDescription, camera: &Camera, words: u32) -> Result<Vec<Band>> {
+pub fn bands(adapter: &AdapterDescription, camera: &Camera, words: u32, head: u64) -> Result<Vec<Band>> {
     let row_bytes = u64::from(camera.width) * u64::from(words) * 4;
-    let rows = adapter.buffer_limit() / row_bytes;
+    let rows = adapter.buffer_limit().saturating_sub(4 * head) / row_bytes;
     if rows == 0 {
         return Err(Error::Limit {
             adapter: adapter.name.clone(),
@@ -51,9 +52,10 @@ pub fn strips(camera: &Camera, rows: u32) -> Vec<Band> {
 }
 
 /// Surfels of a page: whole batches, unless one is too large; each batch is a row of a dispatch, of which every adapter grants so
-/// many. The splat's record is the largest of what is paged alike.
-pub fn page_surfels(adapter: &AdapterDescription) -> u64 {
-    let most = adapter.page_len(size_of::<Splat>());
+/// many. The splat's record is the largest of what is paged alike, or a surfel's attributes are.
+pub fn page_surfels(adapter: &AdapterDescription, needs: &SceneNeeds) -> u64 {
+    let words = splat_words(needs.low_pass).max(SurfelLayout::of(needs).words.into());
+    let most = adapter.page_len(4 * words as usize);
     let whole = most / u64::from(BATCH) * u64::from(BATCH);
     if whole > 0 { whole.min(u64::from(MOST_GROUPS * BATCH)) } else { most.max(1) }
 }

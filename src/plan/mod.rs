@@ -13,6 +13,7 @@ pub mod pass;
 mod pixel;
 mod raster;
 pub mod steps;
+mod surfel;
 pub mod tuning;
 mod view;
 
@@ -25,6 +26,7 @@ pub use optimisation::Optimisation;
 pub use options::{BackendName, Organisation, RenderOptions};
 pub use pixel::{COLOR_CHANNEL, PixelLayout, color_channels};
 pub use raster::{BlendFormat, Raster, RasterDepth};
+pub use surfel::{SurfelLayout, splat_words};
 pub use view::device_unit;
 
 use crate::error::Result;
@@ -77,8 +79,9 @@ impl Plan {
         check::on_adapter(adapter, &needs, camera)?;
         let pixel = PixelLayout::of(&needs);
         let sum_words = pixel.sum_words(&needs);
-        let bands = bands(adapter, camera, sum_words.max(pixel.image_words))?;
-        let page = page_surfels(adapter);
+        let head = if needs.raster.is_none() { needs.accumulator.row().head_words() } else { 0 };
+        let bands = bands(adapter, camera, sum_words.max(pixel.image_words), head)?;
+        let page = page_surfels(adapter, &needs);
         let one_band = bands.len() == 1;
         let gathers = match options.organisation {
             Organisation::Auto => needs.subgroups && known.touched_tiles >= tuning::GATHERED_TOUCHED_TILES,

@@ -15,8 +15,8 @@ use crate::gpu::layout::{ONE, ONE_WIDE, Splat, View};
 use crate::gpu::{Gpu, Sources};
 use crate::passes::upload::upload;
 use crate::plan::steps::{Stage, Step, Twin};
-use crate::plan::{Facts, Known, Optimisation, Organisation, PixelLayout, Plan, RenderOptions};
-use crate::scene::{Camera, Scene};
+use crate::plan::{Facts, Known, Optimisation, Organisation, PixelLayout, Plan, RenderOptions, splat_words};
+use crate::scene::{Camera, LowPass, Scene};
 
 /// What the first three stages leave on the device.
 #[derive(Clone, Debug)]
@@ -99,10 +99,11 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
         Some(buffer) => buffer.read(gpu, len),
         None => Ok(Vec::new()),
     };
+    let head = plan.needs.accumulator.row().head_words();
     Ok(Stages {
-        splats: splats(gpu, &order, &store)?,
+        splats: splats(gpu, options.low_pass, &order, &store)?,
         nearest: words("nearest", band.pixels)?,
-        sums: words("sums", band.pixels * u64::from(plan.sum_words))?,
+        sums: words("sums", head + band.pixels * u64::from(plan.sum_words))?.split_off(head as usize),
         pixel: plan.pixel,
         one: if plan.needs.wide_sums { ONE_WIDE as f64 } else { ONE.into() },
         view,
@@ -110,15 +111,16 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
 }
 
 /// The record of each surfel, in the order of the scene.
-fn splats(gpu: &Gpu, order: &[u32], store: &Store) -> Result<Vec<Splat>> {
+fn splats(gpu: &Gpu, low_pass: LowPass, order: &[u32], store: &Store) -> Result<Vec<Splat>> {
     let mut splats = vec![Splat::zeroed(); order.len()];
     let mut order = order.iter();
-    let words = (size_of::<Splat>() / 4) as u64;
+    let words = splat_words(low_pass);
     for page in &store.pages {
         let Some(stored) = page.buffer("splats") else { continue };
         let stored = stored.read(gpu, page.slots * words)?;
-        for (splat, index) in bytemuck::cast_slice(&stored).iter().zip(&mut order) {
-            splats[*index as usize] = *splat;
+        for (record, index) in stored.chunks_exact(words as usize).zip(&mut order) {
+            // The words of its low-pass, if there are any, come last.
+            splats[*index as usize] = bytemuck::pod_read_unaligned(&bytemuck::cast_slice(record)[..size_of::<Splat>()]);
         }
     }
     Ok(splats)

@@ -82,7 +82,8 @@ impl<'a> Run<'a> {
         let wanted = |name: &'static str| self.store.buffer(name);
         let large = self.by_tiles.then(|| wanted("large_lists")).flatten();
         let small = self.plan.needs.gather.then(|| wanted("small_lists")).flatten();
-        let sums = wanted("overflows");
+        let counts_wraps = self.plan.sum_words > 0 && self.plan.needs.accumulator.row().head_words() > 0;
+        let sums = counts_wraps.then(|| wanted("sums")).flatten();
         let of_pages = self.store.pages.iter().flat_map(|page| [page.buffer("queue"), page.buffer("drawn")]);
         let all: Vec<&Buffer<u32>> = of_pages.chain([large, small, sums]).flatten().collect();
         let mut counted = counts(self.gpu, &all)?.into_iter();

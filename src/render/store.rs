@@ -6,20 +6,19 @@ use super::targets::Targets;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::{Buffer, Readback};
-use crate::gpu::layout::{BATCH, Band as BandUniform, Filter, LIST_START, QUEUE_START, Splat, View, WORKGROUP};
+use crate::gpu::layout::{BATCH, Band as BandUniform, LIST_START, QUEUE_START, View, WORKGROUP};
 use crate::passes::tiles::{list_name, list_words};
 use crate::passes::upload::{self, Uploaded};
 use crate::passes::{asks_for_order, covered, visibility};
 use crate::plan::known::Listed;
-use crate::plan::{Band, Known, Plan, Raster, SceneNeeds};
+use crate::plan::{Band, Known, Plan, Raster, SceneNeeds, splat_words};
 use crate::scene::LowPass;
 
 /// Names in WGSL of buffers that have another one where kernels write them.
-const ALIASES: [(&str, &str); 8] = [
+const ALIASES: [(&str, &str); 7] = [
     ("projected", "splats"),
     ("queued", "queue"),
     ("listed", "rare"),
-    ("projected_filters", "filters"),
     ("surviving", "drawn"),
     ("visible", "nearest"),
     ("added", "sums"),
@@ -27,20 +26,7 @@ const ALIASES: [(&str, &str); 8] = [
 ];
 
 /// Names of buffers that each page has.
-const PAGED: [&str; 12] = [
-    "balls",
-    "centers_low",
-    "colors",
-    "copies",
-    "drawn",
-    "filters",
-    "page_first",
-    "queue",
-    "rare",
-    "rest",
-    "splats",
-    "surfels",
-];
+const PAGED: [&str; 9] = ["attributes", "balls", "drawn", "page_first", "queue", "rare", "rest", "splats", "surfels"];
 
 /// The name under which a buffer is kept.
 fn kept(name: &str) -> &str {
@@ -62,6 +48,8 @@ pub struct Page {
     pub surfels: u64,
     /// Surfels that they stand for together.
     pub stand_for: u64,
+    /// Words of a splat's record.
+    splat_words: u64,
     /// Splats that there is room for.
     pub slots: u64,
 }
@@ -76,15 +64,12 @@ impl Page {
         gpu.queue.write_buffer(&drawn.raw, 0, bytemuck::cast_slice(&[[BATCH / WORKGROUP, 0, 1]; 2]));
         buffers.insert("drawn", drawn);
         buffers.insert("rest", Buffer::storage(gpu, "batches that may be drawn", batches + 1)?);
-        buffers.insert("splats", Buffer::<Splat>::storage(gpu, "splats", 0)?.words());
+        buffers.insert("splats", Buffer::storage(gpu, "splats", 0)?);
         for (name, what) in [("queue", "queue of large splats"), ("rare", "list of rare splats")] {
             buffers.insert(name, Buffer::indirect(gpu, what, QUEUE_START.into())?);
         }
         buffers.insert("page_first", Buffer::uniform(gpu, "page", &first)?);
-        if low_pass != LowPass::None {
-            buffers.insert("filters", Buffer::<Filter>::storage(gpu, "low-pass filters", 0)?.words());
-        }
-        Ok(Self { buffers, surfels, stand_for, slots: 0 })
+        Ok(Self { buffers, surfels, stand_for, splat_words: splat_words(low_pass), slots: 0 })
     }
 
     /// Batches of surfels.
@@ -102,13 +87,11 @@ impl Page {
         if self.slots >= slots {
             return Ok(());
         }
-        let words = |bytes: usize| slots * bytes as u64 / 4;
         let list = slots + u64::from(QUEUE_START);
         for (name, what, words) in [
-            ("splats", "splats", words(size_of::<Splat>())),
+            ("splats", "splats", slots * self.splat_words),
             ("queue", "queue of large splats", list),
             ("rare", "list of rare splats", list),
-            ("filters", "low-pass filters", words(size_of::<Filter>())),
         ] {
             if let Some(buffer) = self.buffers.get_mut(name) {
                 buffer.grow(gpu, what, words)?;
@@ -226,9 +209,8 @@ impl Store {
         };
         self.frame.insert("nearest", nearest);
         if plan.sum_words > 0 {
-            let sums = Buffer::storage(gpu, "weighted sums", pixels * u64::from(plan.sum_words))?;
-            self.frame.insert("sums", sums);
-            self.frame.insert("overflows", Buffer::storage(gpu, "overflow count", 2)?);
+            let words = plan.needs.accumulator.row().head_words() + pixels * u64::from(plan.sum_words);
+            self.frame.insert("sums", Buffer::storage(gpu, "weighted sums", words)?);
         }
         let record = u64::from(plan.pixel.image_words);
         let image = Buffer::readable(gpu, "image", pixels * record)?;

@@ -67,8 +67,9 @@ pub fn accumulators(gpu: &Gpu) -> Vec<&'static AccumulatorRow> {
     ACCUMULATORS.iter().filter(able).collect()
 }
 
-/// Every set of needs that a scene and its options can have, with the first accumulator and one kernel; and of each other
-/// accumulator, kernel and form of epsilon a dozen, others for each.
+/// A sample of the sets of needs that renders have: every one of the eight that say what is blended and written, with the first
+/// accumulator and one kernel, and of each other accumulator, kernel and form of epsilon a dozen, others for each. All that go
+/// together meet two by two (`tests/shaders.rs`).
 pub fn all_needs() -> Vec<SceneNeeds> {
     let shapes = [KernelShape::Gaussian, KernelShape::Ellipse, KernelShape::Hat, KernelShape::Constant];
     let base = base_needs();
@@ -116,6 +117,7 @@ pub fn all_needs() -> Vec<SceneNeeds> {
             cull: false,
             tiles: false,
             gather: false,
+            maps: base.maps.but(&[Map::Index]),
             ..*base
         });
     }
@@ -141,7 +143,8 @@ fn base_needs() -> Vec<SceneNeeds> {
             }
             let projection = if bit(4) { Projection::Pinhole } else { Projection::Orthographic };
             let wanted = [(1, Map::Normal), (5, Map::Depth), (6, Map::Count), (7, Map::Weight)];
-            let wanted: Vec<Map> = wanted.into_iter().filter(|(k, _)| bit(*k)).map(|(_, map)| map).collect();
+            let wanted = wanted.into_iter().filter(|(k, _)| bit(*k)).map(|(_, map)| map);
+            let wanted: Vec<Map> = wanted.chain((bits % 3 == 1).then_some(Map::Index)).collect();
             all.push(SceneNeeds {
                 projection,
                 accumulator: Accumulator::Fixed,
@@ -153,7 +156,7 @@ fn base_needs() -> Vec<SceneNeeds> {
                 gather: bits * 37 / 8 % 8 == 0 && color != ColorNeed::Textured,
                 // Both, of each of the others.
                 subgroups: bits.count_ones() % 3 == 0,
-                cull: bits.count_ones() % 2 == 0,
+                cull: bits * 29 / 16 % 2 == 0,
                 raster: None,
                 triangles: false,
                 kernel: KernelShape::Ellipse,

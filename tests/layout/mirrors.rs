@@ -135,10 +135,9 @@ pub fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         ("surfels", Element::Words("Surfel")),
         ("splats", Element::Words("Splat")),
         ("projected", Element::Words("Splat")),
-        ("filters", Element::Words("Filter")),
-        ("projected_filters", Element::Words("Filter")),
-        ("centers_low", Element::Plain(&[f32::SHAPE])),
-        ("copies", Element::Plain(WORD)),
+        ("attributes", Element::Plain(WORD)),
+        ("indexed", Element::Plain(WORD)),
+        ("page_first", Element::Plain(WORD)),
         ("queue", Element::Plain(WORD)),
         ("queued", Element::Plain(WORD)),
         ("rare", Element::Plain(WORD)),
@@ -154,9 +153,7 @@ pub fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         ("visible", Element::Plain(WORD)),
         ("sums", Element::Plain(sums_of(accumulator).0)),
         ("added", Element::Plain(&[<[u64; 2]>::SHAPE])),
-        ("overflows", Element::Plain(WORD)),
         ("image", Element::Plain(&[f32::SHAPE, <[f32; 4]>::SHAPE])),
-        ("colors", Element::Plain(&[u32::SHAPE, <[u32; 4]>::SHAPE, <[u64; 2]>::SHAPE])),
         ("texels", Element::Plain(WORD)),
         ("srgb_to_linear", Element::Plain(&[<[f32; 256]>::SHAPE])),
     ])
@@ -206,6 +203,11 @@ pub fn differences(module: &Module, accumulator: &str) -> Vec<String> {
             found.push(format!("the host has no buffer {name}"));
             continue;
         };
+        // A splat's filter, where it has one, follows it.
+        let filtered = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some("Filter"));
+        let filtered =
+            filtered.is_some_and(|(_, ty)| matches!(&ty.inner, TypeInner::Struct { members, .. } if members.len() > 1));
+        let record = |of: &str| mirrors[of].size + if of == "Splat" && filtered { mirrors["Filter"].size } else { 0 };
         match (&module.types[ty].inner, element) {
             (TypeInner::Struct { members, span }, Element::Struct(expected) | Element::Words(expected)) => {
                 let device_name = module.types[ty].name.as_deref().unwrap_or("?");
@@ -227,12 +229,15 @@ pub fn differences(module: &Module, accumulator: &str) -> Vec<String> {
                 match module.types.iter().find(of_name).map(|(_, ty)| &ty.inner) {
                     Some(TypeInner::Struct { members, span }) => {
                         compare(module, expected, members, *span as usize, &mirrors[expected], &mut found);
+                        if filtered && *expected == "Splat" {
+                            compare_named(module, "Filter", &mirrors["Filter"], &mut found);
+                        }
                     }
                     _ => found.push(format!("{name}: there is no {expected}")),
                 }
                 match shape(module, ty) {
                     Ok(Shape { kind: ScalarKind::Uint, scalars: 1, .. }) if *expected == "Surfel" => {}
-                    Ok(device) if device.kind == ScalarKind::Uint && device.bytes() == mirrors[expected].size => {}
+                    Ok(device) if device.kind == ScalarKind::Uint && device.bytes() == record(expected) => {}
                     other => found.push(format!("{name} holds {other:?}, on the host {expected}")),
                 }
             }
@@ -244,6 +249,14 @@ pub fn differences(module: &Module, accumulator: &str) -> Vec<String> {
         }
     }
     found
+}
+
+fn compare_named(module: &Module, name: &str, mirror: &Struct, found: &mut Vec<String>) {
+    for (_, ty) in module.types.iter().filter(|(_, ty)| ty.name.as_deref() == Some(name)) {
+        if let TypeInner::Struct { members, span } = &ty.inner {
+            compare(module, name, members, *span as usize, mirror, found);
+        }
+    }
 }
 
 fn compare(

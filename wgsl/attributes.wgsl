@@ -1,0 +1,16 @@
+// What surfels have beside their shape: of each a record of as many words as the render needs, whose places the host says
+// (src/plan/surfel.rs). Another attribute is some more words and no binding.
+
+override ATTRIBUTE_WORDS: u32;
+
+@group(0) @binding(11) var<storage, read> attributes: array<u32>;
+
+fn attribute_word(index: u32, word: u32) -> u32 {
+    return attributes[index * ATTRIBUTE_WORDS + word];
+}
+
+// Four from `word` on.
+fn attribute_vector(index: u32, word: u32) -> vec4<f32> {
+    let at = index * ATTRIBUTE_WORDS + word;
+    return bitcast<vec4<f32>>(vec4<u32>(attributes[at], attributes[at + 1u], attributes[at + 2u], attributes[at + 3u]));
+}

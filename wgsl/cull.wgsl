@@ -3,7 +3,7 @@
 // its fragments could be nearest or within epsilon of the nearest, so no image depends on it. The splats of the others are
 // stored one batch after the other, in slots: those that are left out take no room.
 // Host side and twin: src/passes/cull.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xf717bdff75577530
+// All loops end, by 1 of src/gpu/loops.rs: 0xa6d193549f2d2b17
 
 // A batch's bounding ball: centre and radius, world units relative to the scene's origin.
 @group(0) @binding(23) var<storage, read> balls: array<vec4<f32>>;
@@ -78,13 +78,14 @@ fn ball_of(batch: u32) -> Ball {
 // How far a low-pass may reach past its disk, pixels.
 override FILTER_REACH: f32;
 
-// The batch's pixels, as far as they lie in the image; empty if a first lies past a last.
+// The batch's pixels, as far as they lie in the band; empty if a first lies past a last.
 fn pixels_of(ball: Ball) -> Rectangle {
     let extent = ball_extent(ball.center, ball.radius, ball.nearest);
     // A pixel more on each side, as splats' own bounds have a margin, and one for rounding.
     let margin = FILTER_REACH + 2.0 + 1e-5 * (abs(extent.xy) + abs(extent.zw));
-    let first = max(extent.xy - margin, vec2<f32>(0.0));
-    let last = min(extent.zw + margin, vec2<f32>(f32(held.width), f32(held.height)) - 1.0);
+    let top = f32(held_band.first_row);
+    let first = max(extent.xy - margin, vec2<f32>(0.0, top));
+    let last = min(extent.zw + margin, vec2<f32>(f32(held.width), top + f32(held_band.rows)) - 1.0);
     if (!all(first <= last)) {
         return Rectangle(vec2<u32>(1u), vec2<u32>(0u));
     }
@@ -111,7 +112,7 @@ fn cull_near(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
-    hold_view();
+    hold();
     let batch = linear_index(workgroup, workgroups, local);
     if (batch >= arrayLength(&balls)) {
         return;
@@ -163,8 +164,10 @@ fn cull_far(
 
 // Whether everything drawn so far at `pixels`, and epsilon behind it, lies in front of the ball.
 fn behind(ball: Ball, pixels: Rectangle) -> bool {
-    let first = pixels.first / OCCLUSION_TILE;
-    let last = pixels.last / OCCLUSION_TILE;
+    // Tiles are counted from the band's first row.
+    let above = vec2<u32>(0u, held_band.first_row);
+    let first = (pixels.first - above) / OCCLUSION_TILE;
+    let last = (pixels.last - above) / OCCLUSION_TILE;
     let size = last - first + 1u;
     if (size.x * size.y > MOST_TILES) {
         return false;

@@ -120,9 +120,9 @@ fn large(making: &Making<'_>) -> u32 {
     }
 }
 
-/// The projection of `part` of the surfels; where batches are left out, after [`cull`](super::cull) has listed them. Splats that take
+/// The projection of `part` of the surfels, for `band` or for all from it on; where batches are left out, after [`cull`](super::cull) has listed them. Splats that take
 /// long are listed, and projected by a dispatch of their own.
-pub fn steps(plan: &Plan, part: Part) -> Stage {
+pub fn steps(plan: &Plan, band: usize, part: Part) -> Stage {
     let start = |queue| Clear::of(queue, 0, QUEUE_START.into());
     let mut clears = vec![start("rare")];
     if !plan.needs.cull {
@@ -135,5 +135,5 @@ pub fn steps(plan: &Plan, part: Part) -> Stage {
         run(PROJECT_RARE, Over::Rare),
         run(ARRANGE, Over::Once),
     ];
-    Stage::new("project", 0, runs).after(clears).as_twin(Twin::Project)
+    Stage::new("project", band, runs).after(clears).as_twin(Twin::Project)
 }

@@ -5,8 +5,8 @@
 //! made by count, scan and place, and keeps its pixels' nearest depths, and then their sums, in registers. A splat costs each
 //! tile that it touches about as much as a dozen of scatter's fragments, so large splats are cheaper by tiles on any adapter:
 //! those whose bounds hold more than [`LARGE_BY_TILES`](crate::plan::tuning::LARGE_BY_TILES) pixels are. On a software adapter,
-//! whose atomics are slow, all splats are summed so if they are not tiny ([`touched`]), have one page, and the image has one
-//! band ([`SceneNeeds::gather`](crate::plan::SceneNeeds::gather)): then a tile resolves its pixels at once, and no sum is
+//! whose atomics are slow, all splats are summed so if they are not tiny ([`touched`]) and have one page
+//! ([`SceneNeeds::gather`](crate::plan::SceneNeeds::gather)): then a tile resolves its pixels at once, and no sum is
 //! stored. Nearest depths of small splats are found by scatter in any case, and all splats share the nearest depths before any
 //! is accumulated. Opaque blending within epsilon does not ask for an order, so no list is sorted.
 //!
@@ -116,9 +116,10 @@ fn bin(plan: &Plan, of: Listed, (band, page): (usize, usize), fresh: bool, place
     Stage { page: Some(page), ..stage }.after(vec![Clear::of(list_name(of), first, most - first)])
 }
 
-/// Counts the entries of all lists of a kind.
-pub fn look(plan: &Plan, of: Listed) -> Step {
-    let cuts = (0..plan.bands.len()).flat_map(|band| (0..plan.pages).map(move |page| (band, page)));
+/// Counts the entries of all lists of a kind, in the bands that have their splats from `band` on.
+pub fn look(plan: &Plan, of: Listed, band: usize) -> Step {
+    let bands = if plan.projects_each_band { band..band + 1 } else { 0..plan.bands.len() };
+    let cuts = bands.flat_map(|band| (0..plan.pages).map(move |page| (band, page)));
     let count = |(number, cut)| bin(plan, of, cut, number == 0, false);
     Step::Look(Look::Lists(of, cuts.enumerate().map(count).collect()))
 }
@@ -129,7 +130,7 @@ pub fn visibility(plan: &Plan, band: usize) -> Vec<Stage> {
         let stage = Stage::new("visibility", band, vec![Run { kernel: VISIBILITY, over: Over::Tiles }]);
         Stage { page: Some(page), ..stage }
     };
-    let fresh = |page| band == 0 && page == 0;
+    let fresh = |page| plan.projects_in(band) && page == 0;
     (0..plan.pages).flat_map(|page| [bin(plan, Listed::Large, (band, page), fresh(page), true), draw(page)]).collect()
 }
 

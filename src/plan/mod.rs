@@ -53,6 +53,8 @@ pub struct Plan {
     pub pages: usize,
     /// Pixels that nothing covers differ from 0.
     pub lists_empty: bool,
+    /// Each band has splats of its own: what is drawn first in it hides what is drawn later, and hidden splats are struck out.
+    pub projects_each_band: bool,
     /// The slots of splats are counted on the way.
     pub looks_for_slots: bool,
     /// Large splats are drawn by tiles, not by a workgroup each.
@@ -78,11 +80,7 @@ impl Plan {
         let needs = SceneNeeds::of(facts, adapter, camera, options);
         check::on_adapter(adapter, &needs, camera)?;
         let pixel = PixelLayout::of(&needs);
-        let sum_words = pixel.sum_words(&needs);
-        let head = if needs.raster.is_none() { needs.accumulator.row().head_words() } else { 0 };
-        let bands = bands(adapter, camera, sum_words.max(pixel.image_words), head)?;
         let page = page_surfels(adapter, &needs);
-        let one_band = bands.len() == 1;
         let gathers = match options.organisation {
             Organisation::Auto => needs.subgroups && known.touched_tiles >= tuning::GATHERED_TOUCHED_TILES,
             Organisation::Tile => true,
@@ -90,18 +88,21 @@ impl Plan {
         };
         let gather = needs.tiles
             && gathers
-            && one_band
             && (1..=page).contains(&facts.surfels)
             && !known.crowded
             && options.has(Optimisation::Gathering);
-        // What is drawn first hides what is drawn later in the same band alone. The rasteriser draws every splat.
-        let cull = one_band
-            && options.has(Optimisation::Culling)
+        // The rasteriser draws every splat.
+        let cull = options.has(Optimisation::Culling)
             && tuning::PIXELS_A_CULLED_SURFEL * facts.surfels > camera.pixels() as u64
             && page >= BATCH.into()
             && !needs.copies
             && needs.raster.is_none();
         let needs = SceneNeeds { gather, cull, ..needs };
+        // Tiles that gather store no sums.
+        let sum_words = if gather { 0 } else { pixel.sum_words(&needs) };
+        let head = if sum_words > 0 { needs.accumulator.row().head_words() } else { 0 };
+        let bands = bands(adapter, camera, sum_words.max(pixel.image_words), head)?;
+        let several = bands.len() > 1;
         let looks = [Listed::Large, Listed::Small].map(|of| {
             let wanted = match of {
                 Listed::Large => needs.tiles && (gather || known.large != Some(false)),
@@ -112,12 +113,13 @@ impl Plan {
         Ok(Self {
             needs,
             pixel,
-            sum_words: if gather { 0 } else { sum_words },
+            sum_words,
             width: camera.width,
             bands,
             pages: facts.surfels.div_ceil(page) as usize,
             lists_empty: options.shows_where_nothing_is(),
-            looks_for_slots: cull && !known.slots,
+            projects_each_band: several && (cull || gather),
+            looks_for_slots: cull && (several || !known.slots),
             large_by_tiles: needs.tiles && (looks[0] || known.entries_of(Listed::Large).is_some()),
             looks_for_lists: looks,
         })
@@ -135,10 +137,16 @@ impl Plan {
             bands: cuts::strips(camera, tuning::REFERENCE_ROWS),
             pages: 1,
             lists_empty: options.shows_where_nothing_is(),
+            projects_each_band: false,
             looks_for_slots: false,
             large_by_tiles: false,
             looks_for_lists: [false; 2],
         }
+    }
+
+    /// Whether splats are projected in `band`, and what is unknown of them is looked at.
+    pub fn projects_in(&self, band: usize) -> bool {
+        band == 0 || self.projects_each_band
     }
 
     /// The parts that are drawn one after the other.

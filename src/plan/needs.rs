@@ -22,8 +22,7 @@ pub struct SceneNeeds {
     pub doubled: bool,
     /// A surfel stands for all that are the same: the accumulator is `fixed`, one has many copies, and there is no texture.
     pub copies: bool,
-    /// Batches of surfels that are out of view or hidden are left out: the image is one band, and there are enough surfels for its
-    /// pixels, all of which are looked at for what hides ([`tuning::PIXELS_A_CULLED_SURFEL`]).
+    /// Batches of surfels that are out of view or hidden are left out: there are enough surfels for the image's pixels, all of which are looked at for what hides ([`tuning::PIXELS_A_CULLED_SURFEL`]).
     pub cull: bool,
     /// Large splats, at least, are drawn by tiles: the accumulator is `fixed`, the options do not say scatter, and there is no
     /// texture, whose sums are more than a tile's registers hold.

@@ -21,7 +21,8 @@ use crate::progress::Progress;
 /// How many splats a frame has.
 #[derive(Clone, Copy, Debug)]
 pub struct Tally {
-    /// Those that may touch a pixel of the image, and are not known to be hidden.
+    /// Those that may touch a pixel of the image, and are not known to be hidden; where bands have splats of their own, each counts in
+    /// every band that it is drawn in.
     pub drawn: u64,
     /// The image is right. If it is not, what is known now makes the next one right.
     pub complete: bool,
@@ -43,12 +44,23 @@ pub struct Run<'a> {
     pub timing: Timing,
     /// Large splats are drawn by tiles.
     by_tiles: bool,
+    /// What the device counted so far.
+    tally: Tally,
 }
 
 impl<'a> Run<'a> {
     /// A try that has not begun.
     pub fn new(gpu: &'a Gpu, plan: &'a Plan, kernels: &'a Kernels, store: &'a mut Store, known: &'a mut Known) -> Self {
-        Self { gpu, plan, kernels, store, known, timing: Timing::new(gpu), by_tiles: plan.large_by_tiles }
+        Self {
+            gpu,
+            plan,
+            kernels,
+            store,
+            known,
+            timing: Timing::new(gpu),
+            by_tiles: plan.large_by_tiles,
+            tally: Tally { drawn: 0, complete: true },
+        }
     }
 
     /// Runs `steps` into `frame`; false if there is too little room for the rest, of which `known` now tells.
@@ -62,6 +74,10 @@ impl<'a> Run<'a> {
                 Step::Large { by_workgroups, .. } => self.stage(by_workgroups)?,
                 Step::Draw => self.draw()?,
                 Step::ReadBack(band) => {
+                    // Of the last band `tally` looks.
+                    if self.plan.projects_each_band && *band + 1 < self.plan.bands.len() {
+                        self.count(*band)?;
+                    }
                     self.read_back(*band, frame)?;
                     progress.advance(self.plan.bands[*band].rows.into());
                 }
@@ -78,6 +94,12 @@ impl<'a> Run<'a> {
 
     /// What the device counted.
     pub fn tally(&mut self) -> Result<Tally> {
+        self.count(self.plan.bands.len() - 1)?;
+        Ok(self.tally)
+    }
+
+    /// Adds what the device counted up to the end of `band`.
+    fn count(&mut self, band: usize) -> Result<()> {
         self.timing.flush(self.gpu)?;
         let wanted = |name: &'static str| self.store.buffer(name);
         let large = self.by_tiles.then(|| wanted("large_lists")).flatten();
@@ -88,10 +110,10 @@ impl<'a> Run<'a> {
         let all: Vec<&Buffer<u32>> = of_pages.chain([large, small, sums]).flatten().collect();
         let mut counted = counts(self.gpu, &all)?.into_iter();
         let mut next = || counted.next().unwrap_or_default();
-        let (mut tally, mut most_large, mut slots) = (Tally { drawn: 0, complete: true }, 0, true);
+        let (mut most_large, mut slots) = (0, true);
         for page in &self.store.pages {
             let ([large, unseen], [_, batches]) = (next(), next());
-            tally.drawn += page.stand_for.saturating_sub(unseen.into());
+            self.tally.drawn += page.stand_for.saturating_sub(unseen.into());
             most_large = most_large.max(large);
             slots &= !self.plan.needs.cull || u64::from(batches) * u64::from(BATCH) <= page.slots;
         }
@@ -101,7 +123,9 @@ impl<'a> Run<'a> {
             lists &= entries <= self.store.entries(of) && longest <= LONGEST;
         }
         let [overflows, _] = sums.map_or([0; 2], |_| next());
-        self.known.large = Some(most_large > 0);
+        // Of a view all bands are asked.
+        let before = band > 0 && self.plan.projects_each_band && self.known.large == Some(true);
+        self.known.large = Some(before || most_large > 0);
         self.known.slots &= slots;
         if !lists {
             self.known.entries = [None; 2];
@@ -110,8 +134,8 @@ impl<'a> Run<'a> {
         if slots && lists {
             self.known.overflows = self.known.overflows.max(overflows.into());
         }
-        tally.complete = slots && lists && overflows == 0;
-        Ok(tally)
+        self.tally.complete &= slots && lists && overflows == 0;
+        Ok(())
     }
 
     fn stage(&mut self, stage: &Stage) -> Result<()> {
@@ -219,8 +243,10 @@ impl<'a> Run<'a> {
             self.known.crowded |= gathers;
             return Ok(!gathers);
         }
-        self.store.make_lists(self.gpu, self.plan, of, entries)?;
-        self.known.entries[of as usize] = Some(entries);
+        if entries > self.store.entries(of) || self.known.entries_of(of).is_none() {
+            self.store.make_lists(self.gpu, self.plan, of, entries)?;
+            self.known.entries[of as usize] = Some(entries);
+        }
         Ok(true)
     }
 

@@ -9,7 +9,7 @@ use crate::plan::steps::{Look, Part, Stage, Step};
 pub fn steps(plan: &Plan) -> Vec<Step> {
     let mut steps = Vec::new();
     if plan.needs.raster.is_some() {
-        steps.push(Step::Stage(project::steps(plan, Part::All)));
+        steps.push(Step::Stage(project::steps(plan, 0, Part::All)));
         steps.push(raster::STEP);
     }
     for band in 0..plan.bands.len() {
@@ -26,23 +26,23 @@ pub fn steps(plan: &Plan) -> Vec<Step> {
     steps
 }
 
-/// Splats, which bands share, and the nearest depth of each pixel of a band.
+/// Splats, which bands share or have each, and the nearest depth of each pixel of a band.
 fn nearest(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
     for &part in plan.parts() {
-        if band == 0 {
+        if plan.projects_in(band) {
             if plan.needs.cull {
                 steps.push(Step::Stage(cull::steps(band, part)));
                 steps.extend(plan.looks_for_slots.then_some(Step::Look(Look::Slots(part))));
             }
-            steps.push(Step::Stage(project::steps(plan, part)));
+            steps.push(Step::Stage(project::steps(plan, band, part)));
         }
         steps.push(Step::Stage(visibility::steps(plan, band, part)));
         if part == Part::Near {
             steps.push(Step::Stage(visibility::occlude(band, part)));
         }
     }
-    if plan.looks_for_lists[Listed::Large as usize] && band == 0 {
-        steps.push(tiles::look(plan, Listed::Large));
+    if plan.looks_for_lists[Listed::Large as usize] && plan.projects_in(band) {
+        steps.push(tiles::look(plan, Listed::Large, band));
     }
     large(plan, (tiles::visibility(plan, band), visibility::large(band)), steps);
     steps.push(Step::Stage(visibility::occlude(band, Part::All)));
@@ -51,7 +51,7 @@ fn nearest(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
 /// The sums of each pixel of a band; by tiles that gather, its image too.
 fn sums(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
     if plan.needs.gather {
-        steps.extend(plan.looks_for_lists[Listed::Small as usize].then(|| tiles::look(plan, Listed::Small)));
+        steps.extend(plan.looks_for_lists[Listed::Small as usize].then(|| tiles::look(plan, Listed::Small, band)));
         steps.extend(tiles::resolve(plan, band).into_iter().map(Step::Stage));
         return;
     }

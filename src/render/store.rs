@@ -64,7 +64,8 @@ impl Page {
         gpu.queue.write_buffer(&drawn.raw, 0, bytemuck::cast_slice(&[[BATCH / WORKGROUP, 0, 1]; 2]));
         buffers.insert("drawn", drawn);
         buffers.insert("rest", Buffer::storage(gpu, "batches that may be drawn", batches + 1)?);
-        buffers.insert("splats", Buffer::storage(gpu, "splats", 0)?);
+        // A binding holds one record at least.
+        buffers.insert("splats", Buffer::storage(gpu, "splats", splat_words(low_pass))?);
         for (name, what) in [("queue", "queue of large splats"), ("rare", "list of rare splats")] {
             buffers.insert(name, Buffer::indirect(gpu, what, QUEUE_START.into())?);
         }

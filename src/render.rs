@@ -8,6 +8,7 @@ mod report;
 mod run;
 pub mod sequence;
 mod store;
+pub mod sums;
 mod targets;
 
 use std::borrow::Borrow;

@@ -145,8 +145,8 @@ fn compare_nearest(case: &Case, enclosure: &[Pixel], device: &Stages) -> Finding
 fn compare_sums(case: &Case, enclosure: &[Pixel], device: &Stages) -> Findings {
     let mut findings = Findings::default();
     for (index, pixel) in enclosure.iter().enumerate() {
-        let sum = |channel: u32| device.value(index, channel).unwrap();
-        let layout = device.pixel;
+        let sum = |channel: u32| device.sums.value(index, channel).unwrap();
+        let layout = device.sums.pixel;
         let mut check = |what: &str, interval: &Interval, value: f64| {
             if !interval.holds(value) {
                 findings.fail(format!("{}, pixel {index}, {what}: {value:e} outside {interval:?}", case.name));
@@ -172,7 +172,7 @@ fn compare_sums(case: &Case, enclosure: &[Pixel], device: &Stages) -> Findings {
         if (weight > 0.0) != front.is_finite() {
             findings.fail(format!("{}, pixel {index}: weight {weight:e}, but depth {front:e}", case.name));
         }
-        let count = device.count(index).unwrap() as u32;
+        let count = device.sums.count(index).unwrap() as u32;
         if !(pixel.count.0..=pixel.count.1).contains(&count) {
             findings.fail(format!("{}, pixel {index}: {count} fragments, not {:?}", case.name, pixel.count));
         }

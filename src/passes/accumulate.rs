@@ -45,12 +45,15 @@ use crate::scene::{Camera, Colors, Map, Scene};
 fn fixed_file(needs: &SceneNeeds) -> &'static str {
     match (needs.wide_sums || needs.copies, needs.atomics_u64) {
         (false, false) => "accumulator_fixed.wgsl",
-        (false, true) => "accumulator_fixed_pairs.wgsl",
+        (false, true) => PAIRS,
         // Products are made of words.
         (true, true) if !needs.copies => "accumulator_fixed64.wgsl",
         (true, _) => "accumulator_fixed_wide.wgsl",
     }
 }
+
+/// The file that keeps two of its sums in one number.
+const PAIRS: &str = "accumulator_fixed_pairs.wgsl";
 
 /// The file of its terms.
 fn terms_file(needs: &SceneNeeds) -> &'static str {
@@ -68,13 +71,39 @@ pub fn files(needs: &SceneNeeds) -> Vec<&'static str> {
 
 /// The files that keep the sums of a tile's pixels, where [`files`] keeps them in storage.
 pub fn tile_files(needs: &SceneNeeds) -> [&'static str; 4] {
-    let pairs = fixed_file(needs) == "accumulator_fixed_pairs.wgsl";
+    let pairs = fixed_file(needs) == PAIRS;
     [
         terms_file(needs),
         if needs.wide_sums { "tile_add_wide.wgsl" } else { "tile_add.wgsl" },
         "tile_sums.wgsl",
         if pairs { "tile_deposit_pairs.wgsl" } else { "tile_deposit.wgsl" },
     ]
+}
+
+/// The sums of `fixed` that a device keeps in `words`, each as one number.
+pub fn canonical(needs: &SceneNeeds, words: &[u32]) -> Vec<u64> {
+    let long = |low: u32, high: u32| u64::from(high) << 32 | u64::from(low);
+    if fixed_file(needs) != PAIRS {
+        return words.as_chunks().0.iter().map(|&[low, high]| long(low, high)).collect();
+    }
+    // What the low half carried into the high one is taken out of it again (accumulator_fixed_pairs.wgsl).
+    let pair = |&[low, high, from_low, from_high]: &[u32; 4]| {
+        [long(low, from_low), long(high, from_high).wrapping_sub(from_low.into())]
+    };
+    words.as_chunks().0.iter().flat_map(pair).collect()
+}
+
+/// The words in which a device keeps `sums`: what [`canonical`] is made of.
+pub fn kept(needs: &SceneNeeds, sums: &[u64]) -> Vec<u32> {
+    let [low, high] = [|long: u64| long as u32, |long: u64| (long >> 32) as u32];
+    if fixed_file(needs) != PAIRS {
+        return sums.iter().flat_map(|&sum| [low(sum), high(sum)]).collect();
+    }
+    let pair = |&[first, second]: &[u64; 2]| {
+        let carried = second.wrapping_add(first >> 32);
+        [low(first), low(carried), high(first), high(carried)]
+    };
+    sums.as_chunks().0.iter().flat_map(pair).collect()
 }
 
 /// The sums of one pixel, in f64: weight, weight times attributes.

@@ -136,7 +136,7 @@ fn attributes(
 }
 
 /// The table that decodes 8-bit sRGB, where it is needed, and the texture.
-fn shared(gpu: &Gpu, scene: &Scene, needs: &SceneNeeds) -> Result<Named> {
+pub fn shared(gpu: &Gpu, scene: &Scene, needs: &SceneNeeds) -> Result<Named> {
     let mut shared = Vec::new();
     if let ColorNeed::Srgb8 | ColorNeed::Textured = needs.color {
         let table: [[f32; 4]; 64] = std::array::from_fn(|row| std::array::from_fn(|k| SRGB8_TO_LINEAR[4 * row + k]));

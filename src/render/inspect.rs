@@ -7,15 +7,16 @@ use super::kernels::Kernels;
 use super::run::Run;
 use super::sequence;
 use super::store::Store;
+use super::sums::Sums;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::kernel::{grid, reflect};
-use crate::gpu::layout::{ONE, ONE_WIDE, Splat, View};
+use crate::gpu::layout::{Splat, View};
 use crate::gpu::{Gpu, Sources};
 use crate::passes::upload::upload;
 use crate::plan::steps::{Stage, Step, Twin};
-use crate::plan::{Facts, Known, Optimisation, Organisation, PixelLayout, Plan, RenderOptions, splat_words};
+use crate::plan::{Facts, Known, Optimisation, Organisation, Plan, RenderOptions, splat_words};
 use crate::scene::{Camera, LowPass, Scene};
 
 /// What the first three stages leave on the device.
@@ -23,15 +24,8 @@ use crate::scene::{Camera, LowPass, Scene};
 pub struct Stages {
     /// The record of each surfel, in the order of the scene.
     pub splats: Vec<Splat>,
-    /// The nearest depth of each pixel, device units, as what its bits lack to those of +inf; see
-    /// [`nearest_depth`](Self::nearest_depth).
-    pub nearest: Vec<u32>,
-    /// [`Plan::sum_words`] a pixel; see [`sum`](Self::sum).
-    pub sums: Vec<u32>,
-    /// Where each sum lies.
-    pub pixel: PixelLayout,
-    /// Units of a weight of 1 in the sums of the accumulator `fixed`.
-    pub one: f64,
+    /// Nearest depths, see [`nearest_depth`](Self::nearest_depth), and sums.
+    pub sums: Sums,
     /// The uniform that the kernels saw.
     pub view: View,
 }
@@ -39,25 +33,8 @@ pub struct Stages {
 impl Stages {
     /// The nearest depth of `pixel`, world units, +inf where nothing is. `None` past the image.
     pub fn nearest_depth(&self, pixel: usize) -> Option<f64> {
-        let bits = f32::INFINITY.to_bits().wrapping_sub(*self.nearest.get(pixel)?);
+        let bits = f32::INFINITY.to_bits().wrapping_sub(*self.sums.nearest.get(pixel)?);
         Some(f64::from(f32::from_bits(bits)) * f64::from(self.view.world))
-    }
-
-    /// The sum of `channel` at `pixel` by the accumulator `fixed`, in units of `1 / one`. `None` past the end.
-    pub fn sum(&self, pixel: usize, channel: u32) -> Option<u64> {
-        let at = pixel.checked_mul(self.pixel.channels as usize)?.checked_add(channel as usize)?.checked_mul(2)?;
-        let (low, high) = (self.sums.get(at)?, self.sums.get(at + 1)?);
-        Some(u64::from(*high) << 32 | u64::from(*low))
-    }
-
-    /// The same where a weight of 1 is 1.
-    pub fn value(&self, pixel: usize, channel: u32) -> Option<f64> {
-        Some(self.sum(pixel, channel)? as f64 / self.one)
-    }
-
-    /// The fragments accepted at `pixel`, by the accumulator `fixed`. `None` if they were not counted.
-    pub fn count(&self, pixel: usize) -> Option<u64> {
-        (self.pixel.count_channel < self.pixel.channels).then(|| self.sum(pixel, self.pixel.count_channel))?
     }
 }
 
@@ -66,14 +43,14 @@ impl Stages {
 /// # Errors
 /// [`Error::Usage`] if the image's sums need more than one buffer; and whatever a render can fail with.
 pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu, sources: &Sources) -> Result<Stages> {
-    // A slot for each surfel, and sums of two words in storage.
+    // A slot for each surfel, and sums in storage.
     let mut without = options.without.clone();
-    without.extend([Optimisation::Culling, Optimisation::Copies, Optimisation::Pairs]);
+    without.extend([Optimisation::Culling, Optimisation::Copies]);
     let options = &RenderOptions { organisation: Organisation::Scatter, raster: None, without, ..options.clone() };
     let facts = Facts::of(scene);
     let mut known = Known::default();
     let plan = Plan::of(&facts, &gpu.adapter, camera, options, &known)?;
-    let [band] = plan.bands[..] else {
+    if plan.bands.len() > 1 {
         return Err(Error::Usage(format!(
             "an image of {}x{} pixels needs {} bands on {}, and stages are read back from images of one: choose a \
              smaller image",
@@ -82,7 +59,7 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
             plan.bands.len(),
             gpu.adapter.name
         )));
-    };
+    }
     let kernels = Kernels::new(gpu, sources, &plan, options, facts.surfels)?;
     let uploaded = upload(gpu, scene, &plan.needs, Some(&facts.core), &())?;
     let order = uploaded.order.clone();
@@ -95,19 +72,9 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
     let steps: Vec<_> = sequence::steps(&plan).into_iter().take_while(|step| !resolves(step)).collect();
     run.steps(&steps, &mut Frame::empty(camera, options.maps), &())?;
     run.timing.flush(gpu)?;
-    let words = |name: &str, len: u64| match store.buffer(name) {
-        Some(buffer) => buffer.read(gpu, len),
-        None => Ok(Vec::new()),
-    };
-    let head = plan.needs.accumulator.row().head_words();
-    Ok(Stages {
-        splats: splats(gpu, options.low_pass, &order, &store)?,
-        nearest: words("nearest", band.pixels)?,
-        sums: words("sums", head + band.pixels * u64::from(plan.sum_words))?.split_off(head as usize),
-        pixel: plan.pixel,
-        one: if plan.needs.wide_sums { ONE_WIDE as f64 } else { ONE.into() },
-        view,
-    })
+    let mut sums = Sums::new(camera, &plan);
+    sums.take(gpu, &plan, &store, 0)?;
+    Ok(Stages { splats: splats(gpu, options.low_pass, &order, &store)?, sums, view })
 }
 
 /// The record of each surfel, in the order of the scene.

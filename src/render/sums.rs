@@ -1,0 +1,168 @@
+//! The sums of an image, off the device: what machines that share a scene would exchange, in one form, whatever form a device keeps
+//! them in. Read back, they make the same picture to the bit.
+
+use super::kernels::Kernels;
+use super::run::Run;
+use super::sequence;
+use super::store::Store;
+use crate::error::{Error, Result};
+use crate::frame::Frame;
+use crate::gpu::layout::{ONE, ONE_WIDE, View};
+use crate::gpu::{Gpu, Sources};
+use crate::passes::upload::{Uploaded, shared, upload};
+use crate::passes::{accumulate, resolve as resolve_pass, visibility};
+use crate::plan::known::MOST_TRIES;
+use crate::plan::steps::{Part, Stage, Step, Twin};
+use crate::plan::{Accumulator, Facts, Known, Optimisation, PixelLayout, Plan, RenderOptions};
+use crate::scene::{Camera, Scene};
+
+/// What the attribute pass leaves of an image, by the accumulator `fixed`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sums {
+    /// Columns and rows of the image.
+    pub size: [u32; 2],
+    /// The nearest depth of each pixel, device units, as what its bits lack to those of +inf.
+    pub nearest: Vec<u32>,
+    /// [`PixelLayout::channels`] a pixel, in units of `1 / one`: sums of integers, which add to those of other splats of the pixel.
+    pub sums: Vec<u64>,
+    /// Where each sum lies.
+    pub pixel: PixelLayout,
+    /// Units of a weight of 1.
+    pub one: u64,
+}
+
+impl Sums {
+    /// Room for an image by `plan`.
+    pub(super) fn new(camera: &Camera, plan: &Plan) -> Self {
+        let one = if plan.needs.wide_sums { ONE_WIDE } else { ONE.into() };
+        Self { size: [camera.width, camera.height], nearest: Vec::new(), sums: Vec::new(), pixel: plan.pixel, one }
+    }
+
+    /// The sum of `channel` at `pixel`, in units of `1 / one`. `None` past the end.
+    pub fn sum(&self, pixel: usize, channel: u32) -> Option<u64> {
+        let at = pixel.checked_mul(self.pixel.channels as usize)?.checked_add(channel as usize)?;
+        self.sums.get(at).copied()
+    }
+
+    /// The same where a weight of 1 is 1.
+    pub fn value(&self, pixel: usize, channel: u32) -> Option<f64> {
+        Some(self.sum(pixel, channel)? as f64 / self.one as f64)
+    }
+
+    /// The fragments accepted at `pixel`. `None` if they were not counted.
+    pub fn count(&self, pixel: usize) -> Option<u64> {
+        (self.pixel.count_channel < self.pixel.channels).then(|| self.sum(pixel, self.pixel.count_channel))?
+    }
+
+    /// Appends those of a band, which are on the device.
+    pub(super) fn take(&mut self, gpu: &Gpu, plan: &Plan, store: &Store, band: usize) -> Result<()> {
+        let pixels = plan.bands[band].pixels;
+        let words = |name: &str, len: u64| match store.buffer(name) {
+            Some(buffer) => buffer.read(gpu, len),
+            None => Ok(Vec::new()),
+        };
+        self.nearest.extend(words("nearest", pixels)?);
+        let kept = words("sums", pixels * u64::from(plan.sum_words))?;
+        self.sums.extend(accumulate::canonical(&plan.needs, &kept));
+        Ok(())
+    }
+
+    /// Puts those of a band on the device.
+    fn put(&self, gpu: &Gpu, plan: &Plan, store: &Store, band: usize) {
+        let first = plan.bands[band].first as usize * self.size[0] as usize;
+        let pixels = first..first + plan.bands[band].pixels as usize;
+        let channels = self.pixel.channels as usize;
+        let sums = &self.sums[pixels.start * channels..pixels.end * channels];
+        let kept = accumulate::kept(&plan.needs, sums);
+        for (name, words) in [("nearest", &self.nearest[pixels]), ("sums", &kept)] {
+            if let Some(buffer) = store.buffer(name) {
+                gpu.queue.write_buffer(&buffer.raw, 0, bytemuck::cast_slice(words));
+            }
+        }
+    }
+}
+
+/// How sums are made that leave the device.
+fn stored(options: &RenderOptions) -> Result<RenderOptions> {
+    if options.accumulator != Accumulator::Fixed || options.raster.is_some() {
+        return Err(Error::Usage("sums leave the device in the form of the accumulator fixed: take it".into()));
+    }
+    // Tiles that gather store none.
+    let mut without = options.without.clone();
+    without.push(Optimisation::Gathering);
+    Ok(RenderOptions { without, ..options.clone() })
+}
+
+/// The sums of a render of `scene`.
+///
+/// # Errors
+/// [`Error::Usage`] for another accumulator than `fixed`, and whatever a render can fail with.
+pub fn sums(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu, sources: &Sources) -> Result<Sums> {
+    let options = &stored(options)?;
+    let facts = Facts::of(scene);
+    let mut known = Known::default();
+    let plan = Plan::of(&facts, &gpu.adapter, camera, options, &known)?;
+    let mut store = Store::new(gpu, upload(gpu, scene, &plan.needs, Some(&facts.core), &())?, &plan.needs)?;
+    for _ in 0..MOST_TRIES {
+        let plan = Plan::of(&facts, &gpu.adapter, camera, options, &known)?;
+        let kernels = Kernels::new(gpu, sources, &plan, options, facts.surfels)?;
+        store.fit(gpu, &plan, &known)?;
+        store.set_view(gpu, &View::new(&facts, camera, options));
+        let mut run = Run::new(gpu, &plan, &kernels, &mut store, &mut known);
+        let mut sums = Sums::new(camera, &plan);
+        let mut nothing = Frame::empty(camera, options.maps);
+        for step in sequence::steps(&plan) {
+            match step {
+                Step::Stage(Stage { twin: Some(Twin::Resolve), band, .. }) => {
+                    run.timing.flush(gpu)?;
+                    sums.take(gpu, &plan, run.store, band)?;
+                }
+                Step::ReadBack(_) | Step::Stage(Stage { twin: Some(Twin::Map(_)), .. }) => {}
+                step => drop(run.steps(&[step], &mut nothing, &())?),
+            }
+        }
+        if run.tally()?.complete {
+            return Ok(sums);
+        }
+    }
+    Err(Run::never_fits(gpu))
+}
+
+/// The image that `sums` of a render of `scene` make, whoever made them.
+///
+/// # Errors
+/// [`Error::Usage`] for sums of another render, and whatever a render can fail with.
+pub fn resolve(
+    sums: &Sums,
+    scene: &Scene,
+    camera: &Camera,
+    options: &RenderOptions,
+    gpu: &Gpu,
+    sources: &Sources,
+) -> Result<Frame> {
+    let options = &stored(options)?;
+    let facts = Facts::of(scene);
+    let mut known = Known::default();
+    let plan = Plan::of(&facts, &gpu.adapter, camera, options, &known)?;
+    let expected = Sums::new(camera, &plan);
+    let pixels = camera.pixels();
+    let whole = sums.nearest.len() == pixels && sums.sums.len() == pixels * plan.pixel.channels as usize;
+    if !whole || (sums.size, sums.pixel, sums.one) != (expected.size, expected.pixel, expected.one) {
+        return Err(Error::Usage("the sums are of another scene, image or choice of maps".into()));
+    }
+    let kernels = Kernels::new(gpu, sources, &plan, options, facts.surfels)?;
+    let scene_wide = Uploaded { pages: Vec::new(), shared: shared(gpu, scene, &plan.needs)?, order: Vec::new() };
+    let mut store = Store::new(gpu, scene_wide, &plan.needs)?;
+    store.fit(gpu, &plan, &known)?;
+    store.set_view(gpu, &View::new(&facts, camera, options));
+    let mut frame = Frame::new(camera, options.maps);
+    let mut run = Run::new(gpu, &plan, &kernels, &mut store, &mut known);
+    for band in 0..plan.bands.len() {
+        sums.put(gpu, &plan, run.store, band);
+        // Which tiles are covered follows from the nearest depths.
+        let stages = [visibility::occlude(band, Part::All), resolve_pass::steps(&plan, band)];
+        let steps = stages.into_iter().map(Step::Stage).chain([Step::ReadBack(band)]);
+        run.steps(&steps.collect::<Vec<_>>(), &mut frame, &())?;
+    }
+    Ok(frame)
+}

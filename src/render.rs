@@ -13,12 +13,13 @@ mod targets;
 
 use std::borrow::Borrow;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Sources};
-use crate::plan::{Facts, Optimisation, RenderOptions, check};
+use crate::passes::source::Source;
+use crate::plan::{Optimisation, RenderOptions, check};
 use crate::progress::Progress;
-use crate::scene::{Camera, Scene};
+use crate::scene::Camera;
 use kept::Kept;
 pub use report::{DeviceBytes, Report};
 
@@ -42,42 +43,42 @@ impl Backend {
     }
 }
 
-/// Renders `scene` once.
+/// Renders a scene, or what else is a [`Source`], once.
 ///
 /// # Errors
 /// Those of [`Renderer::new`] and [`Renderer::frame`].
 pub fn render(
-    scene: &Scene,
+    source: &dyn Source,
     camera: &Camera,
     options: &RenderOptions,
     backend: &Backend,
     progress: &dyn Progress,
 ) -> Result<(Frame, Report)> {
-    Renderer::new(scene, options, backend)?.frame(camera, progress)
+    Renderer::new(source, options, backend)?.frame(camera, progress)
 }
 
 /// A scene on a backend, and what stays from frame to frame: the uploaded surfels, the buffers, the kernels, and what earlier frames
 /// have shown. The second frame costs its passes alone.
 ///
-/// Scene and backend are borrowed or owned: `Renderer::new(&scene, &options, &backend)`, or with an [`Arc`](std::sync::Arc) of each
+/// Scene (or another [`Source`]) and backend are borrowed or owned: `Renderer::new(&scene, &options, &backend)`, or with an [`Arc`](std::sync::Arc) of each
 /// something that another program can keep.
 pub struct Renderer<S, B> {
-    scene: S,
+    source: S,
     backend: B,
     kept: Kept,
 }
 
-impl<S: Borrow<Scene>, B: Borrow<Backend>> Renderer<S, B> {
-    /// A renderer of `scene`; nothing is uploaded yet.
+impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
+    /// A renderer of what `source` has; nothing is uploaded yet.
     ///
     /// # Errors
     /// [`Error::Usage`](crate::Error::Usage) for options, scenes and backends that do not go together.
-    pub fn new(scene: S, options: &RenderOptions, backend: B) -> Result<Self> {
+    pub fn new(source: S, options: &RenderOptions, backend: B) -> Result<Self> {
         let reference = matches!(backend.borrow(), Backend::Reference);
         check::options(options, reference)?;
-        let facts = Facts::of(scene.borrow());
+        let facts = source.facts();
         check::scene(&facts, options, reference)?;
-        Ok(Self { scene, backend, kept: Kept::new(facts, options.clone()) })
+        Ok(Self { source, backend, kept: Kept::new(facts, options.clone()) })
     }
 
     /// One frame.
@@ -85,15 +86,20 @@ impl<S: Borrow<Scene>, B: Borrow<Backend>> Renderer<S, B> {
     /// # Errors
     /// A limit of the adapter, and whatever a device may report.
     pub fn frame(&mut self, camera: &Camera, progress: &dyn Progress) -> Result<(Frame, Report)> {
-        let (scene, kept) = (self.scene.borrow(), &mut self.kept);
+        let (source, kept): (&dyn Source, _) = (&self.source, &mut self.kept);
         match self.backend.borrow() {
             Backend::Gpu { gpu, sources } if kept.options.has(Optimisation::UncountedLoops) => {
-                kept.frame((gpu, sources), scene, camera, progress)
+                kept.frame((gpu, sources), source, camera, progress)
             }
             Backend::Gpu { gpu, sources } => {
-                kept.frame((gpu, &sources.clone().with_counted_loops()), scene, camera, progress)
+                kept.frame((gpu, &sources.clone().with_counted_loops()), source, camera, progress)
             }
-            Backend::Reference => Ok(reference::frame(scene, &kept.facts, camera, &kept.options, progress)),
+            Backend::Reference => {
+                let scene = source.whole().ok_or_else(|| {
+                    Error::Usage("the reference needs all surfels in memory: render on an adapter".into())
+                })?;
+                Ok(reference::frame(scene, &kept.facts, camera, &kept.options, progress))
+            }
         }
     }
 

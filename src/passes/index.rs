@@ -12,7 +12,7 @@ use crate::plan::Plan;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Kernel, Over, Part, Run, Stage};
 use crate::scene::options::LEAST_FILTERED_WEIGHT;
-use crate::scene::{Map, Scene};
+use crate::scene::{Map, Provenance};
 
 /// The map's row.
 pub const MAP: MapPass = MapPass {
@@ -44,17 +44,17 @@ fn runs(_: &Plan, band: usize) -> Stage {
 }
 
 /// Input and point of a surfel, as a pixel of a frame keeps them.
-fn named(scene: &Scene, surfel: Option<u32>) -> [f32; 2] {
+fn named(provenance: &Provenance, surfel: Option<u32>) -> [f32; 2] {
     let Some(surfel) = surfel else { return [f32::from_bits(NOTHING); 2] };
-    let (input, point) = scene.provenance.of(surfel.into());
+    let (input, point) = provenance.of(surfel.into());
     [input, point].map(|number| f32::from_bits(u32::try_from(number).unwrap_or(NOTHING - 1)))
 }
 
 /// Of a weight and what a place lacks to the last number, input and point.
-fn finish(words: &mut [f32], scene: &Scene, order: &[u32]) {
+fn finish(words: &mut [f32], provenance: &Provenance, order: &[u32]) {
     for [weight, place] in words.as_chunks_mut().0 {
         let surfel = order.get((u32::MAX - place.to_bits()) as usize);
-        [*weight, *place] = named(scene, surfel.copied());
+        [*weight, *place] = named(provenance, surfel.copied());
     }
 }
 
@@ -83,6 +83,6 @@ fn reference(strip: &Strip<'_>, nearest: &[f64], frame: &mut Frame) {
         }
     }
     for (words, (_, _, surfel)) in map.as_chunks_mut().0.iter_mut().zip(strongest) {
-        *words = named(scene, (surfel != NOTHING).then_some(surfel));
+        *words = named(&scene.provenance, (surfel != NOTHING).then_some(surfel));
     }
 }

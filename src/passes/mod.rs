@@ -4,7 +4,7 @@
 //! | stage | takes | makes |
 //! |---|---|---|
 //! | [`order`] | [`Scene`](crate::scene::Scene) | the order of its surfels in memory |
-//! | [`upload`] | [`Scene`](crate::scene::Scene) | pages of surfels |
+//! | [`upload`] | a [`source::Source`] | pages of surfels |
 //! | [`cull`] | surfels, nearest depths so far | the batches that are projected |
 //! | [`project`] | surfels | [`splat::Splat`] each |
 //! | [`visibility`] | splats | the nearest depth of each pixel |
@@ -31,6 +31,7 @@ pub mod project;
 pub mod raster;
 pub mod resolve;
 pub mod shared;
+pub mod source;
 pub mod splat;
 pub mod tiles;
 pub mod unseen;
@@ -41,7 +42,7 @@ use crate::frame::Frame;
 use crate::plan::pass::{Making, Module, Pass};
 use crate::plan::steps::{Stage, Twin};
 use crate::plan::{Plan, RenderOptions, SceneNeeds};
-use crate::scene::{Camera, Map, Scene};
+use crate::scene::{Camera, Map, Provenance, Scene};
 use splat::Splat;
 
 /// What a strip of the reference has for the twin of a pass.
@@ -70,8 +71,8 @@ pub struct MapPass {
     pub pass: Pass,
     /// After the image of a band is resolved.
     pub runs: fn(&Plan, usize) -> Stage,
-    /// What the host makes of a pixel's words, of the scene and the surfels in the order in which they are stored.
-    pub finish: fn(&mut [f32], &Scene, &[u32]),
+    /// What the host makes of a pixel's words, of the numbers of the surfels in the order in which they are stored.
+    pub finish: fn(&mut [f32], &Provenance, &[u32]),
     /// The twin, of nearest depths.
     pub reference: fn(&Strip<'_>, &[f64], &mut Frame),
 }
@@ -96,10 +97,10 @@ pub fn asks_for_order(needs: &SceneNeeds) -> bool {
 }
 
 /// Makes of `frame`, as it was read back, what a user is given.
-pub fn finish(frame: &mut Frame, needs: &SceneNeeds, scene: &Scene, order: &[u32]) {
+pub fn finish(frame: &mut Frame, needs: &SceneNeeds, provenance: &Provenance, order: &[u32]) {
     for own in own_maps(needs) {
         if let Some(words) = frame.map_mut(own.map) {
-            (own.finish)(words, scene, order);
+            (own.finish)(words, provenance, order);
         }
     }
 }

@@ -61,8 +61,8 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
         )));
     }
     let kernels = Kernels::new(gpu, sources, &plan, options, facts.surfels)?;
-    let uploaded = upload(gpu, scene, &plan.needs, Some(&facts.core), &())?;
-    let order = uploaded.order.clone();
+    let uploaded = upload(gpu, scene, &plan.needs, (&facts, true), &())?;
+    let order: Vec<u32> = uploaded.pages.iter().flat_map(|page| page.numbers.clone()).collect();
     let mut store = Store::new(gpu, uploaded, &plan.needs)?;
     store.fit(gpu, &plan, &known)?;
     let view = View::new(&facts, camera, options);

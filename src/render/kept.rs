@@ -12,12 +12,13 @@ use crate::error::Result;
 use crate::frame::Frame;
 use crate::gpu::layout::View;
 use crate::gpu::{Gpu, Sources};
+use crate::passes::source::Source;
 use crate::passes::upload::upload;
 use crate::passes::{asks_for_order, finish, tiles};
 use crate::plan::known::MOST_TRIES;
 use crate::plan::{Facts, Known, Optimisation, Organisation, Plan, RenderOptions, tuning};
 use crate::progress::Progress;
-use crate::scene::{Camera, Scene};
+use crate::scene::Camera;
 
 /// The facts of a scene, what is known of its frames, and what is on the device.
 pub(super) struct Kept {
@@ -46,7 +47,7 @@ impl Kept {
     pub(super) fn frame(
         &mut self,
         (gpu, sources): (&Gpu, &Sources),
-        scene: &Scene,
+        source: &dyn Source,
         camera: &Camera,
         bar: &dyn Progress,
     ) -> Result<(Frame, Report)> {
@@ -56,7 +57,7 @@ impl Kept {
             let plan = Plan::of(&self.facts, &gpu.adapter, camera, &self.options, &self.known)?;
             // A second try adds nothing to the bar.
             let progress = if number == 0 { bar } else { &() };
-            self.prepare((gpu, sources), scene, &plan, progress)?;
+            self.prepare((gpu, sources), source, &plan, progress)?;
             let (Some(kernels), Some(store)) = (&self.kernels, &mut self.store) else { continue };
             if number == 0 {
                 progress.begin("rendering rows", camera.height.into());
@@ -73,7 +74,7 @@ impl Kept {
             }
             let tally = run.tally()?;
             if tally.complete {
-                finish(&mut frame, &plan.needs, scene, &run.store.order);
+                finish(&mut frame, &plan.needs, &source.provenance(), &run.store.order);
                 bar.end();
                 let clock = if run.timing.on_device() { "timestamps" } else { "wall" };
                 let passes = run.timing.finish(gpu)?;
@@ -104,7 +105,7 @@ impl Kept {
     fn prepare(
         &mut self,
         (gpu, sources): (&Gpu, &Sources),
-        scene: &Scene,
+        source: &dyn Source,
         plan: &Plan,
         progress: &dyn Progress,
     ) -> Result<()> {
@@ -121,8 +122,7 @@ impl Kept {
             Some(store) => store,
             empty => {
                 let ordered = self.options.has(Optimisation::Order) || asks_for_order(&plan.needs);
-                let core = ordered.then_some(&self.facts.core);
-                let uploaded = upload(gpu, scene, &plan.needs, core, progress)?;
+                let uploaded = upload(gpu, source, &plan.needs, (&self.facts, ordered), progress)?;
                 empty.insert(Store::new(gpu, uploaded, &plan.needs)?)
             }
         };

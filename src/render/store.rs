@@ -56,7 +56,8 @@ pub struct Page {
 
 impl Page {
     fn new(gpu: &Gpu, uploaded: upload::Page, first: u32, low_pass: LowPass) -> Result<Self> {
-        let upload::Page { buffers, surfels, stand_for } = uploaded;
+        let upload::Page { buffers, numbers, stand_for } = uploaded;
+        let surfels = numbers.len() as u64;
         let mut buffers = Named::from_iter(buffers);
         let batches = surfels.div_ceil(BATCH.into());
         let drawn = Buffer::indirect(gpu, "batches that are drawn", batches + u64::from(LIST_START))?;
@@ -129,23 +130,26 @@ pub struct Store {
     readback: Option<Readback>,
     /// The rasteriser's textures.
     pub targets: Option<Targets>,
-    /// The surfels of all pages, as indices in the scene; where a map asks for them.
+    /// The numbers of the surfels of all pages in their source; where a map asks for them.
     pub order: Vec<u32>,
 }
 
 impl Store {
     /// The scene's buffers, which were `uploaded` for a render with `needs`; none for pixels yet.
     pub fn new(gpu: &Gpu, uploaded: Uploaded, needs: &SceneNeeds) -> Result<Self> {
-        let mut first = 0;
+        let (mut first, mut order) = (0, Vec::new());
         let pages = uploaded.pages.into_iter().map(|page| {
-            let surfels = page.surfels as u32;
-            let page = Page::new(gpu, page, first, needs.low_pass);
+            let (before, surfels) = (first, page.numbers.len() as u32);
             first += surfels;
-            page
+            if asks_for_order(needs) {
+                order.extend(&page.numbers);
+            }
+            Page::new(gpu, page, before, needs.low_pass)
         });
+        let pages = pages.collect::<Result<_>>()?;
         Ok(Self {
             copies: needs.copies,
-            pages: pages.collect::<Result<_>>()?,
+            pages,
             shared: Named::from_iter(uploaded.shared),
             made: None,
             frame: Named::new(),
@@ -153,7 +157,7 @@ impl Store {
             entries: [0; 2],
             readback: None,
             targets: None,
-            order: if asks_for_order(needs) { uploaded.order } else { Vec::new() },
+            order,
         })
     }
 

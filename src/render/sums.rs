@@ -9,12 +9,13 @@ use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::layout::{ONE, ONE_WIDE, View};
 use crate::gpu::{Gpu, Sources};
+use crate::passes::source::Source;
 use crate::passes::upload::{Uploaded, shared, upload};
 use crate::passes::{accumulate, resolve as resolve_pass, visibility};
 use crate::plan::known::MOST_TRIES;
 use crate::plan::steps::{Part, Stage, Step, Twin};
-use crate::plan::{Accumulator, Facts, Known, Optimisation, PixelLayout, Plan, RenderOptions};
-use crate::scene::{Camera, Scene};
+use crate::plan::{Accumulator, Known, Optimisation, PixelLayout, Plan, RenderOptions};
+use crate::scene::Camera;
 
 /// What the attribute pass leaves of an image, by the accumulator `fixed`.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,16 +94,22 @@ fn stored(options: &RenderOptions) -> Result<RenderOptions> {
     Ok(RenderOptions { without, ..options.clone() })
 }
 
-/// The sums of a render of `scene`.
+/// The sums of a render of what `source` has.
 ///
 /// # Errors
 /// [`Error::Usage`] for another accumulator than `fixed`, and whatever a render can fail with.
-pub fn sums(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu, sources: &Sources) -> Result<Sums> {
+pub fn sums(
+    source: &dyn Source,
+    camera: &Camera,
+    options: &RenderOptions,
+    gpu: &Gpu,
+    sources: &Sources,
+) -> Result<Sums> {
     let options = &stored(options)?;
-    let facts = Facts::of(scene);
+    let facts = source.facts();
     let mut known = Known::default();
     let plan = Plan::of(&facts, &gpu.adapter, camera, options, &known)?;
-    let mut store = Store::new(gpu, upload(gpu, scene, &plan.needs, Some(&facts.core), &())?, &plan.needs)?;
+    let mut store = Store::new(gpu, upload(gpu, source, &plan.needs, (&facts, true), &())?, &plan.needs)?;
     for _ in 0..MOST_TRIES {
         let plan = Plan::of(&facts, &gpu.adapter, camera, options, &known)?;
         let kernels = Kernels::new(gpu, sources, &plan, options, facts.surfels)?;
@@ -128,20 +135,20 @@ pub fn sums(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu, 
     Err(Run::never_fits(gpu))
 }
 
-/// The image that `sums` of a render of `scene` make, whoever made them.
+/// The image that `sums` of a render of what `source` has make, whoever made them.
 ///
 /// # Errors
 /// [`Error::Usage`] for sums of another render, and whatever a render can fail with.
 pub fn resolve(
     sums: &Sums,
-    scene: &Scene,
+    source: &dyn Source,
     camera: &Camera,
     options: &RenderOptions,
     gpu: &Gpu,
     sources: &Sources,
 ) -> Result<Frame> {
     let options = &stored(options)?;
-    let facts = Facts::of(scene);
+    let facts = source.facts();
     let mut known = Known::default();
     let plan = Plan::of(&facts, &gpu.adapter, camera, options, &known)?;
     let expected = Sums::new(camera, &plan);
@@ -151,7 +158,7 @@ pub fn resolve(
         return Err(Error::Usage("the sums are of another scene, image or choice of maps".into()));
     }
     let kernels = Kernels::new(gpu, sources, &plan, options, facts.surfels)?;
-    let scene_wide = Uploaded { pages: Vec::new(), shared: shared(gpu, scene, &plan.needs)?, order: Vec::new() };
+    let scene_wide = Uploaded { pages: Vec::new(), shared: shared(gpu, source, &plan.needs)? };
     let mut store = Store::new(gpu, scene_wide, &plan.needs)?;
     store.fit(gpu, &plan, &known)?;
     store.set_view(gpu, &View::new(&facts, camera, options));

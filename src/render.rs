@@ -108,3 +108,33 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         self.kept.device_bytes()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+    use super::*;
+    use crate::hardcases::cases;
+
+    /// Whether the programs of a render count their loops; none where there is no adapter and none is required.
+    fn counted(without: &[Optimisation]) -> Option<Vec<bool>> {
+        let gpu = match Gpu::open(None) {
+            Ok(gpu) => gpu,
+            Err(error) if std::env::var("EPSPLAT_REQUIRE_ADAPTER").is_ok_and(|v| v == "1") => panic!("{error}"),
+            Err(_) => return None,
+        };
+        let backend = Backend::gpu(gpu);
+        let case = cases().unwrap().swap_remove(0);
+        let options = RenderOptions { without: without.to_vec(), ..case.options };
+        render(&case.scene, &case.camera, &options, &backend, &()).unwrap();
+        let Backend::Gpu { gpu, .. } = &backend else { return None };
+        Some(gpu.programs.count_loops())
+    }
+
+    #[test]
+    fn loops_are_counted_where_that_is_asked_for_and_nowhere_else() {
+        let Some(by_proof) = counted(&[]) else { return };
+        let Some(by_counters) = counted(&[Optimisation::UncountedLoops]) else { return };
+        assert!(!by_proof.is_empty() && by_proof.iter().all(|counted| !counted), "{by_proof:?}");
+        assert!(!by_counters.is_empty() && by_counters.iter().all(|counted| *counted), "{by_counters:?}");
+    }
+}

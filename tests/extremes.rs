@@ -4,11 +4,11 @@
 
 mod common;
 
+use common::judged::judge;
 use epsplat::io::Points;
-use epsplat::metrics::compare;
 use epsplat::plan::RenderOptions;
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Epsilon, Lens, Map, Maps, Scene, Up};
+use epsplat::scene::{Camera, Epsilon, Lens, Scene, Up};
 use epsplat::surfels::analytic::{Shape, generate};
 use epsplat::surfels::build;
 use glam::DVec3;
@@ -34,18 +34,8 @@ fn view(scale: f64, shift: DVec3) -> Camera {
 
 fn check(name: &str, scene: &Scene, camera: &Camera, epsilon: Epsilon) {
     let Some(gpu) = common::gpu() else { return };
-    let maps = Maps::ON_DEVICE;
-    let options = RenderOptions { epsilon, maps, ..RenderOptions::default() };
-    let with_decision = RenderOptions { maps: maps.and(&[Map::Decision]), ..options.clone() };
-    let (reference, _) = render(scene, camera, &with_decision, &Backend::Reference, &()).unwrap();
-    let (frame, _) = render(scene, camera, &options, &Backend::gpu(gpu), &()).unwrap();
-    let share = reference.color.iter().filter(|c| c[3] > 0.0).count() as f64 / camera.pixels() as f64;
-    assert!(share > 0.3, "{name}: the sphere covers {share}");
-    let comparison = compare(&frame, &reference).unwrap();
-    assert!(comparison.excused.unwrap() < 0.01, "{name}: {comparison:?}");
-    for map in &comparison.maps {
-        assert!(map.max_of_range_decided.unwrap() <= 1e-4, "{name}: {map:?}");
-    }
+    let options = RenderOptions { epsilon, ..RenderOptions::default() };
+    judge(name, (scene, camera), options, (0.3, 1.0), &Backend::gpu(gpu));
 }
 
 #[test]

@@ -4,12 +4,12 @@
 
 mod common;
 
+use common::judged::judge;
 use epsplat::gpu::Sources;
 use epsplat::hardcases::{self, Verdict};
-use epsplat::metrics::compare;
 use epsplat::plan::{Accumulator, RenderOptions};
-use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, Lens, Map, Maps, Scene, Surfel, Up};
+use epsplat::render::Backend;
+use epsplat::scene::{Camera, Colors, Lens, Scene, Surfel, Up};
 use glam::{DVec3, Vec3};
 
 /// Disks seen by a camera at the origin that looks along z; colours differ, so that every attribute is summed.
@@ -25,22 +25,7 @@ fn check(name: &str, surfels: Vec<Surfel>, camera: &Camera, covered: f64) {
         up: Up::Y,
         provenance: Default::default(),
     };
-    let maps = Maps::ON_DEVICE;
-    let options = RenderOptions { maps, ..RenderOptions::default() };
-    let with_decision = RenderOptions { maps: maps.and(&[Map::Decision]), ..options.clone() };
-    let (reference, _) = render(&scene, camera, &with_decision, &Backend::Reference, &()).unwrap();
-    let (frame, _) = render(&scene, camera, &options, &Backend::gpu(gpu), &()).unwrap();
-    let share = reference.color.iter().filter(|c| c[3] > 0.0).count() as f64 / camera.pixels() as f64;
-    assert!((share - covered).abs() < 0.02, "{name}: the reference covers {share}");
-    let comparison = compare(&frame, &reference).unwrap();
-    assert!(comparison.excused.unwrap() < 0.01, "{name}: {comparison:?}");
-    for map in &comparison.maps {
-        // A map that hardly varies has no range to speak of; then the error is some units in the last place of f32.
-        let depths =
-            reference.map(Map::Depth).unwrap_or_default().iter().filter(|d| map.map == "depth" && d.is_finite());
-        let rounding = depths.fold(1f32, |largest, d| largest.max(*d)) * 4.0 / 16_777_216.0;
-        assert!(map.max_of_range_decided.unwrap() <= 1e-4 || map.max_abs <= rounding.into(), "{name}: {map:?}");
-    }
+    judge(name, (&scene, camera), RenderOptions::default(), (covered - 0.02, covered + 0.02), &Backend::gpu(gpu));
 }
 
 fn pinhole(size: (u32, u32)) -> Camera {

@@ -149,7 +149,7 @@ impl Program {
         if let Some(error) = pollster::block_on(guard.pop()) {
             return Err(refused(error));
         }
-        Ok(Self { pipelines, draws: drawn, bindings })
+        Ok(Self { pipelines, draws: drawn, bindings, counts_loops: !sources.all_end(files) })
     }
 
     /// What `stage` binds: each of its variables as `binding` says.

@@ -11,9 +11,16 @@ pub struct Program {
     pub(super) pipelines: BTreeMap<String, wgpu::ComputePipeline>,
     pub(super) draws: BTreeMap<String, wgpu::RenderPipeline>,
     pub(super) bindings: Bindings,
+    /// Every loop has a counter that ends it (`src/gpu/loops.rs`).
+    pub(super) counts_loops: bool,
 }
 
 impl Program {
+    /// Whether every loop has a counter that ends it, rather than a proof that it does.
+    pub fn counts_loops(&self) -> bool {
+        self.counts_loops
+    }
+
     /// The variables that an entry point or a draw binds: their names and numbers.
     pub fn variables(&self, stage: &str) -> &[(String, u32)] {
         self.bindings.get(stage).map_or(&[], Vec::as_slice)
@@ -23,6 +30,15 @@ impl Program {
 /// Programs by their text and constants: what was compiled once for a device is not compiled again.
 #[derive(Default)]
 pub(crate) struct Programs(pub(super) Mutex<HashMap<ProgramKey, Arc<Program>>>);
+
+impl Programs {
+    /// Whether each program that was compiled counts its loops.
+    #[cfg(test)]
+    pub(crate) fn count_loops(&self) -> Vec<bool> {
+        let programs = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        programs.values().map(|program| program.counts_loops()).collect()
+    }
+}
 
 /// A module's text, its constants by name as bits, and in words its entry points, draws and whether its loops end.
 pub(super) type ProgramKey = (String, Vec<(&'static str, u64)>, String);

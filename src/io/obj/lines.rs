@@ -1,89 +1,66 @@
-//! The lines of an OBJ file, as the face parser is given them.
+//! The lines of an OBJ file.
 
 use crate::Progress;
 use crate::io::fault::Fault;
 use crate::io::values::{BYTE_ORDER_MARK, finite, line_end, parse_number, shown};
 use crate::scene::Colors;
 use crate::scene::color::{DEFAULT_COLOR, srgb_to_linear};
-use std::io::{self, BufRead, Read};
+use std::io::{BufRead, Read};
+
+use super::faces::Faces;
 
 /// No line is longer, with those that continue it; a polygon of a million corners is shorter.
 const LINE_LIMIT: usize = 1 << 24;
 
-/// What the vertex lines of a file say.
+/// What the lines of a file say.
 #[derive(Debug, Default)]
 pub(super) struct Lines {
     pub(super) positions: Vec<[f64; 3]>,
     /// One colour and alpha for each position, or none at all, as the file has them; none of its own is not a number.
     colors: Vec<[f64; 4]>,
-    pub(super) normals: Vec<[f32; 3]>,
-    pub(super) every_corner_has_a_normal: bool,
-    /// Only if they are wanted, and so for all that follows.
-    pub(super) every_corner_has_texture: bool,
+    pub(super) normals: Vec<[f64; 3]>,
+    /// Only if a surface is wanted, and so for all that follows.
+    pub(super) texture: Vec<[f32; 2]>,
     /// What `mtllib` names.
     pub(super) libraries: Vec<String>,
     /// What `usemtl` names, each once.
     pub(super) materials: Vec<String>,
+    pub(super) faces: Faces,
     /// Lines read.
-    pub(super) count: u64,
+    count: u64,
 }
 
-/// Reads vertices, and passes the parser the faces.
-///
-/// The parser renumbers vertices by first use, drops those of no face, repeats those of several groups or materials,
-/// and stops at text that is not UTF-8. So vertices are kept here; the parser gets each one's number in place of its
-/// coordinates, and sees no comments. Of a mesh it is given texture coordinates too, and each material as a group whose name
-/// is the material's number; of points neither.
-pub(super) struct Source<'a, R> {
+/// The lines that are not read yet.
+struct Reader<'a, R> {
     reader: R,
-    /// Whether texture coordinates and materials are wanted.
-    surface: bool,
     progress: &'a dyn Progress,
     unreported: u64,
-    lines: Lines,
+    /// Lines so far, those of the current one too.
+    count: u64,
     line: Vec<u8>,
     /// What lines end with.
     line_end: u8,
-    /// What the parser is given of the current line, and how much of it has been taken.
-    passed: Vec<u8>,
-    taken: usize,
-    fault: Option<Fault>,
 }
 
-impl<'a, R: BufRead> Source<'a, R> {
-    pub(super) fn new(reader: R, surface: bool, progress: &'a dyn Progress) -> Self {
-        let lines = Lines { every_corner_has_a_normal: true, every_corner_has_texture: surface, ..Lines::default() };
-        let (line, passed) = (Vec::new(), Vec::new());
-        Self { reader, surface, progress, unreported: 0, lines, line, line_end: b'\n', passed, taken: 0, fault: None }
-    }
-
-    /// What was read, unless reading is why the parser stopped.
-    pub(super) fn finish(self) -> Result<Lines, Fault> {
-        self.progress.advance(self.unreported);
-        match self.fault {
-            Some(fault) => Err(fault),
-            None => Ok(self.lines),
-        }
-    }
-
+impl<R: BufRead> Reader<'_, R> {
     /// Takes the next line, with those that continue it; `false` at the end of the file.
     fn next_line(&mut self) -> Result<bool, Fault> {
         self.line.clear();
-        if self.lines.count == 0 {
+        if self.count == 0 {
             self.line_end = line_end(&mut self.reader)?;
         }
         loop {
             let room = LINE_LIMIT.saturating_sub(self.line.len());
             let bytes = self.reader.by_ref().take(room as u64).read_until(self.line_end, &mut self.line)?;
             if room == 0 {
-                let line = self.lines.count;
+                let line = self.count;
                 return Err(Fault::Malformed(format!("line {line} is longer than {LINE_LIMIT} bytes")));
             }
             if bytes == 0 {
                 return Ok(!self.line.is_empty());
             }
-            self.lines.count += 1;
-            if self.lines.count == 1 && self.line.starts_with(BYTE_ORDER_MARK) {
+            self.count += 1;
+            if self.count == 1 && self.line.starts_with(BYTE_ORDER_MARK) {
                 self.line.drain(..BYTE_ORDER_MARK.len());
             }
             self.unreported += bytes as u64;
@@ -101,63 +78,60 @@ impl<'a, R: BufRead> Source<'a, R> {
             }
         }
     }
+}
 
-    fn take_line(&mut self) -> Result<(), Fault> {
-        let Self { lines, line, passed, surface, .. } = self;
+impl Lines {
+    /// Reads all of them; of texture coordinates, materials and their libraries only if a `surface` is wanted.
+    ///
+    /// # Errors
+    /// A number that is none, or a face that names what does not exist.
+    pub(super) fn read(reader: impl BufRead, surface: bool, progress: &dyn Progress) -> Result<Self, Fault> {
+        let line_end = b'\n';
+        let mut rest = Reader { reader, progress, unreported: 0, count: 0, line: Vec::new(), line_end };
+        let (mut lines, mut material) = (Self::default(), None);
+        while rest.next_line()? {
+            lines.count = rest.count;
+            lines.take(&rest.line, surface, &mut material)?;
+        }
+        progress.advance(rest.unreported);
+        lines.faces.check(lines.counts())?;
+        Ok(lines)
+    }
+
+    /// Vertices, texture coordinates and normals so far.
+    fn counts(&self) -> [usize; 3] {
+        [self.positions.len(), self.texture.len(), self.normals.len()]
+    }
+
+    /// Takes a line; `material` is the number of the current one.
+    fn take(&mut self, line: &[u8], surface: bool, material: &mut Option<usize>) -> Result<(), Fault> {
         let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
         match words.next() {
-            Some(b"v") => {
-                lines.vertex(words)?;
-                passed.extend(format!("v {} 0 0\n", lines.positions.len() - 1).bytes());
-            }
+            Some(b"v") => self.vertex(words)?,
             Some(b"vn") => {
                 let mut normal = [0.0; 3];
                 for component in &mut normal {
-                    *component = lines.number(words.next())? as f32;
+                    *component = self.number(words.next())?;
                 }
-                lines.normals.push(normal);
-                let [x, y, z] = normal;
-                passed.extend(format!("vn {x} {y} {z}\n").bytes());
+                self.normals.push(normal);
             }
-            Some(b"vt") if *surface => {
-                let (u, v) = (lines.number(words.next())? as f32, words.next());
-                let v = if v.is_some() { lines.number(v)? as f32 } else { 0.0 };
-                passed.extend(format!("vt {u} {v}\n").bytes());
+            Some(b"vt") if surface => {
+                let (u, v) = (self.number(words.next())? as f32, words.next());
+                let v = if v.is_some() { self.number(v)? as f32 } else { 0.0 };
+                self.texture.push([u, v]);
             }
-            Some(b"mtllib") if *surface => {
-                lines.libraries.push(rest_of(line, b"mtllib"));
-            }
-            Some(b"usemtl") if *surface => {
+            Some(b"mtllib") if surface => self.libraries.push(rest_of(line, b"mtllib")),
+            Some(b"usemtl") if surface => {
                 let name = rest_of(line, b"usemtl");
-                let known = lines.materials.iter().position(|material| *material == name);
-                let number = known.unwrap_or(lines.materials.len());
+                let known = self.materials.iter().position(|material| *material == name);
+                *material = Some(known.unwrap_or(self.materials.len()));
                 if known.is_none() {
-                    lines.materials.push(name);
+                    self.materials.push(name);
                 }
-                passed.extend(format!("g {number}\n").bytes());
             }
-            // A face of one or two corners has no area, and one of none is refused by the parser.
-            Some(b"f") if words.clone().count() > 2 => {
-                passed.push(b'f');
-                for word in words.take_while(|word| !word.starts_with(b"#")) {
-                    let mut indices = word.split(|&byte| byte == b'/');
-                    let (vertex, texture, normal) = (indices.next(), indices.next(), indices.next());
-                    let [texture, normal] = [texture, normal].map(|index| index.filter(|index| !index.is_empty()));
-                    lines.every_corner_has_a_normal &= normal.is_some();
-                    lines.every_corner_has_texture &= texture.is_some();
-                    passed.push(b' ');
-                    passed.extend(vertex.unwrap_or_default());
-                    let texture = texture.filter(|_| *surface);
-                    if texture.is_some() || normal.is_some() {
-                        passed.push(b'/');
-                        passed.extend(texture.unwrap_or_default());
-                    }
-                    if let Some(normal) = normal {
-                        passed.push(b'/');
-                        passed.extend(normal);
-                    }
-                }
-                passed.push(b'\n');
+            Some(b"f") => {
+                let (counts, line) = (self.counts(), self.count);
+                self.faces.add(words, counts, (surface, *material, line))?;
             }
             _ => {}
         }
@@ -235,28 +209,5 @@ impl Lines {
             [r, g, b, finite(a / opaque)]
         };
         (!self.colors.is_empty()).then(|| Colors::Linear(self.colors.iter().map(linear).collect()))
-    }
-}
-
-impl<R: BufRead> Read for Source<'_, R> {
-    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
-        while self.taken == self.passed.len() {
-            self.passed.clear();
-            self.taken = 0;
-            let taken = match self.next_line() {
-                Ok(false) => return Ok(0),
-                Ok(true) => self.take_line(),
-                Err(fault) => Err(fault),
-            };
-            if let Err(fault) = taken {
-                self.fault = Some(fault);
-                return Err(io::ErrorKind::InvalidData.into());
-            }
-        }
-        let rest = &self.passed[self.taken..];
-        let count = rest.len().min(out.len());
-        out[..count].copy_from_slice(&rest[..count]);
-        self.taken += count;
-        Ok(count)
     }
 }

@@ -1,0 +1,31 @@
+//! Scenes of a test's own, judged pixel by pixel by the bounds of the hard cases.
+
+use epsplat::hardcases::{HardCase, Verdict};
+use epsplat::plan::{Accumulator, RenderOptions};
+use epsplat::render::Backend;
+use epsplat::scene::{Camera, Scene, Shading};
+
+/// Fails if the device's image of `scene`, of which the reference covers such a share of pixels, exceeds its derived bound anywhere.
+pub fn judge(
+    name: &str,
+    (scene, camera): (&Scene, &Camera),
+    options: RenderOptions,
+    covered: (f64, f64),
+    backend: &Backend,
+) {
+    let case = HardCase {
+        name: name.to_owned(),
+        about: "",
+        bound: "",
+        scene: scene.clone(),
+        camera: camera.clone(),
+        options: RenderOptions { shading: Shading::Unlit, ..options },
+        covered,
+        excused: 0.01,
+        expected: Vec::new(),
+        smallest: None,
+    };
+    let truth = case.truth().unwrap();
+    let row = case.judge(&truth, Accumulator::Fixed.row(), backend).unwrap();
+    assert!(matches!(row.verdict, Verdict::Pass), "{name}: {row:?}");
+}

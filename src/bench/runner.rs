@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use super::case::{Case, Timed};
-use super::definition::{Config, Definition};
+use super::definition::{Config, Definition, SceneEntry};
 use super::judge;
 use super::machine::machine;
-use super::staging::{points, stage};
+use super::staging::{Point, points, stage};
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::plan::BackendName;
@@ -39,10 +39,21 @@ pub struct Outcome {
 ///
 /// [`Error::NoAdapter`] if a configuration needs a `gpu` and there is none, and those of reading and rendering.
 pub fn run(definition: &Definition, gpu: Option<&Backend>, progress: &dyn Progress) -> Result<Outcome> {
+    let mut outcome = begin(definition, gpu)?;
+    for entry in &definition.scenes {
+        for point in points(entry) {
+            measure(definition, (entry, point), gpu, &mut outcome, progress)?;
+        }
+    }
+    Ok(outcome)
+}
+
+/// A study of which nothing is measured yet.
+pub(super) fn begin(definition: &Definition, gpu: Option<&Backend>) -> Result<Outcome> {
     if definition.needs_gpu() && gpu.is_none() {
         return Err(Error::NoAdapter(format!("the study {} renders on an adapter", definition.name)));
     }
-    let mut outcome = Outcome {
+    Ok(Outcome {
         study: Study {
             name: definition.name.clone(),
             about: definition.about.clone(),
@@ -55,14 +66,19 @@ pub fn run(definition: &Definition, gpu: Option<&Backend>, progress: &dyn Progre
         },
         notes: Vec::new(),
         failures: Vec::new(),
-    };
-    for entry in &definition.scenes {
-        for point in points(entry) {
-            let staged = stage(definition, entry, point, progress)?;
-            Case { definition, entry, staged: &staged, gpu }.run(&mut outcome, progress)?;
-        }
-    }
-    Ok(outcome)
+    })
+}
+
+/// Adds what the configurations show on one point of a scene's sweep.
+pub(super) fn measure(
+    definition: &Definition,
+    (entry, point): (&SceneEntry, Point),
+    gpu: Option<&Backend>,
+    outcome: &mut Outcome,
+    progress: &dyn Progress,
+) -> Result<()> {
+    let staged = stage(definition, entry, point, progress)?;
+    Case { definition, entry, staged: &staged, gpu }.run(outcome, progress)
 }
 
 impl<'a> Case<'a> {

@@ -94,7 +94,7 @@ fn same_case(a: &Measurement, b: &Measurement) -> bool {
 }
 
 /// The median time as a multiple of the baseline's on the same scene; none without a baseline there.
-fn relative(definition: &Definition, study: &Study, of: &Measurement) -> Option<f64> {
+pub(super) fn relative(definition: &Definition, study: &Study, of: &Measurement) -> Option<f64> {
     let baseline = definition.baseline.as_ref()?;
     let base = study.measurements.iter().find(|m| m.config == *baseline && same_case(m, of))?;
     Some(of.total_ms.median / base.total_ms.median).filter(|ratio| ratio.is_finite())

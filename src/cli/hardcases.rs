@@ -5,11 +5,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use epsplat::gpu::Gpu;
-use epsplat::hardcases::{Row, Verdict, cases, run as run_cases, supported};
+use epsplat::hardcases::{Outcome, Row, Verdict, cases, run as run_cases, supported};
 use epsplat::plan::{Accumulator, check};
 use epsplat::render::Backend;
 use epsplat::{Error, Result};
-use serde::Serialize;
 
 use super::progress::Bars;
 use super::{note, outputs, print, write_json};
@@ -37,15 +36,6 @@ pub struct Arguments {
     case: Option<String>,
 }
 
-#[derive(Serialize)]
-struct Outcome<'a> {
-    adapter: &'a str,
-    passed: usize,
-    expected_failures: usize,
-    failed: usize,
-    rows: &'a [Row],
-}
-
 pub fn run(arguments: &Arguments) -> Result<()> {
     let chosen = arguments.accumulator.map(Accumulator::row);
     let mut cases = cases()?;
@@ -69,9 +59,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let accumulators = chosen.map_or_else(|| supported(&backend), |chosen| vec![chosen]);
     let rows = run_cases(&cases, &accumulators, &backend, &Bars::new())?;
 
-    let failed = rows.iter().filter(|row| row.failed()).count();
-    let expected_failures = rows.iter().filter(|row| matches!(row.verdict, Verdict::ExpectedFailure(_))).count();
-    let passed = rows.len() - failed - expected_failures;
+    let outcome = Outcome::of(&name, &rows);
+    let Outcome { passed, expected_failures, failed, .. } = outcome;
     if arguments.json.as_deref() != Some(Path::new("-")) {
         let mut text = table(&rows);
         // Writing to a string cannot fail.
@@ -79,7 +68,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         print(&text)?;
     }
     if let Some(path) = &arguments.json {
-        write_json(path, &Outcome { adapter: &name, passed, expected_failures, failed, rows: &rows })?;
+        write_json(path, &outcome)?;
     }
     if failed > 0 {
         return Err(Error::Gpu { adapter: name, what: format!("{failed} of {} rows failed", rows.len()) });

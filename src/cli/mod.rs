@@ -2,6 +2,7 @@
 
 mod adapters;
 mod bench;
+mod card;
 mod compare;
 mod coverage;
 mod generate;
@@ -47,6 +48,7 @@ enum Command {
     Adapters(adapters::Arguments),
     Hardcases(hardcases::Arguments),
     Bench(bench::Arguments),
+    Card(card::Arguments),
     Simplify(simplify::Arguments),
 }
 
@@ -64,6 +66,7 @@ pub fn run() -> ExitCode {
         Command::Adapters(arguments) => adapters::run(&arguments),
         Command::Hardcases(arguments) => hardcases::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),
+        Command::Card(arguments) => card::run(&arguments),
         Command::Simplify(arguments) => simplify::run(&arguments),
     };
     match outcome {

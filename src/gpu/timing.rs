@@ -102,6 +102,32 @@ impl Timing {
         self.submit(gpu, stage, encoder)
     }
 
+    /// Records what is in no pass, as copies are, and counts it as `stage`: from the end of an empty pass to the start of another.
+    pub(crate) fn around(
+        &mut self,
+        gpu: &Gpu,
+        stage: &'static str,
+        record: impl FnOnce(&mut wgpu::CommandEncoder),
+    ) -> Result<()> {
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let queries = self.next(gpu);
+        let mark = |encoder: &mut wgpu::CommandEncoder, after: bool| {
+            let Some((set, first)) = queries else { return };
+            drop(encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                label: Some(stage),
+                timestamp_writes: Some(wgpu::ComputePassTimestampWrites {
+                    query_set: set,
+                    beginning_of_pass_write_index: after.then_some(first + 1),
+                    end_of_pass_write_index: (!after).then_some(first),
+                }),
+            }));
+        };
+        mark(&mut encoder, false);
+        record(&mut encoder);
+        mark(&mut encoder, true);
+        self.submit(gpu, stage, encoder)
+    }
+
     fn submit(&mut self, gpu: &Gpu, stage: &'static str, encoder: wgpu::CommandEncoder) -> Result<()> {
         self.stages.push(stage);
         if self.queries.is_some() {
@@ -171,11 +197,12 @@ mod tests {
             timing.pass(&gpu, if number % 2 == 0 { "even" } else { "odd" }, |_| {}, |_| Ok(())).unwrap();
         }
         assert_eq!(timing.pending.len(), 2 * PASSES + 3, "a card is handed each pass by itself");
+        timing.around(&gpu, "between", |_| {}).unwrap();
         timing.flush(&gpu).unwrap();
         gpu.wait().unwrap();
         assert_eq!(timing.queries.as_ref().map(Vec::len), Some(3));
         let times = timing.finish(&gpu).unwrap();
-        assert_eq!(times.keys().copied().collect::<Vec<_>>(), ["even", "odd"]);
+        assert_eq!(times.keys().copied().collect::<Vec<_>>(), ["between", "even", "odd"]);
         assert!(times.values().all(|ms| ms.is_finite() && *ms >= 0.0), "{times:?}");
     }
 }

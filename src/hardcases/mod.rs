@@ -145,3 +145,27 @@ pub fn run(
     progress.end();
     Ok(rows)
 }
+
+/// The rows of a run and how many ended how.
+#[derive(Debug, Serialize)]
+pub struct Outcome<'a> {
+    /// The adapter's name.
+    pub adapter: &'a str,
+    /// Rows that keep all that their cases demand.
+    pub passed: usize,
+    /// Rows that exceed a bound as expected of their accumulator.
+    pub expected_failures: usize,
+    /// All others.
+    pub failed: usize,
+    /// All.
+    pub rows: &'a [Row],
+}
+
+impl<'a> Outcome<'a> {
+    /// Counts `rows`.
+    pub fn of(adapter: &'a str, rows: &'a [Row]) -> Self {
+        let failed = rows.iter().filter(|row| row.failed()).count();
+        let expected_failures = rows.iter().filter(|row| matches!(row.verdict, Verdict::ExpectedFailure(_))).count();
+        Self { adapter, passed: rows.len() - failed - expected_failures, expected_failures, failed, rows }
+    }
+}

@@ -28,6 +28,7 @@ fn a_folder_in_which_nothing_can_be_made_is_told_before_anything_is_read() {
     said("hardcases --json /proc/x.json");
     let study = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/textured.toml");
     said(&format!("bench {study} --out /proc/report"));
+    said(&format!("card {study} --out /proc/records"));
     let cameras = concat!(env!("CARGO_MANIFEST_DIR"), "/data/cameras/transforms.json");
     fails(&["render", missing, "--cameras", cameras, "-o", "/proc/views"], 1, &["cannot write /proc/views"]);
 }

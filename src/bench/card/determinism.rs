@@ -1,0 +1,240 @@
+//! Images whose bits must be equal: of two frames of each accumulator that promises it, and of `fixed` however splats are drawn,
+//! whatever is left out that makes frames faster, and in whatever order surfels come.
+
+use std::time::Instant;
+
+use serde::Serialize;
+
+use super::{Card, sphere};
+use crate::error::Result;
+use crate::frame::Frame;
+use crate::plan::{ACCUMULATORS, Accumulator, Optimisation, Organisation, RenderOptions, check as possible};
+use crate::render::{Backend, Renderer};
+use crate::scene::{Colors, Maps, Scene};
+
+/// The part of the time left that it may take.
+const SHARE: f64 = 0.4;
+
+/// Surfels, and the image's side in pixels; of a quick run. There are enough surfels for batches of them to be culled.
+const SIZES: [(u64, u32); 2] = [(200_000, 1024), (5_000, 160)];
+
+/// Mean radii of splats, pixels: small ones, and ones that tiles or workgroups draw.
+const FOOTPRINTS: [f64; 2] = [1.5, 12.0];
+
+/// Two images that must have the same bits.
+#[derive(Clone, Debug, Serialize)]
+pub struct Comparison {
+    /// What is shown.
+    pub scene: String,
+    /// How sums are kept.
+    pub accumulator: &'static str,
+    /// What the second image was made with; the first is the plain one of the accumulator.
+    pub what: String,
+    /// Values that are compared: four of the colour, and those of the maps, of each pixel.
+    pub values: u64,
+    /// Values whose bits differ.
+    pub differing: u64,
+    /// Whether none does.
+    pub equal: bool,
+}
+
+impl Comparison {
+    /// Of an image with another that must be the same.
+    pub fn of(
+        (scene, accumulator): (&str, Accumulator),
+        what: impl Into<String>,
+        expected: &Frame,
+        found: &Frame,
+    ) -> Self {
+        let values = bits(expected).count().max(bits(found).count()) as u64;
+        let alike = (expected.width, expected.height, expected.maps()) == (found.width, found.height, found.maps());
+        let differing = bits(expected).zip(bits(found)).filter(|(a, b)| a != b).count() as u64;
+        let differing = if alike { differing } else { values };
+        Self {
+            scene: scene.to_owned(),
+            accumulator: accumulator.name(),
+            what: what.into(),
+            values,
+            differing,
+            equal: differing == 0,
+        }
+    }
+}
+
+/// All bits of a frame: equality of floats would take -0 for 0 and no NaN for itself.
+fn bits(frame: &Frame) -> impl Iterator<Item = u32> + '_ {
+    let maps = frame.maps().iter().collect::<Vec<_>>().into_iter().filter_map(|map| frame.map(map));
+    frame.color.iter().flatten().chain(maps.flatten()).map(|value| value.to_bits())
+}
+
+/// Renders and compares, as much as the time allows.
+pub(super) fn check(card: &mut Card<'_>) -> Result<()> {
+    let deadline = card.budget.share(SHARE);
+    let (count, side) = SIZES[usize::from(card.asked.quick)];
+    for row in ACCUMULATORS.iter().filter(|row| row.deterministic) {
+        if let Some(why) = lacks(&card.record.adapter, row.of) {
+            card.leave_out(why);
+        }
+    }
+    for footprint in FOOTPRINTS {
+        let staged = sphere(count, Some(footprint), side, card.told.progress)?;
+        let name = format!("{count} surfels of {footprint} px, {side}x{side}");
+        of_scene(card, &name, (&staged.scene, &staged.cameras[0]), deadline)?;
+    }
+    let all = &card.record.determinism;
+    let equal = all.iter().filter(|comparison| comparison.equal).count();
+    (card.told.say)(&format!("  {equal} of {} comparisons are equal", all.len()));
+    Ok(())
+}
+
+/// Why an accumulator is not compared.
+fn lacks(adapter: &crate::gpu::AdapterDescription, accumulator: Accumulator) -> Option<String> {
+    possible::sums(adapter, accumulator).err().map(|error| format!("determinism of {accumulator}: {error}"))
+}
+
+fn of_scene(
+    card: &mut Card<'_>,
+    name: &str,
+    (scene, camera): (&Scene, &crate::scene::Camera),
+    deadline: Instant,
+) -> Result<()> {
+    let variants = variants();
+    let able = |accumulator: &Accumulator| lacks(&card.record.adapter, *accumulator).is_none();
+    let accumulators: Vec<_> =
+        ACCUMULATORS.iter().filter(|row| row.deterministic).map(|row| row.of).filter(able).collect();
+    let reversed = reversed(scene);
+    card.told.progress.begin("comparing images", (accumulators.len() + variants.len()) as u64);
+    let Card { backend, record, told, .. } = card;
+    let backend: &Backend = backend;
+    let frame = |scene: &Scene, options: &RenderOptions| {
+        Renderer::new(scene, options, backend)?.frame(camera, &()).map(|(frame, _)| frame)
+    };
+    let mut plain = None;
+    let mut late = Vec::new();
+    for accumulator in accumulators {
+        if Instant::now() >= deadline {
+            late.push(accumulator.name().to_owned());
+            continue;
+        }
+        let mut renderer = Renderer::new(scene, &options(accumulator), backend)?;
+        let (first, _) = renderer.frame(camera, &())?;
+        let (second, _) = renderer.frame(camera, &())?;
+        let again = frame(scene, &options(accumulator))?;
+        for (what, found) in [("the second frame", second), ("another renderer", again)] {
+            record.determinism.push(Comparison::of((name, accumulator), what, &first, &found));
+        }
+        if accumulator == Accumulator::Fixed {
+            plain = Some(first);
+        }
+        told.progress.advance(1);
+    }
+    for Variant { what, options, reverse } in variants {
+        let Some(plain) = plain.as_ref().filter(|_| Instant::now() < deadline) else {
+            late.push(what);
+            continue;
+        };
+        let found = frame(if reverse { &reversed } else { scene }, &options)?;
+        record.determinism.push(Comparison::of((name, Accumulator::Fixed), what, plain, &found));
+        told.progress.advance(1);
+    }
+    told.progress.end();
+    if !late.is_empty() {
+        card.leave_out(format!("determinism on {name}, as there was no time for it: {}", late.join(", ")));
+    }
+    Ok(())
+}
+
+fn options(accumulator: Accumulator) -> RenderOptions {
+    RenderOptions { accumulator, maps: Maps::ON_DEVICE, ..RenderOptions::default() }
+}
+
+/// A way to make the image of `fixed`.
+struct Variant {
+    what: String,
+    options: RenderOptions,
+    /// The surfels come from last to first.
+    reverse: bool,
+}
+
+fn variants() -> Vec<Variant> {
+    let plain = || options(Accumulator::Fixed);
+    let variant = |what: &str, options| Variant { what: what.to_owned(), options, reverse: false };
+    let organised = |organisation| RenderOptions { organisation, ..plain() };
+    let without = |without| RenderOptions { without, ..plain() };
+    let all = Optimisation::ALL.map(|(optimisation, _)| optimisation).to_vec();
+    let mut variants = vec![
+        variant("organisation scatter", organised(Organisation::Scatter)),
+        variant("organisation tile", organised(Organisation::Tile)),
+    ];
+    for (optimisation, name) in Optimisation::ALL {
+        variants.push(variant(&format!("without {name}"), without(vec![optimisation])));
+    }
+    variants.push(variant("without any optimisation", without(all)));
+    // With the optimisation both would be stored alike.
+    let options = without(vec![Optimisation::Order]);
+    variants.push(Variant { what: "surfels in reverse, without order".into(), options, reverse: true });
+    variants
+}
+
+/// The same surfels from last to first.
+fn reversed(scene: &Scene) -> Scene {
+    let mut reversed = scene.clone();
+    reversed.surfels.reverse();
+    reversed.low.reverse();
+    match &mut reversed.colors {
+        Colors::Srgb8(colors) => colors.reverse(),
+        Colors::Linear(colors) => colors.reverse(),
+        // The first is of no surfel, the second of no generated scene.
+        Colors::Constant(_) | Colors::Textured(_) => {}
+    }
+    reversed
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::scene::Map;
+
+    #[test]
+    fn a_changed_bit_is_noticed() {
+        let staged = sphere(300, Some(3.0), 24, &()).unwrap();
+        let of = |scene: &Scene| {
+            let mut renderer = Renderer::new(scene, &options(Accumulator::Fixed), &Backend::Reference).unwrap();
+            renderer.frame(&staged.cameras[0], &()).unwrap().0
+        };
+        let compare = |found: &Frame| Comparison::of(("s", Accumulator::Fixed), "w", &of(&staged.scene), found);
+        let same = compare(&of(&staged.scene));
+        assert!(same.equal && same.differing == 0 && same.values == 24 * 24 * (4 + 1 + 3 + 1 + 1), "{same:?}");
+        // One bit of a colour, one of each map, and the sign of a zero.
+        let flip = |value: &mut f32| *value = f32::from_bits(value.to_bits() ^ 1);
+        let mut changed = of(&staged.scene);
+        flip(&mut changed.color[300][1]);
+        assert_eq!((compare(&changed).differing, compare(&changed).equal), (1, false));
+        for map in [Map::Depth, Map::Normal, Map::Weight, Map::Count] {
+            let mut changed = of(&staged.scene);
+            flip(&mut changed.map_mut(map).unwrap()[301]);
+            assert_eq!(compare(&changed).differing, 1, "{map:?}");
+        }
+        let mut changed = of(&staged.scene);
+        assert_eq!(changed.color[0], [0.0; 4]);
+        changed.color[0][0] = -0.0;
+        assert_eq!(compare(&changed).differing, 1);
+        // An image that lacks a map is another image.
+        assert!(!compare(&of(&staged.scene).without(Map::Depth)).equal);
+    }
+
+    #[test]
+    fn every_optimisation_is_left_out_once_and_all_are_together() {
+        let variants = variants();
+        for (optimisation, _) in Optimisation::ALL {
+            assert!(variants.iter().any(|variant| variant.options.without == [optimisation]), "{optimisation:?}");
+        }
+        assert!(variants.iter().any(|variant| variant.options.without.len() == Optimisation::ALL.len()));
+        assert_eq!(variants.iter().filter(|variant| variant.reverse).count(), 1);
+        let staged = sphere(50, None, 16, &()).unwrap();
+        let back = reversed(&staged.scene);
+        assert_eq!(back.surfels[0], staged.scene.surfels[49]);
+        assert_eq!(reversed(&back), staged.scene);
+    }
+}

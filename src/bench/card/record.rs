@@ -1,0 +1,156 @@
+//! What a run found, as files.
+
+use std::io::Write as _;
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::{Accuracy, Asked, Comparison, StudyRecord, Throughput, accuracy, markdown};
+use crate::bench::bandwidth::CopyBandwidth;
+use crate::bench::machine::machine;
+use crate::error::{Error, Result};
+use crate::gpu::AdapterDescription;
+use crate::io::atomic::{write_together, write_whole};
+use crate::render::Backend;
+use crate::report::Machine;
+
+/// The files that a run writes beside the folders of its studies: everything as JSON, a summary, and every row of the hard cases.
+pub const FILES: [&str; 3] = ["card.json", "card.md", accuracy::FILE];
+
+/// What a run found.
+#[derive(Clone, Debug, Serialize)]
+pub struct Record {
+    /// The command line that repeats it.
+    pub command: String,
+    /// When it ran.
+    pub date: String,
+    /// Whether it was the shortened form.
+    pub quick: bool,
+    /// Minutes that it might take.
+    pub minutes: f64,
+    /// What it took so far, seconds.
+    pub seconds: f64,
+    /// The machine and the version of epsplat.
+    pub machine: Machine,
+    /// The adapter, its limits and features.
+    pub adapter: AdapterDescription,
+    /// The steps that are done.
+    pub steps: Vec<Step>,
+    /// How fast memory is copied.
+    pub copy_bandwidth: Option<CopyBandwidth>,
+    /// How the hard cases ended.
+    pub accuracy: Option<Accuracy>,
+    /// Images that must have the same bits.
+    pub determinism: Vec<Comparison>,
+    /// Frames by numbers of surfels.
+    pub throughput: Vec<Throughput>,
+    /// The studies that were run.
+    pub studies: Vec<StudyRecord>,
+    /// What could not be done, and why: a sentence each.
+    pub problems: Vec<String>,
+    /// What was not tried, for lack of time or of the adapter's features.
+    pub left_out: Vec<String>,
+}
+
+/// A step that is done.
+#[derive(Clone, Debug, Serialize)]
+pub struct Step {
+    /// Its name.
+    pub name: &'static str,
+    /// What it took, seconds.
+    pub seconds: f64,
+}
+
+impl Record {
+    /// That of a run that has begun.
+    pub(super) fn new(asked: &Asked, backend: &Backend, adapter: AdapterDescription) -> Self {
+        Self {
+            command: asked.command.clone(),
+            date: asked.date.clone(),
+            quick: asked.quick,
+            minutes: asked.minutes,
+            seconds: 0.0,
+            machine: machine(Some(backend)),
+            adapter,
+            steps: Vec::new(),
+            copy_bandwidth: None,
+            accuracy: None,
+            determinism: Vec::new(),
+            throughput: Vec::new(),
+            studies: Vec::new(),
+            problems: Vec::new(),
+            left_out: Vec::new(),
+        }
+    }
+
+    /// What was wrong: images that miss their bounds or differ, studies that fail, and what could not be done. A sentence each.
+    pub fn failures(&self) -> Vec<String> {
+        let hard = self.accuracy.iter().flat_map(|accuracy| &accuracy.failures);
+        let hard = hard.map(|failure| format!("hard case {failure}"));
+        let differ = self.determinism.iter().filter(|comparison| !comparison.equal).map(|comparison| {
+            let Comparison { scene, accumulator, what, values, differing, .. } = comparison;
+            format!("{scene}, {accumulator}, {what}: {differing} of {values} values have other bits")
+        });
+        let studies = self
+            .studies
+            .iter()
+            .flat_map(|study| study.failures.iter().map(move |failure| format!("the study {}: {failure}", study.name)));
+        hard.chain(differ).chain(studies).chain(self.problems.iter().cloned()).collect()
+    }
+
+    /// Writes it as JSON and as Markdown into `folder`, both or none.
+    pub(super) fn write(&self, folder: &Path) -> Result<()> {
+        let [json_file, summary_file] = [FILES[0], FILES[1]].map(|name| folder.join(name));
+        let (json, summary) = (json(&json_file, self)?, markdown(self));
+        write_together([(json_file, json.as_bytes()), (summary_file, summary.as_bytes())])
+    }
+}
+
+fn json(path: &Path, value: &impl Serialize) -> Result<String> {
+    let mut text = serde_json::to_string_pretty(value).map_err(|e| Error::write(path, e.into()))?;
+    text.push('\n');
+    Ok(text)
+}
+
+/// Writes `value` as JSON.
+pub(super) fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
+    let text = json(path, value)?;
+    write_whole(path, |file| file.write_all(text.as_bytes()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_image_that_differs_and_what_could_not_be_done_are_failures() {
+        let asked = Asked {
+            adapter: None,
+            quick: false,
+            minutes: 1.0,
+            studies: Vec::new(),
+            command: "epsplat card".into(),
+            date: String::new(),
+        };
+        let mut record = Record::new(&asked, &Backend::Reference, AdapterDescription::core());
+        let comparison = |differing| Comparison {
+            scene: "s".into(),
+            accumulator: "fixed",
+            what: "without order".into(),
+            values: 10,
+            differing,
+            equal: differing == 0,
+        };
+        record.determinism.push(comparison(0));
+        record.left_out.push("frames of 10 surfels: the time left would not do".into());
+        assert_eq!(record.failures(), Vec::<String>::new());
+        let page = markdown(&record);
+        assert!(page.contains("1 of 1 pairs of images |") && page.contains("## Left out\n\n- frames of 10"), "{page}");
+        record.determinism.push(comparison(3));
+        record.problems.push("throughput: the device was lost".into());
+        let failures = ["s, fixed, without order: 3 of 10 values have other bits", "throughput: the device was lost"];
+        assert_eq!(record.failures(), failures);
+        let page = markdown(&record);
+        assert!(page.contains("1 of 2 pairs of images, **1 DIFFER**") && page.contains(failures[0]), "{page}");
+    }
+}

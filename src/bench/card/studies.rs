@@ -1,0 +1,236 @@
+//! The studies of a run, each with its share of the time left and its report in a folder of its own.
+
+use std::path::{Component, Path};
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+
+use super::Card;
+use crate::bench::definition::{Definition, SceneEntry};
+use crate::bench::runner::{self, Outcome};
+use crate::bench::staging::{Point, points};
+use crate::bench::table::relative;
+use crate::error::{Error, Result};
+use crate::report::{self, Study, Summary};
+
+/// Seconds after which what a study has so far is written, though it goes on.
+const WRITTEN_EVERY: Duration = Duration::from_secs(20);
+
+/// What became of a study.
+#[derive(Clone, Debug, Serialize)]
+pub struct StudyRecord {
+    /// Its name, and that of the folder of its report.
+    pub name: String,
+    /// What it shows.
+    pub about: String,
+    /// What it took, seconds.
+    pub seconds: f64,
+    /// Configurations on scenes that were measured.
+    pub measurements: usize,
+    /// What times are given relative to, if anything.
+    pub baseline: Option<String>,
+    /// Each configuration over all scenes.
+    pub configs: Vec<ConfigRecord>,
+    /// What was left out as the adapter lacks something, or done otherwise.
+    pub notes: Vec<String>,
+    /// Missed error limits, and configurations that gave different bits in two runs.
+    pub failures: Vec<String>,
+    /// Scenes for which there was no time.
+    pub left_out: Vec<String>,
+}
+
+/// A configuration over all scenes of a study.
+#[derive(Clone, Debug, Serialize)]
+pub struct ConfigRecord {
+    /// Its name.
+    pub config: String,
+    /// Scenes that it was measured on.
+    pub scenes: usize,
+    /// Its time as a multiple of the baseline's on the same scene; none without a baseline.
+    pub time_over_baseline: Option<Summary>,
+    /// The largest RMSE against the f64 reference.
+    pub worst_rmse: Option<f64>,
+}
+
+/// What each configuration showed on all scenes, in the order of the definition.
+fn digest(definition: &Definition, study: &Study) -> Vec<ConfigRecord> {
+    let of = |config: &str| {
+        let all: Vec<_> = study.measurements.iter().filter(|m| m.config == config).collect();
+        let times: Vec<f64> = all.iter().filter_map(|m| relative(definition, study, m)).collect();
+        (!all.is_empty()).then(|| ConfigRecord {
+            config: config.to_owned(),
+            scenes: all.len(),
+            time_over_baseline: Summary::of(&times),
+            worst_rmse: all.iter().filter_map(|m| m.numeric_error()).max_by(f64::total_cmp),
+        })
+    };
+    definition.configs.iter().filter_map(|config| of(&config.name)).collect()
+}
+
+/// Refuses studies whose reports cannot have folders of their names.
+///
+/// # Errors
+/// [`Error::Usage`].
+pub fn check_names(studies: &[Definition]) -> Result<()> {
+    for (number, study) in studies.iter().enumerate() {
+        let name = &study.name;
+        let parts: Vec<_> = Path::new(name).components().collect();
+        if !matches!(parts[..], [Component::Normal(part)] if part == name.as_str()) {
+            return Err(Error::Usage(format!("the study {name:?} cannot have a folder of its name: give it another")));
+        }
+        if studies[..number].iter().any(|other| other.name == *name) {
+            return Err(Error::Usage(format!("two studies are called {name:?}: their reports would share a folder")));
+        }
+    }
+    Ok(())
+}
+
+/// Runs the studies, as far as the time allows.
+pub(super) fn run(card: &mut Card<'_>) -> Result<()> {
+    let asked = card.asked;
+    for (number, definition) in asked.studies.iter().enumerate() {
+        let left = asked.studies.len() - number;
+        // What one does not need the others have.
+        let deadline = card.budget.share(1.0 / left as f64);
+        if card.budget.left().is_zero() {
+            card.leave_out(format!("the study {}: the time is over", definition.name));
+            continue;
+        }
+        (card.told.say)(&format!("  {} ({:.0} s for it)", definition.name, (deadline - Instant::now()).as_secs_f64()));
+        if let Err(error) = study(card, definition, deadline) {
+            card.problem(&format!("the study {}", definition.name), error)?;
+        }
+        card.write()?;
+    }
+    Ok(())
+}
+
+/// One study. What it has is written, however it ends.
+fn study(card: &mut Card<'_>, definition: &Definition, deadline: Instant) -> Result<()> {
+    let (start, mut written) = (Instant::now(), Instant::now());
+    let mut outcome = runner::begin(definition, Some(&card.backend))?;
+    outcome.study.command.clone_from(&card.asked.command);
+    outcome.study.date.clone_from(&card.asked.date);
+    let mut left_out = Vec::new();
+    let mut failed = None;
+    let mut last: Option<(Option<u64>, Duration)> = None;
+    let all = definition.scenes.iter().flat_map(|entry| points(entry).into_iter().map(move |point| (entry, point)));
+    for (entry, point) in all {
+        if failed.is_some() || Instant::now() + expected(last, point) >= deadline {
+            left_out.push(named(entry, point));
+            continue;
+        }
+        let begun = Instant::now();
+        let measured =
+            runner::measure(definition, (entry, point), Some(&card.backend), &mut outcome, card.told.progress);
+        failed = measured.err();
+        (card.told.say)(&format!("    {}: {:.1} s", named(entry, point), begun.elapsed().as_secs_f64()));
+        last = Some((point.count, begun.elapsed()));
+        if written.elapsed() > WRITTEN_EVERY {
+            report::write(&card.folder.join(&definition.name), &outcome.study)?;
+            written = Instant::now();
+        }
+    }
+    keep(card, definition, outcome, (left_out, start))?;
+    failed.map_or(Ok(()), Err)
+}
+
+/// What the next point takes, by what the last took of how many surfels.
+fn expected(last: Option<(Option<u64>, Duration)>, next: Point) -> Duration {
+    let Some((count, time)) = last else { return Duration::ZERO };
+    let ratio = next.count.zip(count).map_or(1.0, |(next, last)| next as f64 / last.max(1) as f64);
+    time.mul_f64(ratio.max(1.0))
+}
+
+/// A point of a sweep, in words.
+fn named(entry: &SceneEntry, point: Point) -> String {
+    let count = point.count.map_or(String::new(), |count| format!(", {count} surfels"));
+    let size = point.footprint_px.map_or(String::new(), |radius| format!(" of {radius} px"));
+    format!("{}{count}{size}", entry.name)
+}
+
+fn keep(
+    card: &mut Card<'_>,
+    definition: &Definition,
+    outcome: Outcome,
+    (left_out, start): (Vec<String>, Instant),
+) -> Result<()> {
+    let Outcome { study, notes, failures } = outcome;
+    if !study.measurements.is_empty() {
+        report::write(&card.folder.join(&study.name), &study)?;
+    }
+    if !left_out.is_empty() {
+        card.leave_out(format!("of the study {}, for lack of time: {}", study.name, left_out.join("; ")));
+    }
+    card.record.studies.push(StudyRecord {
+        seconds: start.elapsed().as_secs_f64(),
+        measurements: study.measurements.len(),
+        baseline: definition.baseline.clone(),
+        configs: digest(definition, &study),
+        name: study.name,
+        about: study.about,
+        notes,
+        failures,
+        left_out,
+    });
+    Ok(())
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::render::Backend;
+    use crate::report::{Measurement, Numeric};
+
+    fn study(name: &str) -> Definition {
+        let text = format!(
+            "name = \"{name}\"\nabout = \"a\"\n[[scene]]\nname = \"s\"\nshape = \"sphere\"\ncount = 9\n\
+             [[config]]\nname = \"c\"\nbackend = \"gpu\"\n"
+        );
+        Definition::parse(&text, Path::new("x.toml")).unwrap()
+    }
+
+    #[test]
+    fn a_study_has_a_folder_of_its_own_within_that_of_the_run() {
+        check_names(&["one", "other", "a b"].map(study)).unwrap();
+        for name in ["", ".", "..", "../one", "/one", "one/other", "one/"] {
+            assert!(check_names(&[study(name)]).unwrap_err().to_string().contains("folder"), "{name:?}");
+        }
+        assert!(check_names(&[study("one"), study("one")]).unwrap_err().to_string().contains("two studies"));
+    }
+
+    #[test]
+    fn a_configuration_is_told_by_its_worst_error_and_its_times_over_all_scenes() {
+        let text = "name = \"n\"\nabout = \"a\"\nbaseline = \"a\"\n[[scene]]\nname = \"s\"\nshape = \"sphere\"\n\
+            count = [9, 19]\nquick = true\n[[config]]\nname = \"b\"\nbackend = \"gpu\"\n[[config]]\nname = \"a\"\n\
+            backend = \"gpu\"\n[[config]]\nname = \"c\"\nbackend = \"gpu\"\n";
+        let definition = Definition::parse(text, Path::new("x.toml")).unwrap();
+        let mut outcome = runner::begin(&definition, Some(&Backend::Reference)).unwrap();
+        let rows = [("a", 9, 2.0, 1e-6), ("b", 9, 4.0, 1e-3), ("a", 19, 10.0, 1e-5), ("b", 19, 30.0, 1e-4)];
+        outcome.study.measurements = rows
+            .map(|(config, surfels, median, rmse)| Measurement {
+                scene: "s".into(),
+                config: config.into(),
+                surfels,
+                total_ms: Summary { median, ..Summary::default() },
+                numeric: Some(Numeric { rmse, ..Numeric::default() }),
+                ..Measurement::default()
+            })
+            .to_vec();
+        let found = digest(&definition, &outcome.study);
+        let of = |r: &ConfigRecord| (r.config.clone(), r.scenes, r.time_over_baseline.unwrap().median, r.worst_rmse);
+        let found: Vec<_> = found.iter().map(of).collect();
+        assert_eq!(found, [("b".to_owned(), 2, 2.5, Some(1e-3)), ("a".to_owned(), 2, 1.0, Some(1e-5))]);
+    }
+
+    #[test]
+    fn what_comes_next_takes_as_long_for_each_surfel() {
+        let point = |count| Point { count, footprint_px: None };
+        let second = Duration::from_secs(1);
+        assert_eq!(expected(None, point(Some(10))), Duration::ZERO);
+        assert_eq!(expected(Some((Some(10), second)), point(Some(30))), 3 * second);
+        assert_eq!(expected(Some((Some(10), second)), point(Some(1))), second);
+        assert_eq!(expected(Some((None, second)), point(None)), second);
+    }
+}

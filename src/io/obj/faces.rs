@@ -2,7 +2,6 @@
 
 use glam::DVec3;
 
-use super::lines::Lines;
 use crate::io::fault::Fault;
 use crate::io::polygon;
 use crate::io::values::shown;
@@ -30,6 +29,14 @@ pub(super) struct Faces {
     /// A corner without a normal, or without texture coordinates, was among them.
     lacks_normal: bool,
     lacks_texture: bool,
+}
+
+/// What corners name.
+#[derive(Clone, Copy)]
+pub(super) struct Named<'a> {
+    pub(super) positions: &'a [[f64; 3]],
+    pub(super) texture: &'a [[f32; 2]],
+    pub(super) normals: &'a [[f64; 3]],
 }
 
 /// A triangle of a face.
@@ -102,36 +109,31 @@ impl Faces {
     }
 
     /// The triangles of all faces.
-    pub(super) fn triangles<'a>(&'a self, lines: &'a Lines) -> impl Iterator<Item = Triangle> + 'a {
+    pub(super) fn triangles<'a>(&'a self, named: Named<'a>) -> impl Iterator<Item = Triangle> + 'a {
+        let position = move |corner: &Corner| {
+            named.positions.get(corner.vertex as usize).map_or(DVec3::NAN, |&position| position.into())
+        };
         let starts = std::iter::once(0).chain(self.faces.iter().map(|(end, _)| *end));
         let of_face = move |(start, &(end, material)): (usize, &(usize, u32))| {
             let corners = &self.corners[start..end];
             let cut = match corners.len() {
                 3 => vec![[0, 1, 2]],
-                _ => {
-                    polygon::triangles(&corners.iter().map(|corner| lines.position(corner.vertex)).collect::<Vec<_>>())
-                }
+                _ => polygon::triangles(&corners.iter().map(position).collect::<Vec<_>>()),
             };
-            cut.into_iter().map(move |three| self.triangle(lines, three.map(|k| corners[k]), material))
+            cut.into_iter().map(move |three| self.triangle(named, three.map(|k| corners[k]), material))
         };
         starts.zip(&self.faces).flat_map(of_face)
     }
 
-    fn triangle(&self, lines: &Lines, corners: [Corner; 3], material: u32) -> Triangle {
-        let normal = |corner: Corner| lines.normals.get(corner.normal as usize).copied().unwrap_or_default();
-        let texture = |corner: Corner| lines.texture.get(corner.texture as usize).copied().unwrap_or_default();
+    fn triangle(&self, named: Named<'_>, corners: [Corner; 3], material: u32) -> Triangle {
+        let normal = |corner: Corner| named.normals.get(corner.normal as usize).copied().unwrap_or_default();
+        let texture = |corner: Corner| named.texture.get(corner.texture as usize).copied().unwrap_or_default();
         Triangle {
             vertices: corners.map(|corner| corner.vertex),
             normals: (!self.lacks_normal).then(|| corners.map(normal)),
             texture: (!self.lacks_texture).then(|| corners.map(texture)),
             material,
         }
-    }
-}
-
-impl Lines {
-    fn position(&self, vertex: u32) -> DVec3 {
-        self.positions.get(vertex as usize).map_or(DVec3::NAN, |&position| position.into())
     }
 }
 

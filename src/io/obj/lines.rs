@@ -7,7 +7,7 @@ use crate::scene::Colors;
 use crate::scene::color::{DEFAULT_COLOR, srgb_to_linear};
 use std::io::{BufRead, Read};
 
-use super::faces::Faces;
+use super::faces::{Faces, Named, Triangle};
 
 /// No line is longer, with those that continue it; a polygon of a million corners is shorter.
 const LINE_LIMIT: usize = 1 << 24;
@@ -96,6 +96,12 @@ impl Lines {
         progress.advance(rest.unreported);
         lines.faces.check(lines.counts())?;
         Ok(lines)
+    }
+
+    /// The triangles of all faces.
+    pub(super) fn triangles(&self) -> impl Iterator<Item = Triangle> + '_ {
+        let named = Named { positions: &self.positions, texture: &self.texture, normals: &self.normals };
+        self.faces.triangles(named)
     }
 
     /// Vertices, texture coordinates and normals so far.

@@ -69,7 +69,7 @@ fn read_with<T>(input: Input, surface: bool, progress: &dyn Progress, make: impl
 fn points(lines: Lines) -> Points {
     let colors = lines.colors();
     let mut around = Triangles::new(&lines.positions);
-    for triangle in lines.faces.triangles(&lines) {
+    for triangle in lines.triangles() {
         around.add(triangle.vertices.map(|vertex| vertex as usize), triangle.normals.map(|all| all.map(Some)));
     }
     let has_faces = !lines.faces.is_empty();
@@ -94,7 +94,7 @@ fn points(lines: Lines) -> Points {
 fn mesh(lines: Lines) -> (Mesh, Vec<String>, Vec<String>) {
     let (mut vertices, mut normals) = (Vec::new(), Vec::new());
     let (mut texture, mut material) = (Vec::new(), Vec::new());
-    for triangle in lines.faces.triangles(&lines) {
+    for triangle in lines.triangles() {
         vertices.push(triangle.vertices);
         normals.extend(triangle.normals.map(|named| named.map(|normal| normal.map(|c| c as f32))));
         texture.extend(triangle.texture);

@@ -20,9 +20,9 @@ use super::{note, outputs, print};
 /// optimisations, scaling and compute-vs-raster in the folder benches.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  epsplat card --out card\n  epsplat card --quick --out card-tried\n\n\
-    Writes card.md (a summary), card.json (all of it), hardcases.json, and a report of each study in a folder of its name.\n\
-    Exits with 1, after everything is written, if an image misses its bound or differs in a bit, a study fails, or a step could\n\
-    not be done.")]
+    Writes card.md (a summary), card.json (all of it), hardcases.json, and a report of each study.\n\
+    Exits with 1, after everything is written, if an image misses its bound or differs in a bit,\n\
+    a study fails, or a step could not be done.")]
 pub struct Arguments {
     /// Definitions of studies: .toml
     studies: Vec<PathBuf>,

@@ -72,7 +72,7 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
     /// A renderer of what `source` has; nothing is uploaded yet.
     ///
     /// # Errors
-    /// [`Error::Usage`](crate::Error::Usage) for options, scenes and backends that do not go together.
+    /// [`Error::Usage`] for options, scenes and backends that do not go together.
     pub fn new(source: S, options: &RenderOptions, backend: B) -> Result<Self> {
         let reference = matches!(backend.borrow(), Backend::Reference);
         check::options(options, reference)?;

@@ -3,7 +3,7 @@
 //!
 //! | stage | takes | makes |
 //! |---|---|---|
-//! | [`order`] | [`Scene`](crate::scene::Scene) | the order of its surfels in memory |
+//! | [`order`] | [`Scene`] | the order of its surfels in memory |
 //! | [`upload`] | a [`source::Source`] | pages of surfels |
 //! | [`cull`] | surfels, nearest depths so far | the batches that are projected |
 //! | [`project`] | surfels | [`splat::Splat`] each |
@@ -11,7 +11,7 @@
 //! | [`accumulate`] | splats, nearest depths | [`accumulate::PixelSums`] |
 //! | [`tiles`] | large splats, or all | the same two, or the next |
 //! | [`covered`] | nearest depths | the tiles that have anything |
-//! | [`resolve`] | sums | [`Frame`](crate::frame::Frame) |
+//! | [`resolve`] | sums | [`Frame`] |
 //!
 //! [`index`] makes a map of its own. [`unseen`] says why none of them shows where none does.
 //!

@@ -40,13 +40,13 @@ impl Frame {
         Self { width, height, color, maps: BTreeMap::new() }
     }
 
-    /// The same with a map of [`Map::width`] `values` a pixel.
+    /// This frame with a map of [`Map::width`] `values` a pixel.
     pub fn with(mut self, map: Map, values: Vec<f32>) -> Self {
         self.maps.insert(map, values);
         self
     }
 
-    /// The same without a map.
+    /// This frame without a map.
     pub fn without(mut self, map: Map) -> Self {
         self.maps.remove(&map);
         self
@@ -62,7 +62,7 @@ impl Frame {
         self.maps.get(&map).map(Vec::as_slice)
     }
 
-    /// The same, to be changed.
+    /// A map's values, to be changed.
     pub fn map_mut(&mut self, map: Map) -> Option<&mut [f32]> {
         self.maps.get_mut(&map).map(Vec::as_mut_slice)
     }

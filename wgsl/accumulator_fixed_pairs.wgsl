@@ -42,7 +42,7 @@ fn settle(pixel: u32) {
     }
 }
 
-// The same when all is added: sums and carries of a pair.
+// The sums when all is added: sums and carries of a pair.
 @group(0) @binding(37) var<storage, read> added: array<vec2<u64>>;
 
 // The sums of the pixel that is shown, low and high words: both of a pair are read at once.

@@ -34,7 +34,7 @@ fn disk_corner(number: u32) -> vec2<f32> {
     return vec2<f32>(f32(number & 1u), f32(number >> 1u)) * 2.0 - 1.0;
 }
 
-// The same corner of the shape about a box of pixels, of its sides from the first one.
+// Corner `number` of the shape about a box of pixels, from the box's first corner in units of its sides.
 fn box_corner(number: u32) -> vec2<f32> {
     return vec2<f32>(f32(number & 1u), f32(number >> 1u)) * select(1.0, 2.0, VERTICES == 3u);
 }

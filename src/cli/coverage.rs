@@ -36,7 +36,7 @@ pub struct Arguments {
     /// Rays along each side of a view
     #[arg(long, value_name = "RAYS", default_value_t = DEFAULT_SIDE, value_parser = clap::value_parser!(u32).range(1..=8192))]
     side: u32,
-    /// The same as JSON, to a file or - for stdout (then without the table)
+    /// The measures as JSON, to a file or - for stdout (then without the table)
     #[arg(long, value_name = "FILE|-")]
     json: Option<PathBuf>,
 }

@@ -22,7 +22,7 @@ pub struct Arguments {
     input: PathBuf,
     #[command(flatten)]
     reading: Reading,
-    /// The same as JSON, to a file or - for stdout
+    /// What is known of the points as JSON, to a file or - for stdout
     #[arg(long, value_name = "FILE|-")]
     json: Option<PathBuf>,
 }

@@ -170,7 +170,7 @@ enum ShadingName {
     Unlit,
     /// Colour times the lights' cosines
     Lambert,
-    /// The same, and white highlights
+    /// Colour times the lights' cosines, and white highlights
     Phong,
 }
 

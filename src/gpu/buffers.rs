@@ -27,14 +27,14 @@ impl<T: Pod> Buffer<T> {
         Self::create(gpu, what, len, wgpu::BufferUsages::STORAGE, gpu.buffer_limit())
     }
 
-    /// The same, which the host reads where it lies if the device can let it ([`Readback`]).
+    /// A storage buffer that the host reads where it lies, if the device can let it ([`Readback`]).
     pub(crate) fn readable(gpu: &Gpu, what: &str, len: u64) -> Result<Self> {
         let lies_open = gpu.device.features().contains(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS);
         let read = if lies_open { wgpu::BufferUsages::MAP_READ } else { wgpu::BufferUsages::empty() };
         Self::create(gpu, what, len, wgpu::BufferUsages::STORAGE | read, gpu.buffer_limit())
     }
 
-    /// The same, which may also hold the arguments of indirect dispatches.
+    /// A storage buffer that may also hold the arguments of indirect dispatches.
     pub fn indirect(gpu: &Gpu, what: &str, len: u64) -> Result<Self> {
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT;
         Self::create(gpu, what, len, usage, gpu.buffer_limit())
@@ -48,7 +48,7 @@ impl<T: Pod> Buffer<T> {
         Ok(buffer)
     }
 
-    /// The same as words of 32 bits.
+    /// This buffer, as one of words of 32 bits.
     pub(crate) fn words(self) -> Buffer<u32> {
         let len = self.raw.size() / 4;
         Buffer { raw: self.raw, len, element: PhantomData }

@@ -77,8 +77,8 @@ impl Gpu {
         Self::of(adapter, &handle, features, limits)
     }
 
-    /// The same adapter as a device that can do what every WebGPU implementation can, a browser's or a phone's too, and no more: no
-    /// optional feature, and core limits.
+    /// The adapter that [`open`](Self::open) chooses, as a device that can do what every WebGPU implementation can, a browser's or a
+    /// phone's too, and no more: no optional feature, and core limits.
     pub fn open_core(name: Option<&str>) -> Result<Self> {
         let (adapter, handle) = best(name)?;
         let AdapterDescription { name, api, kind, driver, vertex_storage, .. } = adapter;
@@ -120,7 +120,7 @@ impl Gpu {
         Ok(Self { adapter, device, queue, programs: Programs::default(), failure })
     }
 
-    /// The same device with smaller buffers, of at most `bytes` each: scenes and images are cut into more pages and bands
+    /// This device with smaller buffers, of at most `bytes` each: scenes and images are cut into more pages and bands
     /// than the adapter asks for. It bounds memory, and lets tests cross page borders with small scenes.
     pub fn with_buffer_limit(mut self, bytes: u64) -> Self {
         let limit = &mut self.adapter.max_storage_buffer_binding_size;

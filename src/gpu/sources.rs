@@ -33,7 +33,7 @@ impl Sources {
         Ok(self)
     }
 
-    /// The same, of which every loop is counted, those that are known to end too.
+    /// These texts, every loop of which is counted, those that are known to end too.
     pub(crate) fn with_counted_loops(self) -> Self {
         Self { counts_loops: true, ..self }
     }

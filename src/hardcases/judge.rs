@@ -40,7 +40,7 @@ pub struct MapError {
     pub bound: f64,
     /// Largest error as a fraction of the same pixel's bound: over 1 it is exceeded.
     pub used: f64,
-    /// The same for the bound of the row's own accumulator.
+    /// The largest error as a share of the bound of the row's own accumulator.
     pub used_of_own: f64,
 }
 

@@ -57,7 +57,7 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
     read_with(path, ReadOptions::default(), progress)
 }
 
-/// The same by `options`.
+/// Reads the points of a file, as `options` say.
 ///
 /// # Errors
 ///
@@ -104,7 +104,7 @@ pub fn read_mesh(path: &Path, progress: &dyn Progress) -> Result<Mesh> {
     read_mesh_with(path, ReadOptions::default(), progress)
 }
 
-/// The same by `options`.
+/// Reads the triangles of a mesh file, as `options` say.
 ///
 /// # Errors
 ///

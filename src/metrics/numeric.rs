@@ -58,9 +58,9 @@ pub struct MapError {
     pub not_finite: u64,
     /// Largest absolute difference; of depths, over pixels that both cover.
     pub max_abs: f64,
-    /// The same as a fraction of the range; 1 for any error where B's values span none.
+    /// [`max_abs`](Self::max_abs) as a fraction of the range; 1 for any error where B's values span none.
     pub max_of_range: f64,
-    /// The same over the pixels that are not excused; only if there is a `decision` map.
+    /// [`max_of_range`](Self::max_of_range) over the pixels that are not excused; only if there is a `decision` map.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_of_range_decided: Option<f64>,
 }

@@ -17,7 +17,7 @@ pub struct Splat {
     pub last: [u32; 2],
     /// `a . (dx, dy, 1)` is u/z (pinhole) or u (orthographic).
     pub a: DVec3,
-    /// The same for v.
+    /// `b . (dx, dy, 1)` is v/z (pinhole) or v (orthographic).
     pub b: DVec3,
     /// 1/z (pinhole) or z (orthographic).
     pub c: DVec3,

@@ -14,7 +14,7 @@ pub enum ColorNeed {
     Srgb8,
     /// Four f32 each.
     Linear,
-    /// The same of the texture's mean over the disk, and a place in the texture, which is looked up once a pixel.
+    /// Four f32 each, of the texture's mean over the disk, and a place in the texture, which is looked up once a pixel.
     Textured,
 }
 

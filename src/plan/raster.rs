@@ -55,7 +55,7 @@ pub enum RasterDepth {
     /// The rasteriser interpolates and compares depths, which the visibility pass moves away by epsilon along the
     /// camera's axis (Botsch et al. 2005).
     Offset,
-    /// The same, moved along the view ray (paper 000, section 5.3).
+    /// The classic depth test against depths that are moved along the view ray (paper 000, section 5.3).
     Ray,
 }
 

@@ -147,12 +147,12 @@ impl Stage {
         Self { pass, band, page: None, clears: Vec::new(), runs, twin: None }
     }
 
-    /// The same after `clears`.
+    /// This stage, before which `clears` are done.
     pub fn after(self, clears: Vec<Clear>) -> Self {
         Self { clears, ..self }
     }
 
-    /// The same, in whose place the reference has `twin`.
+    /// This stage, in whose place the reference has `twin`.
     pub fn as_twin(self, twin: Twin) -> Self {
         Self { twin: Some(twin), ..self }
     }

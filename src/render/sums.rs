@@ -45,7 +45,7 @@ impl Sums {
         self.sums.get(at).copied()
     }
 
-    /// The same where a weight of 1 is 1.
+    /// The sum of `channel` at `pixel` in units in which a weight of 1 is 1. `None` past the end.
     pub fn value(&self, pixel: usize, channel: u32) -> Option<f64> {
         Some(self.sum(pixel, channel)? as f64 / self.one as f64)
     }

@@ -26,7 +26,7 @@ pub struct Camera {
     pub height: u32,
     /// Focal length (pinhole, pixels) or scale (orthographic, pixels per world unit) along x.
     pub fx: f64,
-    /// The same along y.
+    /// Focal length (pinhole, pixels) or scale (orthographic, pixels per world unit) along y.
     pub fy: f64,
     /// Principal point, pixels from the left edge; need not be the centre.
     pub cx: f64,

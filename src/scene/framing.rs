@@ -10,7 +10,7 @@ use crate::error::Result;
 /// Part of the way from the image's middle to its edge that surfels' centres fill.
 const FILL: f64 = 0.95;
 
-/// The same of disks, where they would else be cut.
+/// Part of the way that disks fill, where they would else be cut.
 const FILL_OF_DISKS: f64 = 0.98;
 
 /// Rounds of centring; each leaves about the square of the share of depth in the distance.
@@ -26,7 +26,7 @@ impl Camera {
         Self::framed(size, lens, scene, near, Of::Disks)
     }
 
-    /// The same by surfels' centres alone: for studies, in which the view must not depend on the radius.
+    /// The default view by surfels' centres alone: for studies, in which the view must not depend on the radius.
     pub(crate) fn framing_centers(size: (u32, u32), lens: Lens, scene: &Scene, near: f64) -> Result<Self> {
         Self::framed(size, lens, scene, near, Of::Centers)
     }

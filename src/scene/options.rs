@@ -183,7 +183,7 @@ pub enum Shading {
     Unlit,
     /// The blended colour times the lights' irradiance at the blended normal.
     Lambert,
-    /// The same and white highlights (Phong 1975), [`HIGHLIGHT`] times a light's irradiance times `max(0, r . v)^shininess`,
+    /// Lambert's light and white highlights (Phong 1975), [`HIGHLIGHT`] times a light's irradiance times `max(0, r . v)^shininess`,
     /// where r is the light's direction mirrored at the normal and v the direction toward the eye. Phong's own term stops short where a
     /// light sets behind the surface; with the irradiance as a factor (Lewis 1994) it ends there at 0.
     Phong,

@@ -57,7 +57,7 @@ impl Texture {
         sum
     }
 
-    /// The same with straight alpha.
+    /// The colour at a place, with straight alpha.
     pub fn at(&self, u: f32, v: f32) -> [f32; 4] {
         straight(self.premultiplied_at([u, v].map(f64::from)))
     }

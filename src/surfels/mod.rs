@@ -123,7 +123,7 @@ pub fn build(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Pre
     built(gathered, progress)
 }
 
-/// The same, painted with `texture` at the points' texture coordinates, instead of their colours.
+/// Makes one scene of the points of all inputs, painted with `texture` at the points' texture coordinates, instead of their colours.
 ///
 /// # Errors
 ///

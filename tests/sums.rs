@@ -10,7 +10,7 @@ use epsplat::gpu::{Gpu, Sources};
 use epsplat::plan::{Accumulator, Optimisation, Organisation, RenderOptions};
 use epsplat::render::sums::{Sums, resolve, sums};
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, LowPass, Maps, Projection, Scene, Shading};
+use epsplat::scene::{Camera, Colors, Epsilon, Light, LowPass, Map, Maps, Projection, Scene, Shading};
 
 fn of(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu) -> Sums {
     sums(scene, camera, options, gpu, &Sources::default()).unwrap()
@@ -107,11 +107,18 @@ fn a_changed_sum_shows_and_sums_of_another_render_are_refused() {
         RenderOptions { low_pass: LowPass::Ewa, ..options.clone() },
         RenderOptions { maps: Maps::ON_DEVICE, ..options.clone() },
         RenderOptions { accumulator: Accumulator::Fixed32, ..options.clone() },
+        RenderOptions { maps: Maps::of(&[Map::Index]), ..options.clone() },
+        RenderOptions { epsilon: Epsilon::Absolute(0.5), ..options.clone() },
     ];
     for other in others {
         let error = picture(&taken, &other).unwrap_err().to_string();
         assert!(error.contains("sums"), "{error}");
     }
+    // Lights are of the picture alone.
+    let dark = RenderOptions { lights: vec![Light::Headlight { intensity: 0.5 }], ..options.clone() };
+    let [lit, dim] = [&options, &dark].map(|options| picture(&taken, options).unwrap());
+    let expected = render(&scene, &camera, &dark, &Backend::gpu(common::gpu().unwrap()), &()).unwrap().0;
+    assert!(bits(&dim) == bits(&expected) && bits(&dim) != bits(&lit));
     let short = Sums { nearest: taken.nearest[1..].to_vec(), ..taken.clone() };
     assert!(picture(&short, &options).is_err());
 }

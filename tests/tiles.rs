@@ -197,6 +197,28 @@ fn a_view_that_needs_more_room_gets_it() {
     }
 }
 
+/// Bands have splats of their own, and one may need much more room than the next: what is learned of one must not hold for another.
+#[test]
+fn bands_that_need_different_room_get_it() {
+    let Some(gpu) = common::gpu() else { return };
+    let backend = on(gpu.with_buffer_limit(120_000), large_from(30));
+    let scene = sphere(900, 2.5);
+    let far = common::scenes::sphere_camera_with(160, epsplat::scene::Lens::Fov(170.0));
+    let near = common::scenes::sphere_camera(160, Projection::Pinhole);
+    // In the first band, the last, and a sliver of it.
+    let [up, down, sliver] = [-60.0, 60.0, 140.0].map(|moved| Camera { cy: near.cy + moved, ..near.clone() });
+    for organisation in [Organisation::Auto, Organisation::Tile] {
+        let options = RenderOptions { organisation, ..RenderOptions::default() };
+        let mut renderer = Renderer::new(&scene, &options, &backend).unwrap();
+        for view in [&far, &up, &down, &sliver, &far, &near, &up, &sliver, &down] {
+            let (kept, report) = renderer.frame(view, &()).unwrap();
+            let (fresh, _) = render(&scene, view, &options, &backend, &()).unwrap();
+            assert!(bits(&kept) == bits(&fresh), "{organisation:?}, {}", view.cy);
+            assert!(report.needs.contains(&"gather") || organisation == Organisation::Auto);
+        }
+    }
+}
+
 /// The longest lists that are drawn, of large and of small splats over the same tile, both of its halves.
 #[test]
 fn the_longest_lists_are_drawn_to_their_end() {

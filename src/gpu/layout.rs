@@ -76,7 +76,7 @@ pub const AWAY: u32 = 1 << 31;
 
 /// The camera, options and facts of one render, as the kernels see them. See the WGSL for the meaning of each field.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)]
 pub struct View {
     pub rotation: [[f32; 4]; 3],

@@ -81,6 +81,7 @@ pub fn read(path: &Path) -> Outcome<Frame> {
             Some(match &channel.sample_data {
                 // As a frame keeps them.
                 FlatSamples::U32(numbers) if is_whole => numbers.iter().copied().map(f32::from_bits).collect(),
+                _ if is_whole => return None,
                 samples => samples.values_as_f32().collect(),
             })
         };
@@ -120,7 +121,9 @@ mod tests {
         let color = ramp(n, 0.01).into_iter().map(|v| [v, 1.0 - v, -v, 0.5]).collect();
         let maps = MAPS.iter().map(|row| (row.map, ramp(n * row.map.width(), 1e-7)));
         let frame = maps.fold(Frame::of_colors(7, 5, color), |frame, (map, values)| frame.with(map, values));
-        let frame = frame.with(Map::Depth, depth);
+        // A number that is none of f32's, as where nothing is.
+        let names = (0..2 * n as u32).map(|k| f32::from_bits(u32::MAX - k)).collect();
+        let frame = frame.with(Map::Depth, depth).with(Map::Index, names);
         let folder = tempfile::tempdir().unwrap();
         let (a, b) = (folder.path().join("a.exr"), folder.path().join("b.exr"));
         write(&a, &frame).unwrap();

@@ -16,7 +16,7 @@ use crate::gpu::layout::{Splat, View};
 use crate::gpu::{Gpu, Sources};
 use crate::passes::upload::upload;
 use crate::plan::steps::{Stage, Step, Twin};
-use crate::plan::{Facts, Known, Optimisation, Organisation, Plan, RenderOptions, splat_words};
+use crate::plan::{Accumulator, Facts, Known, Optimisation, Organisation, Plan, RenderOptions, splat_words};
 use crate::scene::{Camera, LowPass, Scene};
 
 /// What the first three stages leave on the device.
@@ -43,6 +43,9 @@ impl Stages {
 /// # Errors
 /// [`Error::Usage`] if the image's sums need more than one buffer; and whatever a render can fail with.
 pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu, sources: &Sources) -> Result<Stages> {
+    if options.accumulator != Accumulator::Fixed {
+        return Err(Error::Usage("sums are read back in the form of the accumulator fixed: take it".into()));
+    }
     // A slot for each surfel, and sums in storage.
     let mut without = options.without.clone();
     without.extend([Optimisation::Culling, Optimisation::Copies]);
@@ -72,7 +75,7 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
     let steps: Vec<_> = sequence::steps(&plan).into_iter().take_while(|step| !resolves(step)).collect();
     run.steps(&steps, &mut Frame::empty(camera, options.maps), &())?;
     run.timing.flush(gpu)?;
-    let mut sums = Sums::new(camera, &plan);
+    let mut sums = Sums::new(camera, &plan, &view);
     sums.take(gpu, &plan, &store, 0)?;
     Ok(Stages { splats: splats(gpu, options.low_pass, &order, &store)?, sums, view })
 }

@@ -46,6 +46,12 @@ pub struct Run<'a> {
     by_tiles: bool,
     /// What the device counted so far.
     tally: Tally,
+    /// What lists of large and of small splats were seen to need, in the band that needs most.
+    needed: [Option<u64>; 2],
+    /// In some band lists had too little room.
+    wanting: bool,
+    /// In some band no list holds the large splats.
+    unlisted: bool,
 }
 
 impl<'a> Run<'a> {
@@ -60,6 +66,9 @@ impl<'a> Run<'a> {
             timing: Timing::new(gpu),
             by_tiles: plan.large_by_tiles,
             tally: Tally { drawn: 0, complete: true },
+            needed: [None; 2],
+            wanting: false,
+            unlisted: false,
         }
     }
 
@@ -74,10 +83,7 @@ impl<'a> Run<'a> {
                 Step::Large { by_workgroups, .. } => self.stage(by_workgroups)?,
                 Step::Draw => self.draw()?,
                 Step::ReadBack(band) => {
-                    // Of the last band `tally` looks.
-                    if self.plan.projects_each_band && *band + 1 < self.plan.bands.len() {
-                        self.count(*band)?;
-                    }
+                    self.end_band(*band)?;
                     self.read_back(*band, frame)?;
                     progress.advance(self.plan.bands[*band].rows.into());
                 }
@@ -95,7 +101,27 @@ impl<'a> Run<'a> {
     /// What the device counted.
     pub fn tally(&mut self) -> Result<Tally> {
         self.count(self.plan.bands.len() - 1)?;
+        self.learn();
         Ok(self.tally)
+    }
+
+    /// Counts what `band` leaves, where the next one counts anew; of the last one [`tally`](Self::tally) does.
+    pub fn end_band(&mut self, band: usize) -> Result<()> {
+        let last = band + 1 == self.plan.bands.len();
+        if self.plan.projects_each_band && !last { self.count(band) } else { Ok(()) }
+    }
+
+    /// Keeps what all bands showed of lists: the next try has room for the one that needs most, or looks at all of them again.
+    fn learn(&mut self) {
+        for of in [Listed::Large, Listed::Small] {
+            let entries = &mut self.known.entries[of as usize];
+            *entries = match self.needed[of as usize] {
+                _ if self.wanting => None,
+                _ if self.unlisted && of == Listed::Large => None,
+                Some(needed) => Some(needed.max(entries.unwrap_or(0))),
+                None => *entries,
+            };
+        }
     }
 
     /// Adds what the device counted up to the end of `band`.
@@ -127,9 +153,7 @@ impl<'a> Run<'a> {
         let before = band > 0 && self.plan.projects_each_band && self.known.large == Some(true);
         self.known.large = Some(before || most_large > 0);
         self.known.slots &= slots;
-        if !lists {
-            self.known.entries = [None; 2];
-        }
+        self.wanting |= !lists;
         // Where splats are missing, sums are those of others.
         if slots && lists {
             self.known.overflows = self.known.overflows.max(overflows.into());
@@ -240,13 +264,16 @@ impl<'a> Run<'a> {
         let most = (self.gpu.buffer_limit() / 4).saturating_sub(self.store.list_words(self.plan, of));
         if entries > most || longest > LONGEST {
             self.by_tiles = false;
+            self.unlisted = true;
             self.known.crowded |= gathers;
             return Ok(!gathers);
         }
-        if entries > self.store.entries(of) || self.known.entries_of(of).is_none() {
+        // What earlier bands listed is drawn by now.
+        if entries > self.store.entries(of) {
             self.store.make_lists(self.gpu, self.plan, of, entries)?;
-            self.known.entries[of as usize] = Some(entries);
         }
+        let needed = &mut self.needed[of as usize];
+        *needed = Some(needed.map_or(entries, |most| most.max(entries)));
         Ok(true)
     }
 

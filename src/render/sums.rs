@@ -11,10 +11,10 @@ use crate::gpu::layout::{ONE, ONE_WIDE, View};
 use crate::gpu::{Gpu, Sources};
 use crate::passes::source::Source;
 use crate::passes::upload::{Uploaded, shared, upload};
-use crate::passes::{accumulate, resolve as resolve_pass, visibility};
+use crate::passes::{MAP_PASSES, accumulate, resolve as resolve_pass, visibility};
 use crate::plan::known::MOST_TRIES;
 use crate::plan::steps::{Part, Stage, Step, Twin};
-use crate::plan::{Accumulator, Known, Optimisation, PixelLayout, Plan, RenderOptions};
+use crate::plan::{Accumulator, Known, Optimisation, PixelLayout, Plan, RenderOptions, check};
 use crate::scene::Camera;
 
 /// What the attribute pass leaves of an image, by the accumulator `fixed`.
@@ -30,13 +30,23 @@ pub struct Sums {
     pub pixel: PixelLayout,
     /// Units of a weight of 1.
     pub one: u64,
+    /// What the kernels saw of scene, camera and options; lights and background, which sums do not depend on, are left out.
+    pub view: View,
 }
 
 impl Sums {
     /// Room for an image by `plan`.
-    pub(super) fn new(camera: &Camera, plan: &Plan) -> Self {
+    pub(super) fn new(camera: &Camera, plan: &Plan, view: &View) -> Self {
         let one = if plan.needs.wide_sums { ONE_WIDE } else { ONE.into() };
-        Self { size: [camera.width, camera.height], nearest: Vec::new(), sums: Vec::new(), pixel: plan.pixel, one }
+        let view = View { lights: Default::default(), background: [0.0; 4], ..*view };
+        Self {
+            size: [camera.width, camera.height],
+            nearest: Vec::new(),
+            sums: Vec::new(),
+            pixel: plan.pixel,
+            one,
+            view,
+        }
     }
 
     /// The sum of `channel` at `pixel`, in units of `1 / one`. `None` past the end.
@@ -69,7 +79,7 @@ impl Sums {
     }
 
     /// Puts those of a band on the device.
-    fn put(&self, gpu: &Gpu, plan: &Plan, store: &Store, band: usize) {
+    fn put(&self, gpu: &Gpu, plan: &Plan, store: &Store, band: usize) -> Result<()> {
         let first = plan.bands[band].first as usize * self.size[0] as usize;
         let pixels = first..first + plan.bands[band].pixels as usize;
         let channels = self.pixel.channels as usize;
@@ -77,16 +87,22 @@ impl Sums {
         let kept = accumulate::kept(&plan.needs, sums);
         for (name, words) in [("nearest", &self.nearest[pixels]), ("sums", &kept)] {
             if let Some(buffer) = store.buffer(name) {
-                gpu.queue.write_buffer(&buffer.raw, 0, bytemuck::cast_slice(words));
+                buffer.write(gpu, words.len(), |range| words[range].into(), &())?;
             }
         }
+        Ok(())
     }
 }
 
 /// How sums are made that leave the device.
 fn stored(options: &RenderOptions) -> Result<RenderOptions> {
+    check::options(options, false)?;
     if options.accumulator != Accumulator::Fixed || options.raster.is_some() {
         return Err(Error::Usage("sums leave the device in the form of the accumulator fixed: take it".into()));
+    }
+    if let Some(own) = MAP_PASSES.iter().find(|own| options.maps.has(own.map)) {
+        let map = own.map.row().name;
+        return Err(Error::Usage(format!("sums do not say what the map {map} shows: leave it out, or render")));
     }
     // Tiles that gather store none.
     let mut without = options.without.clone();
@@ -114,9 +130,10 @@ pub fn sums(
         let plan = Plan::of(&facts, &gpu.adapter, camera, options, &known)?;
         let kernels = Kernels::new(gpu, sources, &plan, options, facts.surfels)?;
         store.fit(gpu, &plan, &known)?;
-        store.set_view(gpu, &View::new(&facts, camera, options));
+        let view = View::new(&facts, camera, options);
+        store.set_view(gpu, &view);
         let mut run = Run::new(gpu, &plan, &kernels, &mut store, &mut known);
-        let mut sums = Sums::new(camera, &plan);
+        let mut sums = Sums::new(camera, &plan, &view);
         let mut nothing = Frame::empty(camera, options.maps);
         for step in sequence::steps(&plan) {
             match step {
@@ -124,7 +141,7 @@ pub fn sums(
                     run.timing.flush(gpu)?;
                     sums.take(gpu, &plan, run.store, band)?;
                 }
-                Step::ReadBack(_) | Step::Stage(Stage { twin: Some(Twin::Map(_)), .. }) => {}
+                Step::ReadBack(band) => run.end_band(band)?,
                 step => drop(run.steps(&[step], &mut nothing, &())?),
             }
         }
@@ -151,21 +168,23 @@ pub fn resolve(
     let facts = source.facts();
     let mut known = Known::default();
     let plan = Plan::of(&facts, &gpu.adapter, camera, options, &known)?;
-    let expected = Sums::new(camera, &plan);
+    let view = View::new(&facts, camera, options);
+    let expected = Sums::new(camera, &plan, &view);
     let pixels = camera.pixels();
     let whole = sums.nearest.len() == pixels && sums.sums.len() == pixels * plan.pixel.channels as usize;
-    if !whole || (sums.size, sums.pixel, sums.one) != (expected.size, expected.pixel, expected.one) {
-        return Err(Error::Usage("the sums are of another scene, image or choice of maps".into()));
+    let of = |sums: &Sums| (sums.size, sums.pixel, sums.one, sums.view);
+    if !whole || of(sums) != of(&expected) {
+        return Err(Error::Usage("the sums are of another scene, view or choice of options".into()));
     }
     let kernels = Kernels::new(gpu, sources, &plan, options, facts.surfels)?;
     let scene_wide = Uploaded { pages: Vec::new(), shared: shared(gpu, source, &plan.needs)? };
     let mut store = Store::new(gpu, scene_wide, &plan.needs)?;
     store.fit(gpu, &plan, &known)?;
-    store.set_view(gpu, &View::new(&facts, camera, options));
+    store.set_view(gpu, &view);
     let mut frame = Frame::new(camera, options.maps);
     let mut run = Run::new(gpu, &plan, &kernels, &mut store, &mut known);
     for band in 0..plan.bands.len() {
-        sums.put(gpu, &plan, run.store, band);
+        sums.put(gpu, &plan, run.store, band)?;
         // Which tiles are covered follows from the nearest depths.
         let stages = [visibility::occlude(band, Part::All), resolve_pass::steps(&plan, band)];
         let steps = stages.into_iter().map(Step::Stage).chain([Step::ReadBack(band)]);

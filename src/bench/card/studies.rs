@@ -35,7 +35,7 @@ pub struct StudyRecord {
     pub notes: Vec<String>,
     /// Missed error limits, and configurations that gave different bits in two runs.
     pub failures: Vec<String>,
-    /// Scenes for which there was no time.
+    /// Scenes for which there was no time, or that would have come after an error.
     pub left_out: Vec<String>,
 }
 
@@ -131,7 +131,7 @@ fn study(card: &mut Card<'_>, definition: &Definition, deadline: Instant) -> Res
             written = Instant::now();
         }
     }
-    keep(card, definition, outcome, (left_out, start))?;
+    keep(card, definition, outcome, (left_out, failed.is_some(), start))?;
     failed.map_or(Ok(()), Err)
 }
 
@@ -153,14 +153,15 @@ fn keep(
     card: &mut Card<'_>,
     definition: &Definition,
     outcome: Outcome,
-    (left_out, start): (Vec<String>, Instant),
+    (left_out, failed, start): (Vec<String>, bool, Instant),
 ) -> Result<()> {
     let Outcome { study, notes, failures } = outcome;
     if !study.measurements.is_empty() {
         report::write(&card.folder.join(&study.name), &study)?;
     }
     if !left_out.is_empty() {
-        card.leave_out(format!("of the study {}, for lack of time: {}", study.name, left_out.join("; ")));
+        let why = if failed { "after an error" } else { "for lack of time" };
+        card.leave_out(format!("of the study {}, {why}: {}", study.name, left_out.join("; ")));
     }
     card.record.studies.push(StudyRecord {
         seconds: start.elapsed().as_secs_f64(),

@@ -79,9 +79,9 @@ impl Faces {
             let mut parts = word.split(|&byte| byte == b'/').map(Some).chain(std::iter::repeat(None));
             let mut named = |kind: usize| -> Result<Option<u32>, Fault> {
                 let part = parts.next().flatten().filter(|part| !part.is_empty());
-                let parsed = part.map(|part| part_of(part).ok_or_else(|| no_corner(line, word))).transpose()?;
-                let wanted = parsed.filter(|_| kind != TEXTURE || wants_texture);
-                Ok(wanted.map(|number| place(number, counts[kind])))
+                let wanted = part.filter(|_| kind != TEXTURE || wants_texture);
+                let parsed = wanted.map(|part| part_of(part).ok_or_else(|| no_corner(line, word))).transpose()?;
+                Ok(parsed.map(|number| place(number, counts[kind])))
             };
             let (vertex, texture, normal) = (named(0)?, named(TEXTURE)?, named(2)?);
             let vertex = vertex.ok_or_else(|| no_corner(line, word))?;

@@ -30,7 +30,7 @@ use std::io::BufReader;
 /// # Errors
 ///
 /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where
-/// a number is none or a face names a vertex or normal that does not exist.
+/// a number is none or a face names a vertex or normal that does not exist; where a file has no normal at all, none is missed.
 pub fn read(input: Input, progress: &dyn Progress) -> Result<Points> {
     read_with(input, false, progress, points)
 }
@@ -46,7 +46,7 @@ pub fn read(input: Input, progress: &dyn Progress) -> Result<Points> {
 ///
 /// # Errors
 ///
-/// As [`read`], and where a face names texture coordinates that do not exist.
+/// As [`read`], and where a face names texture coordinates that do not exist, in a file that has some.
 pub fn read_mesh(input: Input, progress: &dyn Progress) -> Result<Mesh> {
     let path = input.path.clone();
     let (mut mesh, libraries, names) = read_with(input, true, progress, mesh)?;

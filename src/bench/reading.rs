@@ -145,18 +145,13 @@ impl SceneEntry {
 
 impl Config {
     fn check(&self) -> Result<(), String> {
-        if self.backend != BackendName::Gpu && self.accumulator.is_some() {
-            return Err("accumulator: only the backend gpu has one".into());
-        }
-        if self.backend != BackendName::Gpu && self.organisation.is_some() {
-            return Err("organisation: only the backend gpu has more than one".into());
-        }
-        if self.backend != BackendName::Gpu && !self.without.is_empty() {
-            return Err("without: only the backend gpu has what it names".into());
-        }
-        if self.backend != BackendName::Raster && (self.blend_format.is_some() || self.raster_depth.is_some()) {
-            return Err("blend_format, raster_depth: only the backend raster has them".into());
-        }
+        let chosen = check::Chosen {
+            accumulator: self.accumulator.is_some(),
+            organisation: self.organisation.is_some(),
+            without: !self.without.is_empty(),
+            raster: self.blend_format.is_some() || self.raster_depth.is_some(),
+        };
+        check::chosen(Some(self.backend), chosen).map_err(|error| error.to_string())?;
         let reference = self.backend == BackendName::Reference;
         check::options(&self.options(None), reference).map_err(|error| error.to_string())?;
         match self.error_limit {
@@ -269,12 +264,12 @@ mod tests {
             ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nlowpass = \"box\"\n", &["lowpass:", "ewa"]),
             (
                 "[[config]]\nname = \"d\"\nbackend = \"gpu\"\nblend_format = \"rgba8unorm\"\n",
-                &["blend_format", "raster"],
+                &["blend-format", "raster"],
             ),
-            ("[[config]]\nname = \"d\"\nbackend = \"raster\"\naccumulator = \"fixed\"\n", &["accumulator:", "gpu"]),
+            ("[[config]]\nname = \"d\"\nbackend = \"raster\"\naccumulator = \"fixed\"\n", &["accumulator", "gpu"]),
             ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nerror_limit = -1\n", &["error_limit:"]),
-            ("[[config]]\nname = \"d\"\nbackend = \"raster\"\norganisation = \"tile\"\n", &["organisation:", "gpu"]),
-            ("[[config]]\nname = \"d\"\nbackend = \"raster\"\nwithout = [\"order\"]\n", &["without:", "gpu"]),
+            ("[[config]]\nname = \"d\"\nbackend = \"raster\"\norganisation = \"tile\"\n", &["organisation", "gpu"]),
+            ("[[config]]\nname = \"d\"\nbackend = \"raster\"\nwithout = [\"order\"]\n", &["left out", "gpu"]),
             ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nwithout = [\"x\"]\n", &["line 6, without:", "culling"]),
             ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nmaps = [\"decision\"]\n", &["decision map", "reference"]),
             ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nmaps = [\"colour\"]\n", &["line 6, maps:", "depth"]),

@@ -252,6 +252,7 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
     if !maps.is_empty() && format == Format::Png {
         return Err(Error::Usage("a PNG holds no maps: give --aov with an .exr output".into()));
     }
+    check_chosen(arguments)?;
     let default = RenderOptions::default();
     let options = RenderOptions {
         epsilon: arguments.epsilon,
@@ -262,8 +263,8 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
             LowPassName::Ewa => LowPass::Ewa,
         },
         accumulator: arguments.accumulator.unwrap_or_default(),
-        organisation: organisation(arguments)?,
-        raster: raster(arguments)?,
+        organisation: arguments.organisation.unwrap_or_default(),
+        raster: raster(arguments),
         shading: match arguments.shading {
             ShadingName::Unlit => Shading::Unlit,
             ShadingName::Lambert => Shading::Lambert,
@@ -292,39 +293,28 @@ fn shininess(arguments: &Arguments) -> Result<Option<f32>> {
     }
 }
 
-/// How the compute kernels draw splats.
-fn organisation(arguments: &Arguments) -> Result<Organisation> {
-    let kernels = matches!(arguments.backend.0, None | Some(BackendName::Gpu));
-    match arguments.organisation {
-        Some(_) if !kernels => Err(Error::Usage("--organisation is a choice of --backend gpu: leave it out".into())),
-        chosen => Ok(chosen.unwrap_or_default()),
-    }
+/// Fails for a choice that the backend does not have.
+fn check_chosen(arguments: &Arguments) -> Result<()> {
+    let chosen = check::Chosen {
+        accumulator: arguments.accumulator.is_some(),
+        organisation: arguments.organisation.is_some(),
+        without: false,
+        raster: arguments.blend_format.is_some() || arguments.raster_depth.is_some(),
+    };
+    check::chosen(arguments.backend.0, chosen)
 }
 
 /// The rasteriser's options, if it renders.
-fn raster(arguments: &Arguments) -> Result<Option<Raster>> {
-    let chosen = arguments.blend_format.is_some() || arguments.raster_depth.is_some();
-    if arguments.backend.0 != Some(BackendName::Raster) {
-        return match chosen {
-            true => Err(Error::Usage("--blend-format and --raster-depth need --backend raster".into())),
-            false => Ok(None),
-        };
-    }
-    if arguments.accumulator.is_some() {
-        return Err(Error::Usage("--backend raster adds in --blend-format: leave --accumulator out".into()));
-    }
+fn raster(arguments: &Arguments) -> Option<Raster> {
     let default = Raster::default();
-    Ok(Some(Raster {
+    (arguments.backend.0 == Some(BackendName::Raster)).then(|| Raster {
         format: arguments.blend_format.unwrap_or(default.format),
         depth: arguments.raster_depth.unwrap_or(default.depth),
-    }))
+    })
 }
 
 fn backend(arguments: &Arguments) -> Result<Backend> {
     if arguments.backend.0 == Some(BackendName::Reference) {
-        if arguments.accumulator.is_some() {
-            return Err(Error::Usage("--backend reference adds in f64: leave --accumulator out".into()));
-        }
         if arguments.adapter.is_some() {
             return Err(Error::Usage("--backend reference uses no adapter: leave --adapter out".into()));
         }

@@ -1,6 +1,8 @@
 //! What goes with what: one rule for the command line, for studies and for callers of the library.
 
-use super::{Accumulator, BlendFormat, ColorNeed, Facts, Features, Organisation, PixelLayout, RasterDepth};
+use super::{
+    Accumulator, BackendName, BlendFormat, ColorNeed, Facts, Features, Organisation, PixelLayout, RasterDepth,
+};
 use super::{RenderOptions, SceneNeeds};
 use crate::error::{Error, Result};
 use crate::gpu::adapter::AdapterDescription;
@@ -40,6 +42,37 @@ pub fn options(options: &RenderOptions, reference: bool) -> Result<()> {
         }
         None if options.organisation == Organisation::Tile && options.accumulator != Accumulator::Fixed => {
             usage("the organisation tile needs the accumulator fixed: leave one of them out")
+        }
+        _ => Ok(()),
+    }
+}
+
+/// What a caller chose, rather than left as it is, of what not every backend has.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Chosen {
+    /// How sums are kept.
+    pub accumulator: bool,
+    /// How the compute kernels draw splats.
+    pub organisation: bool,
+    /// What is left out that makes frames faster.
+    pub without: bool,
+    /// The rasteriser's targets or depths.
+    pub raster: bool,
+}
+
+/// Fails for a choice that `backend` does not have; of the best backend that there is nothing is known but that it does not rasterise.
+///
+/// # Errors
+/// [`Error::Usage`].
+pub fn chosen(backend: Option<BackendName>, chosen: Chosen) -> Result<()> {
+    let kernels = matches!(backend, None | Some(BackendName::Gpu));
+    let only = |what: &str, of: BackendName| usage(format!("{what} of the backend {} alone: leave it out", of.name()));
+    match chosen {
+        Chosen { accumulator: true, .. } if !kernels => only("the accumulator is", BackendName::Gpu),
+        Chosen { organisation: true, .. } if !kernels => only("the organisation is", BackendName::Gpu),
+        Chosen { without: true, .. } if !kernels => only("what can be left out is", BackendName::Gpu),
+        Chosen { raster: true, .. } if backend != Some(BackendName::Raster) => {
+            only("the choice of blend-format and raster-depth is", BackendName::Raster)
         }
         _ => Ok(()),
     }

@@ -228,8 +228,10 @@ fn pages_and_bands_do_not_change_a_bit() {
             let small = small.with_buffer_limit(limit);
             assert_eq!(small.buffer_limit(), limit);
             let (scene, camera) = crowded().remove(1);
-            let refused = stages(&scene, &camera, &options, &small, &Sources::default());
-            assert!(refused.unwrap_err().to_string().contains("bands"));
+            if row.of == Accumulator::Fixed {
+                let refused = stages(&scene, &camera, &options, &small, &Sources::default());
+                assert!(refused.unwrap_err().to_string().contains("bands"));
+            }
             assert!(small.adapter.page_len(size_of::<Splat>()) < scene.surfels.len() as u64 / 2);
             let small = Backend::gpu(small);
             for (scene, camera) in scenes(row) {

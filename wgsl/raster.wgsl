@@ -15,7 +15,7 @@ struct Corner {
     @location(4) @interpolate(flat) c: vec3<f32>,
     @location(5) @interpolate(flat) a_low: vec3<f32>,
     @location(6) @interpolate(flat) color: vec4<f32>,
-    @location(7) @interpolate(flat) normal: vec3<f32>,
+    @location(7) @interpolate(flat) normal: vec4<f32>,
     @location(8) @interpolate(flat) radius: f32,
 }
 

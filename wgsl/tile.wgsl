@@ -3,7 +3,7 @@
 // eight rows are drawn apart, each by the splats that reach them. The footprint, and so every bit, is that of visibility.wgsl
 // and accumulate.wgsl.
 // Host side: src/passes/tiles.rs.
-// All loops end, by 1, 3 of src/gpu/loops.rs: 0x1fb6d73af38222e4
+// All loops end, by 1, 3 of src/gpu/loops.rs: 0xad92804e0862144a
 
 // The lists of the large splats.
 @group(0) @binding(27) var<storage, read> large_lists: array<u32>;
@@ -102,7 +102,12 @@ fn handed_attributes(own: Attributes, from_: u32) -> Attributes {
             handed_number(c.z, from_),
             handed_number(c.w, from_),
         ),
-        vec3<f32>(handed_number(n.x, from_), handed_number(n.y, from_), handed_number(n.z, from_)),
+        vec4<f32>(
+            handed_number(n.x, from_),
+            handed_number(n.y, from_),
+            handed_number(n.z, from_),
+            handed_number(n.w, from_),
+        ),
         handed_number(own.radius, from_),
     );
 }

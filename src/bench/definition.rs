@@ -12,6 +12,7 @@ use crate::plan::{
 };
 use crate::scene::{Epsilon, Kernel, LowPass, Map, Maps, Shading};
 use crate::surfels::analytic::Shape;
+use crate::truth::DEFAULT_GRID;
 
 /// A study: every configuration on every scene.
 #[derive(Clone, Debug, Deserialize)]
@@ -29,6 +30,11 @@ pub struct Definition {
     pub runs: u32,
     /// The configuration that the others' times are given relative to.
     pub baseline: Option<String>,
+    /// Rays of ground truth across a pixel: their square is cast through each.
+    #[serde(default = "default_rays")]
+    pub rays: u32,
+    /// Linear RGBA behind the scene, straight alpha; else what a render has.
+    pub background: Option<[f32; 4]>,
     /// What a quick run takes instead.
     #[serde(default)]
     pub quick: Quick,
@@ -124,6 +130,8 @@ pub enum Making {
     File,
     /// By its points alone, as `epsplat render` does: radii from the distances of neighbours, normals turned to the viewer.
     Points,
+    /// By its points and the normals that its triangles have there: what a scanner's software exports.
+    Normals,
     /// By its points alone, as `epsplat surfels` does: normals that agree, disks.
     Knn,
     /// The same with ellipses.
@@ -215,6 +223,10 @@ fn default_runs() -> u32 {
     7
 }
 
+fn default_rays() -> u32 {
+    DEFAULT_GRID
+}
+
 fn one() -> u32 {
     1
 }
@@ -294,6 +306,12 @@ impl Definition {
             scene.footprint_px = scene.quick_footprint_px.clone().or(scene.footprint_px.take());
         }
         self
+    }
+
+    /// The options of `config` on the scene of `entry`.
+    pub fn options(&self, config: &Config, entry: &SceneEntry) -> RenderOptions {
+        let options = config.options(entry.shading);
+        RenderOptions { background: self.background.unwrap_or(options.background), ..options }
     }
 
     /// Whether a configuration renders on an adapter.

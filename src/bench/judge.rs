@@ -11,7 +11,7 @@ use crate::progress::Progress;
 use crate::render::{Backend, Renderer, render};
 use crate::report::{ImageSet, Measurement, Numeric};
 use crate::scene::{Map, Maps};
-use crate::truth::{DEFAULT_GRID, Truth};
+use crate::truth::Truth;
 
 /// The side that pictures for the page are kept at, pixels.
 const PICTURE_SIDE: usize = 512;
@@ -95,7 +95,7 @@ pub(super) fn against_truth(
     let Some(surface) = &case.staged.surface else { return Ok(worst) };
     for (_, members) in grouped(timed.iter().map(|timed| timed.options.shading)) {
         let options = timed[members[0]].options;
-        let cast = |camera| Truth::cast(surface, camera, options, DEFAULT_GRID, progress);
+        let cast = |camera| Truth::cast(surface, camera, options, case.definition.rays, progress);
         let truths: Vec<Truth> = case.staged.cameras.iter().map(cast).collect::<Result<_>>()?;
         for member in members {
             let timed = &timed[member];

@@ -103,7 +103,7 @@ impl<'a> Case<'a> {
         let wants = |config: &&Config| self.entry.configs.as_ref().is_none_or(|names| names.contains(&config.name));
         let wanted = self.definition.configs.iter().filter(wants);
         let plans: Vec<(&Config, RenderOptions)> =
-            wanted.map(|config| (config, config.options(self.entry.shading))).collect();
+            wanted.map(|config| (config, self.definition.options(config, self.entry))).collect();
         let timed = self.time(&plans, &mut outcome.notes, progress)?;
         let errors = judge::against_reference(self, &timed, progress)?;
         let truths = judge::against_truth(self, &timed, progress)?;

@@ -119,8 +119,11 @@ fn of_file(
         }
         false => None,
     };
-    let bare =
-        || io::read(file, progress).map(|Points { positions, up, .. }| Points { positions, up, ..Points::default() });
+    let normals = || {
+        let kept = |Points { positions, up, normals, .. }| Points { positions, up, normals, ..Points::default() };
+        io::read(file, progress).map(kept)
+    };
+    let bare = || normals().map(|points| Points { normals: None, ..points });
     let sized = |size| {
         let options = FromPoints { size, ..FromPoints::default() };
         Ok::<_, Error>(from_points(vec![bare()?], &options, progress)?.points)
@@ -133,6 +136,7 @@ fn of_file(
     let points = match entry.surfels {
         Making::File => io::read(file, progress)?,
         Making::Points => bare()?,
+        Making::Normals => normals()?,
         Making::Knn => sized(Size::Knn)?,
         Making::Ellipse => sized(Size::Ellipse)?,
         Making::Bsp => sized(Size::Bsp(Triangle::default()))?,

@@ -43,8 +43,10 @@ pub struct Pixel {
     normal_error: f64,
     /// Sum of weight times premultiplied colour.
     color: [f64; 4],
-    /// Sum of weight times normal.
+    /// Sum of weight times normal, turned toward the viewer.
     normal: DVec3,
+    /// Sum of the weights of those that were turned.
+    turned: f64,
     /// Smallest and largest premultiplied colour.
     colors: [[f64; 4]; 2],
     /// Smallest and largest normal.
@@ -64,6 +66,7 @@ const NOTHING: Pixel = Pixel {
     normal_error: 0.0,
     color: [0.0; 4],
     normal: DVec3::ZERO,
+    turned: 0.0,
     colors: [[f64::INFINITY; 4], [f64::NEG_INFINITY; 4]],
     normals: [DVec3::INFINITY, DVec3::NEG_INFINITY],
     depths: [f64::INFINITY, f64::NEG_INFINITY],
@@ -132,6 +135,9 @@ impl Pixel {
         let spread = (self.normals[1] - self.normals[0]).length();
         let normal = spread * wrong_weights + self.normal_error / self.weight + 2.0 * sums + 6.0 * U;
         let normal_length = mean_normal.length() - normal;
+        // Which side is seen is decided by half of the weight.
+        let undecided = self.turned > 0.0
+            && (2.0 * self.turned - self.weight).abs() <= 3.0 * (self.weight_error + self.weight * (sums + 4.0 * U));
         let farthest = self.depths[1].abs();
         let depth = (self.depths[1] - self.depths[0]) * wrong_weights
             + self.depth_error / self.weight
@@ -141,7 +147,7 @@ impl Pixel {
             color,
             depth,
             // Where the mean is no longer than its error, it may point anywhere.
-            normal: if normal_length > 0.0 { 2.0 * normal / normal_length + 6.0 * U } else { 2.0 },
+            normal: if normal_length > 0.0 && !undecided { 2.0 * normal / normal_length + 6.0 * U } else { 2.0 },
             weight: self.weight_error + self.weight * (sums + 4.0 * U),
         }
     }
@@ -200,6 +206,7 @@ fn fragments(
 struct Surface {
     color: [f64; 4],
     normal: DVec3,
+    turned: bool,
     normal_error: f64,
     radius: f64,
 }
@@ -213,7 +220,8 @@ impl Surface {
         let skew = s.length() * t.length() / s.cross(t).length();
         Self {
             color: [r * a, g * a, b * a, a],
-            normal: if splat.away && !scene.oriented { -splat.normal } else { splat.normal },
+            normal: if splat.away { -splat.normal } else { splat.normal },
+            turned: splat.away,
             normal_error: 6.0 * U * skew + 12.0 * U,
             radius: f64::from(surfel.radius()),
         }
@@ -290,6 +298,7 @@ pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Pi
         known.depth_error += weight * f.depth_error;
         known.normal_error += weight * surface.normal_error;
         known.normal += weight * surface.normal;
+        known.turned += if surface.turned { weight } else { 0.0 };
         known.normals = [known.normals[0].min(surface.normal), known.normals[1].max(surface.normal)];
         known.depths = [known.depths[0].min(f.depth), known.depths[1].max(f.depth)];
         for (k, value) in surface.color.into_iter().enumerate() {

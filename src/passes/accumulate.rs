@@ -113,8 +113,10 @@ pub struct PixelSums {
     pub weight: f64,
     /// Of the premultiplied linear colour.
     pub color: [f64; 4],
-    /// Of the normal.
+    /// Of the normal, turned toward the viewer: those of the front and the back of a thin part would cancel.
     pub normal: [f64; 3],
+    /// Of the weights of those that were turned.
+    pub turned: f64,
     /// Of the depth.
     pub depth: f64,
     /// Of [`Textured::terms`](crate::scene::Textured::terms), places in a texture.
@@ -131,6 +133,7 @@ impl PixelSums {
         weight: 0.0,
         color: [0.0; 4],
         normal: [0.0; 3],
+        turned: 0.0,
         depth: 0.0,
         place: [0.0; 4],
         count: 0,
@@ -162,7 +165,7 @@ pub fn reference<'a>(
         let radius = f64::from(surfel.radius());
         let epsilon = absolute + of_radius * radius;
         let times = f64::from(splat.copies);
-        let normal = if splat.away && !scene.oriented { -splat.normal } else { splat.normal };
+        let normal = if splat.away { -splat.normal } else { splat.normal };
         for y in splat.first[1].max(first_row)..=splat.last[1].min(first_row + rows - 1) {
             let row = (y - first_row) as usize * width;
             for x in splat.first[0]..=splat.last[0] {
@@ -192,6 +195,7 @@ pub fn reference<'a>(
                 for (total, value) in sum.normal.iter_mut().zip(normal.to_array()) {
                     *total += weight * value;
                 }
+                sum.turned += if splat.away { weight } else { 0.0 };
                 sum.depth += weight * at.depth;
                 sum.count += splat.copies;
             }

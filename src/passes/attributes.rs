@@ -13,6 +13,7 @@ pub const PASS: Pass = Pass {
         let whole = needs.raster.is_some_and(|raster| raster.depth != RasterDepth::Exact);
         let mut files = vec![
             pick(needs.normal, "normal.wgsl", "normal_absent.wgsl"),
+            pick(needs.sides, "side.wgsl", "side_absent.wgsl"),
             pick(needs.maps.has(Map::Count), "count.wgsl", "count_absent.wgsl"),
             pick(needs.maps.has(Map::Depth), pick(whole, "depth_whole.wgsl", "depth.wgsl"), "depth_absent.wgsl"),
             pick(needs.color == ColorNeed::Textured, "texture.wgsl", "texture_absent.wgsl"),
@@ -36,7 +37,7 @@ pub const PASS: Pass = Pass {
             ("LOW_WORD", surfel.low.into()),
             ("COLOR_CHANNELS", color_channels(making.needs).into()),
             ("NORMAL_CHANNEL", layout.normal_channel.into()),
-            ("TURN_NORMALS", u32::from(making.needs.turn_normals).into()),
+            ("SIDE_CHANNEL", layout.side_channel.into()),
             ("DEPTH_CHANNEL", layout.depth_channel.into()),
             ("COUNT_CHANNEL", layout.count_channel.into()),
             ("PLACE_CHANNEL", layout.place_channel.into()),

@@ -2,7 +2,7 @@
 
 use super::{Accumulator, ColorNeed, Facts, Optimisation, Organisation, Raster, RasterDepth, RenderOptions, tuning};
 use crate::gpu::adapter::AdapterDescription;
-use crate::scene::{Camera, Epsilon, KernelShape, LowPass, Map, Maps, Projection, Shading};
+use crate::scene::{Camera, Epsilon, KernelShape, Light, LowPass, Map, Maps, Projection, Shading};
 
 /// What exists in this render: it chooses the WGSL files that are joined, and so the bindings, buffers and sums.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -48,8 +48,8 @@ pub struct SceneNeeds {
     pub alpha: bool,
     /// Normals are accumulated: pixels are lit, or a normal map is written.
     pub normal: bool,
-    /// Normals have no consistent side and are turned toward the viewer before they are blended.
-    pub turn_normals: bool,
+    /// Which side of a surface is seen is summed too: normals have a consistent one, which a map or a directional light tells.
+    pub sides: bool,
     /// How pixels are lit.
     pub shading: Shading,
     /// Maps that are written; depths are accumulated for theirs, and fragments counted.
@@ -62,6 +62,11 @@ pub const SMALL_WEIGHT: f64 = 1.0 / 512.0;
 fn may_be_small(options: &RenderOptions) -> bool {
     // The convolution with the pixel lowers the weight of splats below it.
     options.kernel.weight(1.0) < SMALL_WEIGHT || options.low_pass == LowPass::Ewa
+}
+
+/// Whether a light tells the two sides of a surface apart.
+fn sided(options: &RenderOptions) -> bool {
+    options.lights.iter().any(|light| matches!(light, Light::Directional { .. }))
 }
 
 impl SceneNeeds {
@@ -90,7 +95,7 @@ impl SceneNeeds {
             color: facts.colors,
             alpha: low[3] != high[3],
             normal: lit || options.maps.has(Map::Normal),
-            turn_normals: !facts.oriented && (lit || options.maps.has(Map::Normal)),
+            sides: facts.oriented && (options.maps.has(Map::Normal) || lit && sided(options)),
             shading: options.shading,
             maps: options.maps,
         }
@@ -150,7 +155,7 @@ impl SceneNeeds {
             (self.epsilon_radius, "epsilon-radius"),
             (self.alpha, "alpha"),
             (self.normal, "normal"),
-            (self.turn_normals, "turn-normals"),
+            (self.sides, "sides"),
             (self.shading == Shading::Lambert, "lambert"),
             (self.shading == Shading::Phong, "phong"),
         ];

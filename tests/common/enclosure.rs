@@ -172,7 +172,7 @@ fn accumulate(
             let blur = if span > 0.0 { 2.0 * E * f64::from(low[k].abs().max(high[k].abs())) / span } else { 0.0 };
             add(&mut pixel.color[k], Interval { low: mapped - blur, high: mapped + blur }, 2.0);
         }
-        let turned = if splat.away && !scene.oriented { -splat.normal } else { splat.normal };
+        let turned = if splat.away { -splat.normal } else { splat.normal };
         for (k, value) in turned.to_array().into_iter().enumerate() {
             let size = if open[candidate.splat] && !scene.oriented { value.abs() } else { f64::NAN };
             let mapped = match size.is_nan() {

@@ -131,7 +131,7 @@ fn base_needs() -> Vec<SceneNeeds> {
     let mut all = Vec::new();
     for bits in 0..1u32 << 8 {
         let bit = |k: u32| bits >> k & 1 == 1;
-        let (lit, normal_map, turn_normals, alpha) = (bit(0), bit(1), bit(2), bit(3));
+        let (lit, normal_map, sides, alpha) = (bit(0), bit(1), bit(2), bit(3));
         let normal = lit || normal_map;
         let shading = match (lit, bits.count_ones() % 2 == 0) {
             (false, _) => Shading::Unlit,
@@ -139,7 +139,7 @@ fn base_needs() -> Vec<SceneNeeds> {
             (true, false) => Shading::Phong,
         };
         for color in [ColorNeed::Constant, ColorNeed::Srgb8, ColorNeed::Linear, ColorNeed::Textured] {
-            if (turn_normals && !normal) || (alpha && color == ColorNeed::Constant) {
+            if (sides && !normal) || (alpha && color == ColorNeed::Constant) {
                 continue;
             }
             let projection = if bit(4) { Projection::Pinhole } else { Projection::Orthographic };
@@ -165,7 +165,7 @@ fn base_needs() -> Vec<SceneNeeds> {
                 color,
                 alpha,
                 normal,
-                turn_normals,
+                sides,
                 shading,
                 maps: Maps::of(&wanted),
                 ..plain

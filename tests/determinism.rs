@@ -262,7 +262,7 @@ fn pile() -> (Scene, Camera) {
         colors: Colors::Linear(colors),
         oriented: true,
         up: Up::Y,
-        provenance: Default::default(),
+        ..Scene::default()
     };
     (scene, front(16))
 }

@@ -16,15 +16,8 @@ use glam::{DVec3, Vec3};
 fn check(name: &str, surfels: Vec<Surfel>, camera: &Camera, covered: f64) {
     let Some(gpu) = common::gpu() else { return };
     let colors = Colors::Srgb8((0..surfels.len()).map(|i| [40 * (i as u8 % 6), 90, 200, 255]).collect());
-    let scene = Scene {
-        origin: DVec3::ZERO,
-        surfels,
-        low: vec![],
-        colors,
-        oriented: true,
-        up: Up::Y,
-        provenance: Default::default(),
-    };
+    let scene =
+        Scene { origin: DVec3::ZERO, surfels, low: vec![], colors, oriented: true, up: Up::Y, ..Scene::default() };
     judge(name, (&scene, camera), RenderOptions::default(), (covered - 0.02, covered + 0.02), &Backend::gpu(gpu));
 }
 

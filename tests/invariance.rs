@@ -65,7 +65,7 @@ fn check_plane(row: &AccumulatorRow, backend: &Backend) {
             colors,
             oriented: true,
             up: Up::Y,
-            provenance: Default::default(),
+            ..Scene::default()
         };
         let frame = frame(&scene, &camera, &options, backend);
         let name = row.name;
@@ -108,7 +108,7 @@ fn check_two_colours(row: &AccumulatorRow, backend: &Backend) {
         colors: Colors::Linear(colors),
         oriented: true,
         up: Up::Y,
-        provenance: Default::default(),
+        ..Scene::default()
     };
     let options = RenderOptions { shading: Shading::Unlit, accumulator: row.of, ..options() };
     let fraction_bits = row.fraction_bits(scene.surfels.len() as u64);

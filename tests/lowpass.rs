@@ -91,7 +91,7 @@ fn depth_is_continuous_where_the_filter_takes_over() {
         colors: Colors::Constant([1.0; 4]),
         oriented: true,
         up: Up::Y,
-        provenance: Default::default(),
+        ..Scene::default()
     };
     let camera = Camera::look_at(
         (8, 200),

@@ -53,7 +53,7 @@ fn scene() -> impl Strategy<Value = Scene> {
             colors,
             oriented,
             up: Up::Z,
-            provenance: Default::default(),
+            ..Scene::default()
         }
     })
 }

@@ -231,15 +231,8 @@ fn the_longest_lists_are_drawn_to_their_end() {
         // Of eight pixels across, and of the whole image.
         let surfels = [4.0, 20.0].iter().flat_map(|&radius| vec![disk(radius); LONGEST]).collect();
         let colors = Colors::Constant([1.0; 4]);
-        let scene = Scene {
-            origin: DVec3::ZERO,
-            surfels,
-            low: vec![],
-            colors,
-            oriented: true,
-            up: Up::Y,
-            provenance: Default::default(),
-        };
+        let scene =
+            Scene { origin: DVec3::ZERO, surfels, low: vec![], colors, oriented: true, up: Up::Y, ..Scene::default() };
         let options = RenderOptions {
             kernel: Kernel::Constant,
             shading: Shading::Unlit,

@@ -13,6 +13,9 @@
 @group(0) @binding(21) var<storage, read_write> rare: array<atomic<u32>>;
 @group(0) @binding(22) var<storage, read> listed: array<u32>;
 
+// Surfels that face away are left out.
+override CULL_BACK: bool;
+
 const QUEUE_GRID: u32 = 2u;
 const QUEUE_LISTING: u32 = 5u;
 // Large splats that a workgroup lists (bin.wgsl).
@@ -70,7 +73,8 @@ fn project_into(slot: u32, every: bool) -> u32 {
     let first = max(ceil(h.low - margin - 0.5), vec2<f32>(0.0));
     let last = min(floor(h.high + margin - 0.5), size - 1.0);
     let exists = index < surfels_held();
-    let visible = exists && all(first <= last);
+    let faces = !(CULL_BACK && h.away > 0.0);
+    let visible = exists && faces && all(first <= last);
 
     var splat: Splat;
     splat.bounds_first = 0xffffffffu;

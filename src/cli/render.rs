@@ -104,6 +104,10 @@ pub struct Arguments {
     /// Filter for splats near a pixel in size or below
     #[arg(long, value_enum, default_value_t = LowPassName::None)]
     lowpass: LowPassName,
+    /// auto: surfels that face away from the eye are left out where the scene is a closed mesh seen from outside, as nobody
+    /// sees them but past its outline; back: they are left out of any scene whose normals have a side; none
+    #[arg(long, value_name = "auto|none|back", default_value = "auto", help_heading = "Surface")]
+    cull: Cull,
     /// How sums are kept on the device: fixed, fixed32, fixed64, packed64, float or cas (see the README)
     #[arg(long, value_name = "NAME")]
     accumulator: Option<Accumulator>,
@@ -257,6 +261,7 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
     let options = RenderOptions {
         epsilon: arguments.epsilon,
         kernel: arguments.kernel,
+        cull: arguments.cull,
         low_pass: match arguments.lowpass {
             LowPassName::None => LowPass::None,
             LowPassName::Max => LowPass::Max,

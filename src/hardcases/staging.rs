@@ -240,7 +240,7 @@ pub fn build(entries: &[Entry]) -> Result<Vec<HardCase>> {
                     colors: Colors::Linear(colors),
                     oriented: true,
                     up: Up::Z,
-                    provenance: Default::default(),
+                    ..Scene::default()
                 },
                 camera: stage.camera,
                 options: filling.options,

@@ -3,6 +3,7 @@
 pub mod atomic;
 pub mod camera;
 pub mod cameras;
+mod closed;
 mod companions;
 #[cfg(feature = "e57")]
 pub mod e57;

@@ -1,7 +1,7 @@
 //! What one input file holds, before it becomes surfels.
 
-use crate::scene::Colors;
 pub use crate::scene::Up;
+use crate::scene::{Colors, number};
 
 /// Points as a file gives them: f64 world coordinates and whatever attributes exist.
 ///
@@ -26,8 +26,46 @@ pub struct Points {
     pub up: Option<Up>,
     /// Radii are those with which disks at the vertices cover the triangles of a mesh.
     pub of_mesh: bool,
+    /// They are the vertices of a mesh that is closed and faces outward: nobody sees its back who is not inside.
+    pub closed: bool,
     /// Points that the file holds and that were left out, as it marks them as withheld, which is deleted.
     pub withheld: u64,
+    /// Vertices of a mesh that the file holds and that were left out, as no triangle with an area names them.
+    pub loose: u64,
     /// The numbers, in order, of all points that the file holds and that were left out; they start at 0.
     pub left_out: Vec<u64>,
+}
+
+impl Points {
+    /// Keeps the points whose flag is set.
+    pub(crate) fn retain(&mut self, keep: &[bool]) {
+        retain(&mut self.positions, keep);
+        self.normals.iter_mut().for_each(|all| retain(all, keep));
+        self.radii.iter_mut().for_each(|all| retain(all, keep));
+        self.axes.iter_mut().for_each(|all| retain(all, keep));
+        self.texture.iter_mut().for_each(|all| retain(all, keep));
+        self.colors.iter_mut().for_each(|all| retain_colors(all, keep));
+        let dropped = keep.iter().enumerate().filter(|(_, keep)| !**keep);
+        let dropped: Vec<u64> = dropped.map(|(read, _)| number(&self.left_out, read as u64)).collect();
+        self.left_out.extend(dropped);
+        self.left_out.sort_unstable();
+    }
+}
+
+/// Keeps the values whose flag is set.
+pub(crate) fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
+    let mut flags = keep.iter();
+    values.retain(|_| flags.next().copied().unwrap_or(false));
+}
+
+pub(crate) fn retain_colors(colors: &mut Colors, keep: &[bool]) {
+    match colors {
+        Colors::Srgb8(codes) => retain(codes, keep),
+        Colors::Linear(colors) => retain(colors, keep),
+        Colors::Constant(_) => {}
+        Colors::Textured(textured) => {
+            let kept = keep.iter().enumerate().filter(|(_, keep)| **keep).map(|(index, _)| index);
+            *textured = textured.taken(&kept.collect::<Vec<_>>());
+        }
+    }
 }

@@ -1,6 +1,8 @@
 //! Normals and radii of a mesh's vertices from the triangles around them: how a mesh becomes points.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
+
+use super::Points;
 
 /// How much larger radii are than needed to cover: a blending kernel fades towards its rim.
 const OVERLAP: f64 = 1.1;
@@ -11,11 +13,18 @@ pub(super) struct Triangles<'a> {
     positions: &'a [[f64; 3]],
     normals: Vec<DVec3>,
     radii: Vec<f64>,
+    /// A corner names a normal that points to the triangle's back.
+    backward: bool,
 }
 
 impl<'a> Triangles<'a> {
     pub(super) fn new(positions: &'a [[f64; 3]]) -> Self {
-        Self { positions, normals: vec![DVec3::ZERO; positions.len()], radii: vec![0.0; positions.len()] }
+        Self {
+            positions,
+            normals: vec![DVec3::ZERO; positions.len()],
+            radii: vec![0.0; positions.len()],
+            backward: false,
+        }
     }
 
     /// Adds a triangle by its vertices' numbers, with the normals its corners name, if they do.
@@ -32,6 +41,7 @@ impl<'a> Triangles<'a> {
                 Some(named) => named[index].map_or(DVec3::ZERO, |normal| DVec3::from(normal).normalize_or_zero()),
                 None => area_normal,
             };
+            self.backward |= normal.dot(area_normal) < 0.0;
             if normal.is_finite() {
                 self.normals[corner] += normal;
             }
@@ -39,6 +49,11 @@ impl<'a> Triangles<'a> {
                 self.radii[corner] = self.radii[corner].max(radius);
             }
         }
+    }
+
+    /// Whether the normals that corners name are on the sides that the triangles face.
+    pub(super) fn face_as_named(&self) -> bool {
+        !self.backward
     }
 
     /// The unit normal, or zero, and the radius, or zero, of each vertex.
@@ -49,6 +64,23 @@ impl<'a> Triangles<'a> {
             self.radii.into_iter().map(|radius| (OVERLAP * radius) as f32).collect(),
         )
     }
+}
+
+/// Vertices that no triangle with an area names cover nothing: they are left out of `points`, the vertices of a mesh whose triangles
+/// gave them `radii`, unless they are most of them, as in a cloud with a few triangles.
+pub(super) fn leave_out_loose(points: &mut Points, radii: &[f32]) {
+    let named: Vec<bool> = radii.iter().map(|radius| *radius > 0.0).collect();
+    let loose = named.iter().filter(|named| !**named).count();
+    if loose > 0 && 2 * loose <= named.len() {
+        points.retain(&named);
+        points.loose = loose as u64;
+    }
+}
+
+/// Whether each of the normals that are `given` is on the side that the `triangles` say, where both say one.
+pub(super) fn agree(given: &[[f32; 3]], triangles: &[[f32; 3]]) -> bool {
+    let side = |(a, b): (&[f32; 3], &[f32; 3])| Vec3::from_array(*a).dot(Vec3::from_array(*b));
+    given.iter().zip(triangles).map(side).all(|side| side >= 0.0)
 }
 
 /// The smallest radius with which disks at the three corners cover the triangle; `None` for one without area.

@@ -80,7 +80,7 @@ mod tests {
 
     fn scene(surfels: Vec<Surfel>) -> Scene {
         let (origin, colors) = (DVec3::ZERO, Colors::Constant([1.0; 4]));
-        Scene { origin, surfels, low: vec![], colors, oriented: true, up: Up::Y, provenance: Default::default() }
+        Scene { origin, surfels, low: vec![], colors, oriented: true, up: Up::Y, ..Scene::default() }
     }
 
     fn sphere(count: u64) -> (Scene, Bounds) {

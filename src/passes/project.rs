@@ -10,11 +10,11 @@ use super::homography::{self, slope};
 use super::lowpass::{self, Design};
 use super::splat::Splat;
 use crate::gpu::layout::QUEUE_START;
-use crate::plan::RenderOptions;
 use crate::plan::pass::{Making, Pass};
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
+use crate::plan::{Facts, RenderOptions, culls_back};
 use crate::plan::{Organisation, Plan, tuning};
-use crate::scene::{Camera, LowPass, Scene, Surfel, copies, has_copies};
+use crate::scene::{Camera, Cull, LowPass, Scene, Surfel, copies, has_copies};
 
 /// The twin of `wgsl/project.wgsl` for one surfel, whose centre is at `relative` (world units) from the camera's eye; `None` if no
 /// pixel can be touched.
@@ -89,11 +89,13 @@ pub fn reference_all(scene: &Scene, camera: &Camera, options: &RenderOptions) ->
     let design = Design::of(options);
     let surfels = scene.surfels.par_iter().enumerate();
     let eye = camera.eye - scene.origin;
+    let cull_back = options.cull != Cull::None && culls_back(&Facts::of(scene), camera, options);
     let copies = (has_copies(scene) && options.draws_copies_once()).then(|| copies(scene));
     let project = |(index, surfel): (usize, &Surfel)| {
         let copies = copies.as_ref().map_or(1, |copies| copies[index]);
         let splat = || reference((index as u32, surfel), scene.center(index) - eye, camera, &design);
-        (copies > 0).then(splat).flatten().map(|splat| Splat { copies, ..splat })
+        let splat = (copies > 0).then(splat).flatten().filter(|splat| !(cull_back && splat.away));
+        splat.map(|splat| Splat { copies, ..splat })
     };
     surfels.filter_map(project).collect()
 }
@@ -103,7 +105,7 @@ pub const PASS: Pass = Pass {
     name: "project",
     files: |_| vec!["project.wgsl"],
     kernels: |_| vec![PROJECT, ARRANGE_RARE, PROJECT_RARE, ARRANGE],
-    constants: |making| vec![("LARGE", large(making).into())],
+    constants: |making| vec![("LARGE", large(making).into()), ("CULL_BACK", u32::from(making.needs.cull_back).into())],
 };
 
 const PROJECT: Kernel = Kernel::new("project");

@@ -167,15 +167,8 @@ mod tests {
         let surfels =
             (0..1600).map(|i| Surfel::disk(Vec3::new(at(i % 40), at(i / 40), 0.0), Vec3::Z, radius)).collect();
         let colors = Colors::Constant([1.0; 4]);
-        let scene = Scene {
-            origin: DVec3::ZERO,
-            surfels,
-            low: vec![],
-            colors,
-            oriented: true,
-            up: Up::Y,
-            provenance: Default::default(),
-        };
+        let scene =
+            Scene { origin: DVec3::ZERO, surfels, low: vec![], colors, oriented: true, up: Up::Y, ..Scene::default() };
         let lens = Lens::OrthographicHeight(1.0);
         let camera = Camera::posed((100, 100), lens, DVec3::new(0.0, 0.0, -5.0), DMat3::IDENTITY, 0.1).unwrap();
         touched(&Facts::of(&scene), &camera, &RenderOptions::default()) >= tuning::GATHERED_TOUCHED_TILES

@@ -5,8 +5,8 @@ use rayon::prelude::*;
 use super::lowpass::Design;
 use super::project::{Missed, projected};
 use crate::frame::Frame;
-use crate::plan::RenderOptions;
-use crate::scene::{Camera, Scene, Surfel};
+use crate::plan::{Facts, RenderOptions, culls_back};
+use crate::scene::{Camera, Cull, Scene, Surfel};
 
 /// The surfels of a scene in a view that shows none of them, by the reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -17,6 +17,8 @@ pub struct Unseen {
     pub outside: u64,
     /// In the image, but over no pixel's centre: too small, or seen edge-on.
     pub between: u64,
+    /// Facing away, where those that do are left out.
+    pub away: u64,
     /// Over pixels that they do not change: seen edge-on, transparent, or of the background's colour.
     pub over: u64,
 }
@@ -26,23 +28,29 @@ impl Unseen {
     pub fn of(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Self {
         let eye = camera.eye - scene.origin;
         let design = Design::of(options);
+        let cull_back = options.cull != Cull::None && culls_back(&Facts::of(scene), camera, options);
         let look = |(index, surfel): (usize, &Surfel)| {
             let seen = projected((0, surfel), scene.center(index) - eye, camera, &design);
             let reasons = [Some(Missed::Behind), Some(Missed::Outside), Some(Missed::Between), None];
-            reasons.map(|reason| u64::from(seen.as_ref().err() == reason.as_ref()))
+            let [behind, outside, between, over] =
+                reasons.map(|reason| u64::from(seen.as_ref().err() == reason.as_ref()));
+            let away = u64::from(cull_back && seen.is_ok_and(|splat| splat.away));
+            [behind, outside, between, away, over - away]
         };
-        let add = |a: [u64; 4], b: [u64; 4]| std::array::from_fn(|k| a[k] + b[k]);
-        let [behind, outside, between, over] = scene.surfels.par_iter().enumerate().map(look).reduce(|| [0; 4], add);
-        Self { behind, outside, between, over }
+        let add = |a: [u64; 5], b: [u64; 5]| std::array::from_fn(|k| a[k] + b[k]);
+        let [behind, outside, between, away, over] =
+            scene.surfels.par_iter().enumerate().map(look).reduce(|| [0; 5], add);
+        Self { behind, outside, between, away, over }
     }
 
     /// One sentence for people.
     pub fn sentence(&self) -> String {
-        let total = self.behind + self.outside + self.between + self.over;
+        let total = self.behind + self.outside + self.between + self.away + self.over;
         let reasons = [
             (self.behind, "behind the camera or nearer than --near"),
             (self.outside, "outside the image"),
             (self.between, "between the centres of its pixels, small or edge-on (--lowpass max shows them)"),
+            (self.away, "with their backs to the camera (--cull none shows them)"),
             (self.over, "over pixels that they do not change: edge-on, transparent or of the background's colour"),
         ];
         let count = |count: u64| if count == total { "all".to_owned() } else { count.to_string() };
@@ -77,20 +85,13 @@ mod tests {
         ];
         let surfels: Vec<Surfel> = at.iter().map(|(center, radius)| Surfel::disk(*center, Vec3::Z, *radius)).collect();
         let colors = Colors::Constant([1.0; 4]);
-        let scene = Scene {
-            origin: DVec3::ZERO,
-            surfels,
-            low: vec![],
-            colors,
-            oriented: true,
-            up: Up::Y,
-            provenance: Default::default(),
-        };
+        let scene =
+            Scene { origin: DVec3::ZERO, surfels, low: vec![], colors, oriented: true, up: Up::Y, ..Scene::default() };
         let camera = Camera::look_at((32, 32), Lens::Fov(45.0), DVec3::ZERO, DVec3::Z, None, Up::Y, 0.1).unwrap();
         let options = RenderOptions::default();
         let mut frame = Frame::new(&camera, options.maps);
         let unseen = Unseen::of(&scene, &camera, &options);
-        assert_eq!(unseen, Unseen { behind: 1, outside: 2, between: 3, over: 0 });
+        assert_eq!(unseen, Unseen { behind: 1, outside: 2, between: 3, away: 0, over: 0 });
         assert!(unseen.sentence().contains("of 6 surfels 1 lie behind the camera"), "{}", unseen.sentence());
         assert!(Unseen { between: 6, ..Unseen::default() }.sentence().contains("all lie between"));
         let black = Surfel::disk(Vec3::new(0.0, 0.0, 3.0), Vec3::Z, 1.0);

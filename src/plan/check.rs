@@ -7,7 +7,7 @@ use super::{RenderOptions, SceneNeeds};
 use crate::error::{Error, Result};
 use crate::gpu::adapter::AdapterDescription;
 use crate::scene::light::MAX_LIGHTS;
-use crate::scene::{Camera, Map, Shading, options::SHININESS_RANGE};
+use crate::scene::{Camera, Cull, Map, Shading, options::SHININESS_RANGE};
 
 fn usage(what: impl Into<String>) -> Result<()> {
     Err(Error::Usage(what.into()))
@@ -99,6 +99,12 @@ pub fn textured(options: &RenderOptions, reference: bool) -> Result<()> {
 pub fn scene(facts: &Facts, options: &RenderOptions, reference: bool) -> Result<()> {
     if u32::try_from(facts.surfels).is_err() {
         return usage(format!("a scene has at most 2^32 - 1 surfels, not {}", facts.surfels));
+    }
+    if options.cull == Cull::Back && !facts.oriented {
+        return usage(
+            "only surfels whose normals have a side face away, and not all of these do: leave --cull back out, or give \
+             normals a side with epsplat surfels",
+        );
     }
     if facts.colors == ColorNeed::Textured { textured(options, reference) } else { Ok(()) }
 }

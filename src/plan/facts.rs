@@ -44,6 +44,8 @@ pub struct Facts {
     pub largest_radius: f32,
     /// [`Scene::oriented`].
     pub oriented: bool,
+    /// [`Scene::closed`].
+    pub closed: bool,
     /// Centres have trailing parts, [`Scene::low`].
     pub doubled: bool,
     /// One surfel has many copies, which can be drawn as one.
@@ -77,6 +79,7 @@ impl Facts {
             },
             largest_radius: scene.largest_radius(),
             oriented: scene.oriented,
+            closed: scene.closed,
             doubled: !scene.low.is_empty(),
             copies: has_copies(scene),
             sample: (0..scene.surfels.len()).step_by(step).map(|k| (scene.surfels[k], scene.center(k))).collect(),

@@ -2,7 +2,7 @@
 
 use super::{Accumulator, ColorNeed, Facts, Optimisation, Organisation, Raster, RasterDepth, RenderOptions, tuning};
 use crate::gpu::adapter::AdapterDescription;
-use crate::scene::{Camera, Epsilon, KernelShape, Light, LowPass, Map, Maps, Projection, Shading};
+use crate::scene::{Camera, Cull, Epsilon, KernelShape, Light, LowPass, Map, Maps, Projection, Shading};
 
 /// What exists in this render: it chooses the WGSL files that are joined, and so the bindings, buffers and sums.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -50,6 +50,8 @@ pub struct SceneNeeds {
     pub normal: bool,
     /// Which side of a surface is seen is summed too: normals have a consistent one, which a map or a directional light tells.
     pub sides: bool,
+    /// Surfels that face away are left out.
+    pub cull_back: bool,
     /// How pixels are lit.
     pub shading: Shading,
     /// Maps that are written; depths are accumulated for theirs, and fragments counted.
@@ -62,6 +64,20 @@ pub const SMALL_WEIGHT: f64 = 1.0 / 512.0;
 fn may_be_small(options: &RenderOptions) -> bool {
     // The convolution with the pixel lowers the weight of splats below it.
     options.kernel.weight(1.0) < SMALL_WEIGHT || options.low_pass == LowPass::Ewa
+}
+
+/// Whether surfels that face away are left out.
+pub fn culls_back(facts: &Facts, camera: &Camera, options: &RenderOptions) -> bool {
+    match options.cull {
+        Cull::None => false,
+        Cull::Back => facts.oriented,
+        Cull::Auto => {
+            let relative = camera.eye - facts.origin;
+            let reach = f64::from(facts.largest_radius);
+            let outside = relative.cmplt(facts.bounds.min - reach) | relative.cmpgt(facts.bounds.max + reach);
+            facts.closed && (outside.any() || camera.projection == Projection::Orthographic)
+        }
+    }
 }
 
 /// Whether a light tells the two sides of a surface apart.
@@ -96,6 +112,7 @@ impl SceneNeeds {
             alpha: low[3] != high[3],
             normal: lit || options.maps.has(Map::Normal),
             sides: facts.oriented && (options.maps.has(Map::Normal) || lit && sided(options)),
+            cull_back: culls_back(facts, camera, options),
             shading: options.shading,
             maps: options.maps,
         }
@@ -156,6 +173,7 @@ impl SceneNeeds {
             (self.alpha, "alpha"),
             (self.normal, "normal"),
             (self.sides, "sides"),
+            (self.cull_back, "cull-back"),
             (self.shading == Shading::Lambert, "lambert"),
             (self.shading == Shading::Phong, "phong"),
         ];

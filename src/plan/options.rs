@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use super::{Accumulator, Optimisation, Raster};
 use crate::error::Error;
-use crate::scene::{Epsilon, Kernel, Light, LowPass, Map, Maps, Shading};
+use crate::scene::{Cull, Epsilon, Kernel, Light, LowPass, Map, Maps, Shading};
 
 /// Who renders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,6 +67,8 @@ impl FromStr for Organisation {
 pub struct RenderOptions {
     /// Depth tolerance.
     pub epsilon: Epsilon,
+    /// Which surfels are left out by the side that they show.
+    pub cull: Cull,
     /// Blending kernel.
     pub kernel: Kernel,
     /// Low-pass filter.
@@ -112,6 +114,7 @@ impl Default for RenderOptions {
     fn default() -> Self {
         Self {
             epsilon: Epsilon::Relative(0.01),
+            cull: Cull::Auto,
             kernel: Kernel::Ellipse { a: 6.0, n: 3.0, smooth: false },
             low_pass: LowPass::None,
             accumulator: Accumulator::Fixed,

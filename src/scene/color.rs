@@ -19,6 +19,13 @@ pub enum Colors {
 /// The colour of surfels that come without one: a light grey that shading can darken and highlights cannot clip.
 pub const DEFAULT_COLOR: [f32; 4] = [0.7, 0.7, 0.7, 1.0];
 
+impl Default for Colors {
+    /// All of [`DEFAULT_COLOR`].
+    fn default() -> Self {
+        Self::Constant(DEFAULT_COLOR)
+    }
+}
+
 impl Colors {
     /// The linear colour of surfel `index`, straight alpha; of a texture the mean over its disk.
     pub fn linear(&self, index: usize) -> [f32; 4] {

@@ -70,15 +70,7 @@ mod tests {
         let surfels =
             (0..count).map(|k| Surfel::disk(Vec3::new((k % places) as f32, 0.0, 0.0), Vec3::Z, 0.1)).collect();
         let colors = Colors::Srgb8((0..count).map(|k| [if k % 6 == 5 { 9 } else { 8 }, 8, 8, 255]).collect());
-        Scene {
-            origin: DVec3::ZERO,
-            surfels,
-            low: vec![],
-            colors,
-            oriented: true,
-            up: Up::Y,
-            provenance: Default::default(),
-        }
+        Scene { origin: DVec3::ZERO, surfels, low: vec![], colors, oriented: true, up: Up::Y, ..Scene::default() }
     }
 
     #[test]

@@ -233,7 +233,7 @@ mod tests {
                 colors: colors.clone(),
                 oriented: true,
                 up,
-                provenance: Default::default(),
+                ..Scene::default()
             };
             let off = Lens::Intrinsics([700.0, 700.0, -200.0, 1500.0]);
             for lens in [Lens::Fov(45.0), off] {
@@ -269,15 +269,8 @@ mod tests {
         surfels.push(Surfel::disk(glam::Vec3::ONE, glam::Vec3::Z, largest));
         surfels.push(Surfel::disk(glam::Vec3::splat(1e6), glam::Vec3::Z, 1.0));
         let colors = Colors::Constant([1.0; 4]);
-        let scene = Scene {
-            origin: DVec3::ZERO,
-            surfels,
-            low: vec![],
-            colors,
-            oriented: true,
-            up: Up::Y,
-            provenance: Default::default(),
-        };
+        let scene =
+            Scene { origin: DVec3::ZERO, surfels, low: vec![], colors, oriented: true, up: Up::Y, ..Scene::default() };
         for size in [(640, 480), (100, 900)] {
             let camera = Camera::framing(size, Lens::Fov(45.0), &scene, 1e-3).unwrap();
             let (mut low, mut high) = (glam::DVec2::INFINITY, glam::DVec2::NEG_INFINITY);
@@ -306,15 +299,7 @@ mod tests {
         let colors = Colors::Constant([1.0; 4]);
         // Trailing parts that put both past the box of what f32 has of their centres.
         let low = vec![[-1e-9, 1e-9, -1e-9], [1e-9, -1e-9, 1e-9]];
-        let scene = Scene {
-            origin: DVec3::ZERO,
-            surfels,
-            low,
-            colors,
-            oriented: true,
-            up: Up::Z,
-            provenance: Default::default(),
-        };
+        let scene = Scene { origin: DVec3::ZERO, surfels, low, colors, oriented: true, up: Up::Z, ..Scene::default() };
         let camera = Camera::framing((64, 48), Lens::Fov(45.0), &scene, 1.0).unwrap();
         for surfel in &scene.surfels {
             let p = camera.to_camera(glam::Vec3::from_array(surfel.center).as_dvec3());
@@ -332,7 +317,7 @@ mod tests {
             colors: Colors::Constant([1.0; 4]),
             oriented: true,
             up: Up::Y,
-            provenance: Default::default(),
+            ..Scene::default()
         };
         let camera = Camera::framing((64, 64), Lens::Fov(45.0), &scene, 1e-6).unwrap();
         let p = camera.to_camera(DVec3::ONE);

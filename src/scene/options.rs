@@ -56,6 +56,32 @@ impl FromStr for Epsilon {
     }
 }
 
+/// Which surfels are left out by the side that they show.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Cull {
+    /// Those that face away, where nobody can see one: the scene is closed ([`Scene::closed`](super::Scene::closed)) and the eye
+    /// outside its box.
+    #[default]
+    Auto,
+    /// None.
+    None,
+    /// Those that face away.
+    Back,
+}
+
+impl FromStr for Cull {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            "none" => Ok(Self::None),
+            "back" => Ok(Self::Back),
+            _ => Err(Error::Usage(format!("surfels are culled auto, none or back, not {text:?}"))),
+        }
+    }
+}
+
 /// The weight of a fragment over the unit disk of its surfel, rho in [0, 1].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kernel {

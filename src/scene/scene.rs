@@ -6,9 +6,10 @@ use rayon::prelude::*;
 use super::{Colors, Provenance, Surfel};
 
 /// The world axis that points up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Up {
     /// Most mesh formats.
+    #[default]
     Y,
     /// Survey data.
     Z,
@@ -37,7 +38,7 @@ impl Up {
 /// Surfel i lies at `origin + surfels[i].center + low[i]`. Splitting a world coordinate into an f64 origin and an f32 offset
 /// keeps georeferenced clouds free of jitter: offsets are as small as the scene, however far away its map origin is. Where they
 /// are not small, as in a scene of two distant clusters, `low` has the digits that an f32 has no room for.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scene {
     /// World coordinates of the point that surfel centres are relative to.
     pub origin: DVec3,
@@ -49,6 +50,8 @@ pub struct Scene {
     pub colors: Colors,
     /// Normals were given, so they tell the two sides of a surface apart; estimated ones do not.
     pub oriented: bool,
+    /// The surfels close their surfaces and face outward, so that their backs are seen from inside alone.
+    pub closed: bool,
     /// The axis a camera without instructions takes as up.
     pub up: Up,
     /// Which points of which inputs the surfels are.
@@ -221,7 +224,7 @@ mod tests {
             colors,
             oriented: true,
             up: Up::Z,
-            provenance: Default::default(),
+            ..Scene::default()
         }
     }
 

@@ -2,8 +2,9 @@
 
 use super::colors::ColorGatherer;
 use super::{LARGEST_COORDINATE, Preparation};
+use crate::io::points::{retain, retain_colors};
 use crate::io::{Points, Up};
-use crate::scene::{Colors, Provenance, number};
+use crate::scene::{Colors, Provenance};
 use crate::{Error, Result};
 
 /// The usable points of all inputs, in order.
@@ -22,6 +23,8 @@ pub(crate) struct Gathered {
     pub colors: Option<Colors>,
     /// What the inputs say.
     pub up: Option<Up>,
+    /// Each of them is closed, [`Points::closed`].
+    pub closed: bool,
     /// Which they are.
     pub provenance: Provenance,
     /// The counts so far.
@@ -35,24 +38,21 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
     let (mut normals, mut radii, mut axes, mut texture) = (None, None, None, None);
     let mut colors = ColorGatherer::new();
     let (mut up, mut provenance) = (None, Provenance::default());
+    let closed = inputs.iter().all(|input| input.closed || input.positions.is_empty());
     let input_count = inputs.len();
     for mut input in inputs {
         let read = input.positions.len();
         preparation.points += read as u64;
         preparation.withheld += input.withheld;
+        preparation.loose += input.loose;
         let keep: Vec<bool> = input.positions.iter().map(is_usable).collect();
         let kept = keep.iter().filter(|&&keep| keep).count();
         if kept < read {
             preparation.dropped_non_finite += (read - kept) as u64;
-            retain(&mut input.positions, &keep);
-            input.normals.iter_mut().for_each(|all| retain(all, &keep));
-            input.radii.iter_mut().for_each(|all| retain(all, &keep));
-            input.axes.iter_mut().for_each(|all| retain(all, &keep));
-            input.texture.iter_mut().for_each(|all| retain(all, &keep));
-            input.colors.iter_mut().for_each(|all| retain_colors(all, &keep));
+            input.retain(&keep);
         }
         let before = positions.len();
-        provenance.push(before as u64, left_out(input.left_out, &keep));
+        provenance.push(before as u64, input.left_out);
         append(&mut normals, before, input.normals, kept);
         append(&mut radii, before, input.radii, kept);
         append(&mut axes, before, input.axes, kept);
@@ -89,16 +89,18 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
         *coordinate += 0.0;
     }
     preparation.replaced_colors = colors.replaced;
-    Ok(Gathered { positions, normals, radii, axes, texture, colors: colors.finish(), up, provenance, preparation })
-}
-
-/// The numbers of those points of a file that its reader `left_out`, and of those it read that are not kept.
-fn left_out(mut left_out: Vec<u64>, keep: &[bool]) -> Vec<u64> {
-    let dropped = keep.iter().enumerate().filter(|(_, keep)| !**keep);
-    let dropped: Vec<u64> = dropped.map(|(read, _)| number(&left_out, read as u64)).collect();
-    left_out.extend(dropped);
-    left_out.sort_unstable();
-    left_out
+    Ok(Gathered {
+        positions,
+        normals,
+        radii,
+        axes,
+        texture,
+        colors: colors.finish(),
+        up,
+        closed,
+        provenance,
+        preparation,
+    })
 }
 
 impl Gathered {
@@ -115,24 +117,6 @@ impl Gathered {
 
 pub(crate) fn is_usable(position: &[f64; 3]) -> bool {
     position.iter().all(|c| c.abs() <= LARGEST_COORDINATE)
-}
-
-/// Keeps the values whose flag is set.
-pub(crate) fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
-    let mut flags = keep.iter();
-    values.retain(|_| flags.next().copied().unwrap_or(false));
-}
-
-fn retain_colors(colors: &mut Colors, keep: &[bool]) {
-    match colors {
-        Colors::Srgb8(codes) => retain(codes, keep),
-        Colors::Linear(colors) => retain(colors, keep),
-        Colors::Constant(_) => {}
-        Colors::Textured(textured) => {
-            let kept = keep.iter().enumerate().filter(|(_, keep)| **keep).map(|(index, _)| index);
-            *textured = textured.taken(&kept.collect::<Vec<_>>());
-        }
-    }
 }
 
 /// Appends `count` values to the `before` values of earlier inputs; what is missing on either side becomes default.

@@ -57,6 +57,8 @@ pub struct Preparation {
     pub points: u64,
     /// Points that are in the files but not among `points`: they are marked as withheld, which is deleted.
     pub withheld: u64,
+    /// Vertices that are in the meshes but not among `points`: no triangle with an area names them.
+    pub loose: u64,
     /// Points left out because a coordinate is not finite or exceeds [`LARGEST_COORDINATE`].
     pub dropped_non_finite: u64,
     /// Surfels in the scene: `points - dropped_non_finite`.
@@ -92,6 +94,7 @@ impl Preparation {
                 self.withheld,
                 "were left out: they are marked as withheld, which is deleted (--keep-withheld keeps them)",
             ),
+            (self.loose > 0).then(|| format!("{} vertices of no triangle were left out", self.loose)),
             counted(self.dropped_non_finite, "were dropped: a coordinate is not finite or too large"),
             counted(self.replaced_colors, "had a colour that is not finite and became grey"),
             counted(self.replaced_places, "had texture coordinates that are not finite or too large and became 0"),
@@ -145,7 +148,7 @@ pub fn build_textured(inputs: Vec<Points>, texture: Texture, progress: &dyn Prog
 }
 
 fn built(gathered: Gathered, progress: &dyn Progress) -> Result<(Scene, Preparation)> {
-    let Gathered { positions, normals, radii, axes, colors, up, provenance, mut preparation, .. } = gathered;
+    let Gathered { positions, normals, radii, axes, colors, up, closed, provenance, mut preparation, .. } = gathered;
     let colors = colors::folded(colors);
     let bounds = Bounds::of(positions.par_iter().map(|position| DVec3::from_array(*position)));
     let (body, _) = body(positions.len(), |index| DVec3::from_array(positions[index]));
@@ -206,7 +209,7 @@ fn built(gathered: Gathered, progress: &dyn Progress) -> Result<(Scene, Preparat
     let low = low_parts(&surfels, relative);
     preparation.rounding = rounding(&surfels, &low, relative);
     let oriented = preparation.estimated_normals == 0;
-    let scene = Scene { origin, surfels, low, colors, oriented, up, provenance };
+    let scene = Scene { origin, surfels, low, colors, oriented, closed: closed && oriented, up, provenance };
     // As the default view sees it.
     preparation.strays = scene.body().1;
     Ok((scene, preparation))

@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::gather::retain;
+use crate::io::points::retain;
 use crate::morton;
 use crate::scene::Bounds;
 use crate::{Error, Result};

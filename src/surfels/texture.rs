@@ -112,15 +112,8 @@ mod tests {
         let at = |k: usize| Vec3::new((k % 12) as f32, (k / 12) as f32, 0.0);
         let surfels: Vec<Surfel> = (0..144).map(|k| Surfel::disk(at(k), Vec3::Z, 1.5)).collect();
         let colors = Colors::Constant([1.0; 4]);
-        let scene = Scene {
-            origin: DVec3::ZERO,
-            surfels,
-            low: vec![],
-            colors,
-            oriented: true,
-            up: Up::Y,
-            provenance: Default::default(),
-        };
+        let scene =
+            Scene { origin: DVec3::ZERO, surfels, low: vec![], colors, oriented: true, up: Up::Y, ..Scene::default() };
         let of = |jump: f32| {
             let centers: Vec<_> =
                 (0..144).map(|k| [0.01 * at(k).x + if at(k).x > 5.5 { jump } else { 0.0 }, 0.02 * at(k).y]).collect();

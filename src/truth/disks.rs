@@ -239,7 +239,7 @@ mod tests {
             colors: Colors::Constant([1.0; 4]),
             oriented: true,
             up: Up::Y,
-            provenance: Default::default(),
+            ..Scene::default()
         }
     }
 

@@ -166,6 +166,7 @@ fn base_needs() -> Vec<SceneNeeds> {
                 alpha,
                 normal,
                 sides,
+                cull_back: bits.count_ones() % 4 == 1,
                 shading,
                 maps: Maps::of(&wanted),
                 ..plain

@@ -127,7 +127,7 @@ fn scene(kinds: &[(Kind, usize)], camera: &Camera, origin: DVec3, length: f64, n
         colors: Colors::Linear(colors),
         oriented: seed.is_multiple_of(2),
         up: Up::Z,
-        provenance: Default::default(),
+        ..Scene::default()
     }
 }
 
@@ -184,7 +184,7 @@ pub fn sphere(count: usize, radius: f64) -> Scene {
         colors: Colors::Srgb8(points.iter().map(|p| [code(p.x), code(p.y), code(p.z), 255]).collect()),
         oriented: true,
         up: Up::Y,
-        provenance: Default::default(),
+        ..Scene::default()
     }
 }
 
@@ -248,7 +248,7 @@ pub fn stack(count: usize, value: f32) -> (Scene, Camera) {
         colors: Colors::Linear(colors),
         oriented: true,
         up: Up::Y,
-        provenance: Default::default(),
+        ..Scene::default()
     };
     (scene, front(4))
 }

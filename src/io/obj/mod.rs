@@ -7,8 +7,9 @@ mod material;
 
 pub(super) use material::companions;
 
+use crate::io::closed::is_closed;
 use crate::io::fault::{self, Fault};
-use crate::io::triangles::Triangles;
+use crate::io::triangles::{Triangles, leave_out_loose};
 use crate::io::{Input, Mesh, Points, Up};
 use crate::{Progress, Result};
 use lines::Lines;
@@ -69,25 +70,33 @@ fn read_with<T>(input: Input, surface: bool, progress: &dyn Progress, make: impl
 fn points(lines: Lines) -> Points {
     let colors = lines.colors();
     let mut around = Triangles::new(&lines.positions);
+    let mut triangles = Vec::new();
     for triangle in lines.triangles() {
+        triangles.push(triangle.vertices);
         around.add(triangle.vertices.map(|vertex| vertex as usize), triangle.normals.map(|all| all.map(Some)));
     }
     let has_faces = !lines.faces.is_empty();
+    let face_as_named = around.face_as_named();
     let (face_normals, radii) = around.finish();
     let paired = || lines.normals.iter().map(|normal| normal.map(|c| c as f32)).collect::<Vec<_>>();
     let normals = match has_faces {
         true => Some(face_normals),
         false => (!lines.normals.is_empty() && lines.normals.len() == lines.positions.len()).then(paired),
     };
-    Points {
+    let mut points = Points {
         normals,
-        radii: has_faces.then_some(radii),
+        radii: has_faces.then(|| radii.clone()),
         of_mesh: has_faces,
+        closed: face_as_named && is_closed(&lines.positions, &triangles),
         colors,
         up: Some(Up::Y),
         positions: lines.positions,
         ..Points::default()
+    };
+    if has_faces {
+        leave_out_loose(&mut points, &radii);
     }
+    points
 }
 
 /// The mesh without its materials, the libraries they are in, and their names.

@@ -5,8 +5,8 @@ use super::faces::{Faces, Triangles};
 use super::header::{self, Encoding};
 use super::{ascii, binary};
 use crate::io::fault::{self, Fault};
-use crate::io::triangles;
 use crate::io::{Input, Material, Mesh, Points, Texture};
+use crate::io::{closed, triangles};
 use crate::{Progress, Result};
 use std::fs::File;
 use std::io::BufReader;
@@ -43,9 +43,14 @@ pub fn read(input: Input, progress: &dyn Progress) -> Result<Points> {
     let mut triangles = triangles::Triangles::new(&points.positions);
     faces.triangles.iter().for_each(|corners| triangles.add(corners.map(|corner| corner as usize), None));
     let (normals, radii) = triangles.finish();
+    let closed = closed::is_closed(&points.positions, &faces.triangles);
+    points.closed = closed && points.normals.as_ref().is_none_or(|given| triangles::agree(given, &normals));
     points.normals.get_or_insert(normals);
     points.of_mesh = points.radii.is_none() && points.axes.is_none();
-    points.radii.get_or_insert(radii);
+    points.radii.get_or_insert_with(|| radii.clone());
+    if points.of_mesh {
+        triangles::leave_out_loose(&mut points, &radii);
+    }
     Ok(points)
 }
 

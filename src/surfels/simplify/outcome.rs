@@ -131,7 +131,7 @@ pub(super) fn scene(
             colors,
             oriented: scene.oriented,
             up: scene.up,
-            provenance: Default::default(),
+            ..Scene::default()
         },
         deviations,
     )

@@ -6,6 +6,7 @@ mod kernels;
 mod reference;
 mod report;
 mod run;
+mod samples;
 pub mod sequence;
 mod store;
 pub mod sums;
@@ -66,6 +67,8 @@ pub struct Renderer<S, B> {
     source: S,
     backend: B,
     kept: Kept,
+    /// For maps, where the colour has several samples.
+    of_centers: Option<Kept>,
 }
 
 impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
@@ -78,7 +81,10 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         check::options(options, reference)?;
         let facts = source.facts();
         check::scene(&facts, options, reference)?;
-        Ok(Self { source, backend, kept: Kept::new(facts, options.clone()) })
+        let [colors, centers] = samples::apart(options);
+        let of_centers = centers.map(|options| Kept::new(facts.clone(), options));
+        let colors = colors.unwrap_or_else(|| options.clone());
+        Ok(Self { source, backend, kept: Kept::new(facts, colors), of_centers })
     }
 
     /// One frame.
@@ -86,26 +92,44 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
     /// # Errors
     /// A limit of the adapter, and whatever a device may report.
     pub fn frame(&mut self, camera: &Camera, progress: &dyn Progress) -> Result<(Frame, Report)> {
-        let (source, kept): (&dyn Source, _) = (&self.source, &mut self.kept);
-        match self.backend.borrow() {
-            Backend::Gpu { gpu, sources } if kept.options.has(Optimisation::UncountedLoops) => {
-                kept.frame((gpu, sources), source, camera, progress)
-            }
-            Backend::Gpu { gpu, sources } => {
-                kept.frame((gpu, &sources.clone().with_counted_loops()), source, camera, progress)
-            }
-            Backend::Reference => {
-                let scene = source.whole().ok_or_else(|| {
-                    Error::Usage("the reference needs all surfels in memory: render on an adapter".into())
-                })?;
-                Ok(reference::frame(scene, &kept.facts, camera, &kept.options, progress))
-            }
-        }
+        let Self { source, backend, kept, of_centers } = self;
+        let one = |kept: &mut Kept| one(&*source, (*backend).borrow(), kept, camera, progress);
+        let Some(of_centers) = of_centers else { return one(kept) };
+        // What is on the device serves both.
+        of_centers.store = kept.store.take();
+        let centers = one(of_centers)?;
+        kept.store = of_centers.store.take();
+        Ok(samples::joined(one(kept)?, centers))
     }
 
     /// Device memory that the last frame was rendered with; none for the reference.
     pub fn device_bytes(&self) -> DeviceBytes {
         self.kept.device_bytes()
+    }
+}
+
+/// A frame of what `kept` is of.
+fn one(
+    source: &dyn Source,
+    backend: &Backend,
+    kept: &mut Kept,
+    camera: &Camera,
+    progress: &dyn Progress,
+) -> Result<(Frame, Report)> {
+    match backend {
+        Backend::Gpu { gpu, sources } if kept.options.has(Optimisation::UncountedLoops) => {
+            kept.frame((gpu, sources), source, camera, progress)
+        }
+        Backend::Gpu { gpu, sources } => {
+            kept.frame((gpu, &sources.clone().with_counted_loops()), source, camera, progress)
+        }
+        Backend::Reference => {
+            let scene = source.whole().ok_or_else(|| {
+                Error::Usage("the reference needs all surfels in memory: render on an adapter".into())
+            })?;
+            let camera = camera.sampled(kept.options.samples)?;
+            Ok(reference::frame(scene, &kept.facts, &camera, &kept.options, progress))
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 // Stage 1: every surfel becomes a splat, once. One invocation a surfel; the rare ones that take longer (thin splats, disks
 // that reach the near depth, large splats) are listed and done together, so that the others of a subgroup need not wait.
 // Twin: src/passes/project.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x82b49e1e87eb831a
+// All loops end, by 1 of src/gpu/loops.rs: 0x7ae6b1602a022588
 
 @group(0) @binding(3) var<storage, read_write> splats: array<SplatRecord>;
 // Word 0 counts the large splats, word 1 all that are out of view; three words from QUEUE_GRID on are a grid with a workgroup

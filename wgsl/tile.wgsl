@@ -3,7 +3,7 @@
 // eight rows are drawn apart, each by the splats that reach them. The footprint, and so every bit, is that of visibility.wgsl
 // and accumulate.wgsl.
 // Host side: src/passes/tiles.rs.
-// All loops end, by 1, 3 of src/gpu/loops.rs: 0xad92804e0862144a
+// All loops end, by 1, 3 of src/gpu/loops.rs: 0xfecb9185fc685e67
 
 // The lists of the large splats.
 @group(0) @binding(27) var<storage, read> large_lists: array<u32>;
@@ -280,8 +280,5 @@ fn tile_resolve(
     hold_lane();
     let column = column_of(covered_tile(linear_index(workgroup, workgroups, local) / TILE_WIDTH), local);
     sum_tile(column);
-    for (var k = 0u; k < column.pixels; k++) {
-        show(k);
-        resolve_pixel(k, column.pixel + k * held.width, column.x, column.y + k);
-    }
+    resolve_column(column, local);
 }

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::plan::{
     Accumulator, BackendName, BlendFormat, Optimisation, Organisation, Raster, RasterDepth, RenderOptions,
 };
-use crate::scene::{Epsilon, Kernel, LowPass, Map, Maps, Shading};
+use crate::scene::{Cull, Epsilon, Kernel, LowPass, Map, Maps, Samples, Shading};
 use crate::surfels::analytic::Shape;
 use crate::truth::DEFAULT_GRID;
 
@@ -177,6 +177,12 @@ pub struct Config {
     pub kernel: Option<Kernel>,
     /// Low-pass filter.
     pub lowpass: Option<LowPass>,
+    /// Which surfels are left out by the side that they show.
+    #[serde(default, deserialize_with = "parsed")]
+    pub cull: Option<Cull>,
+    /// Samples of a pixel: 1, 4, 8 or 16.
+    #[serde(default, deserialize_with = "parsed")]
+    pub samples: Option<Samples>,
     /// The rasteriser's targets.
     #[serde(default, deserialize_with = "parsed")]
     pub blend_format: Option<BlendFormat>,
@@ -255,6 +261,8 @@ impl Config {
         let raster = Raster::default();
         RenderOptions {
             epsilon: self.epsilon.unwrap_or(default.epsilon),
+            cull: self.cull.unwrap_or(default.cull),
+            samples: self.samples.unwrap_or(default.samples),
             kernel: self.kernel.unwrap_or(default.kernel),
             low_pass: self.lowpass.unwrap_or(default.low_pass),
             accumulator: self.accumulator().unwrap_or_default(),

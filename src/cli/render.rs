@@ -13,7 +13,7 @@ use epsplat::io::Texture;
 use epsplat::passes::unseen::{Unseen, is_empty};
 use epsplat::plan::{Accumulator, BackendName, BlendFormat, Organisation, Raster, RasterDepth, RenderOptions, check};
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Epsilon, Kernel, Light, LowPass, MAPS, Map, Maps, Scene, Shading};
+use epsplat::scene::{Camera, Cull, Epsilon, Kernel, Light, LowPass, MAPS, Map, Maps, Samples, Scene, Shading};
 use epsplat::{Error, Result, surfels};
 use glam::DVec3;
 
@@ -104,6 +104,9 @@ pub struct Arguments {
     /// Filter for splats near a pixel in size or below
     #[arg(long, value_enum, default_value_t = LowPassName::None)]
     lowpass: LowPassName,
+    /// Samples of a pixel: 1, 4, 8 or 16. Edges are as smooth as they are many; maps are of the pixel's centre
+    #[arg(long, value_name = "N", default_value = "1", help_heading = "Surface")]
+    samples: Samples,
     /// auto: surfels that face away from the eye are left out where the scene is a closed mesh seen from outside, as nobody
     /// sees them but past its outline; back: they are left out of any scene whose normals have a side; none
     #[arg(long, value_name = "auto|none|back", default_value = "auto", help_heading = "Surface")]
@@ -262,6 +265,7 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
         epsilon: arguments.epsilon,
         kernel: arguments.kernel,
         cull: arguments.cull,
+        samples: arguments.samples,
         low_pass: match arguments.lowpass {
             LowPassName::None => LowPass::None,
             LowPassName::Max => LowPass::Max,

@@ -36,7 +36,7 @@ pub fn start(plan: &Plan, band: usize) -> u64 {
 pub fn clears(plan: &Plan, band: usize) -> Vec<Clear> {
     let mut clears = vec![Clear::of("nearest", start(plan, band), COVERED_LIST.into())];
     if !plan.lists_empty || super::asks_for_order(&plan.needs) {
-        let words = plan.bands[band].pixels * u64::from(plan.pixel.image_words);
+        let words = plan.image_pixels(band) * u64::from(plan.pixel.image_words);
         clears.push(Clear::of("image", 0, words));
     }
     clears

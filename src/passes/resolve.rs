@@ -1,6 +1,6 @@
 //! Stage 4: sums become the image: divide by the weight (paper 000, section 5.4), shade, put over the background.
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, DVec4};
 use rayon::prelude::*;
 
 use super::accumulate::PixelSums;
@@ -10,7 +10,7 @@ use crate::plan::pass::Pass;
 use crate::plan::steps::{Kernel, Over, Run, Stage, Twin};
 use crate::plan::{PixelLayout, Plan, RenderOptions};
 use crate::scene::options::HIGHLIGHT;
-use crate::scene::{Camera, Colors, Light, MAPS, Map, Scene, Shading};
+use crate::scene::{Camera, Colors, Light, MAPS, Map, Samples, Scene, Shading};
 
 /// The twin: resolves `sums`, which start at row `first_row` of the image, into `frame`, which holds just their rows.
 pub fn reference(
@@ -63,6 +63,23 @@ fn side_decision(sum: &PixelSums, scene: &Scene) -> f64 {
 /// The normalised mean; 0 where opposite normals cancel.
 fn unit_or_zero(mean: DVec3) -> DVec3 {
     if mean.length_squared() > 1e-12 { mean.normalize() } else { DVec3::ZERO }
+}
+
+/// The twin for several `samples` a pixel: the mean of the premultiplied colours of `fine`, whose pixels are the samples.
+pub fn mean_of_samples(fine: &Frame, samples: Samples) -> Frame {
+    let (across, down) = (samples.across as usize, samples.down as usize);
+    let (width, height) = (fine.width as usize / across, fine.height as usize / down);
+    let share = 1.0 / f64::from(samples.count());
+    let pixel = |pixel: usize| {
+        let (x, y) = (pixel % width * across, pixel / width * down);
+        let sampled = (0..down).flat_map(|j| (0..across).map(move |i| (y + j) * width * across + x + i));
+        let mean = sampled.fold(DVec4::ZERO, |sum, sample| {
+            let [r, g, b, a] = fine.color[sample].map(f64::from);
+            sum + share * DVec4::new(r * a, g * a, b * a, a)
+        });
+        if mean.w > 0.0 { (mean.truncate() / mean.w).extend(mean.w).to_array().map(|c| c as f32) } else { [0.0; 4] }
+    };
+    Frame::of_colors(width as u32, height as u32, (0..width * height).map(pixel).collect())
 }
 
 /// The linear colour that a surface of colour `straight` and unit `normal` has at the image point `at`, pixels.
@@ -118,6 +135,7 @@ pub const PASS: Pass = Pass {
         let pick = |needed, file, absent| if needed { file } else { absent };
         vec![
             "resolve.wgsl",
+            pick(needs.samples == Samples::ONE, "resolve_pixels.wgsl", "resolve_samples.wgsl"),
             pick(!needs.maps.is_empty(), "image_maps.wgsl", "image_color.wgsl"),
             pick(needs.maps.has(Map::Normal), "normal_map.wgsl", "normal_map_absent.wgsl"),
             pick(needs.maps.has(Map::Weight), "weight_map.wgsl", "weight_map_absent.wgsl"),
@@ -135,6 +153,8 @@ pub const PASS: Pass = Pass {
             vec![("LIGHTS", making.options.lights.len() as f64), ("IMAGE_WORDS", layout.image_words.into())];
         let words = MAPS.iter().zip(layout.map_words);
         constants.extend(words.filter_map(|(row, word)| Some((row.image_word?, f64::from(word)))));
+        let Samples { across, down } = making.needs.samples;
+        constants.extend([("SAMPLES_ACROSS", across.into()), ("SAMPLES_DOWN", down.into())]);
         if making.needs.shading == Shading::Phong {
             constants.push(("SHININESS", making.options.shininess.into()));
         }

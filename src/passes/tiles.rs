@@ -19,7 +19,7 @@ use crate::plan::known::Listed;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Look, Over, Part, Run, Stage, Step};
 use crate::plan::{Band, Facts, Plan, RenderOptions, SceneNeeds};
-use crate::scene::{Camera, LowPass};
+use crate::scene::{Camera, LowPass, Samples};
 
 /// The kernels and files of the tiles' module, beside those of others.
 pub const PASS: Pass = Pass {
@@ -32,6 +32,7 @@ pub const PASS: Pass = Pass {
             "tile_reach.wgsl",
             pick(needs.low_pass == LowPass::None, "tile_filter_absent.wgsl", "tile_filter.wgsl"),
             pick(needs.gather, "tile_small.wgsl", "tile_small_absent.wgsl"),
+            pick(needs.samples == Samples::ONE, "tile_pixels.wgsl", "tile_samples.wgsl"),
             pick(needs.subgroups, "splat_shared.wgsl", "splat_plain.wgsl"),
         ];
         files.extend(accumulate::tile_files(needs));

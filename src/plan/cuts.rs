@@ -19,26 +19,27 @@ pub struct Band {
     pub tiles: u64,
 }
 
-/// The image in bands of whole rows, for `words` u32 words a pixel in the largest buffer, after `head` others.
+/// The image in bands of `whole` rows or a multiple, for `words` u32 words a pixel in the largest buffer, after `head` others.
 ///
 /// # Errors
 /// [`Error::Limit`] if one row is too long.
-pub fn bands(adapter: &AdapterDescription, camera: &Camera, words: u32, head: u64) -> Result<Vec<Band>> {
+pub fn bands(adapter: &AdapterDescription, camera: &Camera, whole: u32, words: u32, head: u64) -> Result<Vec<Band>> {
     let row_bytes = u64::from(camera.width) * u64::from(words) * 4;
     let rows = adapter.buffer_limit().saturating_sub(4 * head) / row_bytes;
-    if rows == 0 {
+    if rows < whole.into() {
         return Err(Error::Limit {
             adapter: adapter.name.clone(),
             limit: "max_storage_buffer_binding_size",
             available: adapter.buffer_limit(),
-            needed: row_bytes,
+            needed: row_bytes * u64::from(whole),
             what: format!("for one row of {} pixels; choose a narrower image", camera.width),
         });
     }
     // A workgroup that draws a splat over the whole band must not tire the invocations of a processor: Mesa's llvmpipe ends loops
     // after 65,535 rounds; of cards none is known to.
     let untiring = if adapter.is_software() { MOST_ROUNDS * TILE * TILE } else { u32::MAX };
-    Ok(strips(camera, rows.min(u64::from(untiring / camera.width)).min(camera.height.into()).max(1) as u32))
+    let rows = rows.min(u64::from(untiring / camera.width)).min(camera.height.into()) as u32;
+    Ok(strips(camera, (rows / whole * whole).max(whole)))
 }
 
 /// The image in bands of `rows` each, the last of what is left.

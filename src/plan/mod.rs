@@ -45,9 +45,9 @@ pub struct Plan {
     pub pixel: PixelLayout,
     /// u32 words of a pixel's sums in storage; the rasteriser's are in textures, those of tiles that gather in registers.
     pub sum_words: u32,
-    /// Columns of the image.
+    /// Columns of samples.
     pub width: u32,
-    /// The rows that buffers hold at a time.
+    /// The rows of samples that buffers hold at a time.
     pub bands: Vec<Band>,
     /// Pages that the surfels fill, where each is drawn by itself.
     pub pages: usize,
@@ -64,7 +64,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The plan for a view by `camera` of the scene that `facts` are of.
+    /// The plan for a view by `camera`, whose pixels are the samples ([`Camera::sampled`]), of the scene that `facts` are of.
     ///
     /// # Errors
     /// [`Error::Usage`](crate::Error::Usage) for what does not go together, and a limit of the adapter.
@@ -101,7 +101,7 @@ impl Plan {
         // Tiles that gather store no sums.
         let sum_words = if gather { 0 } else { pixel.sum_words(&needs) };
         let head = if sum_words > 0 { needs.accumulator.row().head_words() } else { 0 };
-        let bands = bands(adapter, camera, sum_words.max(pixel.image_words), head)?;
+        let bands = bands(adapter, camera, needs.samples.down, sum_words.max(pixel.image_words), head)?;
         let several = bands.len() > 1;
         let looks = [Listed::Large, Listed::Small].map(|of| {
             let wanted = match of {
@@ -125,7 +125,7 @@ impl Plan {
         })
     }
 
-    /// The plan of the f64 reference, which draws strips of rows: no device is asked for anything, and nothing is left out.
+    /// The plan of the f64 reference, which draws strips of rows of samples: no device is asked for anything, and nothing is left out.
     pub fn of_reference(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Self {
         let needs = SceneNeeds::of_picture(facts, camera, options);
         Self {
@@ -147,6 +147,11 @@ impl Plan {
     /// Whether splats are projected in `band`, and what is unknown of them is looked at.
     pub fn projects_in(&self, band: usize) -> bool {
         band == 0 || self.projects_each_band
+    }
+
+    /// Pixels of the image in a band, whose own are samples.
+    pub fn image_pixels(&self, band: usize) -> u64 {
+        self.bands[band].pixels / u64::from(self.needs.samples.count())
     }
 
     /// The parts that are drawn one after the other.

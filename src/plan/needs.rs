@@ -2,7 +2,7 @@
 
 use super::{Accumulator, ColorNeed, Facts, Optimisation, Organisation, Raster, RasterDepth, RenderOptions, tuning};
 use crate::gpu::adapter::AdapterDescription;
-use crate::scene::{Camera, Cull, Epsilon, KernelShape, Light, LowPass, Map, Maps, Projection, Shading};
+use crate::scene::{Camera, Cull, Epsilon, KernelShape, Light, LowPass, Map, Maps, Projection, Samples, Shading};
 
 /// What exists in this render: it chooses the WGSL files that are joined, and so the bindings, buffers and sums.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -52,6 +52,8 @@ pub struct SceneNeeds {
     pub sides: bool,
     /// Surfels that face away are left out.
     pub cull_back: bool,
+    /// Samples of a pixel. The kernels' pixels are samples, but for those that they are resolved to.
+    pub samples: Samples,
     /// How pixels are lit.
     pub shading: Shading,
     /// Maps that are written; depths are accumulated for theirs, and fragments counted.
@@ -113,6 +115,7 @@ impl SceneNeeds {
             normal: lit || options.maps.has(Map::Normal),
             sides: facts.oriented && (options.maps.has(Map::Normal) || lit && sided(options)),
             cull_back: culls_back(facts, camera, options),
+            samples: options.samples,
             shading: options.shading,
             maps: options.maps,
         }
@@ -174,6 +177,7 @@ impl SceneNeeds {
             (self.normal, "normal"),
             (self.sides, "sides"),
             (self.cull_back, "cull-back"),
+            (self.samples != Samples::ONE, "samples"),
             (self.shading == Shading::Lambert, "lambert"),
             (self.shading == Shading::Phong, "phong"),
         ];

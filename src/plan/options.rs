@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use super::{Accumulator, Optimisation, Raster};
 use crate::error::Error;
-use crate::scene::{Cull, Epsilon, Kernel, Light, LowPass, Map, Maps, Shading};
+use crate::scene::{Cull, Epsilon, Kernel, Light, LowPass, Map, Maps, Samples, Shading};
 
 /// Who renders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,6 +69,8 @@ pub struct RenderOptions {
     pub epsilon: Epsilon,
     /// Which surfels are left out by the side that they show.
     pub cull: Cull,
+    /// Samples of a pixel's colour. Maps are of its centre, however many there are: a depth between two surfaces is of none.
+    pub samples: Samples,
     /// Blending kernel.
     pub kernel: Kernel,
     /// Low-pass filter.
@@ -115,6 +117,7 @@ impl Default for RenderOptions {
         Self {
             epsilon: Epsilon::Relative(0.01),
             cull: Cull::Auto,
+            samples: Samples::ONE,
             kernel: Kernel::Ellipse { a: 6.0, n: 3.0, smooth: false },
             low_pass: LowPass::None,
             accumulator: Accumulator::Fixed,

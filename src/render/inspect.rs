@@ -46,6 +46,7 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
     if options.accumulator != Accumulator::Fixed {
         return Err(Error::Usage("sums are read back in the form of the accumulator fixed: take it".into()));
     }
+    super::samples::one_alone(options)?;
     // A slot for each surfel, and sums in storage.
     let mut without = options.without.clone();
     without.extend([Optimisation::Culling, Optimisation::Copies]);

@@ -28,7 +28,7 @@ pub(super) struct Kept {
     /// Width and height of the last frame.
     size: Option<(u32, u32)>,
     kernels: Option<Kernels>,
-    store: Option<Store>,
+    pub(super) store: Option<Store>,
 }
 
 impl Kept {
@@ -51,6 +51,7 @@ impl Kept {
         camera: &Camera,
         bar: &dyn Progress,
     ) -> Result<(Frame, Report)> {
+        let (image, camera) = (camera, &camera.sampled(self.options.samples)?);
         self.look_at(gpu, camera);
         let mut total_ms = 0.0;
         for number in 0..MOST_TRIES {
@@ -65,7 +66,7 @@ impl Kept {
             let start = Instant::now();
             store.set_view(gpu, &View::new(&self.facts, camera, &self.options));
             let mut run = Run::new(gpu, &plan, kernels, store, &mut self.known);
-            let mut frame = Frame::new(camera, self.options.maps);
+            let mut frame = Frame::new(image, self.options.maps);
             let all = run.steps(&sequence::steps(&plan), &mut frame, progress)?;
             let spent = start.elapsed();
             total_ms += spent.as_secs_f64() * 1e3;
@@ -78,7 +79,7 @@ impl Kept {
                 bar.end();
                 let clock = if run.timing.on_device() { "timestamps" } else { "wall" };
                 let passes = run.timing.finish(gpu)?;
-                let report = self.report(gpu, &plan, camera, (tally.drawn, clock, passes, total_ms));
+                let report = self.report(gpu, &plan, image, (tally.drawn, clock, passes, total_ms));
                 return Ok((frame, report));
             }
         }

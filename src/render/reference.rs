@@ -16,9 +16,9 @@ use crate::passes::{MAP_PASSES, Strip, accumulate, project, resolve, visibility}
 use crate::plan::steps::{Step, Twin};
 use crate::plan::{Facts, Plan, RenderOptions, SceneNeeds};
 use crate::progress::Progress;
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, Samples, Scene};
 
-/// Renders `scene`.
+/// Renders `scene` by `camera`, whose pixels are the samples.
 pub(super) fn frame(
     scene: &Scene,
     facts: &Facts,
@@ -43,11 +43,15 @@ pub(super) fn frame(
             members[starts[band]..starts[band + 1]].iter().map(|&index| &splats[index as usize]).collect();
         let strip = Strip { scene, camera, options, splats, ranks: ranks.as_deref(), first_row, rows };
         let frame = strip_by(&strip, &of_bands[band], &spent);
+        let frame =
+            if options.samples == Samples::ONE { frame } else { resolve::mean_of_samples(&frame, options.samples) };
         progress.advance(rows.into());
         frame
     };
     // A few strips at a time: all of them beside the frame would double its memory.
-    let mut frame = Frame::empty(camera, options.maps);
+    let Samples { across, down } = options.samples;
+    let image = Camera { width: camera.width / across, height: camera.height / down, ..camera.clone() };
+    let mut frame = Frame::empty(&image, options.maps);
     let bands: Vec<usize> = (0..plan.bands.len()).collect();
     for group in bands.chunks(8 * rayon::current_num_threads()) {
         let strips: Vec<Frame> = group.par_iter().map(|band| one(*band)).collect();
@@ -55,7 +59,7 @@ pub(super) fn frame(
     }
     progress.end();
     let drawn = splats.iter().map(|splat| u64::from(splat.copies)).sum();
-    (frame, report(camera, plan.needs, (facts.surfels, drawn), spent.passes(), start.elapsed().as_secs_f64() * 1e3))
+    (frame, report(&image, plan.needs, (facts.surfels, drawn), spent.passes(), start.elapsed().as_secs_f64() * 1e3))
 }
 
 /// What the steps of `plan` have twins for: before there are bands, and in each of them.

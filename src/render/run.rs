@@ -218,10 +218,11 @@ impl<'a> Run<'a> {
     fn read_back(&mut self, band: usize, frame: &mut Frame) -> Result<()> {
         self.timing.flush(self.gpu)?;
         let Some((image, readback)) = self.store.image() else { return Ok(()) };
-        let (layout, band) = (&self.plan.pixel, &self.plan.bands[band]);
+        let (layout, pixels) = (&self.plan.pixel, self.plan.image_pixels(band));
         let record = u64::from(layout.image_words) * 4;
-        let start = band.first as usize * frame.width as usize;
-        readback.visit(self.gpu, image, band.pixels * record, |offset, bytes| {
+        let first_row = self.plan.bands[band].first / self.plan.needs.samples.down;
+        let start = first_row as usize * frame.width as usize;
+        readback.visit(self.gpu, image, pixels * record, |offset, bytes| {
             resolve::unpack(layout, bytes, start + (offset / record) as usize, frame);
         })
     }

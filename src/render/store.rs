@@ -12,7 +12,7 @@ use crate::passes::upload::{self, Uploaded};
 use crate::passes::{asks_for_order, covered, visibility};
 use crate::plan::known::Listed;
 use crate::plan::{Band, Known, Plan, Raster, SceneNeeds, splat_words};
-use crate::scene::LowPass;
+use crate::scene::{LowPass, Samples};
 
 /// Names in WGSL of buffers that have another one where kernels write them.
 const ALIASES: [(&str, &str); 7] = [
@@ -108,6 +108,7 @@ impl Page {
 #[derive(Clone, PartialEq)]
 struct Made {
     width: u32,
+    samples: Samples,
     bands: Vec<Band>,
     sum_words: u32,
     image_words: u32,
@@ -171,7 +172,8 @@ impl Store {
     pub fn fit(&mut self, gpu: &Gpu, plan: &Plan, known: &Known) -> Result<()> {
         let raster = plan.needs.raster.map(|raster| (raster, plan.pixel.targets()));
         let (width, bands) = (plan.width, plan.bands.clone());
-        let made = Made { width, bands, sum_words: plan.sum_words, image_words: plan.pixel.image_words, raster };
+        let (sum_words, image_words) = (plan.sum_words, plan.pixel.image_words);
+        let made = Made { width, samples: plan.needs.samples, bands, sum_words, image_words, raster };
         let fresh = self.made.as_ref() != Some(&made);
         if fresh {
             // The old ones make room first.
@@ -218,8 +220,9 @@ impl Store {
             self.frame.insert("sums", Buffer::storage(gpu, "weighted sums", words)?);
         }
         let record = u64::from(plan.pixel.image_words);
-        let image = Buffer::readable(gpu, "image", pixels * record)?;
-        self.readback = Some(Readback::new(gpu, &image, pixels * record * 4, record * 4));
+        let words = record * (0..plan.bands.len()).map(|band| plan.image_pixels(band)).max().unwrap_or(0);
+        let image = Buffer::readable(gpu, "image", words)?;
+        self.readback = Some(Readback::new(gpu, &image, words * 4, record * 4));
         self.frame.insert("image", image);
         let view = Buffer::<View>::uniform(gpu, "view", &bytemuck::Zeroable::zeroed())?;
         self.frame.insert("view", view.words());

@@ -96,6 +96,7 @@ impl Sums {
 
 /// How sums are made that leave the device.
 fn stored(options: &RenderOptions) -> Result<RenderOptions> {
+    super::samples::one_alone(options)?;
     check::options(options, false)?;
     if options.accumulator != Accumulator::Fixed || options.raster.is_some() {
         return Err(Error::Usage("sums leave the device in the form of the accumulator fixed: take it".into()));

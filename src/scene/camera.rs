@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{Scene, Up};
+use super::{Samples, Scene, Up};
 use crate::error::{Error, Result};
 
 /// How camera space becomes pixels.
@@ -131,6 +131,34 @@ pub fn check_near(near: f64) -> Result<()> {
 }
 
 impl Camera {
+    /// The camera whose pixels are the `samples` of this one's.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`] where there are too many in a row or a column.
+    pub fn sampled(&self, samples: Samples) -> Result<Self> {
+        let Samples { across, down } = samples;
+        let (width, height) = (u64::from(self.width) * u64::from(across), u64::from(self.height) * u64::from(down));
+        if width.max(height) > MAX_SIDE.into() {
+            return Err(Error::Usage(format!(
+                "{} samples of each of {}x{} pixels are more than {MAX_SIDE} in a row or column: take fewer",
+                samples.count(),
+                self.width,
+                self.height
+            )));
+        }
+        let [x, y] = [across, down].map(f64::from);
+        Ok(Self {
+            width: width as u32,
+            height: height as u32,
+            fx: self.fx * x,
+            fy: self.fy * y,
+            cx: self.cx * x,
+            cy: self.cy * y,
+            ..self.clone()
+        })
+    }
+
     /// A camera at `eye` that looks at `target`, both in world coordinates. Without `up` (or with one along the view
     /// direction and `up` not given by the user) the world axis that serves is taken.
     pub fn look_at(

@@ -21,7 +21,7 @@ pub use color::Colors;
 pub(crate) use copies::{copies, has_copies};
 pub use light::Light;
 pub use maps::{MAPS, Map, Maps};
-pub use options::{Cull, Epsilon, Kernel, KernelShape, LowPass, Shading};
+pub use options::{Cull, Epsilon, Kernel, KernelShape, LowPass, Samples, Shading};
 pub use provenance::Provenance;
 pub(crate) use provenance::number;
 pub use scene::{Bounds, Scene, Up};

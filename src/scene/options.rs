@@ -82,6 +82,46 @@ impl FromStr for Cull {
     }
 }
 
+/// How many samples of coverage, depth and blending a pixel has: on a grid of 1x1, 2x2, 2x4 or 4x4.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Samples {
+    /// Samples of a pixel, across.
+    pub across: u32,
+    /// And down.
+    pub down: u32,
+}
+
+impl Samples {
+    /// One, at the pixel's centre.
+    pub const ONE: Self = Self { across: 1, down: 1 };
+
+    /// How many they are.
+    pub fn count(self) -> u32 {
+        self.across * self.down
+    }
+}
+
+impl Default for Samples {
+    fn default() -> Self {
+        Self::ONE
+    }
+}
+
+impl FromStr for Samples {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        let [across, down] = match text {
+            "1" => [1, 1],
+            "4" => [2, 2],
+            "8" => [2, 4],
+            "16" => [4, 4],
+            _ => return Err(Error::Usage(format!("a pixel has 1, 4, 8 or 16 samples, not {text:?}"))),
+        };
+        Ok(Self { across, down })
+    }
+}
+
 /// The weight of a fragment over the unit disk of its surfel, rho in [0, 1].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kernel {

@@ -19,7 +19,7 @@ use epsplat::plan::{
     ACCUMULATORS, Accumulator, AccumulatorRow, BlendFormat, ColorNeed, Facts, Raster, RasterDepth, RenderOptions,
     SceneNeeds, check,
 };
-use epsplat::scene::{KernelShape, LowPass, Map, Maps, Projection, Shading};
+use epsplat::scene::{KernelShape, LowPass, Map, Maps, Projection, Samples, Shading};
 
 /// What one unit in a sum of the accumulator `fixed` is of a full weight.
 pub const UNIT: f64 = 1.0 / ONE as f64;
@@ -125,6 +125,9 @@ pub fn all_needs() -> Vec<SceneNeeds> {
     all
 }
 
+/// Several samples, not as many across as down.
+const SAMPLED: Samples = Samples { across: 2, down: 4 };
+
 fn base_needs() -> Vec<SceneNeeds> {
     let (scene, camera) = scenes::stack(1, 1.0);
     let plain = SceneNeeds::of_picture(&Facts::of(&scene), &camera, &RenderOptions::default());
@@ -167,6 +170,7 @@ fn base_needs() -> Vec<SceneNeeds> {
                 normal,
                 sides,
                 cull_back: bits.count_ones() % 4 == 1,
+                samples: if wanted.is_empty() && bits % 3 == 0 { SAMPLED } else { Samples::ONE },
                 shading,
                 maps: Maps::of(&wanted),
                 ..plain

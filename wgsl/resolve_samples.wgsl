@@ -1,0 +1,52 @@
+// Where each pixel has several samples, which all other kernels take for pixels: the mean of their premultiplied colours. One
+// invocation a pixel of a covered tile. Twin: src/passes/resolve.rs.
+// All loops end, by 1 of src/gpu/loops.rs: 0x2b79f289307b2f05
+
+override SAMPLES_ACROSS: u32;
+override SAMPLES_DOWN: u32;
+
+@compute @workgroup_size(WORKGROUP)
+fn resolve(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    hold();
+    let tile = covered_tile(workgroup.y * workgroups.x + workgroup.x);
+    let size = vec2<u32>(TILE_WIDTH / SAMPLES_ACROSS, TILE_ROWS / SAMPLES_DOWN);
+    let first = vec2<u32>(tile % tiles_across(), tile / tiles_across()) * vec2<u32>(TILE_WIDTH, TILE_ROWS);
+    for (var k = local; k < size.x * size.y; k += WORKGROUP) {
+        let corner = first + vec2<u32>(k % size.x * SAMPLES_ACROSS, k / size.x * SAMPLES_DOWN);
+        if (tile < tiles_in_band() && corner.x < held.width && corner.y < held_band.rows) {
+            var sum = vec4<f32>(0.0);
+            for (var i = 0u; i < SAMPLES_ACROSS; i++) {
+                var column = vec4<f32>(0.0);
+                for (var j = 0u; j < SAMPLES_DOWN; j++) {
+                    let sample = (corner.y + j) * held.width + corner.x + i;
+                    show(sample);
+                    column += sample_color(sample, sample, corner.x + i, corner.y + j);
+                }
+                sum += column;
+            }
+            write_mean(corner, sum);
+        }
+    }
+}
+
+// The premultiplied colour of the sample in a column and row of the band, its `sample`th, from what `sums_of` names its sums.
+fn sample_color(sums_of: u32, sample: u32, x: u32, row: u32) -> vec4<f32> {
+    let weight = shown_weight(sums_of, front_at(sample));
+    var color = held.background;
+    if (weight != 0.0) {
+        color = shown_color(sums_of, weight, resolve_normal(sums_of, weight), x, row + held_band.first_row);
+    }
+    // Rounded before it is added, however a compiler would join the two: by tiles or not, the bits are the same.
+    return bitcast<vec4<f32>>(bitcast<vec4<u32>>(vec4<f32>(color.rgb * color.a, color.a)) ^ vec4<u32>(held.zero));
+}
+
+// The straight mean of the samples that start at `corner`, a column and row of the band.
+fn write_mean(corner: vec2<u32>, sum: vec4<f32>) {
+    let pixel = corner.y / SAMPLES_DOWN * (held.width / SAMPLES_ACROSS) + corner.x / SAMPLES_ACROSS;
+    let straight = select(vec3<f32>(0.0), sum.rgb / sum.a, sum.a > 0.0);
+    write_color(pixel * IMAGE_WORDS, vec4<f32>(straight, sum.a / f32(SAMPLES_ACROSS * SAMPLES_DOWN)));
+}

@@ -40,6 +40,7 @@ fn homography(
     every: bool,
 ) -> Homography {
     var h: Homography;
+    h.turn = vec2<f32>(1.0, 0.0);
     let p_z = center[2].high;
     h.away = s.x * t.y - s.y * t.x;
     h.low = vec2<f32>(1.0);
@@ -76,6 +77,7 @@ fn homography(
         h.a = rows.a;
         h.a_low = rows.a_low;
         h.b = rows.b;
+        h.turn = rows.turn;
     }
     h.centered = true;
     h.offset = offset;
@@ -99,6 +101,10 @@ struct Fragment {
 fn intersect(abc: vec3<f32>) -> Fragment {
     let rho2 = dot(abc.xy, abc.xy);
     return Fragment(rho2 <= 1.0 && abc.z >= held.near, abc.z, rho2, 1.0);
+}
+
+fn homogeneous(abc: vec3<f32>) -> vec3<f32> {
+    return vec3<f32>(abc.xy, 1.0);
 }
 
 fn rim(most: f32) -> f32 {

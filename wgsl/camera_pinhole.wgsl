@@ -1,6 +1,6 @@
 // The pinhole camera x = fx X/Z + cx: homography and bounds of a disk, and the evaluation at a pixel.
 // Twin: src/passes/homography.rs and src/passes/footprint.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xb168144743b559fe
+// All loops end, by 1 of src/gpu/loops.rs: 0xd9cd1378ca59384f
 
 fn image_of(position: Double, depth: Double, axis: u32) -> Double {
     let focal = Double(held.intrinsics[axis], held.intrinsics_low[axis]);
@@ -134,6 +134,7 @@ fn scaled_homography(
     let normal = cross(s, t);
     let away = dot(p, normal);
     var h: Homography;
+    h.turn = vec2<f32>(1.0, 0.0);
     h.away = away;
     h.low = vec2<f32>(1.0);
     h.high = vec2<f32>(0.0);
@@ -172,6 +173,7 @@ fn scaled_homography(
                 h.a = rows.a;
                 h.a_low = rows.a_low;
                 h.b = rows.b;
+        h.turn = rows.turn;
             }
             let ratio = p.xy / p.z;
             let s_x = s.xy - ratio * s.z;
@@ -236,6 +238,11 @@ fn intersect(abc: vec3<f32>) -> Fragment {
     // Behind the camera rho is infinite.
     let rho2 = select(3e38, dot(uv, uv), abc.z > 0.0);
     return Fragment(reached && depth >= held.near, depth, select(rho2, min(rho2, 1.0), reached), 1.0);
+}
+
+// (u, v, 1) times a factor that is positive before the camera.
+fn homogeneous(abc: vec3<f32>) -> vec3<f32> {
+    return abc;
 }
 
 // The longest (u/z, v/z) on the disk where 1/z is at most `most`.

@@ -17,8 +17,8 @@ struct Filter {
     gain: f32,
 }
 
-// It follows the splat in its record (records.wgsl).
-alias SplatRecord = array<Words, 6>;
+// Its rows in a splat's record (records.wgsl).
+const FILTER_ROWS: u32 = 2u;
 
 fn with_filter(record: SplatRecord, filter_: Filter) -> SplatRecord {
     var filtered_ = record;

@@ -77,6 +77,8 @@ struct Splat {
     c: array<f32, 3>,
     // Trailing part of a, for thin splats (rows.wgsl); else 0.
     a_low: array<f32, 3>,
+    // Where the disk ends before its rim.
+    clip: Clip,
 }
 
 const AWAY: u32 = 0x80000000u;

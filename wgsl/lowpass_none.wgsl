@@ -6,7 +6,7 @@ struct Filter {
     nothing: u32,
 }
 
-alias SplatRecord = array<Words, 4>;
+const FILTER_ROWS: u32 = 0u;
 
 fn with_filter(record: SplatRecord, filter_: Filter) -> SplatRecord {
     return record;

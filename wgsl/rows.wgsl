@@ -11,6 +11,8 @@ struct Homography {
     b: vec3<f32>,
     c: vec3<f32>,
     a_low: vec3<f32>,
+    // Cosine and sine of the angle by which the unit disk was turned in itself.
+    turn: vec2<f32>,
     anchor: vec2<i32>,
     // First and last point that the disk can reach, image coordinates; empty if low > high.
     low: vec2<f32>,
@@ -30,6 +32,7 @@ struct Homography {
 }
 
 struct Rows {
+    turn: vec2<f32>,
     a: vec3<f32>,
     a_low: vec3<f32>,
     b: vec3<f32>,
@@ -80,6 +83,7 @@ fn thin_rows(a_x: Double, a_y: Double, b_x: Double, b_y: Double, offset_x: Doubl
     let largest = max(max(abs(a.x), abs(a.y)), abs(a.z));
     let grid = bitcast<f32>(bitcast<u32>(largest) & 0x7f800000u) / 2048.0;
     var rows: Rows;
+    rows.turn = turn;
     rows.a = floor(a / grid + 0.5) * grid;
     rows.a_low = (a - rows.a) + vec3<f32>(wide_x.low, wide_y.low, wide_0.low);
     rows.b = vec3<f32>(long_x.high, long_y.high, long_0.high);

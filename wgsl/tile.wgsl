@@ -3,7 +3,7 @@
 // eight rows are drawn apart, each by the splats that reach them. The footprint, and so every bit, is that of visibility.wgsl
 // and accumulate.wgsl.
 // Host side: src/passes/tiles.rs.
-// All loops end, by 1, 3 of src/gpu/loops.rs: 0xfecb9185fc685e67
+// All loops end, by 1, 3 of src/gpu/loops.rs: 0xdfc7b2ab965521e1
 
 // The lists of the large splats.
 @group(0) @binding(27) var<storage, read> large_lists: array<u32>;
@@ -89,6 +89,7 @@ fn handed_splat(from_: u32) -> Splat {
     splat.b = handed_row(own_splat.b, from_);
     splat.c = handed_row(own_splat.c, from_);
     splat.a_low = handed_row(own_splat.a_low, from_);
+    splat.clip = handed_clip(own_splat.clip, from_);
     return splat;
 }
 

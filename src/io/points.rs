@@ -1,7 +1,7 @@
 //! What one input file holds, before it becomes surfels.
 
 pub use crate::scene::Up;
-use crate::scene::{Colors, number};
+use crate::scene::{Clip, Colors, number};
 
 /// Points as a file gives them: f64 world coordinates and whatever attributes exist.
 ///
@@ -18,6 +18,8 @@ pub struct Points {
     /// Half-axes s and t of one elliptical disk each, world units, with the normal s x t; they stand in for normal and radius
     /// where they span an ellipse. Zero, parallel or non-finite ones mean missing.
     pub axes: Option<Vec<[[f32; 3]; 2]>>,
+    /// Where the disks of the half-axes end before their rims.
+    pub clips: Option<Vec<Clip>>,
     /// Colours, [`Colors::Srgb8`] or [`Colors::Linear`].
     pub colors: Option<Colors>,
     /// Texture coordinates (u, v), origin bottom left as in OBJ.
@@ -43,6 +45,7 @@ impl Points {
         self.normals.iter_mut().for_each(|all| retain(all, keep));
         self.radii.iter_mut().for_each(|all| retain(all, keep));
         self.axes.iter_mut().for_each(|all| retain(all, keep));
+        self.clips.iter_mut().for_each(|all| retain(all, keep));
         self.texture.iter_mut().for_each(|all| retain(all, keep));
         self.colors.iter_mut().for_each(|all| retain_colors(all, keep));
         let dropped = keep.iter().enumerate().filter(|(_, keep)| !**keep);

@@ -31,7 +31,7 @@
 //!   `(n - 1) u` of itself, and so does the weight's: `2 n u + 4 u`. The order shows.
 
 use super::footprint::footprint;
-use super::splat::Splat;
+use super::splat::{Intersection, Splat};
 use crate::gpu::layout::TILE;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
@@ -174,7 +174,7 @@ pub fn reference<'a>(
                 let back = nearest[pixel] * (1.0 + relative) + epsilon;
                 let sum = &mut sums[pixel];
                 if options.maps.has(Map::Decision) {
-                    sum.decision = sum.decision.min(decision(at.rho2.sqrt(), at.depth, back, camera.near));
+                    sum.decision = sum.decision.min(decision(at, back, camera.near));
                 }
                 if !(at.hit(camera) && at.depth <= back) {
                     continue;
@@ -206,8 +206,9 @@ pub fn reference<'a>(
 
 /// The relative distance to the nearest decision that could turn the fragment's fate: it is in or out by rim, near
 /// depth and epsilon together, so a fragment that fails one of them clearly is not undecided by the others.
-fn decision(rho: f64, depth: f64, back: f64, near: f64) -> f64 {
-    let margins = [1.0 - rho, depth / near - 1.0, if back.is_finite() { back / depth - 1.0 } else { f64::INFINITY }];
+fn decision(at: Intersection, back: f64, near: f64) -> f64 {
+    let behind = if back.is_finite() { back / at.depth - 1.0 } else { f64::INFINITY };
+    let margins = [1.0 - at.rho2.sqrt(), at.inside, at.depth / near - 1.0, behind];
     if margins.iter().any(|m| *m < -NEARBY) {
         f64::INFINITY
     } else {
@@ -260,12 +261,14 @@ mod tests {
 
     #[test]
     fn a_decision_is_near_only_if_nothing_else_decides() {
+        let at = |rho: f64| Intersection { depth: 2.0, rho2: rho * rho, inside: 1.0 };
+        let of = |rho: f64, back: f64| decision(at(rho), back, 0.1);
         // Just inside the rim, well inside the tolerance.
-        assert!((decision(1.0 - 1e-7, 2.0, 2.2, 0.1) - 1e-7).abs() < 1e-12);
+        assert!((of(1.0 - 1e-7, 2.2) - 1e-7).abs() < 1e-12);
         // At the rim, but far behind the tolerance: out either way.
-        assert_eq!(decision(1.0 - 1e-7, 2.0, 1.0, 0.1), f64::INFINITY);
+        assert_eq!(of(1.0 - 1e-7, 1.0), f64::INFINITY);
         // At the tolerance, but outside the disk.
-        assert_eq!(decision(1.5, 2.0, 2.0, 0.1), f64::INFINITY);
-        assert_eq!(decision(0.5, 2.0, 2.0, 0.1), 0.0);
+        assert_eq!(of(1.5, 2.0), f64::INFINITY);
+        assert_eq!(of(0.5, 2.0), 0.0);
     }
 }

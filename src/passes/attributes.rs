@@ -35,6 +35,7 @@ pub const PASS: Pass = Pass {
             ("ATTRIBUTE_WORDS", surfel.words.into()),
             ("COPIES_WORD", surfel.copies.into()),
             ("LOW_WORD", surfel.low.into()),
+            ("CLIP_WORD", surfel.clip.into()),
             ("COLOR_CHANNELS", color_channels(making.needs).into()),
             ("NORMAL_CHANNEL", layout.normal_channel.into()),
             ("SIDE_CHANNEL", layout.side_channel.into()),

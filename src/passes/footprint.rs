@@ -42,9 +42,11 @@ pub fn footprint(splat: &Splat, camera: &Camera, low_pass: LowPass, x: u32, y: u
     let (dx, dy) = ((i64::from(x) - splat.anchor[0]) as f64, (i64::from(y) - splat.anchor[1]) as f64);
     let at = |row: glam::DVec3| row.x * dx + (row.y * dy + row.z);
     let (a, b, c) = (at(splat.a), at(splat.b), at(splat.c));
-    let disk = match camera.projection {
-        Projection::Pinhole => (c > 0.0).then(|| Intersection { depth: 1.0 / c, rho2: (a * a + b * b) / (c * c) }),
-        Projection::Orthographic => Some(Intersection { depth: c, rho2: a * a + b * b }),
+    let (before, u, v, rho2, depth) = match camera.projection {
+        Projection::Pinhole => (c > 0.0, a / c, b / c, (a * a + b * b) / (c * c), 1.0 / c),
+        Projection::Orthographic => (true, a, b, a * a + b * b, c),
     };
-    filtered(splat, camera, low_pass, disk, c, (dx, dy))
+    let inside = if before { splat.clip.inside(u, v) } else { f64::INFINITY };
+    let disk = before.then_some(Intersection { depth, rho2, inside });
+    filtered(splat, camera, low_pass, disk, c, (dx, dy)).map(|(at, gain)| (Intersection { inside, ..at }, gain))
 }

@@ -122,7 +122,7 @@ pub fn filtered(
         Projection::Pinhole => 1.0 / plane.clamp(1.0 / high, 1.0 / low),
         Projection::Orthographic => plane.clamp(low, high),
     };
-    let round = Intersection { depth, rho2 };
+    let round = Intersection { depth, rho2, inside: f64::INFINITY };
     match (low_pass, disk) {
         (LowPass::Max, Some(disk)) if rho2 > 1.0 || rho2 >= disk.rho2 => Some((disk, 1.0)),
         _ => Some((round, filter.gain)),

@@ -14,7 +14,7 @@ use crate::plan::pass::{Making, Pass};
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
 use crate::plan::{Facts, RenderOptions, culls_back};
 use crate::plan::{Organisation, Plan, tuning};
-use crate::scene::{Camera, Cull, LowPass, Scene, Surfel, copies, has_copies};
+use crate::scene::{Camera, Clip, Cull, LowPass, Scene, Surfel, copies, has_copies};
 
 /// The twin of `wgsl/project.wgsl` for one surfel, whose centre is at `relative` (world units) from the camera's eye; `None` if no
 /// pixel can be touched.
@@ -79,6 +79,7 @@ pub(super) fn projected(
         away: projected.away,
         normal,
         filter,
+        clip: Clip::NONE,
         copies: 1,
     })
 }
@@ -95,7 +96,7 @@ pub fn reference_all(scene: &Scene, camera: &Camera, options: &RenderOptions) ->
         let copies = copies.as_ref().map_or(1, |copies| copies[index]);
         let splat = || reference((index as u32, surfel), scene.center(index) - eye, camera, &design);
         let splat = (copies > 0).then(splat).flatten().filter(|splat| !(cull_back && splat.away));
-        splat.map(|splat| Splat { copies, ..splat })
+        splat.map(|splat| Splat { copies, clip: scene.clips.get(index).copied().unwrap_or_default(), ..splat })
     };
     surfels.filter_map(project).collect()
 }

@@ -11,6 +11,7 @@ pub const PASS: Pass = Pass {
             "layout.wgsl",
             pick(needs.long_words, "words_long.wgsl", "words.wgsl"),
             "records.wgsl",
+            pick(needs.clips, "clip.wgsl", "clip_absent.wgsl"),
             "double.wgsl",
             "rows.wgsl",
             pick(needs.doubled, "center_doubled.wgsl", "center.wgsl"),

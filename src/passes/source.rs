@@ -149,6 +149,10 @@ impl ScenePage<'_> {
             let into = &mut into[self.layout.low as usize..];
             low.iter().zip(into).for_each(|(value, into)| *into = value.to_bits());
         }
+        if let (true, Some(clip)) = (self.needs.clips, self.scene.clips.get(index)) {
+            let into = &mut into[self.layout.clip as usize..];
+            clip.0.iter().flatten().zip(into).for_each(|(value, into)| *into = value.to_bits());
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::scene::Camera;
+use crate::scene::{Camera, Clip};
 
 /// A projected surfel in f64: the twin of [`crate::gpu::layout::Splat`], in world units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,6 +27,8 @@ pub struct Splat {
     pub normal: DVec3,
     /// The low-pass, if there is one.
     pub filter: Option<Filter>,
+    /// Where the disk ends before its rim.
+    pub clip: Clip,
     /// Surfels that it stands for.
     pub copies: u32,
 }
@@ -53,11 +55,13 @@ pub struct Intersection {
     pub depth: f64,
     /// Squared radius on the unit disk; the disk ends at 1.
     pub rho2: f64,
+    /// How far inside the disk's lines ([`Clip::inside`]); it ends at 0.
+    pub inside: f64,
 }
 
 impl Intersection {
-    /// Inside the disk and not nearer than the near depth.
+    /// Inside the disk and its lines, and not nearer than the near depth.
     pub fn hit(&self, camera: &Camera) -> bool {
-        self.rho2 <= 1.0 && self.depth >= camera.near
+        self.rho2 <= 1.0 && self.inside >= 0.0 && self.depth >= camera.near
     }
 }

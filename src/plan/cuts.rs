@@ -55,7 +55,7 @@ pub fn strips(camera: &Camera, rows: u32) -> Vec<Band> {
 /// Surfels of a page: whole batches, unless one is too large; each batch is a row of a dispatch, of which every adapter grants so
 /// many. The splat's record is the largest of what is paged alike, or a surfel's attributes are.
 pub fn page_surfels(adapter: &AdapterDescription, needs: &SceneNeeds) -> u64 {
-    let words = splat_words(needs.low_pass).max(SurfelLayout::of(needs).words.into());
+    let words = splat_words(needs).max(SurfelLayout::of(needs).words.into());
     let most = adapter.page_len(4 * words as usize);
     let whole = most / u64::from(BATCH) * u64::from(BATCH);
     if whole > 0 { whole.min(u64::from(MOST_GROUPS * BATCH)) } else { most.max(1) }

@@ -46,6 +46,8 @@ pub struct Facts {
     pub oriented: bool,
     /// [`Scene::closed`].
     pub closed: bool,
+    /// Disks end at lines, [`Scene::clips`].
+    pub clips: bool,
     /// Centres have trailing parts, [`Scene::low`].
     pub doubled: bool,
     /// One surfel has many copies, which can be drawn as one.
@@ -80,6 +82,7 @@ impl Facts {
             largest_radius: scene.largest_radius(),
             oriented: scene.oriented,
             closed: scene.closed,
+            clips: !scene.clips.is_empty(),
             doubled: !scene.low.is_empty(),
             copies: has_copies(scene),
             sample: (0..scene.surfels.len()).step_by(step).map(|k| (scene.surfels[k], scene.center(k))).collect(),

@@ -52,6 +52,8 @@ pub struct SceneNeeds {
     pub sides: bool,
     /// Surfels that face away are left out.
     pub cull_back: bool,
+    /// Disks end at lines in their planes.
+    pub clips: bool,
     /// Samples of a pixel. The kernels' pixels are samples, but for those that they are resolved to.
     pub samples: Samples,
     /// How pixels are lit.
@@ -115,6 +117,7 @@ impl SceneNeeds {
             normal: lit || options.maps.has(Map::Normal),
             sides: facts.oriented && (options.maps.has(Map::Normal) || lit && sided(options)),
             cull_back: culls_back(facts, camera, options),
+            clips: facts.clips,
             samples: options.samples,
             shading: options.shading,
             maps: options.maps,
@@ -177,6 +180,7 @@ impl SceneNeeds {
             (self.normal, "normal"),
             (self.sides, "sides"),
             (self.cull_back, "cull-back"),
+            (self.clips, "clips"),
             (self.samples != Samples::ONE, "samples"),
             (self.shading == Shading::Lambert, "lambert"),
             (self.shading == Shading::Phong, "phong"),

@@ -115,7 +115,7 @@ impl RenderOptions {
 impl Default for RenderOptions {
     fn default() -> Self {
         Self {
-            epsilon: Epsilon::Relative(0.01),
+            epsilon: Epsilon::Radius(1.0),
             cull: Cull::Auto,
             samples: Samples::ONE,
             kernel: Kernel::Ellipse { a: 6.0, n: 3.0, smooth: false },

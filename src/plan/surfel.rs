@@ -13,6 +13,8 @@ pub struct SurfelLayout {
     pub copies: u32,
     /// The first of the three trailing parts of its centre.
     pub low: u32,
+    /// The first of the six words of the lines at which it ends.
+    pub clip: u32,
 }
 
 impl SurfelLayout {
@@ -26,12 +28,17 @@ impl SurfelLayout {
             ColorNeed::Textured => 16,
         };
         let low = copies + u32::from(needs.copies);
-        Self { words: low + if needs.doubled { 3 } else { 0 }, copies, low }
+        let clip = low + if needs.doubled { 3 } else { 0 };
+        Self { words: clip + if needs.clips { 6 } else { 0 }, copies, low, clip }
     }
 }
 
-/// Words of a splat's record, of which those of its low-pass come last.
-pub fn splat_words(low_pass: LowPass) -> u64 {
-    let filter = if low_pass == LowPass::None { 0 } else { size_of::<Filter>() };
-    (size_of::<Splat>() + filter) as u64 / 4
+/// Words of a splat's record, of which those of its low-pass and its lines come last.
+pub fn splat_words(needs: &SceneNeeds) -> u64 {
+    let filter = if needs.low_pass == LowPass::None { 0 } else { size_of::<Filter>() };
+    let clip = if needs.clips { CLIP_WORDS } else { 0 };
+    (size_of::<Splat>() + filter) as u64 / 4 + clip
 }
+
+/// Words of a splat's lines: whole rows of four, as all of its record.
+const CLIP_WORDS: u64 = 8;

@@ -16,8 +16,10 @@ use crate::gpu::layout::{Splat, View};
 use crate::gpu::{Gpu, Sources};
 use crate::passes::upload::upload;
 use crate::plan::steps::{Stage, Step, Twin};
-use crate::plan::{Accumulator, Facts, Known, Optimisation, Organisation, Plan, RenderOptions, splat_words};
-use crate::scene::{Camera, LowPass, Scene};
+use crate::plan::{
+    Accumulator, Facts, Known, Optimisation, Organisation, Plan, RenderOptions, SceneNeeds, splat_words,
+};
+use crate::scene::{Camera, Scene};
 
 /// What the first three stages leave on the device.
 #[derive(Clone, Debug)]
@@ -78,14 +80,14 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
     run.timing.flush(gpu)?;
     let mut sums = Sums::new(camera, &plan, &view);
     sums.take(gpu, &plan, &store, 0)?;
-    Ok(Stages { splats: splats(gpu, options.low_pass, &order, &store)?, sums, view })
+    Ok(Stages { splats: splats(gpu, &plan.needs, &order, &store)?, sums, view })
 }
 
 /// The record of each surfel, in the order of the scene.
-fn splats(gpu: &Gpu, low_pass: LowPass, order: &[u32], store: &Store) -> Result<Vec<Splat>> {
+fn splats(gpu: &Gpu, needs: &SceneNeeds, order: &[u32], store: &Store) -> Result<Vec<Splat>> {
     let mut splats = vec![Splat::zeroed(); order.len()];
     let mut order = order.iter();
-    let words = splat_words(low_pass);
+    let words = splat_words(needs);
     for page in &store.pages {
         let Some(stored) = page.buffer("splats") else { continue };
         let stored = stored.read(gpu, page.slots * words)?;

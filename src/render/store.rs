@@ -12,7 +12,7 @@ use crate::passes::upload::{self, Uploaded};
 use crate::passes::{asks_for_order, covered, visibility};
 use crate::plan::known::Listed;
 use crate::plan::{Band, Known, Plan, Raster, SceneNeeds, splat_words};
-use crate::scene::{LowPass, Samples};
+use crate::scene::Samples;
 
 /// Names in WGSL of buffers that have another one where kernels write them.
 const ALIASES: [(&str, &str); 7] = [
@@ -55,7 +55,7 @@ pub struct Page {
 }
 
 impl Page {
-    fn new(gpu: &Gpu, uploaded: upload::Page, first: u32, low_pass: LowPass) -> Result<Self> {
+    fn new(gpu: &Gpu, uploaded: upload::Page, first: u32, needs: &SceneNeeds) -> Result<Self> {
         let upload::Page { buffers, numbers, stand_for } = uploaded;
         let surfels = numbers.len() as u64;
         let mut buffers = Named::from_iter(buffers);
@@ -66,12 +66,12 @@ impl Page {
         buffers.insert("drawn", drawn);
         buffers.insert("rest", Buffer::storage(gpu, "batches that may be drawn", batches + 1)?);
         // A binding holds one record at least.
-        buffers.insert("splats", Buffer::storage(gpu, "splats", splat_words(low_pass))?);
+        buffers.insert("splats", Buffer::storage(gpu, "splats", splat_words(needs))?);
         for (name, what) in [("queue", "queue of large splats"), ("rare", "list of rare splats")] {
             buffers.insert(name, Buffer::indirect(gpu, what, QUEUE_START.into())?);
         }
         buffers.insert("page_first", Buffer::uniform(gpu, "page", &first)?);
-        Ok(Self { buffers, surfels, stand_for, splat_words: splat_words(low_pass), slots: 0 })
+        Ok(Self { buffers, surfels, stand_for, splat_words: splat_words(needs), slots: 0 })
     }
 
     /// Batches of surfels.
@@ -145,7 +145,7 @@ impl Store {
             if asks_for_order(needs) {
                 order.extend(&page.numbers);
             }
-            Page::new(gpu, page, before, needs.low_pass)
+            Page::new(gpu, page, before, needs)
         });
         let pages = pages.collect::<Result<_>>()?;
         Ok(Self {

@@ -2,6 +2,7 @@
 
 mod body;
 pub mod camera;
+pub mod clip;
 pub mod color;
 mod copies;
 pub mod framing;
@@ -17,6 +18,7 @@ pub mod texture;
 
 pub(crate) use body::{SMALLEST_SCENE, body};
 pub use camera::{Camera, Lens, Projection};
+pub use clip::Clip;
 pub use color::Colors;
 pub(crate) use copies::{copies, has_copies};
 pub use light::Light;

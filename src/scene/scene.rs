@@ -3,7 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{Colors, Provenance, Surfel};
+use super::{Clip, Colors, Provenance, Surfel};
 
 /// The world axis that points up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -46,6 +46,8 @@ pub struct Scene {
     pub surfels: Vec<Surfel>,
     /// What the f32 centres leave out, world units: one for each surfel, or none at all where it is less than anybody sees.
     pub low: Vec<[f32; 3]>,
+    /// Where disks end before their rims: one for each surfel, or none at all.
+    pub clips: Vec<Clip>,
     /// One colour for all, or one for each surfel in the same order.
     pub colors: Colors,
     /// Normals were given, so they tell the two sides of a surface apart; estimated ones do not.

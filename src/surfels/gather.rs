@@ -4,7 +4,7 @@ use super::colors::ColorGatherer;
 use super::{LARGEST_COORDINATE, Preparation};
 use crate::io::points::{retain, retain_colors};
 use crate::io::{Points, Up};
-use crate::scene::{Colors, Provenance};
+use crate::scene::{Clip, Colors, Provenance};
 use crate::{Error, Result};
 
 /// The usable points of all inputs, in order.
@@ -17,6 +17,8 @@ pub(crate) struct Gathered {
     pub radii: Option<Vec<f32>>,
     /// As given; zero where missing. None if no input has any.
     pub axes: Option<Vec<[[f32; 3]; 2]>>,
+    /// As given; [`Clip::NONE`] where missing. None if no input has any.
+    pub clips: Option<Vec<Clip>>,
     /// As given; zero where missing. None if no input has any.
     pub texture: Option<Vec<[f32; 2]>>,
     /// The colours of the points. None if no input has any.
@@ -35,7 +37,7 @@ pub(crate) struct Gathered {
 pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
     let mut preparation = Preparation::default();
     let mut positions = Vec::new();
-    let (mut normals, mut radii, mut axes, mut texture) = (None, None, None, None);
+    let (mut normals, mut radii, mut axes, mut clips, mut texture) = (None, None, None, None, None);
     let mut colors = ColorGatherer::new();
     let (mut up, mut provenance) = (None, Provenance::default());
     let closed = inputs.iter().all(|input| input.closed || input.positions.is_empty());
@@ -56,6 +58,7 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
         append(&mut normals, before, input.normals, kept);
         append(&mut radii, before, input.radii, kept);
         append(&mut axes, before, input.axes, kept);
+        append(&mut clips, before, input.clips, kept);
         append(&mut texture, before, input.texture, kept);
         colors.append(input.colors, kept);
         if positions.is_empty() {
@@ -94,6 +97,7 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
         normals,
         radii,
         axes,
+        clips,
         texture,
         colors: colors.finish(),
         up,
@@ -110,6 +114,7 @@ impl Gathered {
         self.normals.iter_mut().for_each(|all| retain(all, keep));
         self.radii.iter_mut().for_each(|all| retain(all, keep));
         self.axes.iter_mut().for_each(|all| retain(all, keep));
+        self.clips.iter_mut().for_each(|all| retain(all, keep));
         self.texture.iter_mut().for_each(|all| retain(all, keep));
         self.colors.iter_mut().for_each(|all| retain_colors(all, keep));
     }

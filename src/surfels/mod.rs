@@ -148,7 +148,8 @@ pub fn build_textured(inputs: Vec<Points>, texture: Texture, progress: &dyn Prog
 }
 
 fn built(gathered: Gathered, progress: &dyn Progress) -> Result<(Scene, Preparation)> {
-    let Gathered { positions, normals, radii, axes, colors, up, closed, provenance, mut preparation, .. } = gathered;
+    let Gathered { positions, normals, radii, axes, clips, colors, up, closed, provenance, mut preparation, .. } =
+        gathered;
     let colors = colors::folded(colors);
     let bounds = Bounds::of(positions.par_iter().map(|position| DVec3::from_array(*position)));
     let (body, _) = body(positions.len(), |index| DVec3::from_array(positions[index]));
@@ -209,7 +210,9 @@ fn built(gathered: Gathered, progress: &dyn Progress) -> Result<(Scene, Preparat
     let low = low_parts(&surfels, relative);
     preparation.rounding = rounding(&surfels, &low, relative);
     let oriented = preparation.estimated_normals == 0;
-    let scene = Scene { origin, surfels, low, colors, oriented, closed: closed && oriented, up, provenance };
+    // A clip is of the half-axes that were given with it.
+    let clips = clips.filter(|clips| clips.iter().any(|clip| !clip.is_none())).unwrap_or_default();
+    let scene = Scene { origin, surfels, low, clips, colors, oriented, closed: closed && oriented, up, provenance };
     // As the default view sees it.
     preparation.strays = scene.body().1;
     Ok((scene, preparation))

@@ -169,6 +169,7 @@ fn base_needs() -> Vec<SceneNeeds> {
                 alpha,
                 normal,
                 sides,
+                clips: bits.count_ones() % 5 == 1,
                 cull_back: bits.count_ones() % 4 == 1,
                 samples: if wanted.is_empty() && bits % 3 == 0 { SAMPLED } else { Samples::ONE },
                 shading,

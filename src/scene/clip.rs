@@ -1,0 +1,43 @@
+//! Lines at which a disk ends before its rim.
+
+use glam::DVec3;
+
+/// Two lines in the plane of a disk, each as (x, y, z): of the unit disk the points (u, v) are kept with `x u + y v + z >= 0`. Its
+/// centre may be left out. (Zwicker, Raesaenen, Botsch, Dachsbacher and Pauly 2004, *Perspective Accurate Splatting*, section 5.)
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Clip(pub [[f32; 3]; 2]);
+
+impl Clip {
+    /// Lines that leave nothing out.
+    pub const NONE: Self = Self([[0.0, 0.0, 1.0]; 2]);
+
+    /// Whether it leaves nothing out.
+    pub fn is_none(&self) -> bool {
+        *self == Self::NONE
+    }
+
+    /// How far inside both lines (u, v) lies, in units of the lines' own lengths: negative where it is left out.
+    pub fn inside(&self, u: f64, v: f64) -> f64 {
+        let along = |line: [f32; 3]| DVec3::from(line.map(f64::from)).dot(DVec3::new(u, v, 1.0));
+        along(self.0[0]).min(along(self.0[1]))
+    }
+}
+
+impl Default for Clip {
+    fn default() -> Self {
+        Self::NONE
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_on_the_far_side_of_either_line_is_left_out() {
+        let corner = Clip([[1.0, 0.0, 0.25], [0.0, -1.0, 0.0]]);
+        assert!(corner.inside(0.0, -0.5) > 0.0 && corner.inside(-0.2, 0.0) >= 0.0);
+        assert!(corner.inside(-0.3, -0.5) < 0.0 && corner.inside(0.5, 0.1) < 0.0);
+        assert_eq!(Clip::NONE.inside(1.0, -1.0), 1.0);
+    }
+}

@@ -1,0 +1,49 @@
+// Disks that end at lines in their own planes: at a border, or where the surface has an edge. A point (u, v) of the unit disk
+// is kept where neither line has it on its far side. (Zwicker et al. 2004, Perspective Accurate Splatting, section 5.)
+// Same interface as clip_absent.wgsl. Twin: src/scene/clip.rs, src/passes/footprint.rs.
+
+// The first of six words of a surfel's attributes: two lines.
+override CLIP_WORD: u32;
+
+struct Clip {
+    // Kept: line . (u, v, 1) >= 0.
+    first: vec3<f32>,
+    second: vec3<f32>,
+}
+
+// Of a splat whose unit disk was turned in itself (rows.wgsl).
+fn clip_of(index: u32, turn: vec2<f32>) -> Clip {
+    return Clip(turned_line(index, CLIP_WORD, turn), turned_line(index, CLIP_WORD + 3u, turn));
+}
+
+fn turned_line(index: u32, word: u32, turn: vec2<f32>) -> vec3<f32> {
+    let line = vec3<f32>(
+        bitcast<f32>(attribute_word(index, word)),
+        bitcast<f32>(attribute_word(index, word + 1u)),
+        bitcast<f32>(attribute_word(index, word + 2u)),
+    );
+    return vec3<f32>(line.x * turn.x + line.y * turn.y, line.y * turn.x - line.x * turn.y, line.z);
+}
+
+// Its rows in a splat's record, the last ones.
+const CLIP_ROWS: u32 = 2u;
+
+fn with_clip(record: SplatRecord, clip: Clip) -> SplatRecord {
+    var clipped_ = record;
+    let at = 4u + FILTER_ROWS;
+    clipped_[at] = words(bitcast<vec4<u32>>(vec4<f32>(clip.first, clip.second.x)));
+    clipped_[at + 1u] = words(bitcast<vec4<u32>>(vec4<f32>(clip.second.yz, 0.0, 0.0)));
+    return clipped_;
+}
+
+fn clip_in(record: SplatRecord) -> Clip {
+    let first = bitcast<vec4<f32>>(each_word(record[4u + FILTER_ROWS]));
+    let second = bitcast<vec4<f32>>(each_word(record[5u + FILTER_ROWS]));
+    return Clip(first.xyz, vec3<f32>(first.w, second.xy));
+}
+
+fn clipped(fragment: Fragment, clip: Clip, abc: vec3<f32>) -> Fragment {
+    let p = homogeneous(abc);
+    let far_side = p.z > 0.0 && (dot(clip.first, p) < 0.0 || dot(clip.second, p) < 0.0);
+    return Fragment(fragment.hit && !far_side, fragment.depth, fragment.rho2, fragment.gain);
+}

@@ -1,0 +1,3 @@
+fn handed_clip(own: Clip, from_: u32) -> Clip {
+    return own;
+}

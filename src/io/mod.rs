@@ -23,7 +23,7 @@ pub mod png;
 pub mod points;
 mod polygon;
 pub mod texture;
-mod triangles;
+pub(crate) mod triangles;
 mod values;
 pub mod write_behind;
 

@@ -28,6 +28,8 @@ pub struct Points {
     pub up: Option<Up>,
     /// Radii are those with which disks at the vertices cover the triangles of a mesh.
     pub of_mesh: bool,
+    /// The triangles that the points are the vertices of.
+    pub faces: Option<Faces>,
     /// They are the vertices of a mesh that is closed and faces outward: nobody sees its back who is not inside.
     pub closed: bool,
     /// Points that the file holds and that were left out, as it marks them as withheld, which is deleted.
@@ -36,6 +38,17 @@ pub struct Points {
     pub loose: u64,
     /// The numbers, in order, of all points that the file holds and that were left out; they start at 0.
     pub left_out: Vec<u64>,
+    /// The number of the point of the file that each one is, where several are one; they start at 0.
+    pub numbers: Option<Vec<u32>>,
+}
+
+/// The triangles of a mesh.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Faces {
+    /// The vertices of each, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// The normals that the file gives the corners, any length; zero or non-finite means missing.
+    pub normals: Option<Vec<[[f32; 3]; 3]>>,
 }
 
 impl Points {
@@ -48,10 +61,32 @@ impl Points {
         self.clips.iter_mut().for_each(|all| retain(all, keep));
         self.texture.iter_mut().for_each(|all| retain(all, keep));
         self.colors.iter_mut().for_each(|all| retain_colors(all, keep));
+        if let Some(numbers) = &mut self.numbers {
+            return retain(numbers, keep);
+        }
         let dropped = keep.iter().enumerate().filter(|(_, keep)| !**keep);
         let dropped: Vec<u64> = dropped.map(|(read, _)| number(&self.left_out, read as u64)).collect();
         self.left_out.extend(dropped);
         self.left_out.sort_unstable();
+    }
+}
+
+/// The positions, colours and texture coordinates of the points `of`, by their index, which may be there several times.
+pub(crate) fn taken(points: Points, of: Vec<u32>) -> Points {
+    fn each<T: Copy>(values: &[T], of: &[u32]) -> Vec<T> {
+        of.iter().map(|&index| values[index as usize]).collect()
+    }
+    let colors = match points.colors {
+        Some(Colors::Srgb8(codes)) => Some(Colors::Srgb8(each(&codes, &of))),
+        Some(Colors::Linear(colors)) => Some(Colors::Linear(each(&colors, &of))),
+        other => other,
+    };
+    Points {
+        positions: each(&points.positions, &of),
+        colors,
+        texture: points.texture.map(|texture| each(&texture, &of)),
+        numbers: Some(of),
+        ..points
     }
 }
 

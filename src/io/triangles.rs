@@ -2,8 +2,6 @@
 
 use glam::{DVec3, Vec3};
 
-use super::Points;
-
 /// How much larger radii are than needed to cover: a blending kernel fades towards its rim.
 const OVERLAP: f64 = 1.1;
 
@@ -66,17 +64,6 @@ impl<'a> Triangles<'a> {
     }
 }
 
-/// Vertices that no triangle with an area names cover nothing: they are left out of `points`, the vertices of a mesh whose triangles
-/// gave them `radii`, unless they are most of them, as in a cloud with a few triangles.
-pub(super) fn leave_out_loose(points: &mut Points, radii: &[f32]) {
-    let named: Vec<bool> = radii.iter().map(|radius| *radius > 0.0).collect();
-    let loose = named.iter().filter(|named| !**named).count();
-    if loose > 0 && 2 * loose <= named.len() {
-        points.retain(&named);
-        points.loose = loose as u64;
-    }
-}
-
 /// Whether each of the normals that are `given` is on the side that the `triangles` say, where both say one.
 pub(super) fn agree(given: &[[f32; 3]], triangles: &[[f32; 3]]) -> bool {
     let side = |(a, b): (&[f32; 3], &[f32; 3])| Vec3::from_array(*a).dot(Vec3::from_array(*b));
@@ -88,7 +75,7 @@ pub(super) fn agree(given: &[[f32; 3]], triangles: &[[f32; 3]]) -> bool {
 /// In an acute triangle the circumcentre is the last point to be covered. In one that is obtuse at C, it lies outside;
 /// the last points are on the longest side, where the bisectors of the sides at C cross it: b / (2 cos A) from A and
 /// a / (2 cos B) from B.
-fn covering_radius(p: DVec3, q: DVec3, r: DVec3) -> Option<f64> {
+pub(crate) fn covering_radius(p: DVec3, q: DVec3, r: DVec3) -> Option<f64> {
     let double_area = (q - p).cross(r - p).length();
     let mut sides = [p.distance(q), q.distance(r), r.distance(p)];
     sides.sort_by(f64::total_cmp);

@@ -11,20 +11,25 @@ struct Input {
     first: u64,
     /// Numbers of the points that are no surfels, in order.
     left_out: Vec<u64>,
+    /// The number of each of the others, where several surfels are of one.
+    numbers: Option<Vec<u32>>,
 }
 
 impl Provenance {
     /// Another input follows, whose first surfel would be number `first` of the scene; `left_out` are the numbers, in order, of those of
     /// its points that become none.
-    pub fn push(&mut self, first: u64, left_out: Vec<u64>) {
-        self.0.push(Input { first, left_out });
+    /// Where one point becomes several surfels, `numbers` are those of each surfel's point among those that are kept.
+    pub fn push(&mut self, first: u64, left_out: Vec<u64>, numbers: Option<Vec<u32>>) {
+        self.0.push(Input { first, left_out, numbers });
     }
 
     /// The number of the input that surfel `index` comes from, and of the point in it; both start at 0.
     pub fn of(&self, index: u64) -> (u64, u64) {
         let after = self.0.partition_point(|input| input.first <= index);
         let Some(input) = after.checked_sub(1).and_then(|input| self.0.get(input)) else { return (0, index) };
-        (after as u64 - 1, number(&input.left_out, index - input.first))
+        let kept = index - input.first;
+        let of = input.numbers.as_ref().and_then(|numbers| numbers.get(kept as usize)).map(|&number| number.into());
+        (after as u64 - 1, number(&input.left_out, of.unwrap_or(kept)))
     }
 }
 
@@ -47,11 +52,11 @@ mod tests {
     fn points_are_numbered_as_their_files_hold_them() {
         let mut provenance = Provenance::default();
         assert_eq!(provenance.of(7), (0, 7));
-        provenance.push(0, vec![0, 3, 4]);
-        provenance.push(3, vec![]);
+        provenance.push(0, vec![0, 3, 4], None);
+        provenance.push(3, vec![], None);
         // An input without a surfel.
-        provenance.push(5, vec![0, 1]);
-        provenance.push(5, vec![1]);
+        provenance.push(5, vec![0, 1], None);
+        provenance.push(5, vec![1], None);
         let all: Vec<_> = (0..8).map(|index| provenance.of(index)).collect();
         assert_eq!(all, [(0, 1), (0, 2), (0, 5), (1, 0), (1, 1), (3, 0), (3, 2), (3, 3)]);
     }

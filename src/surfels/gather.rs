@@ -54,7 +54,7 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
             input.retain(&keep);
         }
         let before = positions.len();
-        provenance.push(before as u64, input.left_out);
+        provenance.push(before as u64, input.left_out, input.numbers);
         append(&mut normals, before, input.normals, kept);
         append(&mut radii, before, input.radii, kept);
         append(&mut axes, before, input.axes, kept);

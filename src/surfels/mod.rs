@@ -10,6 +10,7 @@ mod forest;
 mod from_points;
 mod gather;
 mod graph;
+mod mesh;
 mod neighbours;
 mod orient;
 mod outliers;
@@ -122,7 +123,7 @@ impl Preparation {
 /// [`Error::EmptyScene`] if no input holds a usable point, and
 /// [`Error::Usage`] if normals or radii are missing and there are more than 2^32 - 1 points.
 pub fn build(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Preparation)> {
-    let gathered = gather::gather(inputs)?;
+    let gathered = gather::gather(inputs.into_iter().map(mesh::of_vertices).collect())?;
     built(gathered, progress)
 }
 
@@ -135,7 +136,7 @@ pub fn build_textured(inputs: Vec<Points>, texture: Texture, progress: &dyn Prog
     if inputs.iter().any(|input| input.texture.is_none() && !input.positions.is_empty()) {
         return Err(Error::Usage("a texture paints points that have texture coordinates, and some have none".into()));
     }
-    let mut gathered = gather::gather(inputs)?;
+    let mut gathered = gather::gather(inputs.into_iter().map(mesh::of_vertices).collect())?;
     let mut places = gathered.texture.take().unwrap_or_default();
     let unusable = |place: &[f32; 2]| !place.iter().all(|turns| turns.abs() <= LARGEST_PLACE);
     for place in places.iter_mut().filter(|place| unusable(place)) {

@@ -9,7 +9,8 @@ pub(super) use material::companions;
 
 use crate::io::closed::is_closed;
 use crate::io::fault::{self, Fault};
-use crate::io::triangles::{Triangles, leave_out_loose};
+use crate::io::points::Faces;
+use crate::io::triangles::Triangles;
 use crate::io::{Input, Mesh, Points, Up};
 use crate::{Progress, Result};
 use lines::Lines;
@@ -70,9 +71,10 @@ fn read_with<T>(input: Input, surface: bool, progress: &dyn Progress, make: impl
 fn points(lines: Lines) -> Points {
     let colors = lines.colors();
     let mut around = Triangles::new(&lines.positions);
-    let mut triangles = Vec::new();
+    let (mut triangles, mut named) = (Vec::new(), Vec::new());
     for triangle in lines.triangles() {
         triangles.push(triangle.vertices);
+        named.extend(triangle.normals.map(|named| named.map(|normal| normal.map(|c| c as f32))));
         around.add(triangle.vertices.map(|vertex| vertex as usize), triangle.normals.map(|all| all.map(Some)));
     }
     let has_faces = !lines.faces.is_empty();
@@ -83,20 +85,20 @@ fn points(lines: Lines) -> Points {
         true => Some(face_normals),
         false => (!lines.normals.is_empty() && lines.normals.len() == lines.positions.len()).then(paired),
     };
-    let mut points = Points {
+    Points {
         normals,
-        radii: has_faces.then(|| radii.clone()),
+        radii: has_faces.then_some(radii),
         of_mesh: has_faces,
         closed: face_as_named && is_closed(&lines.positions, &triangles),
         colors,
         up: Some(Up::Y),
+        faces: has_faces.then(|| {
+            let all = named.len() == triangles.len();
+            Faces { triangles, normals: all.then_some(named) }
+        }),
         positions: lines.positions,
         ..Points::default()
-    };
-    if has_faces {
-        leave_out_loose(&mut points, &radii);
     }
-    points
 }
 
 /// The mesh without its materials, the libraries they are in, and their names.

@@ -45,12 +45,12 @@ pub fn read(input: Input, progress: &dyn Progress) -> Result<Points> {
     let (normals, radii) = triangles.finish();
     let closed = closed::is_closed(&points.positions, &faces.triangles);
     points.closed = closed && points.normals.as_ref().is_none_or(|given| triangles::agree(given, &normals));
+    let corners = |given: &Vec<[f32; 3]>| faces.triangles.iter().map(|t| t.map(|v| given[v as usize])).collect();
+    let named = points.normals.as_ref().map(corners);
     points.normals.get_or_insert(normals);
     points.of_mesh = points.radii.is_none() && points.axes.is_none();
-    points.radii.get_or_insert_with(|| radii.clone());
-    if points.of_mesh {
-        triangles::leave_out_loose(&mut points, &radii);
-    }
+    points.radii.get_or_insert(radii);
+    points.faces = Some(crate::io::points::Faces { triangles: faces.triangles, normals: named });
     Ok(points)
 }
 

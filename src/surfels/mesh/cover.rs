@@ -1,0 +1,137 @@
+//! Ellipses with which disks at its corners cover a triangle, and the lines at which they end.
+
+use std::f64::consts::PI;
+
+use glam::{DMat2, DVec2, DVec3};
+
+use super::fans::Fan;
+use crate::io::triangles::covering_radius;
+
+/// A triangle with an area.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Facet {
+    /// Unit.
+    pub normal: DVec3,
+    /// Square world units.
+    pub area: f64,
+    /// The smallest radius with which disks at the corners cover it, world units.
+    radius: f64,
+    /// It is covered with less by ellipses of its own shape.
+    long: bool,
+}
+
+/// Of so much less than the circles' area ellipses are taken.
+const WORTH: f64 = 0.8;
+
+impl Facet {
+    /// The triangle of these vertices; none if it has no area or a coordinate is not finite.
+    pub fn of(positions: &[[f64; 3]], corners: [u32; 3]) -> Option<Self> {
+        let [a, b, c] = corners.map(|corner| DVec3::from(positions[corner as usize]));
+        let double = (b - a).cross(c - a);
+        let radius = covering_radius(a, b, c)?;
+        let normal = double.try_normalize()?;
+        let area = 0.5 * double.length();
+        // The ellipse of an equilateral triangle of area A has 4 π / (3 √3) A.
+        let ellipse = 4.0 * PI / (3.0 * 3f64.sqrt()) * area;
+        Some(Self { normal, area, radius, long: ellipse < WORTH * PI * radius * radius })
+    }
+}
+
+/// The ellipse `q q^T <= S` around a corner of a triangle, as S, with which, at each corner, it is covered. The two `sides` go from
+/// the corner, in its plane.
+///
+/// An equilateral triangle is covered by disks of its circumradius at its corners. Any other is the affine image of one, and so
+/// covered by the images of those disks: with corners q_i and their mean m, `S = 2/3 sum (q_i - m)(q_i - m)^T`.
+pub(super) fn wanted(facet: &Facet, [p, q]: [DVec2; 2]) -> DMat2 {
+    if !facet.long {
+        return DMat2::from_diagonal(DVec2::splat(facet.radius * facet.radius));
+    }
+    let mean = (p + q) / 3.0;
+    let square = |d: DVec2| DMat2::from_cols(d * d.x, d * d.y);
+    (square(mean) + square(p - mean) + square(q - mean)) * (2.0 / 3.0)
+}
+
+/// An ellipse around the origin: `q^T S^-1 q <= 1`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ellipse(DMat2);
+
+impl Ellipse {
+    /// A small one that holds all of `ellipses`: of the shape of a circle, of one of them, or of their sum, whichever is least.
+    pub fn around(ellipses: &[DMat2]) -> Option<Self> {
+        let sum = ellipses.iter().fold(DMat2::ZERO, |sum, one| sum + *one);
+        let shapes = ellipses.iter().copied().chain([DMat2::IDENTITY, sum]);
+        let scaled = shapes.filter_map(|shape| {
+            let inverse = shape.inverse();
+            // The largest eigenvalue of shape^-1 S: how much the shape is to be enlarged.
+            let factor = ellipses.iter().map(|one| largest_eigenvalue(inverse * *one)).fold(0.0, f64::max);
+            let scaled = shape * factor;
+            (scaled.is_finite() && scaled.determinant() > 0.0).then_some(scaled)
+        });
+        scaled.min_by(|a, b| a.determinant().total_cmp(&b.determinant())).map(Self)
+    }
+
+    /// The half-axes, the longer one first; the second is the first one turned to the left.
+    pub fn half_axes(&self) -> [DVec2; 2] {
+        let [a, b, c] = [self.0.x_axis.x, self.0.x_axis.y, self.0.y_axis.y];
+        let angle = 0.5 * (2.0 * b).atan2(a - c);
+        let along = DVec2::from_angle(angle);
+        let length = |d: DVec2| d.dot(self.0 * d).max(0.0).sqrt();
+        [along * length(along), along.perp() * length(along.perp())]
+    }
+}
+
+/// Of a matrix whose eigenvalues are real.
+fn largest_eigenvalue(m: DMat2) -> f64 {
+    let half = 0.5 * (m.x_axis.x + m.y_axis.y);
+    half + (half * half - m.determinant()).max(0.0).sqrt()
+}
+
+/// A line in a surfel's plane: what is kept has `normal . q >= offset`, world units from the surfel's centre.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Line {
+    normal: DVec2,
+    offset: f64,
+}
+
+impl Line {
+    /// The line as the disk of two half-axes has it ([`Clip`](crate::scene::Clip)), moved out by `margin`.
+    pub fn on_disk(&self, major: DVec2, minor: DVec2, margin: f64) -> [f32; 3] {
+        let line = [self.normal.dot(major), self.normal.dot(minor), margin - self.offset];
+        // Of a length near one, as half-axes may be of any.
+        let longest = line.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+        line.map(|x| (x / longest) as f32)
+    }
+}
+
+/// Sides that enclose so much more than a straight angle are taken for one.
+const STRAIGHT: f64 = 0.05;
+
+/// Where the surfels of a fan end, of which none is longer than `reach`: a list of at most two lines for each of them. `sides` go
+/// from the vertex to the two other corners of each triangle, in the fan's plane.
+pub(super) fn lines(fan: &Fan, sides: &[[DVec2; 2]], reach: f64) -> Vec<Vec<Line>> {
+    let mut opposite: Vec<Line> =
+        fan.corners.iter().zip(sides).filter(|(corner, _)| corner.ends).filter_map(|(_, side)| across(*side)).collect();
+    opposite.retain(|line| -line.offset < reach);
+    opposite.sort_by(|a, b| b.offset.total_cmp(&a.offset));
+    let (Some([first, _]), Some([_, last])) = (sides.first(), sides.last()) else { return Vec::new() };
+    if fan.round {
+        opposite.truncate(2);
+        return vec![opposite];
+    }
+    let angle: f64 = sides.iter().map(|[next, last]| next.perp_dot(*last).atan2(next.dot(*last))).sum();
+    let along = |d: DVec2| Some(Line { normal: d.try_normalize()?, offset: 0.0 });
+    let (Some(left), Some(right)) = (along(first.perp()), along(-last.perp())) else { return vec![Vec::new()] };
+    if angle > PI + STRAIGHT {
+        let beside = |side: Line| [side].into_iter().chain(opposite.iter().copied()).take(2).collect();
+        return vec![beside(left), beside(right)];
+    }
+    vec![vec![left, right]]
+}
+
+/// The line through the corners opposite to a triangle's vertex.
+fn across([p, q]: [DVec2; 2]) -> Option<Line> {
+    let normal = (q - p).perp().try_normalize()?;
+    // Counter-clockwise the vertex is on the left.
+    let offset = normal.dot(p);
+    (offset < 0.0).then_some(Line { normal, offset })
+}

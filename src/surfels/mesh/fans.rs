@@ -1,0 +1,186 @@
+//! The triangles around a vertex, in turn, and where the surface has an edge or a border between them.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::cover::Facet;
+
+/// The cosine of the angle between the normals of two triangles past which their common edge is one of the surface: of 25, 35, 45
+/// and 60 degrees this gave the best pictures of the models of `benches/picture.toml`.
+pub(super) static EDGE: std::sync::LazyLock<f64> = std::sync::LazyLock::new(|| std::env::var("EDGE_DEG").ok().and_then(|v| v.parse::<f64>().ok()).unwrap_or(40.0).to_radians().cos());
+
+/// A triangle at a vertex: its two other corners, counter-clockwise seen from outside.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Corner {
+    /// Which one.
+    pub triangle: u32,
+    /// Which of its corners is the vertex.
+    pub place: usize,
+    /// The corner that follows the vertex.
+    pub next: u32,
+    /// The one after that.
+    pub last: u32,
+    /// The edge from `next` to `last` is one of the surface: a border, or an edge.
+    pub ends: bool,
+}
+
+/// Triangles around a vertex that make one piece of a surface.
+#[derive(Clone, Debug)]
+pub(super) struct Fan {
+    /// In turn, counter-clockwise seen from outside.
+    pub corners: Vec<Corner>,
+    /// It goes round the vertex: it has no sides.
+    pub round: bool,
+    /// Unit, of its plane.
+    pub normal: DVec3,
+}
+
+impl Fan {
+    fn new(corners: Vec<Corner>, round: bool, facets: &[Option<Facet>]) -> Self {
+        let facet = |corner: &Corner| facets[corner.triangle as usize].as_ref();
+        let sum: DVec3 = corners.iter().filter_map(facet).map(|facet| facet.normal * facet.area).sum();
+        let normal = sum.try_normalize().or_else(|| corners.iter().find_map(facet).map(|facet| facet.normal));
+        Self { corners, round, normal: normal.unwrap_or(DVec3::Z) }
+    }
+
+    /// Takes the mean of the normals that its corners name, where that is near the plane's.
+    pub fn face_as(&mut self, normals: &[[[f32; 3]; 3]]) {
+        let named = |corner: &Corner| DVec3::from(normals[corner.triangle as usize][corner.place].map(f64::from));
+        let mean =
+            self.corners.iter().map(|corner| named(corner).normalize_or_zero()).sum::<DVec3>().normalize_or_zero();
+        if mean.is_finite() && mean.dot(self.normal) > *EDGE {
+            self.normal = mean;
+        }
+    }
+}
+
+/// Which triangles are around each vertex.
+pub(super) struct Around {
+    /// Those of vertex v are `triangles[starts[v]..starts[v + 1]]`.
+    starts: Vec<u32>,
+    triangles: Vec<u32>,
+    /// For each side of each triangle, from its corner on: what is on the other side.
+    beyond: Vec<[Beyond; 3]>,
+}
+
+/// What is on the other side of a triangle's side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Beyond {
+    /// A triangle that goes on with the surface.
+    Surface(u32),
+    /// An edge, a border, or several triangles.
+    Edge,
+}
+
+impl Around {
+    /// Those of a mesh of so many `vertices`; triangles without an area are none.
+    pub fn new(vertices: usize, triangles: &[[u32; 3]], facets: &[Option<Facet>]) -> Self {
+        let real = || (0u32..).zip(triangles.iter().zip(facets)).filter(|(_, (_, facet))| facet.is_some());
+        let mut starts = vec![0u32; vertices + 1];
+        for (_, (corners, _)) in real() {
+            corners.iter().for_each(|&corner| starts[corner as usize + 1] += 1);
+        }
+        for vertex in 0..vertices {
+            starts[vertex + 1] += starts[vertex];
+        }
+        let mut next = starts.clone();
+        let mut of = vec![0; starts[vertices] as usize];
+        for (number, (corners, _)) in real() {
+            for &corner in corners {
+                of[next[corner as usize] as usize] = number;
+                next[corner as usize] += 1;
+            }
+        }
+        let mut around = Self { starts, triangles: of, beyond: Vec::new() };
+        let beyond = |number: u32| [0, 1, 2].map(|side| around.beyond_side(number, side, triangles, facets));
+        around.beyond = (0..triangles.len() as u32).into_par_iter().map(beyond).collect();
+        around
+    }
+
+    fn of(&self, vertex: u32) -> &[u32] {
+        &self.triangles[self.starts[vertex as usize] as usize..self.starts[vertex as usize + 1] as usize]
+    }
+
+    /// Vertices that no triangle names.
+    pub fn loose(&self) -> usize {
+        self.starts.windows(2).filter(|pair| pair[0] == pair[1]).count()
+    }
+
+    fn beyond_side(&self, number: u32, side: usize, triangles: &[[u32; 3]], facets: &[Option<Facet>]) -> Beyond {
+        let corners = triangles[number as usize];
+        let (from, to) = (corners[side], corners[(side + 1) % 3]);
+        let shares = |other: &&u32| **other != number && triangles[**other as usize].contains(&to);
+        let mut others = self.of(from).iter().filter(shares);
+        let (Some(&other), None) = (others.next(), others.next()) else { return Beyond::Edge };
+        let goes_back = (0..3).any(|k| {
+            let corners = triangles[other as usize];
+            (corners[k], corners[(k + 1) % 3]) == (to, from)
+        });
+        let normals = [number, other].map(|triangle| facets[triangle as usize].as_ref().map(|facet| facet.normal));
+        match normals {
+            [Some(one), Some(next)] if goes_back && one.dot(next) > *EDGE => Beyond::Surface(other),
+            _ => Beyond::Edge,
+        }
+    }
+
+    fn corner(&self, triangle: u32, vertex: u32, triangles: &[[u32; 3]]) -> Option<Corner> {
+        let corners = triangles[triangle as usize];
+        let place = corners.iter().position(|&corner| corner == vertex)?;
+        let ends = self.beyond[triangle as usize][(place + 1) % 3] == Beyond::Edge;
+        Some(Corner { triangle, place, next: corners[(place + 1) % 3], last: corners[(place + 2) % 3], ends })
+    }
+
+    /// The fans of a vertex.
+    pub fn fans(&self, vertex: u32, triangles: &[[u32; 3]], facets: &[Option<Facet>]) -> Vec<Fan> {
+        let corners: Vec<Corner> =
+            self.of(vertex).iter().filter_map(|&triangle| self.corner(triangle, vertex, triangles)).collect();
+        // What follows a triangle, counter-clockwise, lies beyond its side from the last corner to the vertex.
+        let follows = |corner: &Corner| match self.beyond[corner.triangle as usize][(corner.place + 2) % 3] {
+            Beyond::Surface(other) => corners.iter().position(|corner| corner.triangle == other),
+            Beyond::Edge => None,
+        };
+        let after: Vec<Option<usize>> = corners.iter().map(follows).collect();
+        let mut begins = vec![true; corners.len()];
+        after.iter().flatten().for_each(|&next| begins[next] = false);
+        let mut seen = vec![false; corners.len()];
+        let mut fans = Vec::new();
+        // First those with sides, from their first triangle on; what is left goes round.
+        let firsts = (0..corners.len()).filter(|&k| begins[k]).chain((0..corners.len()).filter(|&k| !begins[k]));
+        for first in firsts {
+            let (mut fan, mut at) = (Vec::new(), Some(first));
+            while let Some(k) = at.filter(|&k| !seen[k]) {
+                seen[k] = true;
+                fan.push(corners[k]);
+                at = after[k];
+            }
+            if !fan.is_empty() {
+                fans.push(Fan::new(fan, !begins[first], facets));
+            }
+        }
+        fans.into_iter().flat_map(|fan| flat(fan, facets)).collect()
+    }
+}
+
+/// The fan, or where its triangles turn away from its plane too far, its parts between the sides at which they turn most.
+fn flat(fan: Fan, facets: &[Option<Facet>]) -> Vec<Fan> {
+    let normal = |corner: &Corner| facets[corner.triangle as usize].as_ref().map_or(fan.normal, |facet| facet.normal);
+    let bent = fan.corners.iter().any(|corner| normal(corner).dot(fan.normal) < *EDGE);
+    let count = fan.corners.len();
+    if !bent || count < 2 {
+        return vec![fan];
+    }
+    // How much the surface turns between a triangle and the one that follows it.
+    let turn = |k: usize| normal(&fan.corners[k]).dot(normal(&fan.corners[(k + 1) % count]));
+    let mut sides: Vec<usize> = (0..count - usize::from(!fan.round)).collect();
+    sides.sort_by(|&a, &b| turn(a).total_cmp(&turn(b)).then(a.cmp(&b)));
+    let cut = |corners: &[Corner]| flat(Fan::new(corners.to_vec(), false, facets), facets);
+    match fan.round {
+        true => {
+            // Two cuts: the part between them, and the one that goes on to the first.
+            let (low, high) = (sides[0].min(sides[1]) + 1, sides[0].max(sides[1]) + 1);
+            let rest = [&fan.corners[high..], &fan.corners[..low]].concat();
+            [cut(&fan.corners[low..high]), cut(&rest)].concat()
+        }
+        false => [cut(&fan.corners[..=sides[0]]), cut(&fan.corners[sides[0] + 1..])].concat(),
+    }
+}

@@ -14,6 +14,9 @@ pub(super) struct Facet {
     pub normal: DVec3,
     /// Square world units.
     pub area: f64,
+    /// At its corners, radians.
+    pub angles: [f64; 3],
+    corners: [DVec3; 3],
     /// The smallest radius with which disks at the corners cover it, world units.
     radius: f64,
     /// It is covered with less by ellipses of its own shape.
@@ -33,7 +36,21 @@ impl Facet {
         let area = 0.5 * double.length();
         // The ellipse of an equilateral triangle of area A has 4 π / (3 √3) A.
         let ellipse = 4.0 * PI / (3.0 * 3f64.sqrt()) * area;
-        Some(Self { normal, area, radius, long: ellipse < WORTH * PI * radius * radius })
+        let angle = |p: DVec3, q: DVec3| p.cross(q).length().atan2(p.dot(q));
+        let angles = [angle(b - a, c - a), angle(c - b, a - b), angle(a - c, b - c)];
+        Some(Self { normal, area, angles, corners: [a, b, c], radius, long: ellipse < WORTH * PI * radius * radius })
+    }
+}
+
+impl Facet {
+    /// From one of its corners to the two that follow it.
+    pub fn sides(&self, place: usize) -> [DVec3; 2] {
+        [1, 2].map(|next| self.corners[(place + next) % 3] - self.corners[place])
+    }
+
+    /// How far disks at its corners reach, world units, about.
+    pub fn reach(&self) -> f64 {
+        self.radius
     }
 }
 
@@ -68,6 +85,11 @@ impl Ellipse {
             (scaled.is_finite() && scaled.determinant() > 0.0).then_some(scaled)
         });
         scaled.min_by(|a, b| a.determinant().total_cmp(&b.determinant())).map(Self)
+    }
+
+    /// The product of the half-axes.
+    pub fn square(&self) -> f64 {
+        self.0.determinant().max(0.0).sqrt()
     }
 
     /// The half-axes, the longer one first; the second is the first one turned to the left.

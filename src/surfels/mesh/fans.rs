@@ -1,14 +1,16 @@
 //! The triangles around a vertex, in turn, and where the surface has an edge or a border between them.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::cover::Facet;
+use super::cover::{self, Ellipse, Facet};
 
 /// The cosine of the angle between the normals of two triangles past which their common edge is one of the surface: of 25, 35, 45
 /// and 60 degrees this gave the best pictures of the models of `benches/picture.toml`.
 pub(super) static EDGE: std::sync::LazyLock<f64> = std::sync::LazyLock::new(|| std::env::var("EDGE_DEG").ok().and_then(|v| v.parse::<f64>().ok()).unwrap_or(40.0).to_radians().cos());
 
+pub(super) static WASTE: std::sync::LazyLock<f64> = std::sync::LazyLock::new(|| std::env::var("WASTE").ok().and_then(|v| v.parse::<f64>().ok()).unwrap_or(4.0));
+pub(super) static DEV: std::sync::LazyLock<f64> = std::sync::LazyLock::new(|| std::env::var("DEV").ok().and_then(|v| v.parse::<f64>().ok()).unwrap_or(1.0));
 /// A triangle at a vertex: its two other corners, counter-clockwise seen from outside.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Corner {
@@ -43,12 +45,28 @@ impl Fan {
         Self { corners, round, normal: normal.unwrap_or(DVec3::Z) }
     }
 
-    /// Takes the mean of the normals that its corners name, where that is near the plane's.
-    pub fn face_as(&mut self, normals: &[[[f32; 3]; 3]]) {
+    /// Whether one ellipse is much larger than the parts of the triangles that it is to cover.
+    fn wasteful(&self, facets: &[Option<Facet>]) -> bool {
+        let facet = |corner: &Corner| Some((facets[corner.triangle as usize].as_ref()?, corner.place));
+        let (x, y) = self.normal.any_orthonormal_pair();
+        let (mut angle, mut area, mut wanted) = (0.0, 0.0, Vec::new());
+        for (facet, place) in self.corners.iter().filter_map(facet) {
+            angle += facet.angles[place];
+            area += facet.area / 3.0;
+            let sides = facet.sides(place).map(|d| DVec2::new(d.dot(x), d.dot(y)));
+            wanted.push(cover::wanted(facet, sides));
+        }
+        Ellipse::around(&wanted).is_some_and(|ellipse| 0.5 * angle * ellipse.square() > *WASTE * area)
+    }
+
+    /// Takes the mean of the normals that its corners name, where a disk that is turned to it stays within `tolerance`.
+    pub fn face_as(&mut self, normals: &[[[f32; 3]; 3]], facets: &[Option<Facet>], tolerance: f64) {
         let named = |corner: &Corner| DVec3::from(normals[corner.triangle as usize][corner.place].map(f64::from));
         let mean =
             self.corners.iter().map(|corner| named(corner).normalize_or_zero()).sum::<DVec3>().normalize_or_zero();
-        if mean.is_finite() && mean.dot(self.normal) > *EDGE {
+        let reach = self.corners.iter().filter_map(|corner| Some(facets[corner.triangle as usize].as_ref()?.reach()));
+        let turned = mean.cross(self.normal).length() * reach.fold(0.0, f64::max);
+        if mean.is_finite() && mean.dot(self.normal) > *EDGE && turned <= tolerance {
             self.normal = mean;
         }
     }
@@ -131,7 +149,7 @@ impl Around {
     }
 
     /// The fans of a vertex.
-    pub fn fans(&self, vertex: u32, triangles: &[[u32; 3]], facets: &[Option<Facet>]) -> Vec<Fan> {
+    pub fn fans(&self, vertex: u32, triangles: &[[u32; 3]], facets: &[Option<Facet>], tolerance: f64) -> Vec<Fan> {
         let corners: Vec<Corner> =
             self.of(vertex).iter().filter_map(|&triangle| self.corner(triangle, vertex, triangles)).collect();
         // What follows a triangle, counter-clockwise, lies beyond its side from the last corner to the vertex.
@@ -157,30 +175,48 @@ impl Around {
                 fans.push(Fan::new(fan, !begins[first], facets));
             }
         }
-        fans.into_iter().flat_map(|fan| flat(fan, facets)).collect()
+        fans.into_iter().flat_map(|fan| parts(fan, facets, tolerance)).collect()
     }
 }
 
-/// The fan, or where its triangles turn away from its plane too far, its parts between the sides at which they turn most.
-fn flat(fan: Fan, facets: &[Option<Facet>]) -> Vec<Fan> {
-    let normal = |corner: &Corner| facets[corner.triangle as usize].as_ref().map_or(fan.normal, |facet| facet.normal);
-    let bent = fan.corners.iter().any(|corner| normal(corner).dot(fan.normal) < *EDGE);
+/// The parts of a fan that a disk each stands for well: where its triangles turn away from its plane, or one ellipse would be much
+/// larger than what it is to cover, it is cut.
+fn parts(fan: Fan, facets: &[Option<Facet>], tolerance: f64) -> Vec<Fan> {
     let count = fan.corners.len();
-    if !bent || count < 2 {
+    if count < 2 {
         return vec![fan];
     }
-    // How much the surface turns between a triangle and the one that follows it.
-    let turn = |k: usize| normal(&fan.corners[k]).dot(normal(&fan.corners[(k + 1) % count]));
-    let mut sides: Vec<usize> = (0..count - usize::from(!fan.round)).collect();
-    sides.sort_by(|&a, &b| turn(a).total_cmp(&turn(b)).then(a.cmp(&b)));
-    let cut = |corners: &[Corner]| flat(Fan::new(corners.to_vec(), false, facets), facets);
-    match fan.round {
-        true => {
-            // Two cuts: the part between them, and the one that goes on to the first.
-            let (low, high) = (sides[0].min(sides[1]) + 1, sides[0].max(sides[1]) + 1);
-            let rest = [&fan.corners[high..], &fan.corners[..low]].concat();
-            [cut(&fan.corners[low..high]), cut(&rest)].concat()
-        }
-        false => [cut(&fan.corners[..=sides[0]]), cut(&fan.corners[sides[0] + 1..])].concat(),
+    let facet = |corner: &Corner| facets[corner.triangle as usize].as_ref();
+    let bent = fan.corners.iter().filter_map(facet).any(|facet| {
+        let cosine = facet.normal.dot(fan.normal).clamp(-1.0, 1.0);
+        cosine < *EDGE || facet.reach() * (1.0 - cosine * cosine).sqrt() > tolerance
+    });
+    if !bent && !fan.wasteful(facets) {
+        return vec![fan];
     }
+    // Between a triangle and the one that follows it.
+    let mut sides: Vec<usize> = (0..count - usize::from(!fan.round)).collect();
+    if bent {
+        let normal = |k: usize| facet(&fan.corners[k % count]).map_or(fan.normal, |facet| facet.normal);
+        let turn = |k: usize| normal(k).dot(normal(k + 1));
+        sides.sort_by(|&a, &b| turn(a).total_cmp(&turn(b)).then(a.cmp(&b)));
+    } else {
+        // Half of the angle each.
+        let angles: Vec<f64> = fan.corners.iter().map(|corner| facet(corner).map_or(0.0, |f| f.angles[corner.place])).collect();
+        let half = 0.5 * angles.iter().sum::<f64>();
+        let so_far = |k: usize| angles[..=k].iter().sum::<f64>();
+        sides.sort_by(|&a, &b| (so_far(a) - half).abs().total_cmp(&(so_far(b) - half).abs()).then(a.cmp(&b)));
+        if fan.round {
+            sides.insert(1, count - 1);
+            sides.dedup();
+        }
+    }
+    let cut = |corners: &[Corner]| parts(Fan::new(corners.to_vec(), false, facets), facets, tolerance);
+    if !fan.round {
+        return [cut(&fan.corners[..=sides[0]]), cut(&fan.corners[sides[0] + 1..])].concat();
+    }
+    // Two cuts: the part between them, and the one that goes on to the first.
+    let (low, high) = (sides[0].min(sides[1]) + 1, sides[0].max(sides[1]) + 1);
+    let rest = [&fan.corners[high..], &fan.corners[..low]].concat();
+    [cut(&fan.corners[low..high]), cut(&rest)].concat()
 }

@@ -41,10 +41,11 @@ pub(super) fn of_vertices(mut points: Points) -> Points {
     if 2 * loose > points.positions.len() {
         return points;
     }
+    let tolerance = *fans::DEV * crate::surfels::bounds(&points).extent().length();
     let made = |vertex: u32| {
-        let mut fans = around.fans(vertex, &faces.triangles, &facets);
+        let mut fans = around.fans(vertex, &faces.triangles, &facets, tolerance);
         if let Some(normals) = &faces.normals {
-            fans.iter_mut().for_each(|fan| fan.face_as(normals));
+            fans.iter_mut().for_each(|fan| fan.face_as(normals, &facets, tolerance));
         }
         fans.into_iter().flat_map(|fan| surfels(vertex, &fan, &points.positions, &facets)).collect::<Vec<_>>()
     };

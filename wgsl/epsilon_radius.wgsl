@@ -1,11 +1,11 @@
-// Epsilon as a multiple of the fragment's own surfel's longer half-axis. Twin: src/passes/accumulate.rs.
+// Epsilon as a multiple of the fragment's own surfel's shorter half-axis. Twin: src/passes/accumulate.rs.
 
 // Device units.
 fn radius_of(index: u32) -> f32 {
     let surfel = surfel_at(index);
     let s = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * held.unit;
     let t = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]) * held.unit;
-    return max(length(s), length(t));
+    return min(length(s), length(t));
 }
 
 // Of the largest surfel: what depths are measured by.

@@ -223,7 +223,7 @@ impl Surface {
             normal: if splat.away { -splat.normal } else { splat.normal },
             turned: splat.away,
             normal_error: 6.0 * U * skew + 12.0 * U,
-            radius: f64::from(surfel.radius()),
+            radius: f64::from(surfel.shorter()),
         }
     }
 }
@@ -272,7 +272,7 @@ pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Pi
             front[pixel] = front[pixel].min(f.depth);
         }
     });
-    let deepest = f64::from(scene.largest_radius()) * of_radius + absolute;
+    let deepest = f64::from(scene.largest_shorter()) * of_radius + absolute;
     let farthest = splats.iter().fold(0.0, |far: f64, splat| {
         let surfel = &scene.surfels[splat.surfel as usize];
         let center = Vec3::from_array(surfel.center).as_dvec3() - (camera.eye - scene.origin);

@@ -162,8 +162,7 @@ pub fn reference<'a>(
         let color = [r * alpha, g * alpha, b * alpha, alpha];
         let surfel = &scene.surfels[splat.surfel as usize];
         let center = scene.origin + scene.center(splat.surfel as usize);
-        let radius = f64::from(surfel.radius());
-        let epsilon = absolute + of_radius * radius;
+        let epsilon = absolute + of_radius * f64::from(surfel.shorter());
         let times = f64::from(splat.copies);
         let normal = if splat.away { -splat.normal } else { splat.normal };
         for y in splat.first[1].max(first_row)..=splat.last[1].min(first_row + rows - 1) {

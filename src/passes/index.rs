@@ -66,7 +66,7 @@ fn reference(strip: &Strip<'_>, nearest: &[f64], frame: &mut Frame) {
     let mut strongest = vec![(0.0, NOTHING, NOTHING); nearest.len()];
     for splat in &strip.splats {
         let surfel = splat.surfel as usize;
-        let epsilon = absolute + of_radius * f64::from(scene.surfels[surfel].radius());
+        let epsilon = absolute + of_radius * f64::from(scene.surfels[surfel].shorter());
         for y in splat.first[1].max(first_row)..=splat.last[1].min(first_row + rows - 1) {
             for x in splat.first[0]..=splat.last[0] {
                 let pixel = ((y - first_row) * camera.width + x) as usize;

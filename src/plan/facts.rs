@@ -42,6 +42,8 @@ pub struct Facts {
     pub texture: Option<([u32; 2], PlaceRange)>,
     /// [`Scene::largest_radius`].
     pub largest_radius: f32,
+    /// [`Scene::largest_shorter`].
+    pub largest_shorter: f32,
     /// [`Scene::oriented`].
     pub oriented: bool,
     /// [`Scene::closed`].
@@ -80,6 +82,7 @@ impl Facts {
                 _ => None,
             },
             largest_radius: scene.largest_radius(),
+            largest_shorter: scene.largest_shorter(),
             oriented: scene.oriented,
             closed: scene.closed,
             clips: !scene.clips.is_empty(),

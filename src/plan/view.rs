@@ -86,7 +86,7 @@ impl View {
             epsilon_absolute: (absolute * unit) as f32,
             world: (1.0 / unit) as f32,
             epsilon_radius: of_radius as f32,
-            epsilon_deepest: (of_radius * largest_radius * unit) as f32,
+            epsilon_deepest: (of_radius * f64::from(facts.largest_shorter) * unit) as f32,
             farthest: (farthest * unit) as f32,
             middle: (camera.rotation.row(2).dot(core.center() - eye_relative) * unit) as f32,
             texture_width,

@@ -11,7 +11,7 @@ pub enum Epsilon {
     Relative(f64),
     /// World units.
     Absolute(f64),
-    /// A multiple of the fragment's own surfel's longer half-axis.
+    /// A multiple of the fragment's own surfel's shorter half-axis.
     Radius(f64),
 }
 

@@ -184,6 +184,11 @@ impl Scene {
             .reduce(nothing, merge)
     }
 
+    /// The largest [`Surfel::shorter`], world units; zero for a scene without surfels.
+    pub fn largest_shorter(&self) -> f32 {
+        self.surfels.par_iter().map(Surfel::shorter).reduce(|| 0.0, f32::max)
+    }
+
     /// The largest [`Surfel::radius`], world units; zero for a scene without surfels.
     pub fn largest_radius(&self) -> f32 {
         self.surfels.par_iter().map(Surfel::radius).reduce(|| 0.0, f32::max)

@@ -52,6 +52,12 @@ impl Surfel {
         Vec3::from_array(self.s).cross(Vec3::from_array(self.t))
     }
 
+    /// The shorter half-axis: what an epsilon of `radius:K` is measured by, as a long thin disk would else reach through what lies
+    /// behind it.
+    pub fn shorter(&self) -> f32 {
+        Vec3::from_array(self.s).length().min(Vec3::from_array(self.t).length())
+    }
+
     /// The radius of the bounding sphere: the longer half-axis, for perpendicular axes.
     pub fn radius(&self) -> f32 {
         Vec3::from_array(self.s).length().max(Vec3::from_array(self.t).length())

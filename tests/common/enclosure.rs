@@ -145,7 +145,7 @@ fn accumulate(
     for candidate in candidates {
         let splat = &splats[candidate.splat];
         let pixel = &mut pixels[candidate.pixel];
-        let epsilon = absolute + of_radius * f64::from(scene.surfels[splat.surfel as usize].radius());
+        let epsilon = absolute + of_radius * f64::from(scene.surfels[splat.surfel as usize].shorter());
         let back = |front: f64| front * (1.0 + relative) + epsilon;
         if candidate.depth.low > back(pixel.nearest.high) * (1.0 + rounding) {
             continue;

@@ -113,12 +113,14 @@ fn largest_eigenvalue(m: DMat2) -> f64 {
 pub(super) struct Line {
     normal: DVec2,
     offset: f64,
+    /// The sine of half the angle that it makes with the other line: the point between them moves out by no more than the margin.
+    sharp: f64,
 }
 
 impl Line {
     /// The line as the disk of two half-axes has it ([`Clip`](crate::scene::Clip)), moved out by `margin`.
     pub fn on_disk(&self, major: DVec2, minor: DVec2, margin: f64) -> [f32; 3] {
-        let line = [self.normal.dot(major), self.normal.dot(minor), margin - self.offset];
+        let line = [self.normal.dot(major), self.normal.dot(minor), margin * self.sharp - self.offset];
         // Of a length near one, as half-axes may be of any.
         let longest = line.iter().fold(0.0f64, |most, x| most.max(x.abs()));
         line.map(|x| (x / longest) as f32)
@@ -141,7 +143,8 @@ pub(super) fn lines(fan: &Fan, sides: &[[DVec2; 2]], reach: f64) -> Vec<Vec<Line
         return vec![opposite];
     }
     let angle: f64 = sides.iter().map(|[next, last]| next.perp_dot(*last).atan2(next.dot(*last))).sum();
-    let along = |d: DVec2| Some(Line { normal: d.try_normalize()?, offset: 0.0 });
+    let sharp = if angle < PI { (0.5 * angle).sin().max(0.0) } else { 1.0 };
+    let along = |d: DVec2| Some(Line { normal: d.try_normalize()?, offset: 0.0, sharp });
     let (Some(left), Some(right)) = (along(first.perp()), along(-last.perp())) else { return vec![Vec::new()] };
     if angle > PI + STRAIGHT {
         let beside = |side: Line| [side].into_iter().chain(opposite.iter().copied()).take(2).collect();
@@ -155,5 +158,5 @@ fn across([p, q]: [DVec2; 2]) -> Option<Line> {
     let normal = (q - p).perp().try_normalize()?;
     // Counter-clockwise the vertex is on the left.
     let offset = normal.dot(p);
-    (offset < 0.0).then_some(Line { normal, offset })
+    (offset < 0.0).then_some(Line { normal, offset, sharp: 1.0 })
 }

@@ -17,11 +17,11 @@ use crate::io::points::taken;
 use crate::scene::Clip;
 
 /// How much larger disks are than needed to cover: a blending kernel fades towards its rim.
-static OVERLAP: std::sync::LazyLock<f64> = std::sync::LazyLock::new(|| std::env::var("OVERLAP").ok().and_then(|v| v.parse().ok()).unwrap_or(1.1));
+const OVERLAP: f64 = 1.1;
 
-/// How far past an edge or a border a disk goes, in its own longer half-axes: two that end at one line leave no pixel between them
+/// How far past an edge or a border a disk goes, in its own shorter half-axes: two that end at one line leave no pixel between them
 /// out, whatever is rounded.
-static MARGIN: std::sync::LazyLock<f64> = std::sync::LazyLock::new(|| std::env::var("MARGIN").ok().and_then(|v| v.parse().ok()).unwrap_or(0.02));
+const MARGIN: f64 = 0.02;
 
 /// One surfel.
 struct Made {
@@ -41,7 +41,7 @@ pub(super) fn of_vertices(mut points: Points) -> Points {
     if 2 * loose > points.positions.len() {
         return points;
     }
-    let tolerance = *fans::DEV * crate::surfels::bounds(&points).extent().length();
+    let tolerance = fans::TOLERANCE * crate::surfels::bounds(&points).extent().length();
     let made = |vertex: u32| {
         let mut fans = around.fans(vertex, &faces.triangles, &facets, tolerance);
         if let Some(normals) = &faces.normals {
@@ -76,12 +76,12 @@ fn surfels(vertex: u32, fan: &Fan, positions: &[[f64; 3]], facets: &[Option<Face
     let wanted =
         wanted.filter_map(|(corner, sides)| Some(cover::wanted(facets[corner.triangle as usize].as_ref()?, *sides)));
     let Some(ellipse) = Ellipse::around(&wanted.collect::<Vec<_>>()) else { return Vec::new() };
-    let [major, minor] = ellipse.half_axes().map(|axis| axis * *OVERLAP);
+    let [major, minor] = ellipse.half_axes().map(|axis| axis * OVERLAP);
     let world = |axis: DVec2| axis.x * x + axis.y * y;
     let made = |lines: Vec<cover::Line>| {
         let mut clip = Clip::NONE;
         for (line, of_disk) in lines.iter().zip(&mut clip.0) {
-            *of_disk = line.on_disk(major, minor, *MARGIN * major.length());
+            *of_disk = line.on_disk(major, minor, MARGIN * minor.length());
         }
         Made { vertex, s: world(major), t: world(minor), clip }
     };

@@ -20,6 +20,24 @@ impl Provenance {
         self.0.push(Input { first, left_out });
     }
 
+    /// Only those surfels remain whose flag in `keep`, one for each, is set.
+    pub(crate) fn retain(&mut self, keep: &[bool]) {
+        let mut inputs = std::mem::take(&mut self.0).into_iter().peekable();
+        let mut kept = 0;
+        while let Some(Input { first, mut left_out }) = inputs.next() {
+            let end = inputs.peek().map_or(keep.len() as u64, |next| next.first);
+            let own = &keep[first as usize..end as usize];
+            let dropped = own.iter().zip(0..).filter(|(keep, _)| !**keep);
+            let dropped: Vec<u64> = dropped.map(|(_, place)| number(&left_out, place)).collect();
+            self.push(kept, {
+                left_out.extend(&dropped);
+                left_out.sort_unstable();
+                left_out
+            });
+            kept += (own.len() - dropped.len()) as u64;
+        }
+    }
+
     /// The number of the input that surfel `index` comes from, and of the point in it; both start at 0.
     pub fn of(&self, index: u64) -> (u64, u64) {
         let after = self.0.partition_point(|input| input.first <= index);
@@ -54,6 +72,21 @@ mod tests {
         provenance.push(5, vec![1]);
         let all: Vec<_> = (0..8).map(|index| provenance.of(index)).collect();
         assert_eq!(all, [(0, 1), (0, 2), (0, 5), (1, 0), (1, 1), (3, 0), (3, 2), (3, 3)]);
+    }
+
+    #[test]
+    fn points_that_are_dropped_later_are_left_out_too() {
+        let mut provenance = Provenance::default();
+        provenance.push(0, vec![0, 3, 4]);
+        provenance.push(3, vec![]);
+        provenance.push(5, vec![0, 1]);
+        provenance.push(5, vec![1]);
+        let before: Vec<_> = (0..8).map(|index| provenance.of(index)).collect();
+        let keep = [true, false, true, false, true, true, false, true];
+        provenance.retain(&keep);
+        let kept = before.iter().zip(keep).filter(|(_, keep)| *keep).map(|(point, _)| *point);
+        let after: Vec<_> = (0..5).map(|index| provenance.of(index)).collect();
+        assert_eq!(after, kept.collect::<Vec<_>>());
     }
 
     #[test]

@@ -110,6 +110,7 @@ impl Gathered {
         self.axes.iter_mut().for_each(|all| retain(all, keep));
         self.texture.iter_mut().for_each(|all| retain(all, keep));
         self.colors.iter_mut().for_each(|all| retain_colors(all, keep));
+        self.provenance.retain(keep);
     }
 }
 

@@ -132,7 +132,7 @@ fn estimate_at(distinct: &DistinctPositions, index: u32, neighbours: &[Neighbour
 ///
 /// Measured on random points of a sphere, 1,000,000, and on the vertices of igea, the Stanford bunny and the Dragon (1024x1024, PSNR
 /// against rays with `radius:1`): 1.2 times the mean distance alone leaves 3.7e-4 of the sphere's pixels to its back, and gives 31.2,
-/// 24.3 and 31.8 dB; this 3e-5, and 32.3, 25.5 and 33.0 dB, as disks are smaller where points are evenly spaced.
+/// 24.3 and 31.8 dB; this 5e-6, and 32.3, 25.5 and 33.0 dB, as disks are smaller where points are evenly spaced.
 pub(crate) fn fitted_radius(offsets: &[DVec3], normal: DVec3) -> f64 {
     let near = &offsets[..offsets.len().min(RADIUS_NEIGHBOURS)];
     let count = near.len() as f64;

@@ -6,9 +6,11 @@ use std::path::Path;
 
 use epsplat::Error;
 use epsplat::io::{self, Points};
-use epsplat::scene::Colors;
+use epsplat::scene::{Colors, Scene};
 use epsplat::surfels::analytic::{Sample, Shape, generate};
-use epsplat::surfels::{FromPoints, Orientation, Size, Surfels, Triangle, from_points};
+use epsplat::surfels::{
+    FromPoints, Limits, Orientation, Preparation, Size, Surfels, Triangle, build_within, from_points,
+};
 use glam::DVec3;
 
 /// Numbers in [0, 1) that look random.
@@ -47,6 +49,10 @@ fn mean(values: &[f64]) -> f64 {
 
 fn flipped(angles: &[f64]) -> usize {
     angles.iter().filter(|angle| **angle > std::f64::consts::FRAC_PI_2).count()
+}
+
+fn within(outliers: Option<f64>, largest_ratio: f64) -> FromPoints {
+    FromPoints { limits: Limits { outliers, largest_ratio }, ..FromPoints::default() }
 }
 
 fn up() -> FromPoints {
@@ -258,10 +264,10 @@ fn degenerate_clouds_have_surfels() {
 fn options_out_of_range_are_refused() {
     let usual = FromPoints::default;
     for options in [
-        FromPoints { outliers: Some(-1.0), ..usual() },
-        FromPoints { outliers: Some(f64::NAN), ..usual() },
-        FromPoints { largest_ratio: 0.5, ..usual() },
-        FromPoints { largest_ratio: f64::NAN, ..usual() },
+        within(Some(-1.0), 2.0),
+        within(Some(f64::NAN), 2.0),
+        within(None, 0.5),
+        within(None, f64::NAN),
         FromPoints { orientation: Orientation::Toward(vec![]), ..usual() },
         FromPoints { orientation: Orientation::Toward(vec![DVec3::NAN]), ..usual() },
     ] {
@@ -277,29 +283,66 @@ fn outliers_are_dropped_and_counted_with_their_attributes() {
     let colors = (0..5002).map(|i| [i as u8, (i >> 8) as u8, 0, 255]).collect();
     let texture: Vec<_> = (0..5002).map(|i| [i as f32, 0.5]).collect();
     let points = Points { colors: Some(Colors::Srgb8(colors)), texture: Some(texture), ..cloud(positions) };
-    let made = surfels(points.clone(), &FromPoints { outliers: Some(5.0), ..FromPoints::default() });
-    assert_eq!((made.dropped_outliers, made.preparation.surfels), (2, 5000));
+    let made = surfels(points.clone(), &within(Some(5.0), 2.0));
+    assert_eq!((made.preparation.dropped_outliers, made.preparation.surfels), (2, 5000));
     assert_eq!(flipped(&angles(&made, &truth)), 0);
     assert_eq!(made.points.texture.as_ref().unwrap()[99..101], [[99.0, 0.5], [101.0, 0.5]]);
     assert!(matches!(made.points.colors, Some(Colors::Srgb8(ref codes)) if codes[100] == [101, 0, 0, 255]));
     assert!(made.notes()[0].starts_with("2 points were dropped"), "{:?}", made.notes());
-    assert_eq!(surfels(points, &FromPoints { outliers: Some(1e3), ..FromPoints::default() }).dropped_outliers, 0);
+    assert_eq!(surfels(points, &within(Some(1e3), 2.0)).preparation.dropped_outliers, 0);
+}
+
+#[test]
+fn a_scene_of_points_has_the_same_limits() {
+    let (mut positions, _) = samples(Shape::Plane, 10_000);
+    let count = positions.len();
+    // A sparse strip beside the dense square, nine points of which would see one another across it.
+    positions.extend((0..40).map(|k| [1.15 + 0.1 * f64::from(k % 2), -0.9 + 0.045 * f64::from(k), 0.0]));
+    positions.push([0.0, 0.0, 0.6]);
+    let scene = |points: Points, limits: Limits| build_within(vec![points], None, &limits, &()).unwrap();
+    let radii = |made: &(Scene, Preparation)| made.0.surfels.iter().map(|s| s.radius()).collect::<Vec<_>>();
+    let free = scene(cloud(positions.clone()), Limits { largest_ratio: f64::INFINITY, outliers: None });
+    let limited = scene(cloud(positions.clone()), Limits::default());
+    let changed = radii(&free).iter().zip(radii(&limited)).filter(|(free, limited)| *free > limited).count() as u64;
+    assert!(changed > 0 && changed < 100, "{changed}");
+    // That of the median of all holds in any case.
+    assert_eq!(limited.1.limited_by_neighbours, changed + free.1.limited_by_neighbours);
+    assert!(limited.1.notes().iter().any(|note| note.contains("neighbours allow")), "{:?}", limited.1.notes());
+    assert!(radii(&limited).iter().zip(radii(&free)).all(|(limited, free)| *limited <= free));
+    // A point that is far off has no larger disk than those it sees.
+    let typical = radii(&limited)[count / 2];
+    assert!(radii(&limited)[count + 40] <= 2.1 * typical, "{} {typical}", radii(&limited)[count + 40]);
+    // Given radii are no matter of it, however large; those of the others are limited as before.
+    let mut given = vec![0.0; positions.len()];
+    given[count + 40] = 7.5;
+    let made = scene(Points { radii: Some(given), ..cloud(positions.clone()) }, Limits::default());
+    assert_eq!(radii(&made)[count + 40], 7.5);
+    // The same for any order.
+    let reversed = scene(cloud(positions.iter().rev().copied().collect()), Limits::default());
+    assert_eq!(radii(&reversed).into_iter().rev().collect::<Vec<_>>(), radii(&limited));
+    // Outliers are those of `surfels`, and the others keep their numbers.
+    let limits = Limits { outliers: Some(5.0), ..Limits::default() };
+    positions.insert(7, [0.0, 0.3, -0.9]);
+    let (dropped, preparation) = scene(cloud(positions.clone()), limits);
+    let made = surfels(cloud(positions), &FromPoints { limits, ..FromPoints::default() });
+    assert_eq!(preparation.dropped_outliers, made.preparation.dropped_outliers);
+    assert!(
+        preparation.dropped_outliers >= 2 && preparation.surfels + preparation.dropped_outliers == count as u64 + 42
+    );
+    assert_eq!((dropped.provenance.of(6), dropped.provenance.of(7)), ((0, 6), (0, 8)));
 }
 
 #[test]
 fn no_disk_flies_past_its_neighbours() {
     for size in SIZES {
         let (mut positions, _) = samples(Shape::Plane, 10_000);
-        let usual = surfels(
-            cloud(positions.clone()),
-            &FromPoints { size, largest_ratio: f64::INFINITY, ..FromPoints::default() },
-        );
+        let usual = surfels(cloud(positions.clone()), &FromPoints { size, ..within(None, f64::INFINITY) });
         let typical = usual.points.radii.unwrap()[5000];
         // Farther than any neighbour, nearer than what the limit by the median of all would catch.
         positions.push([0.0, 0.0, 0.12]);
         let last = |largest_ratio: f64| {
-            let made = surfels(cloud(positions.clone()), &FromPoints { size, largest_ratio, ..FromPoints::default() });
-            (made.points.radii.unwrap()[10_000], made.limited)
+            let made = surfels(cloud(positions.clone()), &FromPoints { size, ..within(None, largest_ratio) });
+            (made.points.radii.unwrap()[10_000], made.preparation.limited_by_neighbours)
         };
         let ((free, none), (limited, some)) = (last(f64::INFINITY), last(2.0));
         if let Size::Bsp(_) = size {
@@ -349,7 +392,7 @@ fn no_order_and_no_number_of_threads_changes_a_bit() {
     positions.extend(vec![[0.5, 0.25, 3.0]; 50]);
     positions.iter_mut().for_each(|p| p[1] += 5.5e6);
     for size in SIZES {
-        let options = FromPoints { size, outliers: Some(4.0), ..FromPoints::default() };
+        let options = FromPoints { size, ..within(Some(4.0), 2.0) };
         let rows = |made: Surfels| -> Vec<_> {
             let Points { positions, normals, radii, axes, .. } = made.points;
             let axes = axes.unwrap_or_else(|| vec![[[0.0; 3]; 2]; positions.len()]);
@@ -390,7 +433,7 @@ fn georeferenced_coordinates_stay_to_the_last_digit() {
     assert_eq!(made.points.positions, positions);
     io::ply::write_points(&path, &made.points, &()).unwrap();
     let read = io::read(&path, &()).unwrap();
-    assert_eq!(read, Points { up: None, ..made.points });
+    assert_eq!(read, made.points);
     // An f32 there is half a unit coarse.
     assert!((f64::from(6_123_456.789f32) - 6_123_456.789).abs() > 0.01);
 }

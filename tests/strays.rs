@@ -167,3 +167,64 @@ fn a_texture_far_away_is_where_it_is_near_zero() {
     assert!(near_one < 1e-5, "{near_one}");
     assert!(error(&Scene { low: vec![], ..far }) > 1e-3);
 }
+
+/// A scan of 20,000 points, 100 by 80 by 10, and what lies beside it: the scene, and how much of the picture's width or height the scan
+/// fills.
+fn filled(beside: &[DVec3]) -> (Scene, Preparation, f64) {
+    let at = |k: usize, step: f64| (k as f64 * step).fract();
+    let scan = (0..20_000)
+        .map(|k| MAP + DVec3::new(100.0 * at(k, 0.618_034), 80.0 * at(k, 0.754_878), 10.0 * at(k, 0.569_84)));
+    let positions: Vec<_> = scan.clone().chain(beside.iter().map(|p| MAP + *p)).map(|p| p.to_array()).collect();
+    let (scene, preparation) = build(vec![Points { positions, up: Some(Up::Z), ..Points::default() }], &()).unwrap();
+    let camera = Camera::framing((400, 300), Lens::Fov(45.0), &scene, 1e-3).unwrap();
+    let image: Vec<_> = scan.map(|p| camera.to_camera(p)).map(|p| p.truncate() * camera.fx / p.z).collect();
+    let low = image.iter().fold(glam::DVec2::INFINITY, |low, p| low.min(*p));
+    let high = image.iter().fold(glam::DVec2::NEG_INFINITY, |high, p| high.max(*p));
+    (scene, preparation, ((high - low) / glam::DVec2::new(400.0, 300.0)).max_element())
+}
+
+#[test]
+fn a_few_points_at_some_extents_do_not_shrink_the_picture() {
+    let (_, preparation, alone) = filled(&[]);
+    assert!(preparation.strays == 0 && alone > 0.9, "{preparation:?} {alone}");
+    let birds = [DVec3::new(50.0, 40.0, 200.0), DVec3::new(-300.0, 900.0, 5.0), DVec3::new(-302.0, 901.0, 5.0)];
+    let (_, preparation, share) = filled(&birds);
+    assert_eq!(preparation.strays, 3);
+    assert!((share - alone).abs() < 0.01, "{share} {alone}");
+    assert!(preparation.notes().iter().any(|note| note.starts_with("3 points stray")), "{:?}", preparation.notes());
+    // What a scanner writes where it saw nothing is at one place, however often.
+    let (_, preparation, share) = filled(&vec![DVec3::new(50.0, 40.0, -700.0); 500]);
+    assert!(preparation.strays == 500 && (share - alone).abs() < 0.01, "{preparation:?} {share}");
+}
+
+#[test]
+fn what_is_real_stays_in_the_picture() {
+    let all_shown = |beside: Vec<DVec3>, what: &str| {
+        let (scene, preparation, share) = filled(&beside);
+        assert_eq!(preparation.strays, 0, "{what}");
+        let camera = Camera::framing((400, 300), Lens::Fov(45.0), &scene, 1e-3).unwrap();
+        for p in beside {
+            let p = camera.to_camera(MAP + p);
+            let image = p.truncate() * camera.fx / p.z;
+            assert!(image.x.abs() < 200.0 && image.y.abs() < 150.0, "{what} {image}");
+        }
+        share
+    };
+    // A mast of few points, each within reach of the next, up to three times the scan's width.
+    let mast = (1..=30).map(|k| DVec3::new(50.0, 40.0, 10.0 * f64::from(k))).collect();
+    assert!(all_shown(mast, "mast") < 0.6);
+    // A hut far off, of more points than strays come together.
+    all_shown((0..25).map(|k| DVec3::new(400.0 + f64::from(k % 5), f64::from(k / 5), 3.0)).collect(), "hut");
+    // One point just beside.
+    all_shown(vec![DVec3::new(118.0, 40.0, 5.0)], "kerb");
+}
+
+#[test]
+fn a_far_disk_that_reaches_the_others_is_no_stray() {
+    let points = |radius: f32| {
+        let mut points = points(&[MAP], &[MAP + DVec3::new(70.0, 0.0, 0.0)]);
+        *points.radii.as_mut().unwrap().last_mut().unwrap() = radius;
+        build(vec![points], &()).unwrap().1.strays
+    };
+    assert_eq!((points(0.5), points(60.0)), (1, 0));
+}

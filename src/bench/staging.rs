@@ -168,7 +168,7 @@ fn cameras([width, height]: [u32; 2], entry: &SceneEntry, scene: &Scene) -> Resu
         None => Lens::Fov(entry.fov.unwrap_or(DEFAULT_FOV)),
     };
     let (size, near) = ((width, height), Camera::default_near(scene));
-    let center = scene.origin + scene.body().0.center();
+    let center = scene.origin + scene.framed().0.center();
     let target = entry.target.map_or(center, DVec3::from);
     let mut first = match entry.eye {
         Some(eye) => Camera::look_at(size, lens, eye.into(), target, entry.up.map(DVec3::from), scene.up, near)?,

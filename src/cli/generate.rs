@@ -50,6 +50,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         normals: true,
         radii: true,
         colors: ply::ColorProperties::Srgb8,
+        up: Some(arguments.shape.up()),
         ..ply::Properties::default()
     };
     ply::write(&arguments.output, properties, arguments.count, vertices)?;

@@ -79,10 +79,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         radii: held.2,
         colors: held.3,
         texture,
-        up: match scene.up {
-            epsplat::scene::Up::Y => "y",
-            epsplat::scene::Up::Z => "z",
-        },
+        up: scene.up.name(),
         min: bounds.min.to_array(),
         max: bounds.max.to_array(),
         origin: scene.origin.to_array(),
@@ -128,11 +125,13 @@ fn table(input: &std::path::Path, info: &Info) -> String {
         let _ = writeln!(text, "  texture   coordinates given: `epsplat render --texture IMAGE.png` paints by them");
     }
     let _ = writeln!(text, "  box       {} to {}", vector(info.min), vector(info.max));
-    let _ = writeln!(text, "  up        {}", info.up);
-    if let Some(Coverage { spacing, covered }) = info.coverage {
+    let _ = writeln!(text, "  up        {}{}", info.up, if info.preparation.guessed_up { " (a guess)" } else { "" });
+    if let Some(Coverage { spacing, covered, open }) = info.coverage {
         let _ = writeln!(text, "  spacing   {spacing:.4} (median distance to the nearest other point)");
-        let percent = 100.0 * covered;
-        let _ = writeln!(text, "  coverage  {percent:.1} % of the surfels reach far enough toward their neighbours");
+        // Rounded down: 100 % are all.
+        let percent = (1e4 * covered).floor() / 100.0;
+        let open = if open > 0 { format!("; next to {open} one is open") } else { String::new() };
+        let _ = writeln!(text, "  coverage  {percent} % of the surfels have no open gap to their neighbours{open}");
     }
     if !info.lacks.is_empty() {
         let _ = writeln!(text, "  lacks     {}", info.lacks.join(", "));

@@ -37,6 +37,33 @@ pub(super) fn parse_vector(text: &str) -> Result<DVec3, String> {
     }
 }
 
+/// `X,Y,Z`, or an axis by its name: x, y, z, -x, -y or -z.
+pub(super) fn parse_up(text: &str) -> Result<DVec3, String> {
+    let (name, sign) = text.strip_prefix('-').map_or((text, 1.0), |name| (name, -1.0));
+    match name {
+        "x" => Ok(DVec3::X * sign),
+        "y" => Ok(DVec3::Y * sign),
+        "z" => Ok(DVec3::Z * sign),
+        _ => parse_vector(text).map_err(|what| format!("it is none of x, y, z, -x, -y and -z, and {what}")),
+    }
+}
+
+/// A direction as [`parse_up`] reads it: the axis by its name, if it is one.
+pub(super) fn up_argument(up: DVec3) -> String {
+    let axes = [(DVec3::X, "x"), (DVec3::Y, "y"), (DVec3::Z, "z")];
+    let named = |(axis, name): (DVec3, &str)| match up {
+        _ if up == axis => Some(name.to_owned()),
+        _ if up == -axis => Some(format!("-{name}")),
+        _ => None,
+    };
+    axes.into_iter().find_map(named).unwrap_or_else(|| vector_argument(up))
+}
+
+/// A vector as [`parse_vector`] reads it, to the last bit.
+pub(super) fn vector_argument(v: DVec3) -> String {
+    format!("{},{},{}", v.x, v.y, v.z)
+}
+
 /// `propagate`, `up`, or the `X,Y,Z` of a scanner.
 pub(super) fn parse_orientation(text: &str) -> Result<Orientation, String> {
     match text {

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use epsplat::io::{self, Format, Mesh, Points, ReadOptions};
+use epsplat::surfels::Limits;
 use epsplat::{Error, Result};
 
 use super::progress::Bars;
@@ -25,6 +26,23 @@ pub(super) struct Reading {
     /// Keep the points that a LAS file marks as withheld, which is deleted; else they are left out and counted
     #[arg(long)]
     keep_withheld: bool,
+}
+
+/// Which points become surfels, and how large those may be.
+#[derive(Args)]
+pub(super) struct LimitArguments {
+    /// Drop points whose mean distance to 16 neighbours exceeds the mean of all by K standard deviations
+    #[arg(long, value_name = "K")]
+    outliers: Option<f64>,
+    /// No estimated radius above FACTOR times the median of the neighbours'; inf for no limit
+    #[arg(long, value_name = "FACTOR", default_value = "2")]
+    max_radius: f64,
+}
+
+impl LimitArguments {
+    pub(super) fn limits(&self) -> Limits {
+        Limits { outliers: self.outliers, largest_ratio: self.max_radius }
+    }
 }
 
 /// The formats of this build.

@@ -12,16 +12,18 @@ use epsplat::gpu::Gpu;
 use epsplat::io::Texture;
 use epsplat::passes::unseen::{Unseen, is_empty};
 use epsplat::plan::{Accumulator, BackendName, BlendFormat, Organisation, Raster, RasterDepth, RenderOptions, check};
-use epsplat::render::{Backend, render};
+use epsplat::render::{Backend, Report, render};
 use epsplat::scene::{Camera, Cull, Epsilon, Kernel, Light, LowPass, MAPS, Map, Maps, Samples, Scene, Shading};
+use epsplat::surfels::Preparation;
 use epsplat::{Error, Result, surfels};
 use glam::DVec3;
+use serde::Serialize;
 
 use self::output::{Format, note_overflows, summary};
-use self::view::View;
-use super::parse::{parse_color, parse_intrinsics, parse_scale, parse_size, parse_vector};
+use self::view::{ChosenView, View};
+use super::parse::{parse_color, parse_intrinsics, parse_scale, parse_size, parse_up, parse_vector};
 use super::progress::Bars;
-use super::reading::{Reading, help_of, named};
+use super::reading::{LimitArguments, Reading, help_of, named};
 use super::{note, outputs, write_json};
 
 /// Render point clouds and meshes to a PNG or EXR image.
@@ -44,6 +46,8 @@ pub struct Arguments {
     inputs: Vec<PathBuf>,
     #[command(flatten)]
     reading: Reading,
+    #[command(flatten)]
+    limits: LimitArguments,
     /// The image: .png (8-bit sRGB) or .exr (linear f32, every map a layer); with --cameras the folder of the images
     #[arg(short, long)]
     output: PathBuf,
@@ -64,8 +68,9 @@ pub struct Arguments {
     /// What the camera looks at [default: the scene's centre]
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true, requires = "eye")]
     target: Option<DVec3>,
-    /// Which way is up in the image [default: z for LAS and flat clouds, else y]
-    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true, requires = "eye")]
+    /// Which way is up in the image: x, y, z, -x, -y, -z or a direction [default: what the file says, as LAS does and PLY of epsplat;
+    /// else z for flat clouds, y for others]
+    #[arg(long, value_name = "AXIS|X,Y,Z", value_parser = parse_up, allow_hyphen_values = true)]
     up: Option<DVec3>,
     /// Vertical field of view [default: 45]
     #[arg(long, value_name = "DEG", conflicts_with_all = ["ortho", "intrinsics"])]
@@ -205,8 +210,10 @@ fn one(arguments: &Arguments) -> Result<()> {
     let backend = backend(arguments)?;
 
     let bars = Bars::new();
-    let scene = scene(arguments, &bars)?;
-    let camera = view.camera(&scene, Camera::default_near(&scene))?;
+    let (scene, preparation) = scene(arguments, &bars)?;
+    let (camera, chosen) = view.camera(&scene, Camera::default_near(&scene))?;
+    let chosen = chosen.map(|view| ChosenView::new(view, &scene, arguments.up, preparation.guessed_up));
+    chosen.iter().for_each(|view| note(&view.sentence()));
     let (frame, report) = render(&scene, &camera, &options, &backend, &bars)?;
     note_overflows(&report);
     if is_empty(&frame, &options) {
@@ -214,7 +221,7 @@ fn one(arguments: &Arguments) -> Result<()> {
     }
     format.write(&arguments.output, &frame)?;
     match &arguments.json {
-        Some(path) => write_json(path, &report),
+        Some(path) => write_json(path, &Outcome { report: &report, view: chosen }),
         None => {
             note(&summary(&report, &arguments.output));
             Ok(())
@@ -222,8 +229,18 @@ fn one(arguments: &Arguments) -> Result<()> {
     }
 }
 
+/// What a single picture leaves as JSON.
+#[derive(Serialize)]
+struct Outcome<'a> {
+    #[serde(flatten)]
+    report: &'a Report,
+    /// None where the arguments say where the camera is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    view: Option<ChosenView>,
+}
+
 /// What all inputs hold, as one scene.
-fn scene(arguments: &Arguments, bars: &Bars) -> Result<Scene> {
+fn scene(arguments: &Arguments, bars: &Bars) -> Result<(Scene, Preparation)> {
     let texture = arguments.texture.as_deref().map(Texture::read).transpose()?;
     let inputs = arguments.reading.all(&arguments.inputs, bars)?;
     for (path, points) in arguments.inputs.iter().zip(&inputs) {
@@ -235,23 +252,19 @@ fn scene(arguments: &Arguments, bars: &Bars) -> Result<Scene> {
             ));
         }
     }
-    let built = match texture {
-        None => surfels::build(inputs, bars),
-        Some(texture) => {
-            let mut read = arguments.inputs.iter().zip(&inputs);
-            if let Some((path, _)) = read.find(|(_, points)| points.texture.is_none()) {
-                let what = "its points have no texture coordinates, so they cannot be textured; `epsplat sample` gives surfels of \
-                            a mesh some";
-                return Err(Error::malformed(path, what));
-            }
-            surfels::build_textured(inputs, texture, bars)
-        }
-    };
+    let mut read = arguments.inputs.iter().zip(&inputs);
+    if texture.is_some()
+        && let Some((path, _)) = read.find(|(_, points)| points.texture.is_none())
+    {
+        let what = "its points have no texture coordinates, so they cannot be textured; `epsplat sample` gives surfels of a mesh some";
+        return Err(Error::malformed(path, what));
+    }
+    let built = surfels::build_within(inputs, texture, &arguments.limits.limits(), bars);
     let (scene, preparation) = built.map_err(|error| named(error, &arguments.inputs))?;
     for line in preparation.notes() {
         note(&line);
     }
-    Ok(scene)
+    Ok((scene, preparation))
 }
 
 fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {

@@ -89,6 +89,7 @@ fn points(scene: &Scene, shape: SplatShape) -> Points {
             Colors::Constant(color) => Some(Colors::Linear(vec![*color; surfels.len()])),
             colors => Some(colors.clone()),
         },
+        up: Some(scene.up),
         ..Points::default()
     }
 }

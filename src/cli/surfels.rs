@@ -9,7 +9,7 @@ use epsplat::{Error, Result};
 
 use super::parse::parse_orientation;
 use super::progress::Bars;
-use super::reading::{Reading, help_of, named};
+use super::reading::{LimitArguments, Reading, help_of, named};
 use super::{note, outputs};
 
 /// Make surfels of points: normals with a side, and disks or ellipses that cover the surface, kept as PLY.
@@ -26,7 +26,7 @@ pub struct Arguments {
     /// The file: .ply
     #[arg(short, long)]
     output: PathBuf,
-    /// knn: disks of 1.2 times the mean distance to 8 neighbours; ellipse: the ellipse that bounds 8 neighbours in the
+    /// knn: disks of the mean distance to 8 neighbours, larger where gaps are wider; ellipse: the ellipse that bounds 8 neighbours in the
     /// tangent plane; bsp, bsp:circumsphere: disks from clusters of three points, by their mean edge or circumsphere
     #[arg(long, default_value = "knn")]
     size: Size,
@@ -38,12 +38,8 @@ pub struct Arguments {
     /// Estimate normals even where they are given
     #[arg(long)]
     estimate_normals: bool,
-    /// Drop points whose mean distance to 16 neighbours exceeds the mean of all by K standard deviations
-    #[arg(long, value_name = "K")]
-    outliers: Option<f64>,
-    /// No radius above FACTOR times the median of the neighbours'; inf for no limit
-    #[arg(long, value_name = "FACTOR", default_value = "2")]
-    max_radius: f64,
+    #[command(flatten)]
+    limits: LimitArguments,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
@@ -52,8 +48,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         size: arguments.size,
         orientation: orientation(&arguments.orient)?,
         estimate_normals: arguments.estimate_normals,
-        outliers: arguments.outliers,
-        largest_ratio: arguments.max_radius,
+        limits: arguments.limits.limits(),
     };
     outputs::check(&arguments.inputs, [&arguments.output])?;
     let bars = Bars::new();

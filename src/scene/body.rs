@@ -7,6 +7,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::Bounds;
+use super::apart::without_apart;
 use crate::random;
 
 /// Positions that are looked at for the core, about.
@@ -38,6 +39,18 @@ pub(crate) fn body(count: usize, position: impl Fn(usize) -> DVec3 + Sync) -> (B
         return (all, 0);
     }
     box_of(count, &position, holds)
+}
+
+/// The box of what the default view shows of `count` points, each with its radius, and how many are not in it: those that stray
+/// from the body, and those few that lie [apart](super::apart) from it.
+pub(crate) fn framed(count: usize, at: impl Fn(usize) -> (DVec3, f64) + Sync) -> (Bounds, u64) {
+    let (body, strays) = body(count, |index| at(index).0);
+    let Some(core) = core(count, &|index| at(index).0) else { return (body, strays) };
+    if core.extent().max_element() < SMALLEST_SCENE || body.is_empty() {
+        return (body, strays);
+    }
+    let (bounds, apart) = without_apart((&core, &body), count, at);
+    (bounds, strays + apart)
 }
 
 /// The box of the finite positions that are wanted, and how many are not.

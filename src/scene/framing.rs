@@ -1,11 +1,11 @@
 //! The view chosen when nobody chose one.
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use rayon::prelude::*;
 
 use super::camera::check_size;
-use super::{Bounds, Camera, Lens, Projection, Scene, Surfel, Up};
-use crate::error::Result;
+use super::{Bounds, Camera, Lens, Projection, Scene, Surfel};
+use crate::error::{Error, Result};
 
 /// Part of the way from the image's middle to its edge that surfels' centres fill.
 const FILL: f64 = 0.95;
@@ -23,15 +23,37 @@ impl Camera {
     ///
     /// An orthographic lens keeps its scale, so it may show less.
     pub fn framing(size: (u32, u32), lens: Lens, scene: &Scene, near: f64) -> Result<Self> {
-        Self::framed(size, lens, scene, near, Of::Disks)
+        Ok(Self::framed(size, lens, scene, near, (None, Of::Disks))?.0)
+    }
+
+    /// The same with `up`, a direction in world space of any length, instead of the scene's, and what the camera looks at, world
+    /// coordinates: [`Camera::look_at`] from its eye to there gives the camera again.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Usage`](crate::Error::Usage) also for an `up` of no direction.
+    pub fn framing_up(
+        size: (u32, u32),
+        lens: Lens,
+        scene: &Scene,
+        near: f64,
+        up: Option<DVec3>,
+    ) -> Result<(Self, DVec3)> {
+        Self::framed(size, lens, scene, near, (up, Of::Disks))
     }
 
     /// The default view by surfels' centres alone: for studies, in which the view must not depend on the radius.
     pub(crate) fn framing_centers(size: (u32, u32), lens: Lens, scene: &Scene, near: f64) -> Result<Self> {
-        Self::framed(size, lens, scene, near, Of::Centers)
+        Ok(Self::framed(size, lens, scene, near, (None, Of::Centers))?.0)
     }
 
-    fn framed((width, height): (u32, u32), lens: Lens, scene: &Scene, near: f64, of: Of) -> Result<Self> {
+    fn framed(
+        (width, height): (u32, u32),
+        lens: Lens,
+        scene: &Scene,
+        near: f64,
+        (up, of): (Option<DVec3>, Of),
+    ) -> Result<(Self, DVec3)> {
         check_size(width, height)?;
         let (projection, [fx, fy, cx, cy]) = lens.intrinsics(width, height)?;
         // The image's middle and half its width, as X/Z (pinhole) or X (orthographic), and so for its height.
@@ -42,14 +64,19 @@ impl Camera {
             [(0.5 * size - principal) / f, 0.5 * size / f, free / f]
         };
         let image = [interval(width, cx, fx), interval(height, cy, fy)];
-        let framing = Framing::new(scene, projection == Projection::Pinhole, image);
+        let up = up.unwrap_or(scene.up.axis());
+        let Some(unit) = (up / up.abs().max_element()).try_normalize() else {
+            return Err(Error::Usage("the direction of up has no length".into()));
+        };
+        let framing = Framing::new(scene, projection == Projection::Pinhole, image, unit);
         let mut eye = framing.eye(FILL, Of::Centers);
         if of == Of::Disks && framing.cuts(eye) {
             eye = framing.eye(FILL_OF_DISKS, Of::Disks);
         }
         let [right, down, forward] = framing.axes;
         let world = scene.origin + framing.center + right * eye.x + down * eye.y + forward * eye.z;
-        Self::look_at((width, height), lens, world, world + forward * framing.radius, None, scene.up, near)
+        let target = world + forward * framing.radius;
+        Ok((Self::look_at((width, height), lens, world, target, Some(up), scene.up, near)?, target))
     }
 }
 
@@ -105,10 +132,10 @@ impl Disk {
 }
 
 impl<'a> Framing<'a> {
-    fn new(scene: &'a Scene, pinhole: bool, image: [[f64; 3]; 2]) -> Self {
-        let forward = forward(scene.up);
-        let right = forward.cross(scene.up.axis()).normalize();
-        let (body, _) = scene.body();
+    fn new(scene: &'a Scene, pinhole: bool, image: [[f64; 3]; 2], up: DVec3) -> Self {
+        let forward = forward(up);
+        let right = forward.cross(up).normalize();
+        let (body, _) = scene.framed();
         // A scene of one place has no extent but its surfels'.
         let half = 0.5 * body.extent().length();
         let largest = f64::from(scene.largest_radius());
@@ -201,20 +228,22 @@ fn median_radius(scene: &Scene) -> f64 {
     if radii.is_empty() { 0.0 } else { f64::from(*radii.select_nth_unstable_by(middle, f32::total_cmp).1) }
 }
 
-/// The default direction of view.
-fn forward(up: Up) -> DVec3 {
-    match up {
-        Up::Y => -DVec3::new(0.45, 0.35, 1.0),
-        Up::Z => DVec3::new(-0.15, 1.0, -1.2),
-    }
-    .normalize()
+/// The default direction of view with a unit vector as up: that of y or z, whichever is nearer to its line, turned as far as up is.
+fn forward(up: DVec3) -> DVec3 {
+    let (axis, forward) = if up.z.abs() > up.y.abs() {
+        (DVec3::Z, DVec3::new(-0.15, 1.0, -1.2))
+    } else {
+        (DVec3::Y, -DVec3::new(0.45, 0.35, 1.0))
+    };
+    let forward = forward.normalize();
+    if up == axis { forward } else { DQuat::from_rotation_arc(axis, up) * forward }
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::scene::{Colors, Surfel};
+    use crate::scene::{Colors, Surfel, Up};
 
     #[test]
     fn every_point_is_in_the_image_and_the_scene_fills_and_centres_it() {

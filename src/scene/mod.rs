@@ -1,5 +1,6 @@
 //! What is rendered: surfels, camera, lights, options. Knows no GPU and no file.
 
+mod apart;
 mod body;
 pub mod camera;
 pub mod clip;
@@ -16,7 +17,7 @@ mod srgb;
 pub mod surfel;
 pub mod texture;
 
-pub(crate) use body::{SMALLEST_SCENE, body};
+pub(crate) use body::{SMALLEST_SCENE, body, framed};
 pub use camera::{Camera, Lens, Projection};
 pub use clip::Clip;
 pub use color::Colors;

@@ -17,10 +17,33 @@ struct Input {
 
 impl Provenance {
     /// Another input follows, whose first surfel would be number `first` of the scene; `left_out` are the numbers, in order, of those of
-    /// its points that become none.
-    /// Where one point becomes several surfels, `numbers` are those of each surfel's point among those that are kept.
+    /// its points that become none. Where one point becomes several surfels, `numbers` are those of each surfel's point among those that are kept.
     pub fn push(&mut self, first: u64, left_out: Vec<u64>, numbers: Option<Vec<u32>>) {
         self.0.push(Input { first, left_out, numbers });
+    }
+
+    /// Only those surfels remain whose flag in `keep`, one for each, is set.
+    pub(crate) fn retain(&mut self, keep: &[bool]) {
+        let mut inputs = std::mem::take(&mut self.0).into_iter().peekable();
+        let mut kept = 0;
+        while let Some(Input { first, mut left_out, mut numbers }) = inputs.next() {
+            let end = inputs.peek().map_or(keep.len() as u64, |next| next.first);
+            let own = &keep[first as usize..end as usize];
+            let dropped: Vec<u64> = own.iter().zip(0..).filter(|(keep, _)| !**keep).map(|(_, place)| place).collect();
+            match &mut numbers {
+                Some(numbers) => {
+                    let mut flags = own.iter();
+                    numbers.retain(|_| flags.next().copied().unwrap_or(false));
+                }
+                None => {
+                    let of_points: Vec<u64> = dropped.iter().map(|place| number(&left_out, *place)).collect();
+                    left_out.extend(of_points);
+                    left_out.sort_unstable();
+                }
+            }
+            self.push(kept, left_out, numbers);
+            kept += (own.len() - dropped.len()) as u64;
+        }
     }
 
     /// The number of the input that surfel `index` comes from, and of the point in it; both start at 0.
@@ -59,6 +82,21 @@ mod tests {
         provenance.push(5, vec![1], None);
         let all: Vec<_> = (0..8).map(|index| provenance.of(index)).collect();
         assert_eq!(all, [(0, 1), (0, 2), (0, 5), (1, 0), (1, 1), (3, 0), (3, 2), (3, 3)]);
+    }
+
+    #[test]
+    fn points_that_are_dropped_later_are_left_out_too() {
+        let mut provenance = Provenance::default();
+        provenance.push(0, vec![0, 3, 4], None);
+        provenance.push(3, vec![], None);
+        provenance.push(5, vec![0, 1], None);
+        provenance.push(5, vec![1], None);
+        let before: Vec<_> = (0..8).map(|index| provenance.of(index)).collect();
+        let keep = [true, false, true, false, true, true, false, true];
+        provenance.retain(&keep);
+        let kept = before.iter().zip(keep).filter(|(_, keep)| *keep).map(|(point, _)| *point);
+        let after: Vec<_> = (0..5).map(|index| provenance.of(index)).collect();
+        assert_eq!(after, kept.collect::<Vec<_>>());
     }
 
     #[test]

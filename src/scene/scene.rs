@@ -24,6 +24,14 @@ impl Up {
         }
     }
 
+    /// `y` or `z`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Y => "y",
+            Self::Z => "z",
+        }
+    }
+
     /// The unit vector that serves as up in a view along the axis.
     pub fn other(self) -> DVec3 {
         match self {
@@ -121,6 +129,13 @@ impl Scene {
     /// do: a point strays that lies farther from the box of nearly all than sixteen times its longest edge.
     pub fn body(&self) -> (Bounds, u64) {
         super::body(self.surfels.len(), |index| self.center(index))
+    }
+
+    /// The box of the centres that the default view shows, world units relative to [`Scene::origin`], and how many it leaves out: those
+    /// that [stray](Self::body), and groups of at most 16 points, and a thousandth of all, that lie farther than a quarter of the
+    /// longest edge of the box of nearly all from that box and from all others.
+    pub fn framed(&self) -> (Bounds, u64) {
+        super::framed(self.surfels.len(), |index| (self.center(index), self.surfels[index].radius().into()))
     }
 
     /// The box of the finite surfel centres, world units relative to [`Scene::origin`]; disks reach past it by up to

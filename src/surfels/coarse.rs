@@ -15,7 +15,7 @@ pub fn coarse(points: &Points) -> Option<f64> {
     let radii = points.radii.as_ref().filter(|_| points.of_mesh)?;
     let (body, _) = body(points.positions.len(), |index| DVec3::from_array(points.positions[index]));
     let given = radii.iter().map(|radius| f64::from(*radius)).filter(|radius| *radius > 0.0);
-    let share = median(given.collect())? / body.extent().length();
+    let share = median(&mut given.collect::<Vec<_>>())? / body.extent().length();
     (share > COARSE).then_some(share)
 }
 

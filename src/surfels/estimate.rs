@@ -1,13 +1,14 @@
 //! Normals and radii for points that come without.
 
-use std::ops::Range;
-
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::eigen::Symmetric3;
-use super::neighbours::{Neighbour, NeighbourSearch};
+use super::gaps::Cell;
+use super::graph::NeighbourGraph;
+use super::neighbours::Neighbour;
 use super::positions::DistinctPositions;
+use super::sizes::local_limits;
 use crate::Progress;
 
 /// How many neighbours a plane is fitted to. Few follow edges and curvature, many average noise. Measured on spheres of
@@ -19,9 +20,18 @@ pub(crate) const NORMAL_NEIGHBOURS: usize = 16;
 /// How many neighbours a radius is the mean distance of: the first two rings of a square grid.
 pub(crate) const RADIUS_NEIGHBOURS: usize = 8;
 
-/// Disk radius for each unit of mean distance to [`RADIUS_NEIGHBOURS`] neighbours. Gives 1.45 spacings on a square
-/// grid, and leaves 0.03 % of a random (Poisson) plane uncovered, where 1.0 leaves 0.4 % and 1.1 leaves 0.12 %.
-const RADIUS_FACTOR: f64 = 1.2;
+/// Disk radius for each unit of mean distance to [`RADIUS_NEIGHBOURS`] neighbours: 1.2 spacings on a square grid. Disks of it would
+/// leave 0.4 % of a random (Poisson) plane uncovered; wider gaps than it closes are measured one by one.
+const RADIUS_FACTOR: f64 = 1.0;
+
+/// A disk reaches past the farthest corner of its cell by this factor, as surfaces are not flat and normals not exact.
+const PAST_CORNER: f64 = 1.05;
+
+/// Where the cell ends that no neighbour bounds, in distances to the farthest neighbour: a corner beyond is of no gap that they know.
+const CELL_REACH: f64 = 1.5;
+
+/// For the sake of its cell, a disk becomes larger by at most this factor. At a ragged boundary corners lie outside of the surface.
+const LARGEST_FOR_CELL: f64 = 1.8;
 
 /// A radius is at most this many times the mean distance of its neighbours from their own centre. That distance is a
 /// point's own mean distance where points surround it, and stays small for an outlier that sees a far surface.
@@ -54,47 +64,44 @@ pub(crate) struct Estimates {
     /// Median over the wanted positions of the distance to the nearest other position, world units; None if there is
     /// one position only.
     pub median_spacing: Option<f64>,
+    /// Of each position, whether its radius would have been larger.
+    pub limited: Vec<bool>,
 }
 
 /// Estimates a normal and a radius at each position where `wanted` says so (everywhere for None), from all positions.
 ///
 /// The normal is the direction of least variance of the position and its [`NORMAL_NEIGHBOURS`] nearest others (Hoppe et
 /// al. 1992), turned toward `up`: the renderer turns normals to the viewer, so the sign only has to be definite.
-/// The radius is [`RADIUS_FACTOR`] times the mean distance to the [`RADIUS_NEIGHBOURS`] nearest, within the limits of
-/// [`LARGEST_LOCAL_RATIO`] and [`LARGEST_MEDIAN_RATIO`].
+/// The radius is that of [`fitted_radius`], and at most `largest_ratio` times the median of those of the neighbours that have one, as
+/// [`local_limits`] says.
 pub(crate) fn estimate(
     distinct: &DistinctPositions,
     wanted: Option<&[bool]>,
-    up: DVec3,
+    (up, largest_ratio): (DVec3, f64),
     progress: &dyn Progress,
 ) -> Estimates {
-    const CHUNK: usize = 4096;
     let wanted = |index: usize| wanted.is_none_or(|flags| flags.get(index).copied().unwrap_or(false));
     progress.begin("estimating normals and radii", distinct.len() as u64);
-    let search = NeighbourSearch::new(distinct, NORMAL_NEIGHBOURS);
     let mut of_position = vec![Estimate::default(); distinct.len()];
-    of_position.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, estimates)| {
-        let range: Range<usize> = chunk * CHUNK..chunk * CHUNK + estimates.len();
-        if range.clone().any(wanted) {
-            search.of_range(range.clone(), |index, neighbours| {
-                if wanted(index as usize) {
-                    estimates[index as usize - range.start] = estimate_at(distinct, index, neighbours, up);
-                }
-            });
-        }
-        progress.advance(estimates.len() as u64);
-    });
+    let graph = NeighbourGraph::visit(
+        (distinct, NORMAL_NEIGHBOURS, RADIUS_NEIGHBOURS),
+        wanted,
+        &mut of_position,
+        progress,
+        |index, neighbours| estimate_at(distinct, index, neighbours, up),
+    );
     progress.end();
-    let values = |of: fn(&Estimate) -> f32| -> Vec<f64> {
-        of_position.par_iter().enumerate().filter(|(index, _)| wanted(*index)).map(|(_, e)| of(e).into()).collect()
-    };
     if distinct.len() < 2 {
-        return Estimates { of_position, median_spacing: None };
+        let limited = vec![false; distinct.len()];
+        return Estimates { of_position, median_spacing: None, limited };
     }
-    let limit = median(values(|e| e.radius)).unwrap_or(f64::INFINITY) * LARGEST_MEDIAN_RATIO;
-    let median_spacing = median(values(|e| e.spacing));
-    of_position.par_iter_mut().for_each(|e| e.radius = e.radius.min(limit as f32));
-    Estimates { of_position, median_spacing }
+    let radii: Vec<f64> = of_position.par_iter().map(|e| e.radius.into()).collect();
+    let limits = local_limits(&graph, &radii, largest_ratio);
+    let limited = limits.par_iter().zip(&radii).map(|(limit, radius)| radius > limit).collect();
+    of_position.par_iter_mut().zip(limits).for_each(|(e, limit)| e.radius = e.radius.min(limit as f32));
+    let spacings = of_position.par_iter().enumerate().filter(|(index, _)| wanted(*index));
+    let median_spacing = median(&mut spacings.map(|(_, e)| e.spacing.into()).collect::<Vec<f64>>());
+    Estimates { of_position, median_spacing, limited }
 }
 
 fn estimate_at(distinct: &DistinctPositions, index: u32, neighbours: &[Neighbour], up: DVec3) -> Estimate {
@@ -111,23 +118,34 @@ fn estimate_at(distinct: &DistinctPositions, index: u32, neighbours: &[Neighbour
     let Some(nearest) = neighbours.first() else {
         return Estimate { normal: up.as_vec3().to_array(), radius: LONE_RADIUS as f32, spacing: 0.0 };
     };
+    let normal = fitted_normal(offsets, up);
     Estimate {
-        normal: fitted_normal(offsets, up).as_vec3().to_array(),
-        radius: world(fitted_radius(&offsets[1..count.min(RADIUS_NEIGHBOURS + 1)])),
+        normal: normal.as_vec3().to_array(),
+        radius: world(fitted_radius(&offsets[1..], normal)),
         spacing: world(nearest.squared_distance.sqrt()),
     }
 }
 
-/// A radius from the offsets of the nearest neighbours, in their unit.
-pub(crate) fn fitted_radius(offsets: &[DVec3]) -> f64 {
-    let count = offsets.len() as f64;
-    let mean_distance = offsets.iter().map(|o| o.length()).sum::<f64>() / count;
-    if offsets.len() < RADIUS_NEIGHBOURS {
+/// A radius from the offsets of the nearest neighbours, the nearest first, in their unit, and the unit normal across which they lie:
+/// [`RADIUS_FACTOR`] times the mean distance to [`RADIUS_NEIGHBOURS`] of them, within [`LARGEST_LOCAL_RATIO`], or more where the
+/// point's [cell](Cell) reaches farther.
+///
+/// Measured on random points of a sphere, 1,000,000, and on the vertices of igea, the Stanford bunny and the Dragon (1024x1024, PSNR
+/// against rays with `radius:1`): 1.2 times the mean distance alone leaves 3.7e-4 of the sphere's pixels to its back, and gives 31.2,
+/// 24.3 and 31.8 dB; this 5e-6, and 32.3, 25.5 and 33.0 dB, as disks are smaller where points are evenly spaced.
+pub(crate) fn fitted_radius(offsets: &[DVec3], normal: DVec3) -> f64 {
+    let near = &offsets[..offsets.len().min(RADIUS_NEIGHBOURS)];
+    let count = near.len() as f64;
+    let mean_distance = near.iter().map(|o| o.length()).sum::<f64>() / count;
+    if near.len() < RADIUS_NEIGHBOURS {
         return RADIUS_FACTOR * mean_distance;
     }
-    let center = offsets.iter().sum::<DVec3>() / count;
-    let spread = offsets.iter().map(|o| o.distance(center)).sum::<f64>() / count;
-    RADIUS_FACTOR * mean_distance.min(LARGEST_LOCAL_RATIO * spread)
+    let center = near.iter().sum::<DVec3>() / count;
+    let spread = near.iter().map(|o| o.distance(center)).sum::<f64>() / count;
+    let radius = RADIUS_FACTOR * mean_distance.min(LARGEST_LOCAL_RATIO * spread);
+    let reach = CELL_REACH * offsets.last().map_or(0.0, |farthest| farthest.length());
+    let of_cell = PAST_CORNER * Cell::new(offsets, normal, (reach, radius / PAST_CORNER)).farthest_corner();
+    radius.max(of_cell.min(LARGEST_FOR_CELL * radius))
 }
 
 /// The direction in which the offsets vary least, in the half-space of `up` (a unit vector). For offsets on a line it
@@ -155,7 +173,7 @@ pub(crate) fn fitted_normal(offsets: &[DVec3], up: DVec3) -> DVec3 {
 }
 
 /// The middle value (the upper one of two).
-pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
+pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
@@ -181,7 +199,7 @@ mod tests {
 
     #[test]
     fn median_is_the_middle() {
-        assert_eq!(median(vec![]), None);
-        assert_eq!(median(vec![3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median(&mut []), None);
+        assert_eq!(median(&mut [3.0, 1.0, 2.0]), Some(2.0));
     }
 }

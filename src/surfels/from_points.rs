@@ -7,13 +7,13 @@ use super::estimate::{LONE_RADIUS, NORMAL_NEIGHBOURS, RADIUS_RANGE, fitted_norma
 use super::gather::{Gathered, gather};
 use super::graph::NeighbourGraph;
 use super::orient::{self, Orientation};
-use super::outliers::inliers;
+use super::outliers::drop_outliers;
 use super::positions::DistinctPositions;
 use super::sheets;
 use super::sizes::{Size, bsp_radii, ellipse_at, knn_radii, local_limits, offsets};
-use super::{Preparation, guess_up, origin_for, unit, usable_axes};
+use super::{Limits, Preparation, guess_up, origin_for, unit, usable_axes};
 use crate::io::Points;
-use crate::scene::{Bounds, body};
+use crate::scene::{Bounds, body, framed};
 use crate::{Error, Progress, Result};
 
 /// How surfels are made of points.
@@ -25,11 +25,8 @@ pub struct FromPoints {
     pub orientation: Orientation,
     /// Normals are estimated even where they are given.
     pub estimate_normals: bool,
-    /// Points are left out whose mean distance to their neighbours exceeds the mean of all by more than so many standard
-    /// deviations.
-    pub outliers: Option<f64>,
-    /// No half-axis is longer than this times the median of those of the neighbours; infinite for no limit.
-    pub largest_ratio: f64,
+    /// Which points become surfels, and how large those may be.
+    pub limits: Limits,
 }
 
 impl Default for FromPoints {
@@ -39,8 +36,7 @@ impl Default for FromPoints {
             size: Size::Knn,
             orientation: Orientation::Propagate,
             estimate_normals: false,
-            outliers: None,
-            largest_ratio: 2.0,
+            limits: Limits::default(),
         }
     }
 }
@@ -53,10 +49,6 @@ pub struct Surfels {
     pub points: Points,
     /// The counts that every scene has; its `surfels` are those kept.
     pub preparation: Preparation,
-    /// Points left out as outliers.
-    pub dropped_outliers: u64,
-    /// Surfels that would have been larger than [`FromPoints::largest_ratio`] allows.
-    pub limited: u64,
     /// Connected parts of the surface, each of which was oriented on its own; None if nothing was.
     pub parts: Option<u64>,
     /// Positions whose cluster of three spans no triangle, for [`Size::Bsp`]; else 0.
@@ -68,8 +60,6 @@ impl Surfels {
     pub fn notes(&self) -> Vec<String> {
         let mut notes = self.preparation.notes();
         let mut counted = |count: u64, what: &str| notes.extend((count > 0).then(|| format!("{count} points {what}")));
-        counted(self.dropped_outliers, "were dropped: they lie too far from their neighbours");
-        counted(self.limited, "would have had larger surfels than their neighbours allow");
         counted(self.collinear, "are in clusters on a line and took the mean of its edges");
         let distinct = self.preparation.distinct_positions.unwrap_or(self.preparation.surfels);
         counted(self.preparation.surfels - distinct, "lie where another one does");
@@ -93,25 +83,25 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
         (gathered.normals, gathered.axes) = (None, None);
     }
     let bounds = Bounds::of(gathered.positions.par_iter().map(|position| DVec3::from_array(*position)));
-    let (body, strays) = body(gathered.positions.len(), |index| DVec3::from_array(gathered.positions[index]));
-    let up = gathered.up.unwrap_or_else(|| guess_up(&body)).axis();
+    let (body, _) = body(gathered.positions.len(), |index| DVec3::from_array(gathered.positions[index]));
+    let known_up = gathered.up.unwrap_or_else(|| guess_up(&body));
+    let up = known_up.axis();
     let origin = origin_for(&body);
     progress.begin("sorting points", 0);
     let mut distinct = DistinctPositions::new(&gathered.positions, &bounds, origin)?;
     progress.end();
-    let mut graph = NeighbourGraph::new(&distinct, NORMAL_NEIGHBOURS, progress);
-    let dropped_outliers = match options.outliers {
-        Some(deviations) => drop_outliers(&mut gathered, &mut distinct, &mut graph, deviations, progress),
-        None => 0,
-    };
+    if let Some(deviations) = options.limits.outliers {
+        gathered.preparation.dropped_outliers = drop_outliers(&mut gathered, &mut distinct, deviations, progress);
+    }
+    let graph = NeighbourGraph::new(&distinct, NORMAL_NEIGHBOURS, progress);
     let given = given_normals(&gathered);
     let count = gathered.positions.len();
-    let preparation = Preparation {
+    let mut preparation = Preparation {
         surfels: count as u64,
         estimated_normals: given.as_ref().map_or(count, |all| all.iter().filter(|n| n.is_none()).count()) as u64,
         estimated_radii: count as u64,
+        guessed_up: gathered.up.is_none(),
         distinct_positions: Some(distinct.len() as u64),
-        strays,
         median_spacing: median_spacing(&distinct, &graph),
         ..gathered.preparation.clone()
     };
@@ -142,30 +132,13 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
         None => of_point.par_iter().map(|&position| sizes.length(position) as f32).collect(),
     };
     progress.end();
-    let Gathered { positions, colors, texture, up, .. } = gathered;
+    let Gathered { positions, colors, texture, .. } = gathered;
     let (normals, radii) = (Some(point_normals), Some(radii));
-    let points = Points { positions, normals, radii, axes, colors, texture, up, ..Points::default() };
-    let (limited, collinear) = (sizes.limited(), sizes.collinear);
-    Ok(Surfels { points, preparation, dropped_outliers, limited, parts, collinear })
-}
-
-/// Leaves out the points that lie farther from their neighbours than so many `deviations`, and says how many.
-fn drop_outliers(
-    gathered: &mut Gathered,
-    distinct: &mut DistinctPositions,
-    graph: &mut NeighbourGraph,
-    deviations: f64,
-    progress: &dyn Progress,
-) -> u64 {
-    let inside = inliers(distinct, graph, deviations);
-    let keep: Vec<bool> = distinct.of_point().iter().map(|&position| inside[position as usize]).collect();
-    let dropped = keep.iter().filter(|keep| !**keep).count() as u64;
-    if dropped > 0 {
-        gathered.retain(&keep);
-        distinct.retain(&inside);
-        *graph = NeighbourGraph::new(distinct, NORMAL_NEIGHBOURS, progress);
-    }
-    dropped
+    let points = Points { positions, normals, radii, axes, colors, texture, up: Some(known_up), ..Points::default() };
+    preparation.limited_by_neighbours = sizes.limited(distinct.of_point());
+    let radius = |index: usize| points.radii.as_ref().map_or(0.0, |radii| f64::from(radii[index]));
+    preparation.strays = framed(count, |index| (DVec3::from_array(points.positions[index]), radius(index))).1;
+    Ok(Surfels { points, preparation, parts, collinear: sizes.collinear })
 }
 
 /// Turns the `normals` of positions to one side; the connected parts of the surface, if they were looked for.
@@ -219,7 +192,7 @@ impl Sizes {
     ) -> Self {
         let (mut ellipses, mut collinear) = (Vec::new(), 0);
         let radii: Vec<f64> = match options.size {
-            Size::Knn => knn_radii(distinct, graph),
+            Size::Knn => knn_radii(distinct, graph, normals),
             Size::Ellipse => {
                 let own = normals.par_iter().zip(0..distinct.len() as u32);
                 ellipses = own.map(|(normal, position)| ellipse_at(distinct, graph, position, *normal)).collect();
@@ -231,13 +204,14 @@ impl Sizes {
                 radii
             }
         };
-        let limits = local_limits(graph, &radii, options.largest_ratio);
+        let limits = local_limits(graph, &radii, options.limits.largest_ratio);
         Self { radii, limits, ellipses, collinear, scale: distinct.scale() }
     }
 
-    /// Positions whose surfels would be larger than their neighbours allow.
-    fn limited(&self) -> u64 {
-        self.radii.iter().zip(&self.limits).filter(|(radius, limit)| radius > limit).count() as u64
+    /// Points, at these positions, whose surfels would be larger than their neighbours allow.
+    fn limited(&self, of_point: &[u32]) -> u64 {
+        let limited = |position: usize| self.radii[position] > self.limits[position];
+        of_point.par_iter().filter(|position| limited(**position as usize)).count() as u64
     }
 
     fn world(&self, length: f64) -> f64 {
@@ -274,12 +248,7 @@ impl Sizes {
 }
 
 fn check(options: &FromPoints) -> Result<()> {
-    if options.outliers.is_some_and(|deviations| !(deviations.is_finite() && deviations >= 0.0)) {
-        return Err(Error::Usage("outliers are beyond a number of standard deviations that is not negative".into()));
-    }
-    if options.largest_ratio.is_nan() || options.largest_ratio < 1.0 {
-        return Err(Error::Usage("the largest radius is at least 1 times that of the neighbours".into()));
-    }
+    options.limits.check()?;
     match &options.orientation {
         Orientation::Toward(scanners) if scanners.is_empty() || !scanners.iter().all(|at| at.is_finite()) => Err(
             Error::Usage("normals can be turned toward finite positions only, of which at least one is needed".into()),
@@ -319,5 +288,5 @@ fn fit_normals(distinct: &DistinctPositions, graph: &NeighbourGraph, up: DVec3) 
 fn median_spacing(distinct: &DistinctPositions, graph: &NeighbourGraph) -> Option<f64> {
     let nearest = |index| offsets(distinct, graph, index, 1).next();
     let spacings = (0..distinct.len() as u32).into_par_iter().filter_map(|index| Some(nearest(index)?.length()));
-    super::estimate::median(spacings.collect()).map(|spacing| spacing / distinct.scale())
+    super::estimate::median(&mut spacings.collect::<Vec<_>>()).map(|spacing| spacing / distinct.scale())
 }

@@ -117,6 +117,7 @@ impl Gathered {
         self.clips.iter_mut().for_each(|all| retain(all, keep));
         self.texture.iter_mut().for_each(|all| retain(all, keep));
         self.colors.iter_mut().for_each(|all| retain_colors(all, keep));
+        self.provenance.retain(keep);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::neighbours::NeighbourSearch;
+use super::neighbours::{Neighbour, NeighbourSearch};
 use super::positions::DistinctPositions;
 use crate::Progress;
 
@@ -19,25 +19,54 @@ pub(crate) struct NeighbourGraph {
 impl NeighbourGraph {
     /// Finds the `count` nearest neighbours of each position.
     pub fn new(distinct: &DistinctPositions, count: usize, progress: &dyn Progress) -> Self {
-        let degree = count.min(distinct.len().saturating_sub(1));
+        progress.begin("finding neighbours", distinct.len() as u64);
+        let graph = Self::visit((distinct, count, count), |_| true, &mut vec![(); distinct.len()], progress, |_, _| ());
+        progress.end();
+        graph
+    }
+
+    /// Finds the `count` nearest neighbours of each position that is `wanted`, makes its value of them, and keeps the nearest
+    /// `kept` of them. `values` are one for each position; those of others stay, and their neighbours say nothing.
+    pub fn visit<T: Send>(
+        (distinct, count, kept): (&DistinctPositions, usize, usize),
+        wanted: impl Fn(usize) -> bool + Sync,
+        values: &mut [T],
+        progress: &dyn Progress,
+        make: impl Fn(u32, &[Neighbour]) -> T + Sync,
+    ) -> Self {
+        let others = distinct.len().saturating_sub(1);
+        let degree = kept.min(others);
         let mut neighbours = vec![0; distinct.len() * degree];
-        if degree == 0 {
+        if others == 0 {
+            values.iter_mut().filter(|_| wanted(0)).for_each(|value| *value = make(0, &[]));
             return Self { degree, neighbours };
         }
-        progress.begin("finding neighbours", distinct.len() as u64);
-        let search = NeighbourSearch::new(distinct, degree);
-        neighbours.par_chunks_mut(CHUNK * degree).enumerate().for_each(|(chunk, rows)| {
-            let first = chunk * CHUNK;
-            let positions = rows.len() / degree;
-            search.of_range(first..first + positions, |index, nearest| {
-                let row = (index as usize - first) * degree;
-                for (slot, neighbour) in rows[row..].iter_mut().zip(nearest) {
-                    *slot = neighbour.index;
-                }
-            });
-            progress.advance(positions as u64);
-        });
-        progress.end();
+        let search = NeighbourSearch::new(distinct, count.min(others));
+        let visit = |(chunk, values, rows): (usize, &mut [T], &mut [u32])| {
+            let range = chunk * CHUNK..chunk * CHUNK + values.len();
+            if range.clone().any(&wanted) {
+                search.of_range(range.clone(), |index, nearest| {
+                    let place = index as usize - range.start;
+                    if wanted(index as usize) {
+                        values[place] = make(index, nearest);
+                        rows[place * degree..]
+                            .iter_mut()
+                            .zip(nearest)
+                            .take(degree)
+                            .for_each(|(row, near)| *row = near.index);
+                    }
+                });
+            }
+            progress.advance(values.len() as u64);
+        };
+        let chunks = values.par_chunks_mut(CHUNK).enumerate();
+        match degree {
+            0 => chunks.for_each(|(chunk, values)| visit((chunk, values, &mut []))),
+            _ => {
+                let rows = neighbours.par_chunks_mut(CHUNK * degree);
+                chunks.zip(rows).for_each(|((chunk, values), rows)| visit((chunk, values, rows)));
+            }
+        }
         Self { degree, neighbours }
     }
 

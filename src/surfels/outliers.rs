@@ -2,21 +2,43 @@
 
 use rayon::prelude::*;
 
+use super::estimate::NORMAL_NEIGHBOURS;
+use super::gather::Gathered;
 use super::graph::NeighbourGraph;
 use super::positions::DistinctPositions;
+use crate::Progress;
+
+/// Leaves out the points that lie farther from their neighbours than so many `deviations`, and says how many.
+pub(crate) fn drop_outliers(
+    gathered: &mut Gathered,
+    distinct: &mut DistinctPositions,
+    deviations: f64,
+    progress: &dyn Progress,
+) -> u64 {
+    let mut distances = vec![0.0; distinct.len()];
+    NeighbourGraph::visit(
+        (distinct, NORMAL_NEIGHBOURS, 0),
+        |_| true,
+        &mut distances,
+        progress,
+        |_, near| {
+            near.iter().map(|neighbour| neighbour.squared_distance.sqrt()).sum::<f64>() / near.len().max(1) as f64
+        },
+    );
+    let inside = inliers(&distances, deviations);
+    let keep: Vec<bool> = distinct.of_point().iter().map(|&position| inside[position as usize]).collect();
+    let dropped = keep.iter().filter(|keep| !**keep).count() as u64;
+    if dropped > 0 {
+        gathered.retain(&keep);
+        distinct.retain(&inside);
+    }
+    dropped
+}
 
 /// Which positions are no outliers: those whose mean distance to their neighbours is at most the mean of that over all
 /// positions plus `deviations` of its standard deviations (Rusu et al. 2008, "Towards 3D point cloud based object maps
 /// for household environments", section 3.1).
-pub(crate) fn inliers(distinct: &DistinctPositions, graph: &NeighbourGraph, deviations: f64) -> Vec<bool> {
-    let distances: Vec<f64> = (0..distinct.len() as u32)
-        .into_par_iter()
-        .map(|index| {
-            let center = distinct.position(index);
-            let near = graph.of(index);
-            near.iter().map(|&other| center.distance(distinct.position(other))).sum::<f64>() / near.len().max(1) as f64
-        })
-        .collect();
+fn inliers(distances: &[f64], deviations: f64) -> Vec<bool> {
     // One after the other, so that the sums' rounding is the same for any number of threads.
     let count = distances.len() as f64;
     let mean = distances.iter().sum::<f64>() / count;

@@ -3,8 +3,8 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::Error;
-use crate::scene::Colors;
 use crate::scene::color::DEFAULT_COLOR;
+use crate::scene::{Colors, Scene, Surfel};
 
 fn cloud(positions: Vec<[f64; 3]>) -> Points {
     Points { positions, ..Points::default() }
@@ -58,7 +58,8 @@ fn unusable_points_are_dropped_with_their_attributes() {
     assert_eq!(scene.colors, Colors::Srgb8(vec![[1; 4], [3; 4]]));
     assert_eq!(scene.surfels[0], Surfel::disk(Vec3::ZERO, Vec3::Z, 0.5));
     assert_eq!(scene.surfels[1], Surfel::disk(Vec3::X, Vec3::Y, 0.25));
-    let expected = Preparation { points: 3, dropped_non_finite: 1, surfels: 2, ..Preparation::default() };
+    let expected =
+        Preparation { points: 3, dropped_non_finite: 1, surfels: 2, guessed_up: true, ..Preparation::default() };
     assert_eq!(preparation, expected);
 }
 
@@ -141,7 +142,7 @@ fn sphere_normals_and_radii_are_near_the_truth() {
             let cosine = surfel.normal().as_dvec3().normalize().dot(truth).abs();
             assert!(cosine > f64::to_radians(worst_degrees).cos(), "{position:?} {}", cosine.acos().to_degrees());
             let ratio = f64::from(surfel.radius()) / spacing;
-            assert!((1.2..1.9).contains(&ratio), "{ratio}");
+            assert!((1.0..1.6).contains(&ratio), "{ratio}");
         }
         assert!((0.7..1.1).contains(&(preparation.median_spacing.unwrap() / spacing)));
     }
@@ -176,7 +177,19 @@ fn a_random_plane_is_covered() {
         f64::from(holes) / f64::from(samples),
         mean_radius * f64::from(count).sqrt()
     );
-    assert!(f64::from(holes) < 1e-3 * f64::from(samples), "{holes} of {samples}");
+    // The mean distance to 8 neighbours alone leaves 400.
+    assert!(holes <= 8, "{holes} of {samples}");
+    // Not by disks so large that nothing is sharp.
+    assert!(mean_radius * f64::from(count).sqrt() < 1.35, "{mean_radius}");
+    let told = coverage(&scene, &()).unwrap().unwrap();
+    assert!(told.covered > 0.995 && told.covered < 1.0, "{told:?}");
+    // What has holes is not said to have none.
+    let mut small = scene;
+    small.surfels.iter_mut().for_each(|surfel| {
+        *surfel = Surfel::disk(Vec3::from_array(surfel.center), Vec3::Z, surfel.radius() * 0.8);
+    });
+    let told = coverage(&small, &()).unwrap().unwrap();
+    assert!(told.covered < 0.97 && told.open > 1000, "{told:?}");
 }
 
 #[test]

@@ -8,7 +8,9 @@ use epsplat::scene::camera::{DEFAULT_FOV, check_near};
 use epsplat::scene::{Camera, Lens, Scene, Up};
 use epsplat::{Error, Result};
 use glam::DVec3;
+use serde::Serialize;
 
+use super::super::parse::{up_argument, vector_argument};
 use super::Arguments;
 
 pub(super) const DEFAULT_SIZE: (u32, u32) = (1024, 1024);
@@ -22,8 +24,8 @@ pub(super) struct View {
 }
 
 enum Place {
-    /// Chosen to show the scene.
-    Framed,
+    /// Chosen to show the scene, with this up if there is one.
+    Framed(Option<DVec3>),
     /// At the eye; looks at the scene's centre.
     Eye(DVec3, Option<DVec3>),
     /// As given.
@@ -45,7 +47,7 @@ impl View {
         lens.intrinsics(size.0, size.1).map_err(|error| said_by(option, error))?;
         check_near_argument(arguments)?;
         let place = match (arguments.eye, arguments.target) {
-            (None, _) => Place::Framed,
+            (None, _) => Place::Framed(arguments.up),
             (Some(eye), None) => Place::Eye(eye, arguments.up),
             (Some(eye), Some(target)) => Place::Pose(Pose::LookAt(eye, target, arguments.up)),
         };
@@ -84,7 +86,11 @@ impl View {
     fn checked(self) -> Result<Self> {
         let stand_in = match &self.place {
             Place::Pose(pose) => pose.clone(),
-            Place::Framed | Place::Eye(..) => Pose::LookAt(DVec3::ZERO, DVec3::X, None),
+            Place::Framed(up) => {
+                let across = up.filter(|up| *up != DVec3::ZERO).map_or(DVec3::X, |up| up.any_orthogonal_vector());
+                Pose::LookAt(DVec3::ZERO, across, *up)
+            }
+            Place::Eye(..) => Pose::LookAt(DVec3::ZERO, DVec3::X, None),
         };
         self.posed(&stand_in, Up::Z, self.near.unwrap_or(1.0))?;
         Ok(self)
@@ -97,22 +103,58 @@ impl View {
         }
     }
 
-    /// The camera of the view; `default_near` is [`Camera::default_near`] of the scene.
-    pub(super) fn camera(&self, scene: &Scene, default_near: f64) -> Result<Camera> {
+    /// The camera of the view, and what it looks at, world coordinates, where nobody said so; `default_near` is
+    /// [`Camera::default_near`] of the scene.
+    pub(super) fn camera(&self, scene: &Scene, default_near: f64) -> Result<(Camera, Option<[DVec3; 2]>)> {
         let near = self.near.unwrap_or(default_near);
-        match &self.place {
-            Place::Framed => Camera::framing(self.size, self.lens, scene, near),
+        let camera = match &self.place {
+            Place::Framed(up) => {
+                let (camera, target) = Camera::framing_up(self.size, self.lens, scene, near, *up)?;
+                let eye = camera.eye;
+                return Ok((camera, Some([eye, target])));
+            }
             Place::Eye(eye, up) => {
-                let center = scene.origin + scene.body().0.center();
+                let center = scene.origin + scene.framed().0.center();
                 self.posed(&Pose::LookAt(*eye, center, *up), scene.up, near)
             }
             Place::Pose(pose) => self.posed(pose, scene.up, near),
-        }
+        };
+        Ok((camera?, None))
     }
 
     /// Pixels of the picture.
     pub(super) fn pixels(&self) -> u64 {
         u64::from(self.size.0) * u64::from(self.size.1)
+    }
+}
+
+/// A view that was chosen to show the scene, in the words of the options that give it again.
+#[derive(Serialize)]
+pub(super) struct ChosenView {
+    eye: [f64; 3],
+    target: [f64; 3],
+    up: [f64; 3],
+    /// Why up is what it is.
+    because: &'static str,
+}
+
+impl ChosenView {
+    /// From `eye` to `target`; up is `given` or the scene's, which may have been `guessed`.
+    pub(super) fn new([eye, target]: [DVec3; 2], scene: &Scene, given: Option<DVec3>, guessed: bool) -> Self {
+        let because = match (given, guessed, scene.up) {
+            (Some(_), ..) => "as asked for",
+            (None, false, _) => "as the file or its format says",
+            (None, true, Up::Z) => "a guess, as the points lie flat",
+            (None, true, Up::Y) => "a guess",
+        };
+        let up = given.unwrap_or(scene.up.axis());
+        Self { eye: eye.into(), target: target.into(), up: up.into(), because }
+    }
+
+    /// The options, and why.
+    pub(super) fn sentence(&self) -> String {
+        let [eye, target] = [self.eye, self.target].map(|v| vector_argument(v.into()));
+        format!("view: --eye {eye} --target {target} --up {} ({})", up_argument(self.up.into()), self.because)
     }
 }
 

@@ -59,7 +59,7 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
     let backend = backend(arguments)?;
 
     let bars = Bars::new();
-    let scene = scene(arguments, &bars)?;
+    let (scene, _) = scene(arguments, &bars)?;
     let near = Camera::default_near(&scene);
     let largest = views.iter().map(|(_, view)| view.pixels()).max().unwrap_or(1);
     let writers = writers(largest, options.maps);
@@ -69,7 +69,7 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
     // The first empty picture and why it is, and how many are.
     let empty = RefCell::new((None, 0));
     let frames = views.iter().map(|(file, view)| {
-        let frame = view.camera(&scene, near).and_then(|camera| {
+        let frame = view.camera(&scene, near).and_then(|(camera, _)| {
             let frame = renderer.frame(&camera, &())?;
             if is_empty(&frame.0, &options) {
                 let (first, count) = &mut *empty.borrow_mut();

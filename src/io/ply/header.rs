@@ -1,5 +1,6 @@
 //! The header of a PLY file (Turk 1994): encoding, elements and their properties.
 
+use crate::io::Up;
 use crate::io::fault::Fault;
 use crate::io::values::{BYTE_ORDER_MARK, line_end, shown};
 use std::io::{BufRead, Read};
@@ -88,6 +89,8 @@ pub(super) struct Header {
     pub(super) elements: Vec<Element>,
     /// Images that MeshLab names in comments.
     pub(super) textures: Vec<String>,
+    /// Which way is up, as epsplat says in a comment.
+    pub(super) up: Option<Up>,
     /// Lines, `end_header` included: the first value of an ASCII file is on the next.
     pub(super) lines: u64,
     /// What lines end with.
@@ -100,7 +103,7 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
     let mut line = Vec::new();
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
-    let mut textures = Vec::new();
+    let (mut textures, mut up) = (Vec::new(), None);
     for number in 1.. {
         line.clear();
         reader.take(LINE_LIMIT).read_until(line_end, &mut line)?;
@@ -127,9 +130,9 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
         match keyword {
             None | Some("obj_info") => {}
             Some("comment") => {
-                let name =
-                    text.trim().strip_prefix("comment").and_then(|rest| rest.trim().strip_prefix("TextureFile "));
-                textures.extend(name.map(|name| name.trim().to_owned()));
+                let comment = text.trim().strip_prefix("comment").unwrap_or_default().trim();
+                textures.extend(comment.strip_prefix("TextureFile ").map(|name| name.trim().to_owned()));
+                up = [Up::Y, Up::Z].into_iter().find(|up| words.clone().eq(["up", up.name()])).or(up);
             }
             Some("format") => {
                 let unread = "not a PLY format that is read (ascii, binary_little_endian or binary_big_endian 1.0)";
@@ -149,7 +152,7 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
             }
             Some("end_header") => {
                 let encoding = encoding.ok_or_else(|| malformed("the PLY header has no format line"))?;
-                return Ok(Header { encoding, elements, textures, lines: number, line_end });
+                return Ok(Header { encoding, elements, textures, up, lines: number, line_end });
             }
             Some(_) => return Err(malformed("not a PLY header line")),
         }

@@ -27,6 +27,8 @@ use std::sync::Arc;
 /// radii get them from the triangles around them, as in an OBJ file: normals weighted by area, and radii with which disks
 /// cover the triangles.
 ///
+/// A comment `up y` or `up z` in the header says which way is up.
+///
 /// Other properties are skipped, and so are other elements: those before the last one that is read by their declared
 /// shape, those after it without being looked at. Zero vertices are no error here.
 ///
@@ -85,12 +87,12 @@ pub fn read_mesh(input: Input, progress: &dyn Progress) -> Result<Mesh> {
         normals: points.normals.map(|normals| corners(&triangles, &normals)),
         texture,
         positions: points.positions,
+        up: points.up,
         colors: points.colors,
         triangles,
         material: painted.then_some(texture_numbers),
         materials,
         notes,
-        ..Mesh::default()
     })
 }
 
@@ -123,7 +125,8 @@ fn contents(input: Input, surface: bool, progress: &dyn Progress) -> Result<(Poi
         Encoding::BigEndian => binary::read::<true>(reader, &header, length, Faces::new(surface), progress),
     };
     progress.end();
-    let Contents { points, faces } = contents.map_err(in_file)?;
+    let Contents { mut points, faces } = contents.map_err(in_file)?;
+    points.up = header.up;
     let triangles = faces.finish(&points.positions).map_err(in_file)?;
     Ok((points, triangles, header.textures))
 }

@@ -1,7 +1,7 @@
 //! From surfels to PLY bytes.
 
-use crate::io::Points;
 use crate::io::atomic::{Output, write_whole};
+use crate::io::{Points, Up};
 use crate::scene::Colors;
 use crate::scene::color::{DEFAULT_COLOR, SRGB8_TO_LINEAR, linear_to_srgb};
 use crate::{Error, Progress, Result};
@@ -86,6 +86,8 @@ pub struct Properties {
     pub colors: ColorProperties,
     /// `float texture_u texture_v` are written.
     pub texture: bool,
+    /// `comment up y` or `comment up z` says which way is up.
+    pub up: Option<Up>,
 }
 
 impl Properties {
@@ -104,11 +106,15 @@ impl Properties {
                 Some(Colors::Linear(_) | Colors::Constant(_) | Colors::Textured(_)) => ColorProperties::Linear,
             },
             texture: points.texture.is_some(),
+            up: points.up,
         }
     }
 
     fn write_header(self, out: &mut Output<'_>, count: u64) -> io::Result<()> {
         write!(out, "ply\nformat binary_little_endian 1.0\ncomment epsplat {}\n", env!("CARGO_PKG_VERSION"))?;
+        if let Some(up) = self.up {
+            writeln!(out, "comment up {}", up.name())?;
+        }
         writeln!(out, "element vertex {count}")?;
         let mut scalars =
             |kind: &str, names: &[&str]| names.iter().try_for_each(|name| writeln!(out, "property {kind} {name}"));
@@ -198,7 +204,7 @@ pub fn write(
     })
 }
 
-/// Writes all that `points` hold, so that [`read`](super::read) gives them back (their `up` is no part of a PLY file).
+/// Writes all that `points` hold, so that [`read`](super::read) gives them back.
 ///
 /// With half-axes, normals that are missing are their product s x t, and radii that are missing their longer one.
 ///

@@ -9,6 +9,7 @@ use std::str::FromStr;
 use glam::DVec3;
 
 pub use self::ray::depth_along_ray;
+use crate::scene::Up;
 use crate::{Error, Result};
 
 /// Distance of the torus' tube centre from its axis, world units.
@@ -44,6 +45,14 @@ impl Shape {
         (Self::Plane, "plane", "a square of edge 2 at z = 0, in one colour"),
         (Self::Checkerboard, "checkerboard", "the same square with 32 x 32 black and white squares"),
     ];
+
+    /// Which way is up in the default view of it.
+    pub fn up(self) -> Up {
+        match self {
+            Self::Sphere => Up::Y,
+            Self::Torus | Self::Plane | Self::Checkerboard => Up::Z,
+        }
+    }
 
     /// The surface's area, square world units.
     pub fn area(self) -> f64 {

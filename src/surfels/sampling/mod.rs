@@ -32,7 +32,8 @@ use self::surface::Place;
 use crate::error::{Error, Result};
 use crate::io::{Mesh, Points};
 use crate::progress::Progress;
-use crate::scene::Colors;
+use crate::scene::{Colors, Up, body};
+use crate::surfels::guess_up;
 
 /// The most samples.
 pub const MOST: usize = 1 << 28;
@@ -162,6 +163,11 @@ fn normals_at(surface: &MeshSurface<'_>, places: &[Place]) -> Vec<DVec3> {
     places.par_iter().map(|place| surface.normal(*place)).collect()
 }
 
+/// Up of a mesh that does not say, as for its vertices.
+fn guessed_up(mesh: &Mesh) -> Up {
+    guess_up(&body(mesh.positions.len(), |index| DVec3::from_array(mesh.positions[index])).0)
+}
+
 fn points(
     surface: &MeshSurface<'_>,
     places: &[Place],
@@ -176,7 +182,7 @@ fn points(
         radii,
         colors: colors.map(Colors::Linear),
         texture: places.map(|place| surface.texture(*place)).collect(),
-        up: surface.mesh.up,
+        up: Some(surface.mesh.up.unwrap_or_else(|| guessed_up(surface.mesh))),
         ..Points::default()
     }
 }

@@ -6,17 +6,23 @@ use crate::surfels::estimate::{LARGEST_MEDIAN_RATIO, RADIUS_NEIGHBOURS, median};
 use crate::surfels::graph::NeighbourGraph;
 
 /// The largest radius of each position's disk: `factor` times the median of its neighbours' radii, and never more than
-/// [`LARGEST_MEDIAN_RATIO`] times that of all, in the unit of `radii`.
+/// [`LARGEST_MEDIAN_RATIO`] times that of all, in the unit of `radii`. Where a radius is zero, the position has none, and says
+/// nothing of others.
 ///
 /// At a boundary and around an outlier, points have neighbours on one side only, or far away, and so large radii; their
 /// neighbours' do not, wherever those have points around them. Densities that differ from place to place do not matter.
 pub(crate) fn local_limits(graph: &NeighbourGraph, radii: &[f64], factor: f64) -> Vec<f64> {
-    let global = median(radii.to_vec()).map_or(f64::INFINITY, |median| median * LARGEST_MEDIAN_RATIO);
+    let mut any: Vec<f64> = radii.par_iter().copied().filter(|radius| *radius > 0.0).collect();
+    let global = median(&mut any).map_or(f64::INFINITY, |median| median * LARGEST_MEDIAN_RATIO);
     (0..radii.len() as u32)
         .into_par_iter()
-        .map(|index| {
-            let near = graph.of(index).iter().take(RADIUS_NEIGHBOURS).map(|&other| radii[other as usize]);
-            median(near.collect()).map_or(f64::INFINITY, |median| median * factor).min(global)
+        .map_init(Vec::new, |near, index| {
+            near.clear();
+            if radii[index as usize] > 0.0 {
+                let of_near = graph.of(index).iter().take(RADIUS_NEIGHBOURS).map(|&other| radii[other as usize]);
+                near.extend(of_near.filter(|radius| *radius > 0.0));
+            }
+            median(near).map_or(f64::INFINITY, |median| median * factor).min(global)
         })
         .collect()
 }

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 pub(crate) use self::bsp::bsp_radii;
 use self::ellipse::{ELLIPSE_NEIGHBOURS, bounding_ellipse};
 pub(crate) use self::limit::local_limits;
-use super::estimate::{RADIUS_NEIGHBOURS, fitted_radius};
+use super::estimate::{NORMAL_NEIGHBOURS, fitted_radius};
 use super::graph::NeighbourGraph;
 use super::positions::DistinctPositions;
 use crate::{Error, Result};
@@ -20,7 +20,8 @@ use crate::{Error, Result};
 /// How the size of a surfel follows from the points around it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Size {
-    /// A disk of 1.2 times the mean distance to 8 neighbours.
+    /// A disk of the mean distance to 8 neighbours, or more where the gap to the next point is wider: it holds the point's Voronoi
+    /// cell in the tangent plane.
     #[default]
     Knn,
     /// The ellipse that bounds 8 neighbours in the tangent plane, with the half-axes of their covariance there (Pajarola et
@@ -74,13 +75,14 @@ pub(crate) fn offsets<'a>(
 }
 
 /// The radius of each position's disk by the mean distance of its neighbours, scaled units; zero where it has none.
-pub(crate) fn knn_radii(distinct: &DistinctPositions, graph: &NeighbourGraph) -> Vec<f64> {
+pub(crate) fn knn_radii(distinct: &DistinctPositions, graph: &NeighbourGraph, normals: &[[f32; 3]]) -> Vec<f64> {
     (0..distinct.len() as u32)
         .into_par_iter()
         .map_init(Vec::new, |near, index| {
             near.clear();
-            near.extend(offsets(distinct, graph, index, RADIUS_NEIGHBOURS));
-            if near.is_empty() { 0.0 } else { fitted_radius(near) }
+            near.extend(offsets(distinct, graph, index, NORMAL_NEIGHBOURS));
+            let normal = DVec3::from_array(normals[index as usize].map(f64::from));
+            if near.is_empty() { 0.0 } else { fitted_radius(near, normal.normalize()) }
         })
         .collect()
 }

@@ -1,0 +1,244 @@
+//! From points to the scene that is rendered.
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::estimate::{self, Estimate, Estimates};
+use super::gather::{self, Gathered};
+use super::outliers::drop_outliers;
+use super::positions::DistinctPositions;
+use super::{
+    LARGEST_COORDINATE, Limits, Preparation, colors, guess_up, mesh, origin_for, texture, unit, usable_axes,
+    usable_radius,
+};
+use crate::io::Points;
+use crate::scene::scene::{low_parts, shows};
+use crate::scene::{Bounds, Colors, SMALLEST_SCENE, Scene, Surfel, Texture, body};
+use crate::{Error, Progress, Result};
+
+/// The largest radius of a disk, in extents of the scene: from anywhere near the scene it is a plane without an end, and depths
+/// on it are as exact as others.
+const LARGEST_IN_EXTENTS: f64 = 1e6;
+
+/// The largest absolute texture coordinate: f32 ones beyond have no digits after the point that a texture could use.
+const LARGEST_PLACE: f32 = 1e4;
+
+/// Makes one scene of the points of all inputs, within the default [`Limits`].
+///
+/// Surfels keep the order of the points. Each is the ellipse of its half-axes where they are given, else a disk. What a point lacks
+/// is estimated from its neighbours among all points; the result for a point does not depend on the order the points come in, to
+/// the last bit.
+///
+/// # Errors
+///
+/// [`Error::EmptyScene`] if no input holds a usable point, and
+/// [`Error::Usage`] if normals or radii are missing and there are more than 2^32 - 1 points.
+pub fn build(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Preparation)> {
+    build_within(inputs, None, &Limits::default(), progress)
+}
+
+/// Makes one scene of the points of all inputs, painted with `texture` at the points' texture coordinates, instead of their colours.
+///
+/// # Errors
+///
+/// Those of [`build`], and [`Error::Usage`] if an input has no texture coordinates.
+pub fn build_textured(inputs: Vec<Points>, texture: Texture, progress: &dyn Progress) -> Result<(Scene, Preparation)> {
+    build_within(inputs, Some(texture), &Limits::default(), progress)
+}
+
+/// [`build`], or with a texture [`build_textured`], within other limits than the default ones. Radii and half-axes that are given,
+/// those of a mesh's vertices too, are no matter of [`Limits::largest_ratio`].
+///
+/// # Errors
+///
+/// Those of [`build`] and [`build_textured`], and [`Error::Usage`] for limits out of range.
+pub fn build_within(
+    inputs: Vec<Points>,
+    texture: Option<Texture>,
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> Result<(Scene, Preparation)> {
+    limits.check()?;
+    let inputs: Vec<Points> = inputs.into_iter().map(mesh::of_vertices).collect();
+    let Some(texture) = texture else { return built(gather::gather(inputs)?, limits, progress).map(|(made, _)| made) };
+    if inputs.iter().any(|input| input.texture.is_none() && !input.positions.is_empty()) {
+        return Err(Error::Usage("a texture paints points that have texture coordinates, and some have none".into()));
+    }
+    let mut gathered = gather::gather(inputs)?;
+    let unusable = |place: &[f32; 2]| !place.iter().all(|turns| turns.abs() <= LARGEST_PLACE);
+    for place in gathered.texture.iter_mut().flatten().filter(|place| unusable(place)) {
+        *place = [0.0; 2];
+        gathered.preparation.replaced_places += 1;
+    }
+    let ((mut scene, preparation), places) = built(gathered, limits, progress)?;
+    scene.colors = Colors::Textured(texture::painted(&scene, texture.into(), &places.unwrap_or_default(), progress)?);
+    Ok((scene, preparation))
+}
+
+/// The scene, and the texture coordinates of its surfels.
+type Built = ((Scene, Preparation), Option<Vec<[f32; 2]>>);
+
+fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Progress) -> Result<Built> {
+    let bounds = Bounds::of(gathered.positions.par_iter().map(|position| DVec3::from_array(*position)));
+    let (body, _) = body(gathered.positions.len(), |index| DVec3::from_array(gathered.positions[index]));
+    let origin = origin_for(&body);
+    let up = gathered.up.unwrap_or_else(|| guess_up(&body));
+    let sorted = |positions: &[[f64; 3]]| {
+        progress.begin("sorting points", 0);
+        let distinct = DistinctPositions::new(positions, &bounds, origin);
+        progress.end();
+        distinct
+    };
+    let mut distinct = None;
+    if let Some(deviations) = limits.outliers {
+        let mut all = sorted(&gathered.positions)?;
+        gathered.preparation.dropped_outliers = drop_outliers(&mut gathered, &mut all, deviations, progress);
+        distinct = Some(all);
+    }
+    let mut preparation = std::mem::take(&mut gathered.preparation);
+    let given = Given(&gathered);
+    let count = gathered.positions.len();
+    preparation.surfels = count as u64;
+    preparation.guessed_up = gathered.up.is_none();
+    preparation.estimated_normals = (0..count).into_par_iter().filter(|&i| given.lacks_normal(i)).count() as u64;
+    preparation.estimated_radii = (0..count).into_par_iter().filter(|&i| given.lacks_radius(i)).count() as u64;
+    let estimated = if preparation.estimated_normals > 0 || preparation.estimated_radii > 0 {
+        let distinct = distinct.map_or_else(|| sorted(&gathered.positions), Ok)?;
+        let how = (up.axis(), limits.largest_ratio);
+        Some(Estimated { of_position: estimated(&given, &distinct, how, &mut preparation, progress), distinct })
+    } else {
+        None
+    };
+    let estimate_of = |i: usize| estimated.as_ref().map_or_else(Estimate::default, |all| all.of_point(i));
+    let surfel = |(i, position): (usize, &[f64; 3])| {
+        // Adding +0 makes -0 the same coordinate as 0.
+        let center = (DVec3::from_array(*position) - origin).as_vec3() + Vec3::ZERO;
+        if let Some([s, t]) = given.axes(i) {
+            return Surfel::ellipse(center, s, t);
+        }
+        let normal = given.normal(i).unwrap_or_else(|| Vec3::from_array(estimate_of(i).normal));
+        let radius = given.radius(i).unwrap_or_else(|| estimate_of(i).radius);
+        Surfel::disk(center, normal, radius)
+    };
+    let mut surfels: Vec<Surfel> = gathered.positions.par_iter().enumerate().map(surfel).collect();
+    drop(estimated);
+    preparation.limited_radii = limit_radii(&mut surfels, body.extent().max_element())?;
+    let relative = |index: usize| DVec3::from_array(gathered.positions[index]) - origin;
+    let low = low_parts(&surfels, relative);
+    preparation.rounding = rounding(&surfels, &low, relative);
+    let oriented = preparation.estimated_normals == 0;
+    let Gathered { colors, closed, clips, provenance, texture, .. } = gathered;
+    let (colors, closed) = (colors::folded(colors), closed && oriented);
+    // Most scenes have no disk that ends before its rim.
+    let clips = clips.filter(|clips| clips.iter().any(|clip| !clip.is_none())).unwrap_or_default();
+    let scene = Scene { origin, surfels, low, clips, colors, oriented, closed, up, provenance };
+    // As the default view sees it.
+    preparation.strays = scene.framed().1;
+    Ok(((scene, preparation), texture))
+}
+
+/// What points have that is usable.
+struct Given<'a>(&'a Gathered);
+
+impl Given<'_> {
+    fn axes(&self, i: usize) -> Option<[Vec3; 2]> {
+        usable_axes(*self.0.axes.as_ref()?.get(i)?)
+    }
+
+    fn normal(&self, i: usize) -> Option<Vec3> {
+        unit(*self.0.normals.as_ref()?.get(i)?)
+    }
+
+    fn radius(&self, i: usize) -> Option<f32> {
+        usable_radius(*self.0.radii.as_ref()?.get(i)?)
+    }
+
+    fn lacks_normal(&self, i: usize) -> bool {
+        self.normal(i).is_none() && self.axes(i).is_none()
+    }
+
+    fn lacks_radius(&self, i: usize) -> bool {
+        self.radius(i).is_none() && self.axes(i).is_none()
+    }
+}
+
+/// What was estimated for the points that lack something.
+struct Estimated {
+    distinct: DistinctPositions,
+    of_position: Vec<Estimate>,
+}
+
+impl Estimated {
+    fn of_point(&self, i: usize) -> Estimate {
+        self.of_position[self.distinct.of_point()[i] as usize]
+    }
+}
+
+/// Estimates what is not `given`, with the direction of up and the largest ratio of a radius to those around it.
+fn estimated(
+    given: &Given<'_>,
+    distinct: &DistinctPositions,
+    (up, largest_ratio): (DVec3, f64),
+    preparation: &mut Preparation,
+    progress: &dyn Progress,
+) -> Vec<Estimate> {
+    let all = preparation.estimated_normals.max(preparation.estimated_radii) == preparation.surfels;
+    let wanted = (!all).then(|| {
+        let mut wanted = vec![false; distinct.len()];
+        for (i, &position) in distinct.of_point().iter().enumerate() {
+            wanted[position as usize] |= given.lacks_normal(i) || given.lacks_radius(i);
+        }
+        wanted
+    });
+    let Estimates { of_position, median_spacing, limited } =
+        estimate::estimate(distinct, wanted.as_deref(), (up, largest_ratio), progress);
+    preparation.distinct_positions = Some(distinct.len() as u64);
+    preparation.median_spacing = median_spacing;
+    let smaller = |(i, &position): (usize, &u32)| limited[position as usize] && given.lacks_radius(i);
+    preparation.limited_by_neighbours =
+        distinct.of_point().par_iter().enumerate().filter(|point| smaller(*point)).count() as u64;
+    of_position
+}
+
+/// Limits disks to [`LARGEST_IN_EXTENTS`] and says how many were larger.
+///
+/// # Errors
+///
+/// [`Error::EmptyScene`] if the scene is too small for f32 arithmetic.
+fn limit_radii(surfels: &mut [Surfel], extent: f64) -> Result<u64> {
+    let largest = surfels.par_iter().map(Surfel::radius).reduce(|| 0.0, f32::max);
+    if extent >= SMALLEST_SCENE && f64::from(largest) <= LARGEST_IN_EXTENTS * extent {
+        return Ok(0);
+    }
+    // Where most disks are larger than the box of their centres, they are the scene.
+    let typical = estimate::median(&mut surfels.par_iter().map(|surfel| surfel.radius().into()).collect::<Vec<_>>());
+    let size = extent.max(2.0 * typical.unwrap_or(0.0));
+    if size < SMALLEST_SCENE {
+        return Err(Error::EmptyScene(format!(
+            "the scene is {size:.1e} world units wide, and scenes of {SMALLEST_SCENE:e} to {LARGEST_COORDINATE:e} are drawn: scale it"
+        )));
+    }
+    let most = LARGEST_IN_EXTENTS * size;
+    let limit = |surfel: &mut Surfel| {
+        // Each half-axis by itself, so that a thin ellipse stays one.
+        let shortened = |axis: [f32; 3]| {
+            let axis = DVec3::from_array(axis.map(f64::from));
+            axis.clamp_length_max(most).as_vec3().to_array()
+        };
+        let before = *surfel;
+        (surfel.s, surfel.t) = (shortened(before.s), shortened(before.t));
+        u64::from(*surfel != before)
+    };
+    Ok(surfels.par_iter_mut().map(limit).sum())
+}
+
+/// The largest error of a centre, `center` with all its digits, where it shows at its disk's size.
+fn rounding(surfels: &[Surfel], low: &[[f32; 3]], center: impl Fn(usize) -> DVec3 + Sync) -> Option<f64> {
+    let error = |(index, low): (usize, &[f32; 3])| {
+        let surfel = &surfels[index];
+        let kept = DVec3::from_array(surfel.center.map(f64::from)) + DVec3::from_array(low.map(f64::from));
+        let error = (center(index) - kept).abs().max_element();
+        shows(surfel, error).then_some(error)
+    };
+    low.par_iter().enumerate().filter_map(error).reduce_with(f64::max)
+}

@@ -1,0 +1,148 @@
+//! The gaps between points: how far a disk must reach so that none stays open.
+//!
+//! Randomly placed points leave gaps that are wider than the mean distance of neighbours says: in any direction the next one may be
+//! far. What is nearer to a point than to any other is its Voronoi cell, so disks that hold their points' cells leave no hole. The
+//! farthest place of a cell is one of its corners, where three points are equally far: the middle of a gap, or beside one. Where the
+//! surface ends, a cell has no corner, and no disk stands out farther for it.
+
+use glam::{DVec2, DVec3};
+
+/// The cosine of the elevation over the tangent plane up to which a point is beside another: 60 degrees.
+const STEEPEST: f64 = 0.5;
+
+/// Corners of a cell that is cut by as many borders as there are neighbours, and four of its outline.
+const MOST_CORNERS: usize = 32;
+
+/// A corner of a cell, and the neighbour across the edge from it to the next one; none across the outline.
+#[derive(Clone, Copy, Default)]
+struct Corner {
+    at: DVec2,
+    across: Option<DVec2>,
+}
+
+/// The cell of a point in its tangent plane, as far as neighbours are known.
+pub(crate) struct Cell {
+    corners: [Corner; MOST_CORNERS],
+    count: usize,
+    /// The axes of the plane.
+    basis: [DVec3; 2],
+}
+
+impl Cell {
+    /// The cell of a point whose neighbours lie at `offsets`, the nearest first, in the plane across the unit vector `normal`; it ends at
+    /// `reach`, in the unit of the offsets, where no neighbour bounds it. A cell whose corners are all within `enough` is not cut
+    /// further.
+    pub fn new(offsets: &[DVec3], normal: DVec3, (reach, enough): (f64, f64)) -> Self {
+        let (e1, e2) = normal.any_orthonormal_pair();
+        let mut corners = [Corner::default(); MOST_CORNERS];
+        for (corner, (x, y)) in corners.iter_mut().zip([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)]) {
+            corner.at = DVec2::new(x, y) * reach;
+        }
+        let mut cell = Self { corners, count: 4, basis: [e1, e2] };
+        let mut farthest = 2.0 * reach * reach;
+        for offset in offsets {
+            let (neighbour, squared) = (DVec2::new(offset.dot(e1), offset.dot(e2)), offset.length_squared());
+            if squared > 4.0 * farthest || farthest <= enough * enough {
+                break;
+            }
+            if neighbour.length_squared() > STEEPEST * STEEPEST * squared && cell.clip(neighbour) {
+                farthest = cell.corners().iter().fold(0.0, |m: f64, corner| m.max(corner.at.length_squared()));
+            }
+        }
+        cell
+    }
+
+    fn corners(&self) -> &[Corner] {
+        &self.corners[..self.count]
+    }
+
+    /// Leaves what is nearer to the point than to `neighbour`; whether that is less.
+    fn clip(&mut self, neighbour: DVec2) -> bool {
+        let half = 0.5 * neighbour.length_squared();
+        let beyond = |corner: &Corner| corner.at.dot(neighbour) - half;
+        if self.count + 1 >= MOST_CORNERS || self.corners().iter().all(|corner| beyond(corner) <= 0.0) {
+            return false;
+        }
+        let (before, count) = (self.corners, self.count);
+        self.count = 0;
+        for k in 0..count {
+            let (from, to) = (before[k], before[if k + 1 < count { k + 1 } else { 0 }]);
+            let (a, b) = (beyond(&from), beyond(&to));
+            let crossing = || from.at + (to.at - from.at) * (a / (a - b));
+            if a <= 0.0 {
+                self.push(from);
+                if b > 0.0 {
+                    self.push(Corner { at: crossing(), across: Some(neighbour) });
+                }
+            } else if b <= 0.0 {
+                self.push(Corner { at: crossing(), across: from.across });
+            }
+        }
+        true
+    }
+
+    fn push(&mut self, corner: Corner) {
+        self.corners[self.count] = corner;
+        self.count += 1;
+    }
+
+    /// The corners between two neighbours, in the tangent plane relative to the point.
+    fn closed(&self) -> impl Iterator<Item = DVec2> {
+        let corners = self.corners();
+        let before = |k: usize| corners[if k > 0 { k - 1 } else { corners.len() - 1 }].across;
+        let closed = move |(k, corner): (usize, &Corner)| before(k).and(corner.across).map(|_| corner.at);
+        corners.iter().enumerate().filter_map(closed)
+    }
+
+    /// The distance to the farthest corner between two neighbours; zero if there is none.
+    pub fn farthest_corner(&self) -> f64 {
+        self.closed().fold(0.0, |m: f64, corner| m.max(corner.length_squared())).sqrt()
+    }
+
+    /// The corners between two neighbours, relative to the point.
+    pub fn closed_corners(&self) -> impl Iterator<Item = DVec3> {
+        let [e1, e2] = self.basis;
+        self.closed().map(move |corner| e1 * corner.x + e2 * corner.y)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_cell_of_a_grid_is_a_square_and_a_missing_point_widens_it() {
+        let ring = |missing: usize| -> Vec<DVec3> {
+            let mut all: Vec<_> = (0..25)
+                .filter(|k| *k != 12 && *k != missing)
+                .map(|k| DVec3::new((k % 5) as f64 - 2.0, (k / 5) as f64 - 2.0, 0.0))
+                .collect();
+            all.sort_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
+            all
+        };
+        for normal in [DVec3::Z, -DVec3::Z, DVec3::new(0.1, 0.05, 1.0).normalize()] {
+            let whole = Cell::new(&ring(12), normal, (3.0, 0.0)).farthest_corner();
+            assert!((whole - 0.5f64.sqrt()).abs() < 0.02, "{whole}");
+            // Without the point at (1, 0) the cell goes on to (1, 0.0), the middle of what is missing.
+            let wider = Cell::new(&ring(13), normal, (3.0, 0.0)).farthest_corner();
+            assert!((wider - 1.0).abs() < 0.02, "{wider}");
+        }
+        assert_eq!(Cell::new(&ring(12), DVec3::Z, (3.0, 0.0)).closed_corners().count(), 4);
+    }
+
+    #[test]
+    fn a_cell_that_is_open_has_no_corner_there() {
+        // A straight border, points in a line, and none at all.
+        let border: Vec<_> =
+            [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| DVec3::new(x, y, 0.0)).to_vec();
+        let cell = Cell::new(&border, DVec3::Z, (5.0, 0.0));
+        assert_eq!(cell.closed_corners().count(), 2);
+        assert!(cell.closed_corners().all(|corner| corner.y > 0.0));
+        let line: Vec<_> = (1..9).map(|k| DVec3::X * f64::from(k)).collect();
+        assert_eq!(Cell::new(&line, DVec3::Z, (5.0, 0.0)).farthest_corner(), 0.0);
+        assert_eq!(Cell::new(&[], DVec3::Z, (5.0, 0.0)).farthest_corner(), 0.0);
+        // Another sheet right above and below bounds nothing.
+        let sheets = [DVec3::Z * 0.1, -DVec3::Z * 0.1, DVec3::X, DVec3::Y, -DVec3::X, -DVec3::Y];
+        assert!((Cell::new(&sheets, DVec3::Z, (5.0, 0.0)).farthest_corner() - 0.5f64.sqrt()).abs() < 1e-12);
+    }
+}

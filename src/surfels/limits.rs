@@ -1,0 +1,35 @@
+//! What keeps the stray points of scans from spoiling a picture.
+
+use crate::{Error, Result};
+
+/// Which points of a cloud become surfels, and how large those of them may be whose radius is estimated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Points are left out whose mean distance to 16 neighbours exceeds the mean of all by more than so many standard
+    /// deviations; None keeps all.
+    pub outliers: Option<f64>,
+    /// No estimated half-axis is longer than this times the median of those of the neighbours; infinite for no limit.
+    pub largest_ratio: f64,
+}
+
+impl Default for Limits {
+    /// All points, and no half-axis above twice those around it.
+    fn default() -> Self {
+        Self { outliers: None, largest_ratio: 2.0 }
+    }
+}
+
+impl Limits {
+    /// Refuses what limits nothing or everything.
+    pub(crate) fn check(&self) -> Result<()> {
+        if self.outliers.is_some_and(|deviations| !(deviations.is_finite() && deviations >= 0.0)) {
+            return Err(Error::Usage(
+                "outliers are beyond a number of standard deviations that is not negative".into(),
+            ));
+        }
+        if self.largest_ratio.is_nan() || self.largest_ratio < 1.0 {
+            return Err(Error::Usage("the largest radius is at least 1 times that of the neighbours".into()));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,74 @@
+//! What became of the points of a scene.
+
+#[cfg(doc)]
+use super::{LARGEST_COORDINATE, Limits};
+#[cfg(doc)]
+use crate::scene::Scene;
+
+/// What was done to the points on the way to a scene.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Preparation {
+    /// Points in all inputs.
+    pub points: u64,
+    /// Points that are in the files but not among `points`: they are marked as withheld, which is deleted.
+    pub withheld: u64,
+    /// Vertices that are in the meshes but not among `points`: no triangle with an area names them.
+    pub loose: u64,
+    /// Points left out because a coordinate is not finite or exceeds [`LARGEST_COORDINATE`].
+    pub dropped_non_finite: u64,
+    /// Points left out as outliers, which [`Limits::outliers`] asks for.
+    pub dropped_outliers: u64,
+    /// Surfels in the scene: `points - dropped_non_finite - dropped_outliers`.
+    pub surfels: u64,
+    /// Surfels whose normal was missing, zero or not finite, and was estimated from neighbours.
+    pub estimated_normals: u64,
+    /// Surfels whose radius was missing, not positive or not finite, and was estimated from neighbours.
+    pub estimated_radii: u64,
+    /// Surfels whose colour was not finite and was replaced by [`DEFAULT_COLOR`](crate::scene::color::DEFAULT_COLOR).
+    pub replaced_colors: u64,
+    /// Points whose texture coordinates were not finite or too large and became 0; counted where a texture paints them.
+    pub replaced_places: u64,
+    /// Different positions among the surfels; None if nothing had to be estimated, so nobody looked.
+    pub distinct_positions: Option<u64>,
+    /// No input says which way is up, so it was guessed.
+    pub guessed_up: bool,
+    /// Points that stray: they lie so far from nearly all others that the default view leaves them out ([`Scene::framed`]).
+    pub strays: u64,
+    /// Surfels whose radius was estimated and would have been larger than [`Limits::largest_ratio`] allows.
+    pub limited_by_neighbours: u64,
+    /// Surfels larger than a million times the scene, which were made that large.
+    pub limited_radii: u64,
+    /// The largest error of a centre's coordinate, world units, where it may show: it is more than 1/256 of the surfel's shorter
+    /// half-axis, although coordinates are kept in twice the digits of f32.
+    pub rounding: Option<f64>,
+    /// Median distance between an estimated position and the nearest other one, world units; None if nothing had to be
+    /// estimated or there is only one position.
+    pub median_spacing: Option<f64>,
+}
+
+impl Preparation {
+    /// What a user should hear of: a sentence for everything that was lost or replaced.
+    pub fn notes(&self) -> Vec<String> {
+        let counted = |count: u64, what: &str| (count > 0).then(|| format!("{count} points {what}"));
+        let notes = [
+            counted(
+                self.withheld,
+                "were left out: they are marked as withheld, which is deleted (--keep-withheld keeps them)",
+            ),
+            (self.loose > 0).then(|| format!("{} vertices of no triangle were left out", self.loose)),
+            counted(self.dropped_non_finite, "were dropped: a coordinate is not finite or too large"),
+            counted(self.dropped_outliers, "were dropped: they lie too far from their neighbours"),
+            counted(self.replaced_colors, "had a colour that is not finite and became grey"),
+            counted(self.replaced_places, "had texture coordinates that are not finite or too large and became 0"),
+        ];
+        let strays = counted(self.strays, "stray: they lie far away from all others, outside of the default view");
+        let by_neighbours =
+            counted(self.limited_by_neighbours, "would have had larger surfels than their neighbours allow");
+        let limited =
+            counted(self.limited_radii, "had a radius of more than a million times the scene and became that large");
+        let rounding = self.rounding.map(|error| {
+            format!("the smallest surfels lie so far from others that their coordinates err by up to {error:.2e} world units")
+        });
+        notes.into_iter().chain([strays, by_neighbours, limited, rounding]).flatten().collect()
+    }
+}

@@ -1,0 +1,109 @@
+//! What scans need of `epsplat render`: which way is up, a view that is told, radii within limits, and no outliers.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use common::command::{DATA, Folder, fails, ply, succeeds, text};
+
+/// The line that says which view was chosen.
+fn view(output: &std::process::Output) -> String {
+    let stderr = String::from_utf8(output.stderr.clone()).unwrap();
+    let lines: Vec<_> = stderr.lines().filter(|line| line.starts_with("view: ")).collect();
+    assert!(lines.len() <= 1, "{stderr}");
+    lines.first().map_or(String::new(), |line| (*line).to_owned())
+}
+
+#[test]
+fn the_view_that_was_chosen_is_told_in_words_that_give_it_again() {
+    let folder = Folder::new();
+    let small = ["--size", "48x36", "--backend", "reference"];
+    let draw = |input: &str, name: &str, more: &[&str]| {
+        let image = folder.path(name);
+        let output = succeeds(&[&["render", input, "-o", text(&image)], &small[..], more].concat());
+        (view(&output), std::fs::read(image).unwrap())
+    };
+    let bunny = format!("{DATA}/bunny.obj");
+    for (up, why) in [
+        (None, "(as the file or its format says)"),
+        (Some("-z"), "(as asked for)"),
+        (Some("1,2,-0.5"), "(as asked for)"),
+    ] {
+        let more: Vec<_> = up.into_iter().flat_map(|up| ["--up", up]).collect();
+        let (told, picture) = draw(&bunny, "chosen.png", &more);
+        assert!(told.ends_with(why) && told.contains(&format!("--up {} (", up.unwrap_or("y"))), "{told}");
+        let words: Vec<_> = told["view: ".len()..told.find(" (").unwrap()].split(' ').collect();
+        let (again, same) = draw(&bunny, "again.png", &words);
+        assert!(again.is_empty() && same == picture, "{told}");
+    }
+    // The control: another up is another picture, and the names of axes are their vectors.
+    let of = |up: &str| draw(&bunny, "up.png", &["--up", up]).1;
+    assert!(of("z") != of("y") && of("z") == of("0,0,1") && of("-x") == of("-1,0,0"));
+    assert!(of("y") == draw(&bunny, "default.png", &[]).1);
+    for (up, words) in [("w", "none of x, y, z"), ("0,0,0", "up is zero")] {
+        fails(&["render", &bunny, "-o", text(&folder.path("x.png")), "--up", up], 2, &[words]);
+    }
+    let rows: String = (0..400).map(|i| format!("{} {} 0\n", i % 20, i / 20)).collect();
+    let flat = folder.file("flat.ply", ply("x y z", 400, &rows));
+    assert!(draw(text(&flat), "flat.png", &[]).0.ends_with("--up z (a guess, as the points lie flat)"));
+    let json = folder.path("view.json");
+    draw(text(&flat), "flat.png", &["--json", text(&json)]);
+    let report: serde_json::Value = serde_json::from_slice(&std::fs::read(json).unwrap()).unwrap();
+    assert_eq!((&report["view"]["up"], report["width"].as_u64()), (&serde_json::json!([0.0, 0.0, 1.0]), Some(48)));
+}
+
+#[test]
+fn up_stays_what_it_was_in_what_is_written() {
+    let folder = Folder::new();
+    let made = folder.path("made.ply");
+    let drawn = |input: &str| {
+        let image = folder.path("view.png");
+        // So large that no disk is cut, which would take the camera farther away.
+        view(&succeeds(&["render", input, "-o", text(&image), "--size", "640x640", "--backend", "reference"]))
+    };
+    let up = || epsplat::io::read(&made, &()).unwrap().up.unwrap().name();
+    // As tall as wide, so that a reader who is not told would guess y.
+    let rows: String = (0..1000).map(|i| format!("{} {} {}\n", i % 10, i / 10 % 10, i / 100)).collect();
+    let tall = folder.file("tall.ply", ply("x y z", 1000, &rows).replace("end_header", "comment up z\nend_header"));
+    for command in [&["surfels"][..], &["surfels", "--size", "ellipse"], &["simplify", "--tolerance", "rel:0.1"]] {
+        succeeds(&[command, &[text(&tall), "-o", text(&made)]].concat());
+        assert_eq!(up(), "z", "{command:?}");
+    }
+    // The control: without the comment it would tip over.
+    let unsaid = folder.file("unsaid.ply", ply("x y z", 1000, &rows));
+    assert!(drawn(text(&unsaid)).ends_with("--up y (a guess)"));
+    // Of a scan the same camera, by way of surfels.
+    let scan = format!("{DATA}/autzen.laz");
+    succeeds(&["surfels", &scan, "-o", text(&made)]);
+    let (scan, surfels) = (drawn(&scan), drawn(text(&made)));
+    assert!(scan == surfels && scan.ends_with("--up z (as the file or its format says)"), "{scan} {surfels}");
+    // An OBJ file has y up, however flat.
+    let floor = folder.file("floor.obj", "v 0 0 0\nv 9 0 0\nv 0 9 0\nf 1 2 3\n");
+    succeeds(&["sample", text(&floor), "-o", text(&made), "--count", "500"]);
+    assert_eq!(up(), "y");
+    for (shape, expected) in [("sphere", "y"), ("torus", "z"), ("plane", "z"), ("checkerboard", "z")] {
+        succeeds(&["generate", shape, "--count", "300", "-o", text(&made)]);
+        assert_eq!(up(), expected, "{shape}");
+    }
+}
+
+#[test]
+fn render_limits_radii_and_drops_outliers_as_surfels_does() {
+    let folder = Folder::new();
+    let image = folder.path("i.png");
+    let rows: String = (0..900).map(|i| format!("{} {} {}\n", i % 30, i / 30, (i % 7) as f64 * 0.01)).collect();
+    let cloud = folder.file("cloud.ply", ply("x y z", 902, &(rows + "15 15 9\n40 15 0\n")));
+    let told = |more: &[&str]| {
+        let small = ["--size", "32x32", "--backend", "reference"];
+        let output = succeeds(&[&["render", text(&cloud), "-o", text(&image)], &small[..], more].concat());
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let limited = "larger surfels than their neighbours allow";
+    assert!(told(&[]).contains(limited) && !told(&["--max-radius", "inf"]).contains(limited));
+    assert!(told(&["--outliers", "5"]).contains("2 points were dropped: they lie too far from their neighbours"));
+    let refuses = |more: &[&str], words: &[&str]| {
+        fails(&[&["render", text(&cloud), "-o", text(&image)], more].concat(), 2, words);
+    };
+    refuses(&["--max-radius", "0.5"], &["at least 1"]);
+    refuses(&["--outliers=-1"], &["not negative"]);
+}

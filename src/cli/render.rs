@@ -110,7 +110,7 @@ pub struct Arguments {
     #[arg(long, value_enum, default_value_t = LowPassName::None)]
     lowpass: LowPassName,
     /// Samples of a pixel: 1, 4, 8 or 16. Edges are as smooth as they are many; maps are of the pixel's centre
-    #[arg(long, value_name = "N", default_value = "1", help_heading = "Surface")]
+    #[arg(long, value_name = "N", default_value = "4", help_heading = "Surface")]
     samples: Samples,
     /// auto: surfels that face away from the eye are left out where the scene is a closed mesh seen from outside, as nobody
     /// sees them but past its outline; back: they are left out of any scene whose normals have a side; none

@@ -16,6 +16,16 @@ impl Clip {
         *self == Self::NONE
     }
 
+    /// The same with lines whose longest number is 1, so that no product of theirs overflows; a line that is none, or not finite,
+    /// leaves nothing out.
+    pub fn usable(self) -> Self {
+        Self(self.0.map(|line| {
+            let longest = line.iter().fold(0.0f32, |longest, x| longest.max(x.abs()));
+            let usable = line.iter().all(|x| x.is_finite()) && longest > 0.0;
+            if usable { line.map(|x| x / longest) } else { Self::NONE.0[0] }
+        }))
+    }
+
     /// How far inside both lines (u, v) lies, in units of the lines' own lengths: negative where it is left out.
     pub fn inside(&self, u: f64, v: f64) -> f64 {
         let along = |line: [f32; 3]| DVec3::from(line.map(f64::from)).dot(DVec3::new(u, v, 1.0));
@@ -39,5 +49,7 @@ mod tests {
         assert!(corner.inside(0.0, -0.5) > 0.0 && corner.inside(-0.2, 0.0) >= 0.0);
         assert!(corner.inside(-0.3, -0.5) < 0.0 && corner.inside(0.5, 0.1) < 0.0);
         assert_eq!(Clip::NONE.inside(1.0, -1.0), 1.0);
+        let odd = Clip([[f32::NAN, 0.0, 0.0], [0.0, 3e38, -3e38]]);
+        assert_eq!(odd.usable(), Clip([[0.0, 0.0, 1.0], [0.0, 1.0, -1.0]]));
     }
 }

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::io::Points;
 use crate::scene::scene::{low_parts, shows};
-use crate::scene::{Bounds, Colors, SMALLEST_SCENE, Scene, Surfel, Texture, body};
+use crate::scene::{Bounds, Clip, Colors, SMALLEST_SCENE, Scene, Surfel, Texture, body};
 use crate::{Error, Progress, Result};
 
 /// The largest radius of a disk, in extents of the scene: from anywhere near the scene it is a plane without an end, and depths
@@ -130,7 +130,8 @@ fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Progress) -> Re
     let Gathered { colors, closed, clips, provenance, texture, .. } = gathered;
     let (colors, closed) = (colors::folded(colors), closed && oriented);
     // Most scenes have no disk that ends before its rim.
-    let clips = clips.filter(|clips| clips.iter().any(|clip| !clip.is_none())).unwrap_or_default();
+    let clips: Vec<Clip> = clips.unwrap_or_default().into_iter().map(Clip::usable).collect();
+    let clips = if clips.iter().all(Clip::is_none) { Vec::new() } else { clips };
     let scene = Scene { origin, surfels, low, clips, colors, oriented, closed, up, provenance };
     // As the default view sees it.
     preparation.strays = scene.framed().1;

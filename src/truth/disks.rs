@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use glam::{DVec3, Vec3, Vec3A};
+use glam::{DVec2, DVec3, Vec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use super::nearest::nearest;
 use super::triangles::PADDING;
-use crate::scene::{Bounds, Scene, Surfel};
+use crate::scene::{Bounds, Clip, Scene, Surfel};
 
 /// The shorter half-axis is taken for at least this part of the longer: a disk seen as a line has a distance all the same.
 const THINNEST: f64 = 1e-9;
@@ -40,18 +40,24 @@ struct Disk {
     axes: [DVec3; 3],
     /// Lengths of the half-axes, the longer one first.
     half: [f64; 2],
+    /// Where it ends before its rim, by the half-axes that came.
+    clip: Clip,
+    /// Cosine and sine of the angle from those to the principal ones.
+    turn: DVec2,
 }
 
 /// A surfel and its centre with all digits.
 struct Placed<'a> {
     center: DVec3,
     surfel: &'a Surfel,
+    clip: Clip,
 }
 
 impl Placed<'_> {
     /// What tells it from others.
-    fn bits(&self) -> ([u64; 3], [[u32; 3]; 2]) {
-        let axes = [self.surfel.s, self.surfel.t].map(|axis| axis.map(f32::to_bits));
+    fn bits(&self) -> ([u64; 3], [[u32; 3]; 4]) {
+        let Clip([first, second]) = self.clip;
+        let axes = [self.surfel.s, self.surfel.t, first, second].map(|axis| axis.map(f32::to_bits));
         (self.center.to_array().map(f64::to_bits), axes)
     }
 }
@@ -65,7 +71,9 @@ impl DiskTree {
             let numbers = [surfel.center, surfel.s, surfel.t];
             numbers.as_flattened().iter().all(|c| c.is_finite()) && surfel.radius() > 0.0
         };
-        let placed = |index: usize| Placed { center: scene.center(index), surfel: &scene.surfels[index] };
+        let clip = |index: usize| scene.clips.get(index).copied().unwrap_or_default();
+        let placed =
+            |index: usize| Placed { center: scene.center(index), surfel: &scene.surfels[index], clip: clip(index) };
         let all = (0..scene.surfels.len()).map(placed);
         let mut surfels: Vec<Placed<'_>> = all.filter(|placed| sized(&placed.surfel)).collect();
         // Boxes tell nothing apart that is in one place: of thousands that are, each would be looked at for each point.
@@ -73,7 +81,7 @@ impl DiskTree {
         surfels.dedup_by_key(|placed| placed.bits());
         let bounds = surfels.par_iter().fold(
             || Bounds::EMPTY,
-            |bounds, Placed { center, surfel }| {
+            |bounds, Placed { center, surfel, .. }| {
                 let (center, reach) = (*center, extent(surfel));
                 bounds.with_point(center - reach).with_point(center + reach)
             },
@@ -83,7 +91,7 @@ impl DiskTree {
         let radius = if extent > 0.0 { 0.5 * extent } else { 1.0 };
         let disk = |placed: &Placed<'_>| {
             let [s, t] = [placed.surfel.s, placed.surfel.t].map(world);
-            Disk::new((placed.center - center) / radius, s / radius, t / radius)
+            Disk { clip: placed.clip, ..Disk::new((placed.center - center) / radius, s / radius, t / radius) }
         };
         let disks: Vec<Disk> = surfels.par_iter().map(disk).collect();
         let boxes: Vec<Aabb> = disks.iter().map(Disk::padded_box).collect();
@@ -160,7 +168,8 @@ impl Disk {
         let half = [long.length(), short.length().max(THINNEST * long.length())];
         let long = long.normalize_or(DVec3::X);
         let short = short.try_normalize().unwrap_or_else(|| long.any_orthonormal_vector());
-        Self { center, axes: [long, short, long.cross(short)], half }
+        let turn = DVec2::new(cos, sin);
+        Self { center, axes: [long, short, long.cross(short)], half, clip: Clip::NONE, turn }
     }
 
     fn padded_box(&self) -> Aabb {
@@ -176,7 +185,10 @@ impl Disk {
         let t = (self.center - point).dot(normal) / direction.dot(normal);
         let offset = point + direction * t - self.center;
         let (u, v) = (offset.dot(long) / self.half[0], offset.dot(short) / self.half[1]);
-        (u * u + v * v <= 1.0).then_some(t)
+        // p = u' s' + v' t' with s' = s cos + t sin and t' = t cos - s sin.
+        let (cos, sin) = (self.turn.x, self.turn.y);
+        let inside = self.clip.inside(u * cos - v * sin, u * sin + v * cos) >= 0.0;
+        (inside && u * u + v * v <= 1.0).then_some(t)
     }
 
     /// Beyond the rim the nearest point (x', y') of the ellipse with half-axes a and b has the normal through (x, y):

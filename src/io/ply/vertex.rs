@@ -4,8 +4,8 @@ use super::header::{Element, Kind, Scalar};
 use crate::io::Points;
 use crate::io::fault::{Fault, reserve};
 use crate::io::values::{SRGB16_TO_LINEAR, finite};
-use crate::scene::Colors;
 use crate::scene::color::SRGB8_TO_LINEAR;
+use crate::scene::{Clip, Colors};
 
 /// A property that is used, by where it lies among the row's numbers.
 #[derive(Clone, Copy, Debug)]
@@ -66,10 +66,14 @@ pub(super) struct Layout {
     normal: Option<[usize; 3]>,
     radius: Option<usize>,
     axes: Option<[[usize; 3]; 2]>,
+    clip: Option<[usize; 6]>,
     color: Option<[(usize, Coding); 3]>,
     alpha: Option<(usize, Coding)>,
     texture: Option<[usize; 2]>,
 }
+
+/// The lines at which an ellipse ends ([`Clip`]), in units of its half-axes.
+pub(super) const CLIP_NAMES: [&str; 6] = ["clip1_u", "clip1_v", "clip1_w", "clip2_u", "clip2_v", "clip2_w"];
 
 /// What programs call texture coordinates, the most telling names first.
 const TEXTURE_NAMES: [[&str; 2]; 5] =
@@ -111,6 +115,10 @@ impl Layout {
         let radius = column(&["radius", "scale"]);
         let mut axis = |names: [&str; 3]| Some([column(&names[..1])?, column(&names[1..2])?, column(&names[2..])?]);
         let axes = axis(["sx", "sy", "sz"]).zip(axis(["tx", "ty", "tz"])).map(<[_; 2]>::from);
+        let clip = axes.and_then(|_| {
+            let found: Vec<usize> = CLIP_NAMES.iter().filter_map(|name| column(&[name])).collect();
+            <[usize; 6]>::try_from(found).ok()
+        });
         let texture = TEXTURE_NAMES.iter().find_map(|[u, v]| Some([column(&[u])?, column(&[v])?]));
         let coded = |index: usize| (index, Coding::of(columns[index].scalar));
         let (color, alpha) = (color.map(|color| color.map(coded)), alpha.map(coded));
@@ -122,6 +130,7 @@ impl Layout {
             normal,
             radius,
             axes,
+            clip,
             color,
             alpha,
             texture,
@@ -142,6 +151,7 @@ pub(super) struct Vertices<'a> {
     normals: Vec<[f32; 3]>,
     radii: Vec<f32>,
     axes: Vec<[[f32; 3]; 2]>,
+    clips: Vec<Clip>,
     texture: Vec<[f32; 2]>,
     srgb8: Vec<[u8; 4]>,
     linear: Vec<[f32; 4]>,
@@ -151,12 +161,13 @@ impl<'a> Vertices<'a> {
     /// Room for `rows`, which must be a number that the file's length allows.
     pub(super) fn with_capacity(layout: &'a Layout, rows: u64) -> Result<Self, Fault> {
         let (mut positions, mut normals, mut radii) = (Vec::new(), Vec::new(), Vec::new());
-        let (mut axes, mut texture) = (Vec::new(), Vec::new());
+        let (mut axes, mut clips, mut texture) = (Vec::new(), Vec::new(), Vec::new());
         let (mut srgb8, mut linear) = (Vec::new(), Vec::new());
         reserve(&mut positions, rows)?;
         reserve(&mut normals, if layout.normal.is_some() { rows } else { 0 })?;
         reserve(&mut radii, if layout.radius.is_some() { rows } else { 0 })?;
         reserve(&mut axes, if layout.axes.is_some() { rows } else { 0 })?;
+        reserve(&mut clips, if layout.clip.is_some() { rows } else { 0 })?;
         reserve(&mut texture, if layout.texture.is_some() { rows } else { 0 })?;
         let (codes, lights) = match (layout.color.is_some(), layout.is_srgb8()) {
             (false, _) => (0, 0),
@@ -165,7 +176,7 @@ impl<'a> Vertices<'a> {
         };
         reserve(&mut srgb8, codes)?;
         reserve(&mut linear, lights)?;
-        Ok(Self { layout, positions, normals, radii, axes, texture, srgb8, linear })
+        Ok(Self { layout, positions, normals, radii, axes, clips, texture, srgb8, linear })
     }
 
     pub(super) fn len(&self) -> u64 {
@@ -185,6 +196,12 @@ impl<'a> Vertices<'a> {
         }
         if let Some(axes) = layout.axes {
             self.axes.extend((0..rows).map(|row| axes.map(|axis| axis.map(|column| value(column, row) as f32))));
+        }
+        if let Some(clip) = layout.clip {
+            self.clips.extend((0..rows).map(|row| {
+                let line = |first: usize| [0, 1, 2].map(|k| value(clip[first + k], row) as f32);
+                Clip([line(0), line(3)])
+            }));
         }
         if let Some(texture) = layout.texture {
             self.texture.extend((0..rows).map(|row| texture.map(|column| value(column, row) as f32)));
@@ -216,6 +233,7 @@ impl<'a> Vertices<'a> {
             normals: layout.normal.map(|_| self.normals),
             radii: layout.radius.map(|_| self.radii),
             axes: layout.axes.map(|_| self.axes),
+            clips: layout.clip.map(|_| self.clips),
             colors,
             texture: layout.texture.map(|_| self.texture),
             up: None,

@@ -1,9 +1,10 @@
 //! From surfels to PLY bytes.
 
+use super::vertex::CLIP_NAMES;
 use crate::io::atomic::{Output, write_whole};
 use crate::io::{Points, Up};
-use crate::scene::Colors;
 use crate::scene::color::{DEFAULT_COLOR, SRGB8_TO_LINEAR, linear_to_srgb};
+use crate::scene::{Clip, Colors};
 use crate::{Error, Progress, Result};
 use std::io::{self, Write};
 use std::path::Path;
@@ -19,6 +20,8 @@ pub struct Vertex {
     pub radius: f32,
     /// Half-axes s and t, world units.
     pub axes: [[f32; 3]; 2],
+    /// Where their ellipse ends before its rim.
+    pub clip: Clip,
     /// Where colours are written, a surfel without one gets [`DEFAULT_COLOR`].
     pub color: Option<Color>,
     /// Texture coordinates (u, v), origin bottom left.
@@ -82,6 +85,8 @@ pub struct Properties {
     pub radii: bool,
     /// `float sx sy sz tx ty tz` are written.
     pub axes: bool,
+    /// `float clip1_u clip1_v clip1_w clip2_u clip2_v clip2_w` are written.
+    pub clips: bool,
     /// How `red green blue` and `alpha` are written.
     pub colors: ColorProperties,
     /// `float texture_u texture_v` are written.
@@ -99,6 +104,7 @@ impl Properties {
             normals: points.normals.is_some() || points.axes.is_some(),
             radii: points.radii.is_some() || points.axes.is_some(),
             axes: points.axes.is_some(),
+            clips: points.axes.is_some() && points.clips.iter().flatten().any(|clip| !clip.is_none()),
             colors: match &points.colors {
                 None => ColorProperties::Absent,
                 Some(Colors::Srgb8(codes)) if codes.iter().all(|code| code[3] == 255) => ColorProperties::Srgb8,
@@ -119,10 +125,11 @@ impl Properties {
         let mut scalars =
             |kind: &str, names: &[&str]| names.iter().try_for_each(|name| writeln!(out, "property {kind} {name}"));
         scalars(if self.double_coordinates { "double" } else { "float" }, &["x", "y", "z"])?;
-        let groups: [(bool, &[&str]); 3] = [
+        let groups: [(bool, &[&str]); 4] = [
             (self.normals, &["nx", "ny", "nz"]),
             (self.radii, &["radius"]),
             (self.axes, &["sx", "sy", "sz", "tx", "ty", "tz"]),
+            (self.clips, &CLIP_NAMES),
         ];
         for (_, names) in groups.into_iter().filter(|(written, _)| *written) {
             scalars("float", names)?;
@@ -158,6 +165,9 @@ impl Properties {
         }
         if self.axes {
             floats(vertex.axes.as_flattened());
+        }
+        if self.clips {
+            floats(vertex.clip.0.as_flattened());
         }
         let color = vertex.color.unwrap_or(Color::Linear(DEFAULT_COLOR));
         match self.colors {
@@ -222,6 +232,7 @@ pub fn write_points(path: &Path, points: &Points, progress: &dyn Progress) -> Re
         let axes = of(&points.axes, index);
         Vertex {
             position: *position,
+            clip: of(&points.clips, index).unwrap_or_default(),
             normal: of(&points.normals, index).unwrap_or_else(|| axes.map_or([0.0; 3], normal)),
             radius: of(&points.radii, index).unwrap_or_else(|| axes.map_or(0.0, longer)),
             axes: axes.unwrap_or_default(),

@@ -197,7 +197,7 @@ fn a_broken_accumulator_kernel_or_epsilon_is_noticed() {
     }
     let radius = case("hat", EPSILONS[2], Projection::Pinhole);
     let file = "epsilon_radius.wgsl";
-    noticed(&radius, row, file, "max(length(s), length(t))", "1.05 * max(length(s), length(t))");
+    noticed(&radius, row, file, "min(length(s), length(t))", "1.05 * max(length(s), length(t))");
     noticed(&radius, row, file, "held.epsilon_radius * radius", "held.epsilon_deepest");
     let absolute = case("hat", EPSILONS[1], Projection::Pinhole);
     noticed(&absolute, row, "epsilon.wgsl", "held.epsilon_absolute", "1.05 * held.epsilon_absolute");

@@ -251,7 +251,11 @@ fn unmapped(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu) 
         PixelSums {
             weight,
             color: [0, 1, 2, 3].map(color),
-            turned: 0.0,
+            turned: if device.sums.pixel.depth_channel > device.sums.pixel.side_channel {
+                sum(device.sums.pixel.side_channel)
+            } else {
+                0.0
+            },
             normal: [0, 1, 2].map(normal),
             place: [0.0; 4],
             depth: weight * front + common::depth_span(&device.view, front) * sum(device.sums.pixel.depth_channel),

@@ -19,7 +19,7 @@ use epsplat::passes::{accumulate, visibility};
 use epsplat::plan::{Accumulator, COLOR_CHANNEL, RenderOptions};
 use epsplat::render::{Backend, render};
 use epsplat::scene::options::HIGHLIGHT;
-use epsplat::scene::{Epsilon, Kernel, LowPass, Map, Maps, Projection, Shading};
+use epsplat::scene::{Cull, Epsilon, Kernel, LowPass, Map, Maps, Projection, Shading};
 
 fn options(kernel: Kernel) -> RenderOptions {
     RenderOptions { kernel, epsilon: Epsilon::Relative(0.02), maps: Maps::ON_DEVICE, ..Default::default() }
@@ -269,7 +269,7 @@ fn a_broken_projection_is_noticed() {
         "bounds",
     );
     noticed(&all[0], broken("center.wgsl", "d.low - held.eye_low[i]", "d.low * 0.0"), "eye of 24 bits");
-    noticed(&all[0], broken("project.wgsl", "h.away > 0.0", "h.away < 0.0"), "the other side");
+    noticed(&all[0], broken("project.wgsl", "AWAY, h.away > 0.0", "AWAY, h.away < 0.0"), "the other side");
     let camera = "camera_orthographic.wgsl";
     noticed(&all[1], broken(camera, "p_z - dot(c, offset)", "p_z * 1.00001 - dot(c, offset)"), "orthographic depth");
     let case = &all[7];
@@ -310,7 +310,7 @@ fn a_broken_footprint_or_sum_is_noticed() {
     sums(file, "splat.b[1] * d.y", "splat.b[1] * d.y * 1.001").expect_noticed("row b");
     sums("kernel_ellipse.wgsl", "-KERNEL_A", "-1.0001 * KERNEL_A").expect_noticed("kernel");
     sums("epsilon.wgsl", "held.epsilon_relative", "held.epsilon_relative * 1.05").expect_noticed("epsilon");
-    sums("normal.wgsl", "normal * 0.5 + 0.5;", "normal * 0.5 + 0.50001;").expect_noticed("normal");
+    sums("normal.wgsl", ") * 0.5 + 0.5,", ") * 0.5 + 0.50001,").expect_noticed("normal");
     sums("color_linear.wgsl", "color.rgb * color.a", "color.rgb * (color.a * 1.0001)").expect_noticed("premultiplied");
     sums(
         "depth.wgsl",
@@ -327,7 +327,9 @@ fn the_frame_of_the_device_is_the_frame_of_the_twins() {
     for projection in [Projection::Pinhole, Projection::Orthographic] {
         for shading in [Shading::Lambert, Shading::Unlit, Shading::Phong] {
             let (scene, camera) = (sphere(3000, 1.5), sphere_camera(256, projection));
-            let mut options = RenderOptions { shading, ..options(DEFAULT_KERNEL) };
+            // Near an outline normals of the front and turned ones of the back leave a short mean, of which an error is a larger part:
+            // hard_cases.rs and accumulators.rs judge those by the mean's own length.
+            let mut options = RenderOptions { shading, cull: Cull::Back, ..options(DEFAULT_KERNEL) };
             let (device, _) = render(&scene, &camera, &options, &backend, &()).unwrap();
             options.maps = options.maps.and(&[Map::Decision]);
             let (twin, _) = render(&scene, &camera, &options, &Backend::Reference, &()).unwrap();

@@ -1,18 +1,13 @@
 // Normals, each turned toward the viewer and mapped from [-1, 1] to [0, 1] before they are summed: those of the front and the back
 // of a thin part would cancel.
 // Twin: src/passes/accumulate.rs, src/passes/resolve.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x48492fde2c1d418a
+// All loops end, by 1 of src/gpu/loops.rs: 0x7cce3e5f76821828
 
 override NORMAL_CHANNEL: u32;
 
 // World space, unit, mapped to [0, 1]; w: 1 if it was turned.
 fn normal_of(index: u32, splat: Splat) -> vec4<f32> {
-    let surfel = surfel_at(index);
-    // In device units, so that no product underflows.
-    let s = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * held.unit;
-    let t = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]) * held.unit;
-    let n = cross(s, t);
-    let unit_normal = normalize(n / max(max(abs(n.x), abs(n.y)), abs(n.z)));
+    let unit_normal = surfel_normal(index);
     let turned = (splat.bounds_last & AWAY) != 0u;
     return vec4<f32>(select(unit_normal, -unit_normal, turned) * 0.5 + 0.5, select(0.0, 1.0, turned));
 }

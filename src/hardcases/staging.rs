@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use super::{Expected, HardCase};
 use crate::error::Result;
 use crate::plan::{Accumulator, Optimisation, RenderOptions};
-use crate::scene::{Camera, Colors, Kernel, Lens, Projection, Scene, Shading, Surfel, Up};
+use crate::scene::{Camera, Colors, Epsilon, Kernel, Lens, Projection, Scene, Shading, Surfel, Up};
 
 /// Part of `x` beyond a whole number, for the k-th of a sequence that fills [0, 1) evenly along each of six axes.
 pub fn fraction(k: usize, axis: usize) -> f64 {
@@ -159,10 +159,11 @@ pub struct Filling {
 const BITS: &str = "24 fraction bits, all that one word leaves where hundreds of fragments may meet, keep 16 of a weight \
                     of 1/400 at a disk's rim";
 
-/// Unlit, nothing behind the scene; and each disk is drawn, also those that are the same: sums of many terms are judged.
+/// Unlit, nothing behind the scene; and each disk is drawn, also those that are the same: sums of many terms are judged. The tolerance
+/// does not depend on the disks' sizes, which differ by many powers of ten.
 pub fn options() -> RenderOptions {
-    let without = vec![Optimisation::Copies];
-    RenderOptions { shading: Shading::Unlit, lights: Vec::new(), without, ..RenderOptions::default() }
+    let (without, epsilon) = (vec![Optimisation::Copies], Epsilon::Relative(0.01));
+    RenderOptions { epsilon, shading: Shading::Unlit, lights: Vec::new(), without, ..RenderOptions::default() }
 }
 
 impl Filling {

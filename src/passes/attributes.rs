@@ -13,6 +13,7 @@ pub const PASS: Pass = Pass {
         let whole = needs.raster.is_some_and(|raster| raster.depth != RasterDepth::Exact);
         let mut files = vec![
             pick(needs.normal, "normal.wgsl", "normal_absent.wgsl"),
+            pick(needs.own_normals, "normal_own.wgsl", "normal_plane.wgsl"),
             pick(needs.sides, "side.wgsl", "side_absent.wgsl"),
             pick(needs.maps.has(Map::Count), "count.wgsl", "count_absent.wgsl"),
             pick(needs.maps.has(Map::Depth), pick(whole, "depth_whole.wgsl", "depth.wgsl"), "depth_absent.wgsl"),
@@ -36,6 +37,7 @@ pub const PASS: Pass = Pass {
             ("COPIES_WORD", surfel.copies.into()),
             ("LOW_WORD", surfel.low.into()),
             ("CLIP_WORD", surfel.clip.into()),
+            ("NORMAL_WORD", surfel.normal.into()),
             ("COLOR_CHANNELS", color_channels(making.needs).into()),
             ("NORMAL_CHANNEL", layout.normal_channel.into()),
             ("SIDE_CHANNEL", layout.side_channel.into()),

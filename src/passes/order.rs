@@ -50,12 +50,13 @@ pub fn order(scene: &Scene, core: &Bounds) -> Vec<u32> {
 }
 
 /// The bits of a surfel and its colour.
-fn content(scene: &Scene, index: usize) -> ([[u32; 3]; 6], [u32; 4]) {
+fn content(scene: &Scene, index: usize) -> ([[u32; 3]; 7], [u32; 4]) {
     let Surfel { center, s, t } = scene.surfels[index];
     let low = scene.low.get(index).copied().unwrap_or_default();
+    let normal = scene.normals.get(index).copied().unwrap_or_default();
     let Clip([first, second]) = scene.clips.get(index).copied().unwrap_or_default();
     (
-        [center, low, s, t, first, second].map(|part| part.map(f32::to_bits)),
+        [center, low, s, t, first, second, normal].map(|part| part.map(f32::to_bits)),
         scene.colors.linear(index).map(f32::to_bits),
     )
 }

@@ -96,7 +96,13 @@ pub fn reference_all(scene: &Scene, camera: &Camera, options: &RenderOptions) ->
         let copies = copies.as_ref().map_or(1, |copies| copies[index]);
         let splat = || reference((index as u32, surfel), scene.center(index) - eye, camera, &design);
         let splat = (copies > 0).then(splat).flatten().filter(|splat| !(cull_back && splat.away));
-        splat.map(|splat| Splat { copies, clip: scene.clips.get(index).copied().unwrap_or_default(), ..splat })
+        let own = |splat: Splat| Splat {
+            copies,
+            clip: scene.clips.get(index).copied().unwrap_or_default(),
+            normal: scene.normals.get(index).map_or(splat.normal, |normal| Vec3::from_array(*normal).as_dvec3()),
+            ..splat
+        };
+        splat.map(own)
     };
     surfels.filter_map(project).collect()
 }

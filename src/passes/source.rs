@@ -149,6 +149,10 @@ impl ScenePage<'_> {
             let into = &mut into[self.layout.low as usize..];
             low.iter().zip(into).for_each(|(value, into)| *into = value.to_bits());
         }
+        if let (true, Some(normal)) = (self.needs.own_normals, self.scene.normals.get(index)) {
+            let into = &mut into[self.layout.normal as usize..];
+            normal.iter().zip(into).for_each(|(value, into)| *into = value.to_bits());
+        }
         if let (true, Some(clip)) = (self.needs.clips, self.scene.clips.get(index)) {
             let into = &mut into[self.layout.clip as usize..];
             clip.0.iter().flatten().zip(into).for_each(|(value, into)| *into = value.to_bits());

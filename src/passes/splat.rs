@@ -23,7 +23,7 @@ pub struct Splat {
     pub c: DVec3,
     /// The normal points away from the viewer.
     pub away: bool,
-    /// World space, unit, as the surfel has it.
+    /// World space, unit, as light sees the surfel.
     pub normal: DVec3,
     /// The low-pass, if there is one.
     pub filter: Option<Filter>,

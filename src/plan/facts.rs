@@ -50,6 +50,8 @@ pub struct Facts {
     pub closed: bool,
     /// Disks end at lines, [`Scene::clips`].
     pub clips: bool,
+    /// Surfels have normals of their own, [`Scene::normals`].
+    pub own_normals: bool,
     /// Centres have trailing parts, [`Scene::low`].
     pub doubled: bool,
     /// One surfel has many copies, which can be drawn as one.
@@ -86,6 +88,7 @@ impl Facts {
             oriented: scene.oriented,
             closed: scene.closed,
             clips: !scene.clips.is_empty(),
+            own_normals: !scene.normals.is_empty(),
             doubled: !scene.low.is_empty(),
             copies: has_copies(scene),
             sample: (0..scene.surfels.len()).step_by(step).map(|k| (scene.surfels[k], scene.center(k))).collect(),

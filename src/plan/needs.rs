@@ -50,6 +50,8 @@ pub struct SceneNeeds {
     pub normal: bool,
     /// Which side of a surface is seen is summed too: normals have a consistent one, which a map or a directional light tells.
     pub sides: bool,
+    /// Normals are summed that are others than those of the disks' planes.
+    pub own_normals: bool,
     /// Surfels that face away are left out.
     pub cull_back: bool,
     /// Disks end at lines in their planes.
@@ -116,6 +118,7 @@ impl SceneNeeds {
             alpha: low[3] != high[3],
             normal: lit || options.maps.has(Map::Normal),
             sides: facts.oriented && (options.maps.has(Map::Normal) || lit && sided(options)),
+            own_normals: facts.own_normals && (lit || options.maps.has(Map::Normal)),
             cull_back: culls_back(facts, camera, options),
             clips: facts.clips,
             samples: options.samples,
@@ -179,6 +182,7 @@ impl SceneNeeds {
             (self.alpha, "alpha"),
             (self.normal, "normal"),
             (self.sides, "sides"),
+            (self.own_normals, "own-normals"),
             (self.cull_back, "cull-back"),
             (self.clips, "clips"),
             (self.samples != Samples::ONE, "samples"),

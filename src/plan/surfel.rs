@@ -15,6 +15,8 @@ pub struct SurfelLayout {
     pub low: u32,
     /// The first of the six words of the lines at which it ends.
     pub clip: u32,
+    /// The first of the three words of its own normal.
+    pub normal: u32,
 }
 
 impl SurfelLayout {
@@ -29,7 +31,8 @@ impl SurfelLayout {
         };
         let low = copies + u32::from(needs.copies);
         let clip = low + if needs.doubled { 3 } else { 0 };
-        Self { words: clip + if needs.clips { 6 } else { 0 }, copies, low, clip }
+        let normal = clip + if needs.clips { 6 } else { 0 };
+        Self { words: normal + if needs.own_normals { 3 } else { 0 }, copies, low, clip, normal }
     }
 }
 

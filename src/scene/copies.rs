@@ -48,7 +48,8 @@ fn by_content(scene: &Scene, a: usize, b: usize) -> Ordering {
     let bits = |index: usize| {
         let surfel = &scene.surfels[index];
         let low = scene.low.get(index).copied().unwrap_or_default();
-        [surfel.center, surfel.s, surfel.t, low].map(|v| v.map(f32::to_bits))
+        let normal = scene.normals.get(index).copied().unwrap_or_default();
+        [surfel.center, surfel.s, surfel.t, low, normal].map(|v| v.map(f32::to_bits))
     };
     let clip = |index: usize| scene.clips.get(index).copied().unwrap_or_default().0.map(|line| line.map(f32::to_bits));
     let color = |index: usize| match &scene.colors {

@@ -56,6 +56,8 @@ pub struct Scene {
     pub low: Vec<[f32; 3]>,
     /// Where disks end before their rims: one for each surfel, or none at all.
     pub clips: Vec<Clip>,
+    /// The unit normals that light sees, where they are others than those of the disks' planes: one for each surfel, or none at all.
+    pub normals: Vec<[f32; 3]>,
     /// One colour for all, or one for each surfel in the same order.
     pub colors: Colors,
     /// Normals were given, so they tell the two sides of a surface apart; estimated ones do not.

@@ -127,15 +127,33 @@ fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Progress) -> Re
     let low = low_parts(&surfels, relative);
     preparation.rounding = rounding(&surfels, &low, relative);
     let oriented = preparation.estimated_normals == 0;
+    let normals = own_normals(&given, &surfels);
     let Gathered { colors, closed, clips, provenance, texture, .. } = gathered;
     let (colors, closed) = (colors::folded(colors), closed && oriented);
     // Most scenes have no disk that ends before its rim.
     let clips: Vec<Clip> = clips.unwrap_or_default().into_iter().map(Clip::usable).collect();
     let clips = if clips.iter().all(Clip::is_none) { Vec::new() } else { clips };
-    let scene = Scene { origin, surfels, low, clips, colors, oriented, closed, up, provenance };
+    let scene = Scene { origin, surfels, low, clips, normals, colors, oriented, closed, up, provenance };
     // As the default view sees it.
     preparation.strays = scene.framed().1;
     Ok(((scene, preparation), texture))
+}
+
+/// A given normal that is turned by less from the half-axes' is theirs, radians.
+const LEAST_TURN: f32 = 1e-3;
+
+/// The normals that are given beside half-axes, where they are others than theirs.
+fn own_normals(given: &Given<'_>, surfels: &[Surfel]) -> Vec<[f32; 3]> {
+    let plane = |surfel: &Surfel| unit(surfel.normal().to_array()).unwrap_or(Vec3::Z);
+    let own = |(i, surfel): (usize, &Surfel)| {
+        let normal = given.axes(i).and_then(|_| given.normal(i));
+        normal.filter(|normal| normal.angle_between(plane(surfel)) > LEAST_TURN).unwrap_or(plane(surfel)).to_array()
+    };
+    let differs = |(i, surfel): (usize, &Surfel)| own((i, surfel)) != plane(surfel).to_array();
+    if given.0.normals.is_none() || given.0.axes.is_none() || !surfels.par_iter().enumerate().any(differs) {
+        return Vec::new();
+    }
+    surfels.par_iter().enumerate().map(own).collect()
 }
 
 /// What points have that is usable.

@@ -134,6 +134,8 @@ fn base_needs() -> Vec<SceneNeeds> {
     let mut all = Vec::new();
     for bits in 0..1u32 << 8 {
         let bit = |k: u32| bits >> k & 1 == 1;
+        // Bits that have little to do with the others.
+        let mixed = |k: u32| bits.wrapping_mul(0x9e37_79b9) >> k & 1 == 1;
         let (lit, normal_map, sides, alpha) = (bit(0), bit(1), bit(2), bit(3));
         let normal = lit || normal_map;
         let shading = match (lit, bits.count_ones() % 2 == 0) {
@@ -169,9 +171,10 @@ fn base_needs() -> Vec<SceneNeeds> {
                 alpha,
                 normal,
                 sides,
-                clips: bits.count_ones() % 5 == 1,
-                cull_back: bits.count_ones() % 4 == 1,
-                samples: if wanted.is_empty() && bits % 3 == 0 { SAMPLED } else { Samples::ONE },
+                own_normals: normal && mixed(26),
+                clips: mixed(28),
+                cull_back: mixed(27),
+                samples: if wanted.is_empty() && mixed(25) { SAMPLED } else { Samples::ONE },
                 shading,
                 maps: Maps::of(&wanted),
                 ..plain

@@ -78,7 +78,7 @@ fn a_changed_layout_is_noticed() {
         "    middle: f32,\n    farthest: f32,\n",
     );
     assert!(exchanged.contains("\"farthest\"") && exchanged.contains("\"middle\""), "{exchanged}");
-    let cut = Sources::default().replace("lowpass_none.wgsl", "array<Words, 4>", "array<Words, 5>").unwrap();
+    let cut = Sources::default().replace("records.wgsl", "4u + FILTER_ROWS", "5u + FILTER_ROWS").unwrap();
     let cut = differences(&first_of(&cut, &needs), needs.accumulator.name()).join("; ");
     assert!(cut.contains("projected holds") && cut.contains("splats holds"), "{cut}");
     let longer = broken("    rows: u32,\n    padding_0: u32,\n", "    rows: u32,\n    padding_0: vec2<u32>,\n");

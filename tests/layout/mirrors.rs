@@ -207,7 +207,12 @@ pub fn differences(module: &Module, accumulator: &str) -> Vec<String> {
         let filtered = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some("Filter"));
         let filtered =
             filtered.is_some_and(|(_, ty)| matches!(&ty.inner, TypeInner::Struct { members, .. } if members.len() > 1));
-        let record = |of: &str| mirrors[of].size + if of == "Splat" && filtered { mirrors["Filter"].size } else { 0 };
+        // And so do its lines, in two rows of four words.
+        let clipped = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some("Clip"));
+        let clipped =
+            clipped.is_some_and(|(_, ty)| matches!(&ty.inner, TypeInner::Struct { members, .. } if members.len() > 1));
+        let beside = if filtered { mirrors["Filter"].size } else { 0 } + if clipped { 32 } else { 0 };
+        let record = |of: &str| mirrors[of].size + if of == "Splat" { beside } else { 0 };
         match (&module.types[ty].inner, element) {
             (TypeInner::Struct { members, span }, Element::Struct(expected) | Element::Words(expected)) => {
                 let device_name = module.types[ty].name.as_deref().unwrap_or("?");
@@ -268,6 +273,16 @@ fn compare(
     found: &mut Vec<String>,
 ) {
     let mut device = Vec::new();
+    // The lines of a splat are a member in WGSL alone: in its record they come after its filter.
+    let (members, span) = match members {
+        [own @ .., last] if name == "Splat" && last.name.as_deref() == Some("clip") => {
+            let end = own
+                .last()
+                .map_or(0, |member| member.offset as usize + shape(module, member.ty).map_or(0, |shape| shape.bytes()));
+            (own, end)
+        }
+        all => (all, span),
+    };
     for member in members {
         let member_name = member.name.clone().unwrap_or_default();
         match shape(module, member.ty) {

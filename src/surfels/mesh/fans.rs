@@ -65,16 +65,13 @@ impl Fan {
             .map_or((0.0, 0.0), |ellipse| (0.5 * angle * ellipse.square() / area, ellipse.half_axes()[0].length()))
     }
 
-    /// Takes the mean of the normals that its corners name, where a disk that is turned to it stays within `tolerance`.
-    pub fn face_as(&mut self, normals: &[[[f32; 3]; 3]], facets: &[Option<Facet>], tolerance: f64) {
+    /// The mean of the normals that its corners name, where that is on the plane's side; else the plane's.
+    pub fn seen_normal(&self, named: Option<&Vec<[[f32; 3]; 3]>>) -> DVec3 {
+        let Some(normals) = named else { return self.normal };
         let named = |corner: &Corner| DVec3::from(normals[corner.triangle as usize][corner.place].map(f64::from));
         let mean =
             self.corners.iter().map(|corner| named(corner).normalize_or_zero()).sum::<DVec3>().normalize_or_zero();
-        let reach = self.corners.iter().filter_map(|corner| Some(facets[corner.triangle as usize].as_ref()?.reach()));
-        let turned = mean.cross(self.normal).length() * reach.fold(0.0, f64::max);
-        if mean.is_finite() && mean.dot(self.normal) > EDGE && turned <= tolerance {
-            self.normal = mean;
-        }
+        if mean.is_finite() && mean.dot(self.normal) > 0.0 { mean } else { self.normal }
     }
 }
 

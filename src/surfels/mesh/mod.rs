@@ -26,6 +26,7 @@ const MARGIN: f64 = 0.02;
 /// One surfel.
 struct Made {
     vertex: u32,
+    normal: DVec3,
     s: DVec3,
     t: DVec3,
     clip: Clip,
@@ -43,18 +44,19 @@ pub(super) fn of_vertices(mut points: Points) -> Points {
     }
     let tolerance = fans::TOLERANCE * crate::surfels::bounds(&points).extent().length();
     let made = |vertex: u32| {
-        let mut fans = around.fans(vertex, &faces.triangles, &facets, tolerance);
-        if let Some(normals) = &faces.normals {
-            fans.iter_mut().for_each(|fan| fan.face_as(normals, &facets, tolerance));
-        }
-        fans.into_iter().flat_map(|fan| surfels(vertex, &fan, &points.positions, &facets)).collect::<Vec<_>>()
+        let fans = around.fans(vertex, &faces.triangles, &facets, tolerance);
+        let of_fan = |fan: Fan| {
+            let normal = fan.seen_normal(faces.normals.as_ref());
+            surfels((vertex, normal), &fan, &points.positions, &facets)
+        };
+        fans.into_iter().flat_map(of_fan).collect::<Vec<_>>()
     };
     let all: Vec<Made> = (0..points.positions.len() as u32).into_par_iter().flat_map_iter(made).collect();
     let of: Vec<u32> = all.iter().map(|made| made.vertex).collect();
     let axes = |made: &Made| [made.s, made.t].map(|axis| axis.as_vec3().to_array());
     let radius = |made: &Made| made.s.length().max(made.t.length()) as f32;
     Points {
-        normals: Some(all.iter().map(|made| made.s.cross(made.t).normalize_or_zero().as_vec3().to_array()).collect()),
+        normals: Some(all.iter().map(|made| made.normal.as_vec3().to_array()).collect()),
         radii: Some(all.iter().map(radius).collect()),
         axes: Some(all.iter().map(axes).collect()),
         clips: Some(all.iter().map(|made| made.clip).collect()),
@@ -64,7 +66,7 @@ pub(super) fn of_vertices(mut points: Points) -> Points {
 }
 
 /// The surfels of one of a vertex's fans: one, or where its sides enclose more than a straight angle, one on each side.
-fn surfels(vertex: u32, fan: &Fan, positions: &[[f64; 3]], facets: &[Option<Facet>]) -> Vec<Made> {
+fn surfels((vertex, normal): (u32, DVec3), fan: &Fan, positions: &[[f64; 3]], facets: &[Option<Facet>]) -> Vec<Made> {
     let at = |vertex: u32| DVec3::from(positions[vertex as usize]);
     let (x, y) = fan.normal.any_orthonormal_pair();
     // As any_orthonormal_pair gives them x × y is the normal.
@@ -83,7 +85,7 @@ fn surfels(vertex: u32, fan: &Fan, positions: &[[f64; 3]], facets: &[Option<Face
         for (line, of_disk) in lines.iter().zip(&mut clip.0) {
             *of_disk = line.on_disk(major, minor, MARGIN * minor.length());
         }
-        Made { vertex, s: world(major), t: world(minor), clip }
+        Made { vertex, normal, s: world(major), t: world(minor), clip }
     };
     cover::lines(fan, &corners, major.length()).into_iter().map(made).collect()
 }

@@ -1,0 +1,11 @@
+// A surfel's normal: that of its disk. Same interface as normal_own.wgsl.
+
+// World space, unit.
+fn surfel_normal(index: u32) -> vec3<f32> {
+    let surfel = surfel_at(index);
+    // In device units, so that no product underflows.
+    let s = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * held.unit;
+    let t = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]) * held.unit;
+    let n = cross(s, t);
+    return normalize(n / max(max(abs(n.x), abs(n.y)), abs(n.z)));
+}

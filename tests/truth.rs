@@ -309,15 +309,14 @@ fn the_bunny_of_surfels_is_the_bunny_of_triangles() {
     let vertex_normals = points.normals.unwrap();
     mesh.normals = Some(mesh.triangles.iter().map(|t| t.map(|vertex| vertex_normals[vertex as usize])).collect());
     let smooth = error(&Surface::mesh(&mesh).unwrap());
-    // The surfels' radii cover the triangles around them, so there are no holes; but their disks are flat and reach beyond
-    // the outline, which costs the overlap of the covered sets: 0.957. Four pixels of 19,010 leak.
+    // The surfels cover the triangles, so there are no holes, and end where these do.
     assert_eq!(faceted.hole_rate, Some(0.0));
-    assert!(faceted.silhouette_iou.unwrap() > 0.95 && faceted.leak_rate.unwrap() < 1e-3);
-    // A vertex has the mean normal of the facets around it, and surfels blend: 8.4 degrees from the facets themselves.
-    // Of these 3.8 are left against the same vertex normals, interpolated: 6.7 within 4 pixels of an outline or a step
-    // in depth, where a disk in front stands for what is behind it, and 2.6 elsewhere.
+    eprintln!("{faceted:?} {smooth:?}");
+    assert!(faceted.silhouette_iou.unwrap() > 0.99 && faceted.leak_rate.unwrap() < 1e-3);
+    // The file names no normals and its facets are large for it: surfels lie in them, 0.29 degrees from the facets' own normals, and
+    // as far from the normals of vertices, interpolated, as the facets are.
     let (facets, vertices) = (faceted.normal_degrees.unwrap().mean, smooth.normal_degrees.unwrap().mean);
-    assert!((8.0..9.0).contains(&facets) && (3.5..4.2).contains(&vertices), "{facets} {vertices}");
+    assert!(facets < 0.5 && (6.0..7.0).contains(&vertices), "{facets} {vertices}");
     // Neither truth differs in depth. The mean error is 0.23 %, the median 0.12 %.
     assert_eq!(faceted.depth_relative, smooth.depth_relative);
     assert!(faceted.depth_relative.unwrap().mean < 0.003);

@@ -73,7 +73,12 @@ pub fn accumulators(gpu: &Gpu) -> Vec<&'static AccumulatorRow> {
 /// together meet two by two (`tests/shaders.rs`).
 pub fn all_needs() -> Vec<SceneNeeds> {
     let shapes = [KernelShape::Gaussian, KernelShape::Ellipse, KernelShape::Hat, KernelShape::Constant];
-    let base = base_needs();
+    let mut base = base_needs();
+    let unmapped: Vec<_> = base.iter().copied().filter(|needs| needs.maps.is_empty()).collect();
+    base.extend(unmapped.iter().map(|needs| {
+        let (gather, doubled, long_words) = (needs.tiles, !needs.doubled, !needs.long_words);
+        SceneNeeds { samples: SAMPLED, gather, doubled, long_words, ..*needs }
+    }));
     let mut all = base.clone();
     let mut next = 0;
     for row in ACCUMULATORS {
@@ -174,7 +179,7 @@ fn base_needs() -> Vec<SceneNeeds> {
                 own_normals: normal && mixed(26),
                 clips: mixed(28),
                 cull_back: mixed(27),
-                samples: if wanted.is_empty() && mixed(25) { SAMPLED } else { Samples::ONE },
+                samples: Samples::ONE,
                 shading,
                 maps: Maps::of(&wanted),
                 ..plain

@@ -10,9 +10,11 @@ fn radius_of(index: u32) -> f32 {
 
 // Of the largest surfel: what depths are measured by.
 fn deepest_accepted(front: f32) -> f32 {
-    return min(front + (front * held.epsilon_relative + held.epsilon_deepest), held.farthest);
+    let epsilon = min(held.epsilon_deepest, front * held.epsilon_most);
+    return min(front + (front * held.epsilon_relative + epsilon), held.farthest);
 }
 
 fn farthest_accepted(front: f32, radius: f32) -> f32 {
-    return min(front + (front * held.epsilon_relative + held.epsilon_radius * radius), held.farthest);
+    let epsilon = min(held.epsilon_radius * radius, front * held.epsilon_most);
+    return min(front + (front * held.epsilon_relative + epsilon), held.farthest);
 }

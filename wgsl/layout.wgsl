@@ -42,8 +42,9 @@ struct View {
     // Texels; 0 without a texture.
     texture_width: u32,
     texture_height: u32,
+    // What an epsilon by the radius does not exceed, as a fraction of the nearest depth.
+    epsilon_most: f32,
     padding_0: u32,
-    padding_1: u32,
     // The middle of the range of texture coordinates, its span, and the largest squared reach in units of the span.
     place: vec4<f32>,
 }

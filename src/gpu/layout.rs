@@ -104,8 +104,8 @@ pub struct View {
     pub middle: f32,
     pub texture_width: u32,
     pub texture_height: u32,
+    pub epsilon_most: f32,
     pub padding_0: u32,
-    pub padding_1: u32,
     pub place: [f32; 4],
 }
 

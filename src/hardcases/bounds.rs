@@ -281,7 +281,7 @@ pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Pi
     let farthest = (farthest + f64::from(scene.largest_radius())) * 1.001;
     let mut pixels = vec![NOTHING; camera.pixels()];
     fragments(&splats, scene, camera, |pixel, splat, surface, f| {
-        let back = |front: f64| front * (1.0 + relative) + absolute + of_radius * surface.radius;
+        let back = |front: f64| options.epsilon.farthest(front, surface.radius);
         let rounding = 4.0 * U * f.depth.abs();
         let may = f.may_hit(camera) && f.depth - f.depth_error - rounding <= back(high[pixel]);
         let must = f.surely_hits(camera) && f.depth + f.depth_error + rounding <= back(low[pixel].beside(splat.surfel));
@@ -307,7 +307,7 @@ pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Pi
             known.colors[1][k] = known.colors[1][k].max(value);
         }
         let near = front[pixel];
-        known.interval = (near * relative + deepest).min(farthest - near).max(0.0);
+        known.interval = (near * relative + deepest.min(near * options.epsilon.most())).min(farthest - near).max(0.0);
     });
     pixels
 }

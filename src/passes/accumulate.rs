@@ -155,14 +155,13 @@ pub fn reference<'a>(
 ) -> Vec<PixelSums> {
     let width = camera.width as usize;
     let rows = (nearest.len() / width) as u32;
-    let (relative, absolute, of_radius) = options.epsilon.parts();
     let mut sums = vec![PixelSums::ZERO; nearest.len()];
     for splat in splats {
         let [r, g, b, alpha] = scene.colors.linear(splat.surfel as usize).map(f64::from);
         let color = [r * alpha, g * alpha, b * alpha, alpha];
         let surfel = &scene.surfels[splat.surfel as usize];
         let center = scene.origin + scene.center(splat.surfel as usize);
-        let epsilon = absolute + of_radius * f64::from(surfel.shorter());
+        let radius = f64::from(surfel.shorter());
         let times = f64::from(splat.copies);
         let normal = if splat.away { -splat.normal } else { splat.normal };
         for y in splat.first[1].max(first_row)..=splat.last[1].min(first_row + rows - 1) {
@@ -170,7 +169,7 @@ pub fn reference<'a>(
             for x in splat.first[0]..=splat.last[0] {
                 let Some((at, gain)) = footprint(splat, camera, options.low_pass, x, y) else { continue };
                 let pixel = row + x as usize;
-                let back = nearest[pixel] * (1.0 + relative) + epsilon;
+                let back = options.epsilon.farthest(nearest[pixel], radius);
                 let sum = &mut sums[pixel];
                 if options.maps.has(Map::Decision) {
                     sum.decision = sum.decision.min(decision(at, back, camera.near));

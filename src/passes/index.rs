@@ -62,16 +62,15 @@ fn finish(words: &mut [f32], provenance: &Provenance, order: &[u32]) {
 fn reference(strip: &Strip<'_>, nearest: &[f64], frame: &mut Frame) {
     let Strip { scene, camera, options, first_row, rows, .. } = *strip;
     let (Some(ranks), Some(map)) = (strip.ranks, frame.map_mut(Map::Index)) else { return };
-    let (relative, absolute, of_radius) = options.epsilon.parts();
     let mut strongest = vec![(0.0, NOTHING, NOTHING); nearest.len()];
     for splat in &strip.splats {
         let surfel = splat.surfel as usize;
-        let epsilon = absolute + of_radius * f64::from(scene.surfels[surfel].shorter());
+        let radius = f64::from(scene.surfels[surfel].shorter());
         for y in splat.first[1].max(first_row)..=splat.last[1].min(first_row + rows - 1) {
             for x in splat.first[0]..=splat.last[0] {
                 let pixel = ((y - first_row) * camera.width + x) as usize;
                 let Some((at, gain)) = footprint(splat, camera, options.low_pass, x, y) else { continue };
-                if !at.hit(camera) || at.depth > nearest[pixel] * (1.0 + relative) + epsilon {
+                if !at.hit(camera) || at.depth > options.epsilon.farthest(nearest[pixel], radius) {
                     continue;
                 }
                 let weight = (gain * options.kernel.weight(at.rho2)).max(LEAST_FILTERED_WEIGHT);

@@ -113,7 +113,7 @@ impl SceneNeeds {
             triangles: options.raster.is_some() && tuning::PIXELS_A_TRIANGLE * facts.surfels > camera.pixels() as u64,
             kernel: options.kernel.shape(),
             low_pass: options.low_pass,
-            epsilon_radius: matches!(options.epsilon, Epsilon::Radius(_)),
+            epsilon_radius: matches!(options.epsilon, Epsilon::Radius(_) | Epsilon::Bounded { .. }),
             color: facts.colors,
             alpha: low[3] != high[3],
             normal: lit || options.maps.has(Map::Normal),

@@ -115,7 +115,7 @@ impl RenderOptions {
 impl Default for RenderOptions {
     fn default() -> Self {
         Self {
-            epsilon: Epsilon::Radius(1.0),
+            epsilon: Epsilon::Bounded { radius: 1.0, relative: 0.01 },
             cull: Cull::Auto,
             samples: Samples::ONE,
             kernel: Kernel::Ellipse { a: 6.0, n: 3.0, smooth: false },

@@ -36,6 +36,9 @@ pub fn device_unit(body: &Bounds, bounds: &Bounds, eye: DVec3) -> f64 {
     if reach > 0.0 && reach.is_finite() { (-reach.log2().ceil()).clamp(-126.0, 126.0).exp2() } else { 1.0 }
 }
 
+/// A fraction of a depth that bounds nothing: with it no product overflows.
+const LARGEST_FRACTION: f64 = 1e9;
+
 impl View {
     /// The view by `camera` of the scene that `facts` are of.
     pub fn new(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Self {
@@ -91,8 +94,8 @@ impl View {
             middle: (camera.rotation.row(2).dot(core.center() - eye_relative) * unit) as f32,
             texture_width,
             texture_height,
+            epsilon_most: options.epsilon.most().min(LARGEST_FRACTION) as f32,
             padding_0: 0,
-            padding_1: 0,
             place,
         }
     }

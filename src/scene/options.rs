@@ -13,6 +13,14 @@ pub enum Epsilon {
     Absolute(f64),
     /// A multiple of the fragment's own surfel's shorter half-axis.
     Radius(f64),
+    /// The lesser of a multiple of that half-axis and a fraction of the nearest depth: disks that are coarse for their scene do not
+    /// reach through it.
+    Bounded {
+        /// The multiple.
+        radius: f64,
+        /// The fraction.
+        relative: f64,
+    },
 }
 
 /// The smallest relative tolerance in force: visibility and attribute pass must agree that the nearest fragment is
@@ -26,8 +34,22 @@ impl Epsilon {
         match self {
             Self::Relative(e) => (e.max(LEAST_EPSILON), 0.0, 0.0),
             Self::Absolute(e) => (LEAST_EPSILON, e, 0.0),
-            Self::Radius(k) => (LEAST_EPSILON, 0.0, k),
+            Self::Radius(k) | Self::Bounded { radius: k, .. } => (LEAST_EPSILON, 0.0, k),
         }
+    }
+
+    /// The fraction of the nearest depth that what depends on the radius does not exceed.
+    pub fn most(self) -> f64 {
+        match self {
+            Self::Bounded { relative, .. } => relative,
+            _ => f64::INFINITY,
+        }
+    }
+
+    /// The farthest depth that is accepted of a surfel whose shorter half-axis is `radius`, where the `nearest` is known; world units.
+    pub fn farthest(self, nearest: f64, radius: f64) -> f64 {
+        let (relative, absolute, of_radius) = self.parts();
+        nearest * (1.0 + relative) + (absolute + of_radius * radius).min(nearest * self.most())
     }
 }
 
@@ -44,9 +66,16 @@ impl FromStr for Epsilon {
     fn from_str(text: &str) -> Result<Self, Error> {
         let bad = || {
             Error::Usage(format!(
-                "an epsilon is rel:E (fraction of depth), abs:E (world units) or radius:K (times the surfel's), not {text:?}"
+                "an epsilon is rel:E (fraction of depth), abs:E (world units), radius:K (times the surfel's) or the lesser of two, \
+                 radius:K,rel:E, not {text:?}"
             ))
         };
+        if let Some((radius, relative)) = text.split_once(',') {
+            return match (kind_and_amount(radius), kind_and_amount(relative)) {
+                (Some(("radius", radius)), Some(("rel", relative))) => Ok(Self::Bounded { radius, relative }),
+                _ => Err(bad()),
+            };
+        }
         match kind_and_amount(text).ok_or_else(bad)? {
             ("rel", value) => Ok(Self::Relative(value)),
             ("abs", value) => Ok(Self::Absolute(value)),

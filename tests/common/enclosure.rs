@@ -139,14 +139,14 @@ fn accumulate(
     pixels: &mut [Pixel],
 ) {
     let (low, high) = scene.color_range();
-    let (relative, absolute, of_radius) = options.epsilon.parts();
+    let (_, _, of_radius) = options.epsilon.parts();
     // Of the comparison with the farthest accepted depth: a radius takes eight more roundings.
     let rounding = if of_radius > 0.0 { 12.0 * E } else { 4.0 * E };
     for candidate in candidates {
         let splat = &splats[candidate.splat];
         let pixel = &mut pixels[candidate.pixel];
-        let epsilon = absolute + of_radius * f64::from(scene.surfels[splat.surfel as usize].shorter());
-        let back = |front: f64| front * (1.0 + relative) + epsilon;
+        let radius = f64::from(scene.surfels[splat.surfel as usize].shorter());
+        let back = |front: f64| options.epsilon.farthest(front, radius);
         if candidate.depth.low > back(pixel.nearest.high) * (1.0 + rounding) {
             continue;
         }

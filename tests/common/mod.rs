@@ -198,7 +198,8 @@ pub fn bits(frame: &Frame) -> Vec<u32> {
 /// The length of the interval behind the nearest depth `front` in which the device measures depths, world units.
 pub fn depth_span(view: &View, front: f64) -> f64 {
     let world = f64::from(view.world);
-    let epsilon = f64::from(view.epsilon_absolute).max(f64::from(view.epsilon_deepest));
-    let deepest = front * (1.0 + f64::from(view.epsilon_relative)) + epsilon * world;
+    let of_radius = (f64::from(view.epsilon_deepest) * f64::from(view.world)).min(front * f64::from(view.epsilon_most));
+    let absolute = f64::from(view.epsilon_absolute) * f64::from(view.world);
+    let deepest = front * (1.0 + f64::from(view.epsilon_relative)) + absolute.max(of_radius);
     deepest.min(f64::from(view.farthest) * world) - front
 }

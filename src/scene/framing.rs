@@ -31,7 +31,7 @@ impl Camera {
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`](crate::Error::Usage) also for an `up` of no direction.
+    /// [`Error::Usage`] also for an `up` of no direction.
     pub fn framing_up(
         size: (u32, u32),
         lens: Lens,

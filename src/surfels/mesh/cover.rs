@@ -47,11 +47,6 @@ impl Facet {
     pub fn sides(&self, place: usize) -> [DVec3; 2] {
         [1, 2].map(|next| self.corners[(place + next) % 3] - self.corners[place])
     }
-
-    /// How far disks at its corners reach, world units, about.
-    pub fn reach(&self) -> f64 {
-        self.radius
-    }
 }
 
 /// The ellipse `q q^T <= S` around a corner of a triangle, as S, with which, at each corner, it is covered. The two `sides` go from

@@ -5,10 +5,11 @@
 use common::scenes::{sphere, sphere_camera};
 use epsplat::frame::Frame;
 use epsplat::gpu::Gpu;
+use epsplat::metrics::compare;
 use epsplat::passes::resolve::mean_of_samples;
 use epsplat::plan::{Accumulator, Organisation, RenderOptions};
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Clip, Colors, Maps, Projection, Samples, Scene, Shading};
+use epsplat::scene::{Camera, Clip, Colors, Map, Maps, Projection, Samples, Scene, Shading};
 
 mod common;
 
@@ -87,6 +88,18 @@ fn the_reference_and_every_organisation_agree() {
         let Some(small) = common::gpu().map(|gpu| Backend::gpu(Gpu::with_buffer_limit(gpu, 60_000))) else { return };
         assert!(same(&of(Organisation::Auto, Accumulator::Fixed, &small)));
     }
+}
+
+#[test]
+fn colours_of_many_samples_are_excused_by_their_samples() {
+    let Some(gpu) = common::gpu() else { return };
+    let (scene, camera, backend) = (scene(), &views()[0], Backend::gpu(gpu));
+    let with = |maps: &[Map]| RenderOptions { maps: Maps::of(maps), ..options(samples("4")) };
+    let (frame, _) = render(&scene, camera, &with(&[Map::Depth]), &backend, &()).unwrap();
+    let (reference, _) = render(&scene, camera, &with(&[Map::Depth, Map::Decision]), &Backend::Reference, &()).unwrap();
+    let comparison = compare(&frame, &reference).unwrap();
+    assert!(comparison.rmse_decided.unwrap() < 1e-6, "{comparison:?}");
+    assert!((0.0..0.01).contains(&comparison.excused.unwrap()));
 }
 
 #[test]

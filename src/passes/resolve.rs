@@ -65,7 +65,8 @@ fn unit_or_zero(mean: DVec3) -> DVec3 {
     if mean.length_squared() > 1e-12 { mean.normalize() } else { DVec3::ZERO }
 }
 
-/// The twin for several `samples` a pixel: the mean of the premultiplied colours of `fine`, whose pixels are the samples.
+/// The twin for several `samples` a pixel: the mean of the premultiplied colours of `fine`, whose pixels are the samples, and their least
+/// [`Map::Decision`].
 pub fn mean_of_samples(fine: &Frame, samples: Samples) -> Frame {
     let (across, down) = (samples.across as usize, samples.down as usize);
     let (width, height) = (fine.width as usize / across, fine.height as usize / down);
@@ -79,7 +80,15 @@ pub fn mean_of_samples(fine: &Frame, samples: Samples) -> Frame {
         });
         if mean.w > 0.0 { (mean.truncate() / mean.w).extend(mean.w).to_array().map(|c| c as f32) } else { [0.0; 4] }
     };
-    Frame::of_colors(width as u32, height as u32, (0..width * height).map(pixel).collect())
+    let mean = Frame::of_colors(width as u32, height as u32, (0..width * height).map(pixel).collect());
+    // A pixel is as near to a decision as the nearest of its samples.
+    let Some(decisions) = fine.map(Map::Decision) else { return mean };
+    let least = |pixel: usize| {
+        let (x, y) = (pixel % width * across, pixel / width * down);
+        let sampled = (0..down).flat_map(|j| (0..across).map(move |i| (y + j) * width * across + x + i));
+        sampled.map(|sample| decisions[sample]).fold(f32::INFINITY, f32::min)
+    };
+    mean.with(Map::Decision, (0..width * height).map(least).collect())
 }
 
 /// The linear colour that a surface of colour `straight` and unit `normal` has at the image point `at`, pixels.

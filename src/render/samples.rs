@@ -5,7 +5,7 @@ use super::report::Report;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::plan::RenderOptions;
-use crate::scene::{Maps, Samples};
+use crate::scene::{Map, Maps, Samples};
 
 /// The options of the two renders that one with `options` takes: of colours, unless `options` serve, and of maps, if there are any
 /// beside several samples.
@@ -13,7 +13,8 @@ pub(super) fn apart(options: &RenderOptions) -> [Option<RenderOptions>; 2] {
     if options.samples == Samples::ONE || options.maps.is_empty() {
         return [None, None];
     }
-    let colors = RenderOptions { maps: Maps::NONE, ..options.clone() };
+    let maps = if options.maps.has(Map::Decision) { Maps::of(&[Map::Decision]) } else { Maps::NONE };
+    let colors = RenderOptions { maps, ..options.clone() };
     let centers = RenderOptions { samples: Samples::ONE, ..options.clone() };
     [Some(colors), Some(centers)]
 }
@@ -40,6 +41,10 @@ pub(super) fn joined((colors, of_colors): (Frame, Report), (centers, of_centers)
     let needs = of_centers.needs.into_iter().filter(|need| !report.needs.contains(need)).collect::<Vec<_>>();
     report.needs.extend(needs);
     let mut frame = centers;
+    // Of the colour's samples and of the centre.
+    if let (Some(decisions), Some(of_samples)) = (frame.map_mut(Map::Decision), colors.map(Map::Decision)) {
+        decisions.iter_mut().zip(of_samples).for_each(|(least, other)| *least = least.min(*other));
+    }
     frame.color = colors.color;
     (frame, report)
 }

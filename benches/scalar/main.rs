@@ -21,7 +21,7 @@ use epsplat::io::Points;
 use epsplat::metrics::compare;
 use epsplat::plan::RenderOptions;
 use epsplat::render::{Backend, Renderer};
-use epsplat::scene::{Camera, Colors, Kernel, Lens, Scene, Shading};
+use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Lens, Scene, Shading};
 use epsplat::surfels::analytic::{Shape, generate};
 use epsplat::surfels::build;
 use glam::DVec3;
@@ -90,7 +90,9 @@ struct Measured {
 
 /// Compares the images, then takes the time of `rounds` frames each, in turns.
 fn measure(scene: &Scene, backend: &Backend, rounds: usize) -> Result<Measured> {
-    let options = RenderOptions { shading: Shading::Unlit, ..RenderOptions::default() };
+    // The plain program knows this tolerance alone.
+    let epsilon = Epsilon::Relative(0.01);
+    let options = RenderOptions { shading: Shading::Unlit, epsilon, ..RenderOptions::default() };
     let camera = Camera::framing((1024, 1024), Lens::Fov(45.0), scene, Camera::default_near(scene))?;
     let mut renderer = Renderer::new(scene, &options, backend)?;
     let (expected, _) = renderer.frame(&camera, &())?;

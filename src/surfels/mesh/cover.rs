@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{DMat2, DVec2, DVec3};
 
-use super::fans::Fan;
+use super::fans::{Fan, MANY};
 use crate::io::triangles::covering_radius;
 
 /// A triangle with an area.
@@ -71,7 +71,8 @@ impl Ellipse {
     /// A small one that holds all of `ellipses`: of the shape of a circle, of one of them, or of their sum, whichever is least.
     pub fn around(ellipses: &[DMat2]) -> Option<Self> {
         let sum = ellipses.iter().fold(DMat2::ZERO, |sum, one| sum + *one);
-        let shapes = ellipses.iter().copied().chain([DMat2::IDENTITY, sum]);
+        let own = if ellipses.len() <= MANY { ellipses } else { &[] };
+        let shapes = own.iter().copied().chain([DMat2::IDENTITY, sum]);
         let scaled = shapes.filter_map(|shape| {
             let inverse = shape.inverse();
             // The largest eigenvalue of shape^-1 S: how much the shape is to be enlarged.

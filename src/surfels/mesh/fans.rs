@@ -16,6 +16,9 @@ pub(super) const TOLERANCE: f64 = 2e-4;
 /// An ellipse may be so much larger than what it is to cover where the surface ends, and where it goes on.
 const WASTE: [f64; 2] = [2.0, 6.0];
 
+/// Fans of more triangles are cut in halves, wherever they turn: nobody should wait for the middle of a disk of a million.
+pub(super) const MANY: usize = 32;
+
 /// A triangle at a vertex: its two other corners, counter-clockwise seen from outside.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Corner {
@@ -77,7 +80,7 @@ impl Fan {
 
 /// Which triangles are around each vertex.
 pub(super) struct Around {
-    /// Those of vertex v are `triangles[starts[v]..starts[v + 1]]`.
+    /// Those of vertex v, in order, are `triangles[starts[v]..starts[v + 1]]`.
     starts: Vec<u32>,
     triangles: Vec<u32>,
     /// For each side of each triangle, from its corner on: what is on the other side.
@@ -130,8 +133,10 @@ impl Around {
     fn beyond_side(&self, number: u32, side: usize, triangles: &[[u32; 3]], facets: &[Option<Facet>]) -> Beyond {
         let corners = triangles[number as usize];
         let (from, to) = (corners[side], corners[(side + 1) % 3]);
-        let shares = |other: &&u32| **other != number && triangles[**other as usize].contains(&to);
-        let mut others = self.of(from).iter().filter(shares);
+        // Looked for at the end that fewer triangles have.
+        let (at, end) = if self.of(from).len() <= self.of(to).len() { (from, to) } else { (to, from) };
+        let shares = |other: &&u32| **other != number && triangles[**other as usize].contains(&end);
+        let mut others = self.of(at).iter().filter(shares);
         let (Some(&other), None) = (others.next(), others.next()) else { return Beyond::Edge };
         let goes_back = (0..3).any(|k| {
             let corners = triangles[other as usize];
@@ -157,7 +162,7 @@ impl Around {
             self.of(vertex).iter().filter_map(|&triangle| self.corner(triangle, vertex, triangles)).collect();
         // What follows a triangle, counter-clockwise, lies beyond its side from the last corner to the vertex.
         let follows = |corner: &Corner| match self.beyond[corner.triangle as usize][(corner.place + 2) % 3] {
-            Beyond::Surface(other) => corners.iter().position(|corner| corner.triangle == other),
+            Beyond::Surface(other) => corners.binary_search_by_key(&other, |corner| corner.triangle).ok(),
             Beyond::Edge => None,
         };
         let after: Vec<Option<usize>> = corners.iter().map(follows).collect();
@@ -201,7 +206,7 @@ fn parts(fan: Fan, facets: &[Option<Facet>], tolerance: f64) -> Vec<Fan> {
     }
     // Between a triangle and the one that follows it.
     let mut sides: Vec<usize> = (0..count - usize::from(!fan.round)).collect();
-    if bent {
+    if bent && count <= MANY {
         let normal = |k: usize| facet(&fan.corners[k % count]).map_or(fan.normal, |facet| facet.normal);
         let turn = |k: usize| normal(k).dot(normal(k + 1));
         sides.sort_by(|&a, &b| turn(a).total_cmp(&turn(b)).then(a.cmp(&b)));
@@ -209,9 +214,10 @@ fn parts(fan: Fan, facets: &[Option<Facet>], tolerance: f64) -> Vec<Fan> {
         // Half of the angle each.
         let angles: Vec<f64> =
             fan.corners.iter().map(|corner| facet(corner).map_or(0.0, |f| f.angles[corner.place])).collect();
-        let half = 0.5 * angles.iter().sum::<f64>();
-        let so_far = |k: usize| angles[..=k].iter().sum::<f64>();
-        sides.sort_by(|&a, &b| (so_far(a) - half).abs().total_cmp(&(so_far(b) - half).abs()).then(a.cmp(&b)));
+        let mut so_far = angles;
+        (1..count).for_each(|k| so_far[k] += so_far[k - 1]);
+        let half = 0.5 * so_far[count - 1];
+        sides.sort_by(|&a, &b| (so_far[a] - half).abs().total_cmp(&(so_far[b] - half).abs()).then(a.cmp(&b)));
         if fan.round {
             sides.insert(1, count - 1);
             sides.dedup();

@@ -71,15 +71,6 @@ fn the_border_cuts_no_disk_of_a_default_picture() {
 }
 
 #[test]
-fn a_coarse_mesh_is_told_of_sample_and_a_fine_one_is_not() {
-    let folder = Folder::new();
-    let coarse = render(&folder, &[&format!("{DATA}/cube.obj")]);
-    assert!(coarse.contains("the 8 vertices of the mesh") && coarse.contains("epsplat sample"), "{coarse}");
-    let fine = render(&folder, &[&format!("{DATA}/bunny.obj")]);
-    assert!(!fine.contains("epsplat sample"), "{fine}");
-}
-
-#[test]
 fn a_stray_point_is_told_and_shrinks_neither_picture_nor_box() {
     let folder = Folder::new();
     let points: Vec<String> = (0..400)

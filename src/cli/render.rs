@@ -243,15 +243,6 @@ struct Outcome<'a> {
 fn scene(arguments: &Arguments, bars: &Bars) -> Result<(Scene, Preparation)> {
     let texture = arguments.texture.as_deref().map(Texture::read).transpose()?;
     let inputs = arguments.reading.all(&arguments.inputs, bars)?;
-    for (path, points) in arguments.inputs.iter().zip(&inputs) {
-        if let Some(share) = surfels::coarse(points) {
-            let (path, vertices, percent) = (path.display(), points.positions.len(), 100.0 * share);
-            note(&format!(
-                "the {vertices} vertices of the mesh {path} become disks of {percent:.0} % of its size, which show as such: `epsplat \
-                 sample {path} -o surfels.ply --count 100000` covers its triangles with small ones"
-            ));
-        }
-    }
     let mut read = arguments.inputs.iter().zip(&inputs);
     if texture.is_some()
         && let Some((path, _)) = read.find(|(_, points)| points.texture.is_none())

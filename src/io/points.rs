@@ -1,7 +1,7 @@
 //! What one input file holds, before it becomes surfels.
 
 pub use crate::scene::Up;
-use crate::scene::{Clip, Colors, number};
+use crate::scene::{Clip, Colors};
 
 /// Points as a file gives them: f64 world coordinates and whatever attributes exist.
 ///
@@ -52,7 +52,8 @@ pub struct Faces {
 }
 
 impl Points {
-    /// Keeps the points whose flag is set.
+    /// Keeps what each point has of the points whose flag is set. Which points of the file they are, [`Provenance`](crate::scene::Provenance)
+    /// keeps.
     pub(crate) fn retain(&mut self, keep: &[bool]) {
         retain(&mut self.positions, keep);
         self.normals.iter_mut().for_each(|all| retain(all, keep));
@@ -61,13 +62,6 @@ impl Points {
         self.clips.iter_mut().for_each(|all| retain(all, keep));
         self.texture.iter_mut().for_each(|all| retain(all, keep));
         self.colors.iter_mut().for_each(|all| retain_colors(all, keep));
-        if let Some(numbers) = &mut self.numbers {
-            return retain(numbers, keep);
-        }
-        let dropped = keep.iter().enumerate().filter(|(_, keep)| !**keep);
-        let dropped: Vec<u64> = dropped.map(|(read, _)| number(&self.left_out, read as u64)).collect();
-        self.left_out.extend(dropped);
-        self.left_out.sort_unstable();
     }
 }
 
@@ -96,7 +90,7 @@ pub(crate) fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
     values.retain(|_| flags.next().copied().unwrap_or(false));
 }
 
-pub(crate) fn retain_colors(colors: &mut Colors, keep: &[bool]) {
+fn retain_colors(colors: &mut Colors, keep: &[bool]) {
     match colors {
         Colors::Srgb8(codes) => retain(codes, keep),
         Colors::Linear(colors) => retain(colors, keep),

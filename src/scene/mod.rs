@@ -26,7 +26,6 @@ pub use light::Light;
 pub use maps::{MAPS, Map, Maps};
 pub use options::{Cull, Epsilon, Kernel, KernelShape, LowPass, Samples, Shading};
 pub use provenance::Provenance;
-pub(crate) use provenance::number;
 pub use scene::{Bounds, Scene, Up};
 pub use surfel::Surfel;
 pub use texture::{Place, Texture, Textured};

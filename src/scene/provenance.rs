@@ -57,7 +57,7 @@ impl Provenance {
 }
 
 /// The number of the `kept`th point (from 0) that is none of `left_out`, which are in order.
-pub(crate) fn number(left_out: &[u64], kept: u64) -> u64 {
+fn number(left_out: &[u64], kept: u64) -> u64 {
     // As many of the kept ones lie before the kth that is left out as its number exceeds k.
     let (mut low, mut high) = (0, left_out.len());
     while low < high {

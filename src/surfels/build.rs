@@ -66,7 +66,7 @@ pub fn build_within(
     }
     let mut gathered = gather::gather(inputs)?;
     let unusable = |place: &[f32; 2]| !place.iter().all(|turns| turns.abs() <= LARGEST_PLACE);
-    for place in gathered.texture.iter_mut().flatten().filter(|place| unusable(place)) {
+    for place in gathered.points.texture.iter_mut().flatten().filter(|place| unusable(place)) {
         *place = [0.0; 2];
         gathered.preparation.replaced_places += 1;
     }
@@ -79,10 +79,10 @@ pub fn build_within(
 type Built = ((Scene, Preparation), Option<Vec<[f32; 2]>>);
 
 fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Progress) -> Result<Built> {
-    let bounds = Bounds::of(gathered.positions.par_iter().map(|position| DVec3::from_array(*position)));
-    let (body, _) = body(gathered.positions.len(), |index| DVec3::from_array(gathered.positions[index]));
+    let bounds = Bounds::of(gathered.points.positions.par_iter().map(|position| DVec3::from_array(*position)));
+    let (body, _) = body(gathered.points.positions.len(), |index| DVec3::from_array(gathered.points.positions[index]));
     let origin = origin_for(&body);
-    let up = gathered.up.unwrap_or_else(|| guess_up(&body));
+    let up = gathered.points.up.unwrap_or_else(|| guess_up(&body));
     let sorted = |positions: &[[f64; 3]]| {
         progress.begin("sorting points", 0);
         let distinct = DistinctPositions::new(positions, &bounds, origin);
@@ -91,19 +91,19 @@ fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Progress) -> Re
     };
     let mut distinct = None;
     if let Some(deviations) = limits.outliers {
-        let mut all = sorted(&gathered.positions)?;
+        let mut all = sorted(&gathered.points.positions)?;
         gathered.preparation.dropped_outliers = drop_outliers(&mut gathered, &mut all, deviations, progress);
         distinct = Some(all);
     }
     let mut preparation = std::mem::take(&mut gathered.preparation);
     let given = Given(&gathered);
-    let count = gathered.positions.len();
+    let count = gathered.points.positions.len();
     preparation.surfels = count as u64;
-    preparation.guessed_up = gathered.up.is_none();
+    preparation.guessed_up = gathered.points.up.is_none();
     preparation.estimated_normals = (0..count).into_par_iter().filter(|&i| given.lacks_normal(i)).count() as u64;
     preparation.estimated_radii = (0..count).into_par_iter().filter(|&i| given.lacks_radius(i)).count() as u64;
     let estimated = if preparation.estimated_normals > 0 || preparation.estimated_radii > 0 {
-        let distinct = distinct.map_or_else(|| sorted(&gathered.positions), Ok)?;
+        let distinct = distinct.map_or_else(|| sorted(&gathered.points.positions), Ok)?;
         let how = (up.axis(), limits.largest_ratio);
         Some(Estimated { of_position: estimated(&given, &distinct, how, &mut preparation, progress), distinct })
     } else {
@@ -120,15 +120,15 @@ fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Progress) -> Re
         let radius = given.radius(i).unwrap_or_else(|| estimate_of(i).radius);
         Surfel::disk(center, normal, radius)
     };
-    let mut surfels: Vec<Surfel> = gathered.positions.par_iter().enumerate().map(surfel).collect();
+    let mut surfels: Vec<Surfel> = gathered.points.positions.par_iter().enumerate().map(surfel).collect();
     drop(estimated);
     preparation.limited_radii = limit_radii(&mut surfels, body.extent().max_element())?;
-    let relative = |index: usize| DVec3::from_array(gathered.positions[index]) - origin;
+    let relative = |index: usize| DVec3::from_array(gathered.points.positions[index]) - origin;
     let low = low_parts(&surfels, relative);
     preparation.rounding = rounding(&surfels, &low, relative);
     let oriented = preparation.estimated_normals == 0;
     let normals = own_normals(&given, &surfels);
-    let Gathered { colors, closed, clips, provenance, texture, .. } = gathered;
+    let Gathered { points: Points { colors, closed, clips, texture, .. }, provenance, .. } = gathered;
     let (colors, closed) = (colors::folded(colors), closed && oriented);
     // Most scenes have no disk that ends before its rim.
     let clips: Vec<Clip> = clips.unwrap_or_default().into_iter().map(Clip::usable).collect();
@@ -150,7 +150,8 @@ fn own_normals(given: &Given<'_>, surfels: &[Surfel]) -> Vec<[f32; 3]> {
         normal.filter(|normal| normal.angle_between(plane(surfel)) > LEAST_TURN).unwrap_or(plane(surfel)).to_array()
     };
     let differs = |(i, surfel): (usize, &Surfel)| own((i, surfel)) != plane(surfel).to_array();
-    if given.0.normals.is_none() || given.0.axes.is_none() || !surfels.par_iter().enumerate().any(differs) {
+    if given.0.points.normals.is_none() || given.0.points.axes.is_none() || !surfels.par_iter().enumerate().any(differs)
+    {
         return Vec::new();
     }
     surfels.par_iter().enumerate().map(own).collect()
@@ -161,15 +162,15 @@ struct Given<'a>(&'a Gathered);
 
 impl Given<'_> {
     fn axes(&self, i: usize) -> Option<[Vec3; 2]> {
-        usable_axes(*self.0.axes.as_ref()?.get(i)?)
+        usable_axes(*self.0.points.axes.as_ref()?.get(i)?)
     }
 
     fn normal(&self, i: usize) -> Option<Vec3> {
-        unit(*self.0.normals.as_ref()?.get(i)?)
+        unit(*self.0.points.normals.as_ref()?.get(i)?)
     }
 
     fn radius(&self, i: usize) -> Option<f32> {
-        usable_radius(*self.0.radii.as_ref()?.get(i)?)
+        usable_radius(*self.0.points.radii.as_ref()?.get(i)?)
     }
 
     fn lacks_normal(&self, i: usize) -> bool {

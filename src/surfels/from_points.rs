@@ -80,27 +80,27 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
     check(options)?;
     let mut gathered = gather(inputs)?;
     if options.estimate_normals {
-        (gathered.normals, gathered.axes) = (None, None);
+        (gathered.points.normals, gathered.points.axes) = (None, None);
     }
-    let bounds = Bounds::of(gathered.positions.par_iter().map(|position| DVec3::from_array(*position)));
-    let (body, _) = body(gathered.positions.len(), |index| DVec3::from_array(gathered.positions[index]));
-    let known_up = gathered.up.unwrap_or_else(|| guess_up(&body));
+    let bounds = Bounds::of(gathered.points.positions.par_iter().map(|position| DVec3::from_array(*position)));
+    let (body, _) = body(gathered.points.positions.len(), |index| DVec3::from_array(gathered.points.positions[index]));
+    let known_up = gathered.points.up.unwrap_or_else(|| guess_up(&body));
     let up = known_up.axis();
     let origin = origin_for(&body);
     progress.begin("sorting points", 0);
-    let mut distinct = DistinctPositions::new(&gathered.positions, &bounds, origin)?;
+    let mut distinct = DistinctPositions::new(&gathered.points.positions, &bounds, origin)?;
     progress.end();
     if let Some(deviations) = options.limits.outliers {
         gathered.preparation.dropped_outliers = drop_outliers(&mut gathered, &mut distinct, deviations, progress);
     }
     let graph = NeighbourGraph::new(&distinct, NORMAL_NEIGHBOURS, progress);
     let given = given_normals(&gathered);
-    let count = gathered.positions.len();
+    let count = gathered.points.positions.len();
     let mut preparation = Preparation {
         surfels: count as u64,
         estimated_normals: given.as_ref().map_or(count, |all| all.iter().filter(|n| n.is_none()).count()) as u64,
         estimated_radii: count as u64,
-        guessed_up: gathered.up.is_none(),
+        guessed_up: gathered.points.up.is_none(),
         distinct_positions: Some(distinct.len() as u64),
         median_spacing: median_spacing(&distinct, &graph),
         ..gathered.preparation.clone()
@@ -132,7 +132,7 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
         None => of_point.par_iter().map(|&position| sizes.length(position) as f32).collect(),
     };
     progress.end();
-    let Gathered { positions, colors, texture, .. } = gathered;
+    let Points { positions, colors, texture, .. } = gathered.points;
     let (normals, radii) = (Some(point_normals), Some(radii));
     let points = Points { positions, normals, radii, axes, colors, texture, up: Some(known_up), ..Points::default() };
     preparation.limited_by_neighbours = sizes.limited(distinct.of_point());
@@ -259,14 +259,14 @@ fn check(options: &FromPoints) -> Result<()> {
 
 /// The usable ones of the given normals, of unit length; those of half-axes come first. None if no input has any.
 fn given_normals(gathered: &Gathered) -> Option<Vec<Option<[f32; 3]>>> {
-    let Gathered { normals, axes, .. } = gathered;
+    let Points { normals, axes, .. } = &gathered.points;
     (normals.is_some() || axes.is_some()).then(|| {
         let of_axes = |i: usize| {
             let [s, t] = usable_axes(*axes.as_ref()?.get(i)?)?.map(|axis| axis.as_dvec3());
             Some(s.cross(t).normalize().as_vec3())
         };
         let of_normal = |i: usize| unit(*normals.as_ref()?.get(i)?);
-        let all = (0..gathered.positions.len()).into_par_iter();
+        let all = (0..gathered.points.positions.len()).into_par_iter();
         all.map(|i| of_axes(i).or_else(|| of_normal(i)).map(|normal| normal.to_array())).collect()
     })
 }

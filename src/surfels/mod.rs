@@ -2,7 +2,6 @@
 
 pub mod analytic;
 mod build;
-mod coarse;
 mod colors;
 mod coverage;
 mod eigen;
@@ -31,7 +30,6 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 pub use self::build::{build, build_textured, build_within};
-pub use self::coarse::coarse;
 pub use self::coverage::{Coverage, coverage};
 pub use self::from_points::{FromPoints, Surfels, from_points};
 pub use self::limits::Limits;

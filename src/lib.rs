@@ -49,6 +49,7 @@ mod random;
 pub mod render;
 pub mod report;
 pub mod scene;
+mod sets;
 pub mod surfels;
 pub mod truth;
 

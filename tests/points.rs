@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod common;
+
 use std::path::Path;
 
 use epsplat::Error;
@@ -9,7 +11,7 @@ use epsplat::io::{self, Points};
 use epsplat::scene::{Colors, Scene};
 use epsplat::surfels::analytic::{Sample, Shape, generate};
 use epsplat::surfels::{
-    FromPoints, Limits, Orientation, Preparation, Size, Surfels, Triangle, build_within, from_points,
+    FromPoints, Limits, Orientation, Preparation, Size, Surfels, Triangle, build, build_within, from_points,
 };
 use glam::DVec3;
 
@@ -436,4 +438,35 @@ fn georeferenced_coordinates_stay_to_the_last_digit() {
     assert_eq!(read, made.points);
     // An f32 there is half a unit coarse.
     assert!((f64::from(6_123_456.789f32) - 6_123_456.789).abs() > 0.01);
+}
+
+#[test]
+fn surfels_of_given_normals_end_at_sharp_edges() {
+    use epsplat::metrics::{SurfaceDistances, coverage};
+    use epsplat::surfels::sampling::voxels::Voxel;
+    use epsplat::surfels::sampling::{MeshSurface, Method, Priority, sample};
+    let mesh = common::meshes::bar(4);
+    let evenly = |surface: &MeshSurface<'_>, voxels: &[Voxel]| Priority::Area.of(surface, voxels);
+    let (sampled, _) = sample(&mesh, 4000, &Method::Stratified { priority: &evenly, depth: None }, 0, &()).unwrap();
+    let tree = epsplat::truth::TriangleTree::new(&mesh).unwrap();
+    for size in [Size::Knn, Size::Ellipse] {
+        let options = FromPoints { size, ..FromPoints::default() };
+        let of = |normals: Option<Vec<[f32; 3]>>| {
+            surfels(Points { normals, ..cloud(sampled.positions.clone()) }, &options).points
+        };
+        let points = of(sampled.normals.clone());
+        let cut = points.clips.as_ref().unwrap().iter().filter(|clip| !clip.is_none()).count();
+        assert!((200..1500).contains(&cut), "{cut}");
+        let (scene, _) = build(vec![points], &()).unwrap();
+        let rims = |scene: &Scene| SurfaceDistances::of(scene, &mesh, &tree).unwrap().rims_to_mesh.unwrap();
+        let whole = Scene { clips: Vec::new(), ..scene.clone() };
+        assert!(rims(&scene).mean < 0.2 * rims(&whole).mean, "{:?} {:?}", rims(&scene), rims(&whole));
+        let holes = |scene: &Scene| coverage(&tree, scene, 64, 128, &()).unwrap().seen.holes;
+        assert!(holes(&scene) <= holes(&whole) + 5, "{} {}", holes(&scene), holes(&whole));
+        // Estimated normals turn over several points, and a smooth cloud has no edge.
+        assert!(of(None).clips.is_none());
+        let (positions, normals) = samples(Shape::Sphere, 3000);
+        let smooth = surfels(Points { normals: Some(normals), ..cloud(positions) }, &options);
+        assert!(smooth.points.clips.is_none());
+    }
 }

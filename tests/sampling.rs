@@ -10,7 +10,7 @@ use common::meshes::{bar, sphere};
 use epsplat::Error;
 use epsplat::io::{Mesh, Points, Texture};
 use epsplat::metrics::{SurfaceDistances, coverage};
-use epsplat::scene::{Colors, Scene};
+use epsplat::scene::{Clip, Colors, Scene};
 use epsplat::surfels::build;
 use epsplat::surfels::sampling::voxels::Voxel;
 use epsplat::surfels::sampling::{MeshSurface, Method, Priority, Sampling, sample};
@@ -127,9 +127,12 @@ fn a_sphere_is_covered_evenly() {
     assert!(coverage(&tree, &longer(&scene, 0.5), 64, 128, &()).unwrap().hole_share.unwrap() > 0.01);
 }
 
-/// The disks of a scene, longer by a factor.
+/// The disks of a scene, longer by a factor, that end at the same lines.
 fn longer(scene: &Scene, factor: f32) -> Scene {
     let mut scene = scene.clone();
+    for Clip(lines) in &mut scene.clips {
+        lines.iter_mut().for_each(|[u, v, _]| (*u, *v) = (factor * *u, factor * *v));
+    }
     for surfel in &mut scene.surfels {
         (surfel.s, surfel.t) = (surfel.s.map(|c| factor * c), surfel.t.map(|c| factor * c));
     }
@@ -151,6 +154,7 @@ fn flat_sides_are_covered_up_to_sharp_edges_by_disks_that_end_with_their_cells()
         assert_eq!(uncovered(&least), 0);
         // Controls: a tenth less, and with one in ten left out.
         assert!(uncovered(&longer(&scene, 0.72)) > 0);
+        least.clips = least.clips.chunks(10).flat_map(|ten| &ten[1..]).copied().collect();
         least.surfels = least.surfels.chunks(10).flat_map(|ten| &ten[1..]).copied().collect();
         assert!(uncovered(&least) > 0);
     }
@@ -352,4 +356,54 @@ fn what_cannot_be_sampled_is_counted_or_said() {
         let error = sample(&mesh, 10, &Method::Uniform, 0, &()).unwrap_err().to_string();
         assert!(error.contains(said), "{error}");
     }
+}
+
+/// The share of a disk's radius by which disks go past an edge, and some more for those whose cells do.
+const PAST: f64 = 0.03;
+
+#[test]
+fn disks_end_at_edges_and_borders() {
+    let open = |sides: u32| {
+        let mut mesh = bar(sides);
+        // Without its ends.
+        mesh.triangles.truncate(2 * sides as usize);
+        mesh
+    };
+    for mesh in [bar(4), bar(3), open(4)] {
+        let points = by(&mesh, 3000, Priority::Area);
+        let tree = TriangleTree::new(&mesh).unwrap();
+        let (scene, _) = build(vec![points.clone()], &()).unwrap();
+        assert!(scene.clips.iter().filter(|clip| !clip.is_none()).count() > 100);
+        let rims = |scene: &Scene| SurfaceDistances::of(scene, &mesh, &tree).unwrap().rims_to_mesh.unwrap();
+        let radius = f64::from(scene.surfels.iter().map(|surfel| surfel.radius()).fold(0.0, f32::max));
+        assert!(rims(&scene).max < PAST * radius, "{:?} {radius}", rims(&scene));
+        assert!(coverage(&tree, &scene, 64, 128, &()).unwrap().is_hole_free());
+        // The control: whole disks.
+        let whole = Scene { clips: Vec::new(), ..scene };
+        assert!(rims(&whole).max > 10.0 * PAST * radius, "{:?} {radius}", rims(&whole));
+    }
+    // A smooth surface has none, nor half-axes, which would be of no use.
+    let smooth = by(&sphere(5, false), 2000, Priority::Area);
+    assert!(smooth.clips.is_none() && smooth.axes.is_none() && smooth.radii.is_some());
+}
+
+#[test]
+fn planes_are_the_surface_s_own_whatever_normals_it_is_lit_by() {
+    // A bar that is lit as if it were round.
+    let mut mesh = bar(4);
+    let outward = |vertex: u32| {
+        let [x, y, _] = mesh.positions[vertex as usize];
+        DVec3::new(x, y, 0.0).as_vec3().to_array()
+    };
+    mesh.normals = Some(mesh.triangles.iter().map(|triangle| triangle.map(outward)).collect());
+    let points = by(&mesh, 3000, Priority::Area);
+    let tree = TriangleTree::new(&mesh).unwrap();
+    let (scene, _) = build(vec![points], &()).unwrap();
+    let distances = SurfaceDistances::of(&scene, &mesh, &tree).unwrap();
+    let radius = f64::from(scene.surfels.iter().map(|surfel| surfel.radius()).fold(0.0, f32::max));
+    assert!(distances.rims_to_mesh.unwrap().max < PAST * radius, "{distances:?}");
+    let turned = scene.normals.iter().zip(&scene.surfels).filter(|(normal, surfel)| {
+        DVec3::from(normal.map(f64::from)).dot(surfel.normal().as_dvec3().normalize()) < 0.9
+    });
+    assert!(turned.count() > 300, "normals that are not those of the planes");
 }

@@ -14,7 +14,7 @@ use epsplat::Error;
 use epsplat::io::Points;
 use epsplat::metrics::SurfaceDistances;
 use epsplat::metrics::coverage::coverage;
-use epsplat::scene::{Colors, Scene, Surfel};
+use epsplat::scene::{Clip, Colors, Scene, Surfel};
 use epsplat::surfels::analytic::{Shape, generate};
 use epsplat::surfels::build;
 use epsplat::surfels::sampling::voxels::Voxel;
@@ -53,6 +53,17 @@ fn as_grown(surfel: &Surfel, tolerance: f64) -> Surfel {
         axis.map(|c| c * (grown(length, tolerance) / length) as f32)
     };
     Surfel { s: shrunk(surfel.s), t: shrunk(surfel.t), ..*surfel }
+}
+
+/// A scene of other `surfels`, as long in other units, that end at the same lines.
+fn with_lines_of(scene: &Scene, surfels: Vec<Surfel>) -> Scene {
+    let length = |axis: [f32; 3]| Vec3::from_array(axis).length();
+    let clip = |((clip, from), to): ((&Clip, &Surfel), &Surfel)| {
+        let [s, t] = [length(to.s) / length(from.s), length(to.t) / length(from.t)];
+        Clip(clip.0.map(|[u, v, w]| [u * s, v * t, w]))
+    };
+    let clips = scene.clips.iter().zip(&scene.surfels).zip(&surfels).map(clip).collect();
+    Scene { surfels, clips, ..scene.clone() }
 }
 
 fn center(surfel: &Surfel) -> DVec3 {
@@ -249,13 +260,14 @@ fn at_sharp_edges_each_point_has_a_disk_within_the_tolerance_and_none_is_left_op
         assert!(whole.is_hole_free(), "{options:?}: {whole:?}");
         // Nor is there a hole between disks as they grew, which is what selection sees to: some are written twice as long, as
         // large as the samples were.
-        let as_they_grew = Scene { surfels, ..simplified.clone() };
+        let as_they_grew = with_lines_of(&simplified, surfels);
         let least = seen(&as_they_grew);
         assert!(least.is_hole_free(), "{options:?}: {least:?}");
         // Control: with one in ten left out.
         let fewer: Vec<Surfel> = as_they_grew.surfels.chunks(10).flat_map(|ten| &ten[1..]).copied().collect();
         assert!(bare(&fewer) > 0);
-        assert!(!seen(&Scene { surfels: fewer, ..simplified.clone() }).is_hole_free());
+        let clips = as_they_grew.clips.chunks(10).flat_map(|ten| &ten[1..]).copied().collect();
+        assert!(!seen(&Scene { surfels: fewer, clips, ..simplified.clone() }).is_hole_free());
         // Disks are as large as the faces where those are flat, and show past their edges by no more than cells do.
         let rims = SurfaceDistances::of(&simplified, &mesh, &tree).unwrap().rims_to_mesh.unwrap();
         let spacing = sampled.surfels.iter().map(|s| f64::from(s.radius())).sum::<f64>() / 6_000.0;
@@ -266,7 +278,8 @@ fn at_sharp_edges_each_point_has_a_disk_within_the_tolerance_and_none_is_left_op
         assert!(rims.max < limit, "{options:?}: {rims:?} {limit}");
         // Control: half as long again, those that end at an edge show more.
         let longer = |s: &Surfel| Surfel { s: s.s.map(|c| 1.5 * c), t: s.t.map(|c| 1.5 * c), ..*s };
-        let longer = Scene { surfels: simplified.surfels.iter().map(longer).collect(), ..simplified.clone() };
+        let surfels = simplified.surfels.iter().map(longer).collect();
+        let longer = Scene { surfels, clips: Vec::new(), ..simplified.clone() };
         assert!(SurfaceDistances::of(&longer, &mesh, &tree).unwrap().rims_to_mesh.unwrap().max > limit);
     }
 }
@@ -295,20 +308,28 @@ fn cylinder(count: u64) -> (Scene, f64) {
 fn ellipses_reach_past_an_edge_no_farther_than_disks_may() {
     let (sampled, spacing) = cylinder(20_000);
     let tolerance = 0.002;
-    let past = |surfel: &Surfel| f64::from(surfel.center[2]).abs() + f64::from(surfel.s[2].hypot(surfel.t[2])) - 1.0;
+    // How far a disk goes past the end of the cylinder, and how far it would without the lines at which it ends.
+    let past = |(surfel, clip): (&Surfel, Clip)| {
+        let [s, t] = [surfel.s[2], surfel.t[2]].map(f64::from);
+        let rim = (0..256).map(|k| (f64::from(k) / 128.0 * PI).sin_cos());
+        let along = rim.map(|(v, u)| (s * u + t * v) * clip.reach(u, v) * f64::from(surfel.center[2]).signum());
+        f64::from(surfel.center[2]).abs() + along.fold(0.0, f64::max) - 1.0
+    };
+    let whole = |surfel: &Surfel| past((surfel, Clip::NONE));
     for shape in [SplatShape::Disk, SplatShape::Ellipse] {
-        let (surfels, _) = run(&sampled, Options { shape, ..within(tolerance) });
+        let (simplified, _) = simplify(&sampled, &Options { shape, ..within(tolerance) }, &()).unwrap();
+        let Scene { surfels, clips, .. } = simplified;
         // As far as a cell may, and eight tolerances more.
         let limit = 2.5 * spacing + 8.0 * tolerance;
-        let farthest = surfels.iter().map(past).fold(0.0, f64::max);
+        let farthest = surfels.iter().zip(clips).map(past).fold(0.0, f64::max);
         assert!(farthest <= limit, "{shape:?}: {farthest} of {limit}");
         // There are some on the side that end there, and they are long.
         let ratio = |s: &Surfel| f64::from(Vec3::from_array(s.s).length() / Vec3::from_array(s.t).length()).ln().abs();
-        let ending = surfels.iter().filter(|surfel| past(surfel) > 0.0 && surfel.normal().z.abs() < 0.5);
+        let ending = surfels.iter().filter(|surfel| whole(surfel) > 0.0 && surfel.normal().z.abs() < 0.5);
         let long = ending.clone().filter(|surfel| ratio(surfel) > 3f64.ln()).count();
         assert_eq!(long > 20, shape == SplatShape::Ellipse, "{long}");
         // Control: longer by two fifths, ellipses are beyond.
-        let longer = |s: &Surfel| past(&Surfel { s: s.s.map(|c| 1.4 * c), t: s.t.map(|c| 1.4 * c), ..*s });
+        let longer = |s: &Surfel| whole(&Surfel { s: s.s.map(|c| 1.4 * c), t: s.t.map(|c| 1.4 * c), ..*s });
         assert!(shape == SplatShape::Disk || ending.map(longer).fold(0.0, f64::max) > limit);
     }
 }
@@ -454,4 +475,28 @@ fn tolerances_are_read_and_refused() {
     let diagonal = plane.bounds().extent().length();
     let relative = simplify(&plane, &Options { tolerance: Tolerance::Relative(0.01), ..DISKS }, &()).unwrap();
     assert_eq!(relative, simplify(&plane, &within(0.01 * diagonal), &()).unwrap());
+}
+
+#[test]
+fn larger_surfels_end_where_those_did_that_they_stand_for() {
+    let evenly = |surface: &MeshSurface<'_>, voxels: &[Voxel]| Priority::Area.of(surface, voxels);
+    let method = Method::Stratified { priority: &evenly, depth: None };
+    for sides in [3, 4] {
+        let mesh = bar(sides);
+        let tree = TriangleTree::new(&mesh).unwrap();
+        let (points, _) = sample(&mesh, 6_000, &method, 0, &()).unwrap();
+        let unclipped = Points { clips: None, axes: None, ..points.clone() };
+        let [with, without] = [points, unclipped].map(|points| build(vec![points], &()).unwrap().0);
+        let (simplified, report) = simplify(&with, &within(0.001), &()).unwrap();
+        let (control, report_without) = simplify(&without, &within(0.001), &()).unwrap();
+        // Cut at two ends a disk may grow past them, and fewer are needed.
+        assert!(report.selected < report_without.selected / 2, "{report:?} {report_without:?}");
+        let rims = |scene: &Scene| SurfaceDistances::of(scene, &mesh, &tree).unwrap().rims_to_mesh.unwrap();
+        let spacing = with.surfels.iter().map(|s| f64::from(s.radius())).sum::<f64>() / 6_000.0;
+        let (ours, theirs) = (rims(&simplified), rims(&Scene { clips: Vec::new(), ..control }));
+        assert!(ours.mean < 0.5 * theirs.mean && ours.percentile_99 < 1.2 * spacing, "{ours:?} {theirs:?} {spacing}");
+        assert!(coverage(&tree, &simplified, 64, 128, &()).unwrap().is_hole_free());
+        // The control: without its lines it stands out.
+        assert!(rims(&Scene { clips: Vec::new(), ..simplified }).mean > 5.0 * ours.mean);
+    }
 }

@@ -80,11 +80,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 fn points(scene: &Scene, shape: SplatShape) -> Points {
     let surfels = &scene.surfels;
     let normal = |surfel: &Surfel| surfel.normal().normalize_or_zero().to_array();
+    // Lines are by half-axes.
+    let half_axes = shape == SplatShape::Ellipse || !scene.clips.is_empty();
     Points {
         positions: (0..surfels.len()).map(|index| (scene.origin + scene.center(index)).to_array()).collect(),
-        normals: (shape == SplatShape::Disk).then(|| surfels.iter().map(normal).collect()),
-        radii: (shape == SplatShape::Disk).then(|| surfels.iter().map(|surfel| surfel.radius()).collect()),
-        axes: (shape == SplatShape::Ellipse).then(|| surfels.iter().map(|surfel| [surfel.s, surfel.t]).collect()),
+        normals: (!half_axes).then(|| surfels.iter().map(normal).collect()),
+        radii: (!half_axes).then(|| surfels.iter().map(|surfel| surfel.radius()).collect()),
+        axes: half_axes.then(|| surfels.iter().map(|surfel| [surfel.s, surfel.t]).collect()),
+        clips: (!scene.clips.is_empty()).then(|| scene.clips.clone()),
         colors: match &scene.colors {
             Colors::Constant(color) => Some(Colors::Linear(vec![*color; surfels.len()])),
             colors => Some(colors.clone()),

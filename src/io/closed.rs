@@ -1,5 +1,6 @@
 //! Whether a mesh closes its surface and faces outward: then nobody outside sees a back of it.
 
+use crate::sets::Sets;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -36,7 +37,7 @@ fn pairs(triangles: &[[u32; 3]]) -> bool {
 }
 
 /// For each position the first vertex that has it.
-fn distinct(positions: &[[f64; 3]]) -> Vec<u32> {
+pub(crate) fn distinct(positions: &[[f64; 3]]) -> Vec<u32> {
     // Adding +0 makes -0 the same coordinate as 0.
     let key = |vertex: u32| positions[vertex as usize].map(|c| (c + 0.0).to_bits());
     let mut order: Vec<u32> = (0..positions.len() as u32).collect();
@@ -50,24 +51,16 @@ fn distinct(positions: &[[f64; 3]]) -> Vec<u32> {
 
 /// Whether each connected part of the `triangles` encloses a positive volume.
 fn faces_outward(positions: &[[f64; 3]], triangles: &[[u32; 3]]) -> bool {
-    let mut parent: Vec<u32> = (0..positions.len() as u32).collect();
-    fn root(parent: &mut [u32], mut vertex: u32) -> u32 {
-        while parent[vertex as usize] != vertex {
-            parent[vertex as usize] = parent[parent[vertex as usize] as usize];
-            vertex = parent[vertex as usize];
-        }
-        vertex
-    }
+    let mut parts = Sets::new(positions.len());
     for &[a, b, c] in triangles {
-        let [a, b, c] = [a, b, c].map(|corner| root(&mut parent, corner));
-        let least = a.min(b).min(c);
-        [a, b, c].into_iter().for_each(|part| parent[part as usize] = least);
+        parts.unite(a, b);
+        parts.unite(b, c);
     }
     let mut volumes = vec![0.0; positions.len()];
     let mut enclosed = vec![false; positions.len()];
     let at = |vertex: u32| DVec3::from(positions[vertex as usize]);
     for &[a, b, c] in triangles {
-        let part = root(&mut parent, a) as usize;
+        let part = parts.least(a) as usize;
         // Relative to a vertex of the part, so that it does not matter where in the world it is.
         let from = at(part as u32);
         volumes[part] += (at(a) - from).dot((at(b) - from).cross(at(c) - from));

@@ -3,7 +3,7 @@
 pub mod atomic;
 pub mod camera;
 pub mod cameras;
-mod closed;
+pub(crate) mod closed;
 mod companions;
 #[cfg(feature = "e57")]
 pub mod e57;

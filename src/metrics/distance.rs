@@ -40,7 +40,8 @@ pub struct Distances {
 pub struct SurfaceDistances {
     /// Of the surfels' centres from the mesh.
     pub centers_to_mesh: Option<Distances>,
-    /// Of eight points on each disk's rim from the mesh: a disk on a curved surface leaves it toward the rim.
+    /// Of eight points on each disk's rim from the mesh, where lines cut it of those at which it ends on the way to them: a disk on a
+    /// curved surface leaves it toward the rim.
     pub rims_to_mesh: Option<Distances>,
     /// Of [`MESH_POINTS`] random points of the mesh, evenly by area, from the nearest surfel's centre: how finely it is sampled.
     pub mesh_to_centers: Option<Distances>,
@@ -75,7 +76,8 @@ impl SurfaceDistances {
         let rim = |index: usize, k: u32| {
             let surfel = &scene.surfels[index];
             let (sin, cos) = (TAU * f64::from(k) / f64::from(RIM_POINTS)).sin_cos();
-            center(index) + world(surfel.s) * cos + world(surfel.t) * sin
+            let kept = scene.clips.get(index).map_or(1.0, |clip| clip.reach(cos, sin));
+            center(index) + (world(surfel.s) * cos + world(surfel.t) * sin) * kept
         };
         let surfels = (0..scene.surfels.len()).into_par_iter();
         let centers = surfels.clone().map(center).map(|point| triangles.distance(point));

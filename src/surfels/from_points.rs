@@ -1,8 +1,9 @@
 //! Surfels from points: what `epsplat surfels` does.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::creases::clips;
 use super::estimate::{LONE_RADIUS, NORMAL_NEIGHBOURS, RADIUS_RANGE, fitted_normal};
 use super::gather::{Gathered, gather};
 use super::graph::NeighbourGraph;
@@ -13,7 +14,7 @@ use super::sheets;
 use super::sizes::{Size, bsp_radii, ellipse_at, knn_radii, local_limits, offsets};
 use super::{Limits, Preparation, guess_up, origin_for, unit, usable_axes};
 use crate::io::Points;
-use crate::scene::{Bounds, body, framed};
+use crate::scene::{Bounds, Clip, Surfel, body, framed};
 use crate::{Error, Progress, Result};
 
 /// How surfels are made of points.
@@ -127,18 +128,53 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
         let ellipse = |(&position, &normal)| sizes.ellipse((&distinct, &graph), &normals, position, normal);
         of_point.par_iter().zip(&point_normals).map(ellipse).collect::<Vec<_>>()
     });
-    let radii = match &axes {
+    let radii: Vec<f32> = match &axes {
         Some(axes) => axes.par_iter().map(|[s, _]| DVec3::from_array(s.map(f64::from)).length() as f32).collect(),
         None => of_point.par_iter().map(|&position| sizes.length(position) as f32).collect(),
     };
     progress.end();
+    let (axes, clips) = match preparation.estimated_normals {
+        0 => cut(&distinct, &graph, (&point_normals, &radii), axes),
+        _ => (axes, None),
+    };
     let Points { positions, colors, texture, .. } = gathered.points;
-    let (normals, radii) = (Some(point_normals), Some(radii));
-    let points = Points { positions, normals, radii, axes, colors, texture, up: Some(known_up), ..Points::default() };
+    let (normals, radii, up) = (Some(point_normals), Some(radii), Some(known_up));
+    let points = Points { positions, normals, radii, axes, clips, colors, texture, up, ..Points::default() };
     preparation.limited_by_neighbours = sizes.limited(distinct.of_point());
     let radius = |index: usize| points.radii.as_ref().map_or(0.0, |radii| f64::from(radii[index]));
     preparation.strays = framed(count, |index| (DVec3::from_array(points.positions[index]), radius(index))).1;
     Ok(Surfels { points, preparation, parts, collinear: sizes.collinear })
+}
+
+/// The half-axes of points and the lines at which their surfels end at edges: as they are, of disks or `axes`, without an edge.
+fn cut(
+    distinct: &DistinctPositions,
+    graph: &NeighbourGraph,
+    (normals, radii): (&[[f32; 3]], &[f32]),
+    axes: Option<Vec<[[f32; 3]; 2]>>,
+) -> (Option<Vec<[[f32; 3]; 2]>>, Option<Vec<Clip>>) {
+    // Points at one position may have several normals: the first tells.
+    let mut first = vec![0; distinct.len()];
+    distinct.of_point().iter().enumerate().rev().for_each(|(point, position)| first[*position as usize] = point);
+    let wide = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
+    let half_axes = |point: usize| match &axes {
+        Some(axes) => axes[point],
+        None => {
+            let Surfel { s, t, .. } = Surfel::disk(Vec3::ZERO, Vec3::from_array(normals[point]), radii[point]);
+            [s, t]
+        }
+    };
+    let of_positions: Vec<DVec3> = first.iter().map(|point| wide(normals[*point]).normalize_or_zero()).collect();
+    let clips = clips(distinct, graph, &of_positions, |position| half_axes(first[position as usize]).map(wide));
+    if clips.is_empty() {
+        return (axes, None);
+    }
+    let is_first = |(point, position): (usize, &u32)| normals[point] == normals[first[*position as usize]];
+    let clip = |(point, position): (usize, &u32)| {
+        if is_first((point, position)) { clips[*position as usize] } else { Clip::NONE }
+    };
+    let of_points = distinct.of_point().par_iter().enumerate().map(clip).collect();
+    (Some((0..normals.len()).into_par_iter().map(half_axes).collect()), Some(of_points))
 }
 
 /// Turns the `normals` of positions to one side; the connected parts of the surface, if they were looked for.

@@ -196,11 +196,45 @@ impl Disk {
     /// That function is convex and falls, so Newton's method comes to the root from below and never passes it.
     fn squared_distance(&self, point: DVec3) -> f64 {
         let offset = point - self.center;
-        let [x, y] = [offset.dot(self.axes[0]).abs(), offset.dot(self.axes[1]).abs()];
+        let foot = DVec2::new(offset.dot(self.axes[0]), offset.dot(self.axes[1]));
         let height = offset.dot(self.axes[2]);
+        let nearest = self.nearest_in_plane(foot);
+        foot.distance_squared(nearest) + height * height
+    }
+
+    /// The nearest point to `foot` of the ellipse, cut by its lines: that of the whole ellipse where the lines keep it, else one on a
+    /// chord that a line cuts out, as what is kept is convex. Far away where nothing is kept.
+    fn nearest_in_plane(&self, foot: DVec2) -> DVec2 {
+        let whole = self.nearest_of_ellipse(foot);
+        let half = DVec2::from_array(self.half);
+        if self.clip.is_none() {
+            return whole;
+        }
+        let lines = self.clip.0.map(|line| self.principal(line));
+        if lines.iter().all(|line| line.dot((whole / half).extend(1.0)) >= 0.0) {
+            return whole;
+        }
+        let chords = [chord(lines[0], lines[1]), chord(lines[1], lines[0])].into_iter().flatten();
+        let on_chord = chords.map(|[from, to]| {
+            let (from, to) = (from * half, to * half);
+            let along = (foot - from).dot(to - from) / (to - from).length_squared();
+            from + (to - from) * if along.is_nan() { 0.0 } else { along.clamp(0.0, 1.0) }
+        });
+        let nearer = |a: &DVec2, b: &DVec2| foot.distance_squared(*a).total_cmp(&foot.distance_squared(*b));
+        on_chord.min_by(nearer).unwrap_or(DVec2::INFINITY)
+    }
+
+    /// A line on the unit disk of the principal half-axes.
+    fn principal(&self, line: [f32; 3]) -> DVec3 {
+        let ([x, y, z], [cos, sin]) = (line.map(f64::from), self.turn.to_array());
+        DVec3::new(x * cos + y * sin, y * cos - x * sin, z)
+    }
+
+    fn nearest_of_ellipse(&self, foot: DVec2) -> DVec2 {
+        let [x, y] = foot.abs().to_array();
         let [a, b] = self.half;
         if (x / a).powi(2) + (y / b).powi(2) <= 1.0 {
-            return height * height;
+            return foot;
         }
         let mut t = (a * x - a * a).max(b * y - b * b).max(0.0);
         for _ in 0..60 {
@@ -212,9 +246,31 @@ impl Disk {
             }
             t += step;
         }
-        let (dx, dy) = (x * t / (t + a * a), y * t / (t + b * b));
-        dx * dx + dy * dy + height * height
+        foot - DVec2::new(x * t / (t + a * a), y * t / (t + b * b))
+            * DVec2::new(1.0f64.copysign(foot.x), 1.0f64.copysign(foot.y))
     }
+}
+
+/// The part of a line that lies on the unit disk and inside the other line: its two ends.
+fn chord(line: DVec3, other: DVec3) -> Option<[DVec2; 2]> {
+    let length = line.truncate().length();
+    let (toward, distance) = (line.truncate() / length, -line.z / length);
+    let half = (1.0 - distance * distance).sqrt();
+    let (mut low, mut high) = (-half, half);
+    // No chord, of a line past the rim or without a direction, has no ends.
+    if half.is_nan() {
+        return None;
+    }
+    let (foot, along) = (toward * distance, toward.perp());
+    let (at_foot, rise) = (other.dot(foot.extend(1.0)), other.truncate().dot(along));
+    if rise > 0.0 {
+        low = low.max(-at_foot / rise);
+    } else if rise < 0.0 {
+        high = high.min(-at_foot / rise);
+    } else if at_foot < 0.0 {
+        return None;
+    }
+    (low <= high).then_some([foot + along * low, foot + along * high])
 }
 
 #[cfg(test)]
@@ -255,31 +311,50 @@ mod tests {
         }
     }
 
+    /// Lines of all kinds for the disks of `scene()`: that leave out the centre, that meet on the disk, and none.
+    fn clips() -> Vec<Clip> {
+        let mut next = noise(5);
+        let line = |angle: f64, z: f64| [angle.cos() as f32, angle.sin() as f32, z as f32];
+        let mut clip = |k: u32| {
+            let (angle, z) = (4.0 * next(), if k % 7 == 0 { -0.3 } else { 0.3 * next().abs() });
+            if k % 3 == 0 { Clip::NONE } else { Clip([line(angle, z), line(angle + 1.3, 0.2)]) }
+        };
+        (0..340).map(&mut clip).collect()
+    }
+
     #[test]
     fn distances_are_those_of_points_on_the_disks() {
-        let scene = scene();
-        let tree = DiskTree::new(&scene);
-        assert_eq!((tree.len(), tree.is_empty()), (298, false));
-        let mut next = noise(2);
-        for _ in 0..40 {
-            let point = DVec3::new(next(), next(), next()) * 3.5;
-            let (mut sampled, mut to_center) = (f64::INFINITY, f64::INFINITY);
-            for surfel in &scene.surfels {
-                let [center, s, t] = [surfel.center, surfel.s, surfel.t].map(|v| Vec3::from_array(v).as_dvec3());
-                if s == DVec3::ZERO {
-                    continue;
+        for clips in [Vec::new(), clips()] {
+            let scene = Scene { clips, ..scene() };
+            let tree = DiskTree::new(&scene);
+            // Forty are the same as others but for their lines.
+            assert_eq!(tree.len(), if scene.clips.is_empty() { 298 } else { 338 });
+            let mut next = noise(2);
+            for _ in 0..40 {
+                let point = DVec3::new(next(), next(), next()) * 3.5;
+                let (mut sampled, mut to_center) = (f64::INFINITY, f64::INFINITY);
+                for (index, surfel) in scene.surfels.iter().enumerate() {
+                    let [center, s, t] = [surfel.center, surfel.s, surfel.t].map(|v| Vec3::from_array(v).as_dvec3());
+                    if s == DVec3::ZERO {
+                        continue;
+                    }
+                    let clip = scene.clips.get(index).copied().unwrap_or_default();
+                    to_center = to_center.min(center.distance(point));
+                    for k in 0..20 * 200 {
+                        let (sin, cos) = (f64::from(k % 200) / 200.0 * std::f64::consts::TAU).sin_cos();
+                        let rho = f64::from(k / 200 + 1) / 20.0;
+                        if clip.inside(rho * cos, rho * sin) >= 0.0 {
+                            sampled = sampled.min((center + rho * (s * cos + t * sin)).distance(point));
+                        }
+                    }
                 }
-                to_center = to_center.min(center.distance(point));
-                for k in 0..20 * 200 {
-                    let (sin, cos) = (f64::from(k % 200) / 200.0 * std::f64::consts::TAU).sin_cos();
-                    let rho = f64::from(k / 200 + 1) / 20.0;
-                    sampled = sampled.min((center + rho * (s * cos + t * sin)).distance(point));
-                }
+                let world = scene.origin + point;
+                let distance = tree.distance(world);
+                // To a corner between lines and rim it is as far along the rim from the next sample.
+                let near = if scene.clips.is_empty() { distance.hypot(0.02) } else { distance + 0.02 };
+                assert!(distance < sampled + 1e-8 && sampled < near, "{distance} {sampled}");
+                assert!((tree.distance_to_center(world) - to_center).abs() < 1e-8);
             }
-            let world = scene.origin + point;
-            let distance = tree.distance(world);
-            assert!(distance < sampled + 1e-8 && sampled < distance.hypot(0.02), "{distance} {sampled}");
-            assert!((tree.distance_to_center(world) - to_center).abs() < 1e-8);
         }
     }
 

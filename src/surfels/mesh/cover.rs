@@ -6,6 +6,7 @@ use glam::{DMat2, DVec2, DVec3};
 
 use super::fans::{Fan, MANY};
 use crate::io::triangles::covering_radius;
+use crate::scene::Clip;
 
 /// A triangle with an area.
 #[derive(Clone, Copy, Debug)]
@@ -114,12 +115,9 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// The line as the disk of two half-axes has it ([`Clip`](crate::scene::Clip)), moved out by `margin`.
+    /// The line as the disk of two half-axes has it ([`Clip`]), moved out by `margin`.
     pub fn on_disk(&self, major: DVec2, minor: DVec2, margin: f64) -> [f32; 3] {
-        let line = [self.normal.dot(major), self.normal.dot(minor), margin * self.sharp - self.offset];
-        // Of a length near one, as half-axes may be of any.
-        let longest = line.iter().fold(0.0f64, |most, x| most.max(x.abs()));
-        line.map(|x| (x / longest) as f32)
+        Clip::line(self.normal, self.offset - margin * self.sharp, [major, minor])
     }
 }
 

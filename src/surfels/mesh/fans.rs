@@ -11,7 +11,7 @@ const EDGE: f64 = 0.866_025_403_784_438_6;
 
 /// The part of a mesh's diagonal by which a disk may stand off the triangles that it stands for. Of 1, 2, 3, 4 and 5 times 1e-4, on
 /// eleven models, 2 is where pictures of 1024x1024 hardly gain by more surfels.
-pub(super) const TOLERANCE: f64 = 2e-4;
+pub(in crate::surfels) const TOLERANCE: f64 = 2e-4;
 
 /// An ellipse may be so much larger than what it is to cover where the surface ends, and where it goes on.
 const WASTE: [f64; 2] = [2.0, 6.0];

@@ -11,6 +11,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use self::cover::{Ellipse, Facet};
+pub(super) use self::fans::TOLERANCE;
 use self::fans::{Around, Fan};
 use crate::io::Points;
 use crate::io::points::taken;
@@ -21,7 +22,7 @@ const OVERLAP: f64 = 1.1;
 
 /// How far past an edge or a border a disk goes, in its own shorter half-axes: two that end at one line leave no pixel between them
 /// out, whatever is rounded.
-const MARGIN: f64 = 0.02;
+pub(super) const MARGIN: f64 = 0.02;
 
 /// One surfel.
 struct Made {
@@ -42,7 +43,7 @@ pub(super) fn of_vertices(mut points: Points) -> Points {
     if 2 * loose > points.positions.len() {
         return points;
     }
-    let tolerance = fans::TOLERANCE * crate::surfels::bounds(&points).extent().length();
+    let tolerance = TOLERANCE * crate::surfels::bounds(&points).extent().length();
     let made = |vertex: u32| {
         let fans = around.fans(vertex, &faces.triangles, &facets, tolerance);
         let of_fan = |fan: Fan| {

@@ -3,10 +3,12 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::ends::{Covering, Ends};
 use super::surface::{MeshSurface, Place};
 use super::voronoi::{SIDE, Voronoi};
 use crate::error::Result;
 use crate::progress::Progress;
+use crate::scene::Clip;
 use crate::surfels::eigen::Symmetric3;
 use crate::surfels::positions::DistinctPositions;
 
@@ -20,7 +22,32 @@ const STEEPEST: f64 = 1.732;
 /// A cell whose mean square length is more than so many times that of its width is a line, and lies in many planes.
 const LONGEST: f64 = 1e12;
 
-/// The unit normal and the radius of each sample's disk. Normals that the mesh names are `named`.
+/// The disks of all samples, one after the other.
+pub(super) struct Disks {
+    /// Unit.
+    pub normals: Vec<DVec3>,
+    /// World units.
+    pub radii: Vec<f32>,
+    /// Where disks end before their rims, by the half-axes that [`axes`] gives; none if no disk does.
+    pub clips: Vec<Clip>,
+}
+
+impl Disks {
+    /// Half-axes s and t, world units.
+    pub fn half_axes(&self) -> Vec<[[f32; 3]; 2]> {
+        let half = |(normal, radius): (&DVec3, &f32)| {
+            axes(*normal).map(|axis| (axis * f64::from(*radius)).as_vec3().to_array())
+        };
+        self.normals.iter().zip(&self.radii).map(half).collect()
+    }
+}
+
+/// The unit half-axes of a disk with a unit normal.
+pub(super) fn axes(normal: DVec3) -> [DVec3; 2] {
+    normal.any_orthonormal_pair().into()
+}
+
+/// The unit normal, the radius and the lines of each sample's disk.
 ///
 /// # The plane
 ///
@@ -40,12 +67,7 @@ const LONGEST: f64 = 1e12;
 /// From farther off, cells that are not flat are covered by the disks around them too, if [`OVERLAP`] makes all a little
 /// larger. Of 3.5 million rays at 57,000 samples of Stanford's bunny from 64 views, 2 find a hole with 1.2, of 3.9 million at
 /// igea one, and none with 1.25; of 4.0 million at the fandisk none with either.
-pub(super) fn disks(
-    surface: &MeshSurface<'_>,
-    samples: &[Place],
-    named: Option<Vec<DVec3>>,
-    progress: &dyn Progress,
-) -> Result<(Vec<DVec3>, Vec<f32>)> {
+pub(super) fn disks(surface: &MeshSurface<'_>, samples: &[Place], progress: &dyn Progress) -> Result<Disks> {
     let points: Vec<[f64; 3]> = samples.par_iter().map(|place| surface.point(*place).to_array()).collect();
     let distinct = DistinctPositions::new(&points, &surface.bounds, DVec3::ZERO)?;
     // Samples that coincide have one cell; the first of them tells its normal.
@@ -53,13 +75,10 @@ pub(super) fn disks(
     for (sample, &position) in distinct.of_point().iter().enumerate().rev() {
         sample_at[position as usize] = sample as u32;
     }
-    let facet = |&sample: &u32| surface.triangles[samples[sample as usize].triangle as usize].normal;
-    let facets: Vec<DVec3> = sample_at.iter().map(facet).collect();
-    let voronoi = Voronoi::new(surface, &distinct, &facets, progress);
-    let normals = match named {
-        Some(named) => sample_at.iter().map(|&sample| named[sample as usize]).collect(),
-        None => nearest_planes(&voronoi, &facets, progress),
-    };
+    let triangles: Vec<u32> = sample_at.iter().map(|&sample| samples[sample as usize].triangle).collect();
+    let ends = Ends::new(surface)?;
+    let voronoi = Voronoi::new(surface, &distinct, &triangles, &ends.patches, progress);
+    let normals = nearest_planes(&voronoi, distinct.len(), progress);
     let reaches = voronoi.measure(progress, |sample, triangle, corners| {
         let normal = normals[sample as usize];
         let cosine = triangle.normal.dot(normal).abs();
@@ -74,30 +93,60 @@ pub(super) fn disks(
     for (position, distance) in reaches {
         reach[position as usize] = reach[position as usize].max(distance);
     }
-    let radius = |&position: &u32| (OVERLAP * reach[position as usize] / distinct.scale()) as f32;
-    let mut radii: Vec<f32> = distinct.of_point().iter().map(radius).collect();
+    let mut radii: Vec<f32> = reach.iter().map(|reach| (OVERLAP * reach / distinct.scale()) as f32).collect();
     // A cell may be less than rounding: there the smallest disk will do.
     let smallest = radii.iter().copied().filter(|radius| *radius > 0.0).fold(f32::INFINITY, f32::min);
     radii.iter_mut().filter(|radius| **radius == 0.0).for_each(|radius| *radius = smallest);
-    Ok((distinct.of_point().iter().map(|&position| normals[position as usize]).collect(), radii))
+    let clips = clips(&ends, &voronoi, &normals, &radii, progress);
+    let of_point = distinct.of_point().iter().map(|&position| position as usize);
+    Ok(Disks {
+        normals: of_point.clone().map(|position| normals[position]).collect(),
+        radii: of_point.clone().map(|position| radii[position]).collect(),
+        clips: if clips.is_empty() { clips } else { of_point.map(|position| clips[position]).collect() },
+    })
+}
+
+/// Where each position's disk ends; none if no disk does.
+fn clips(ends: &Ends, voronoi: &Voronoi<'_>, normals: &[DVec3], radii: &[f32], progress: &dyn Progress) -> Vec<Clip> {
+    if ends.is_empty() {
+        return Vec::new();
+    }
+    let center = |position: usize| voronoi.position(position as u32);
+    let count = normals.len();
+    let near: Vec<bool> =
+        (0..count).into_par_iter().map(|at| ends.are_near(center(at), f64::from(radii[at]))).collect();
+    let parts = voronoi
+        .measure(progress, |sample, _, corners| if near[sample as usize] { corners.to_vec() } else { Vec::new() });
+    let mut cells = vec![Vec::new(); count];
+    for (position, corners) in parts {
+        cells[position as usize].extend(corners.iter().map(|corner| corner / voronoi.scale()));
+    }
+    let clip = |at: usize| {
+        let disk =
+            Covering { center: center(at), axes: axes(normals[at]), radius: f64::from(radii[at]), cell: &cells[at] };
+        if near[at] { ends.clip(&disk) } else { Clip::NONE }
+    };
+    let clips: Vec<Clip> = (0..count).into_par_iter().map(clip).collect();
+    if clips.iter().all(Clip::is_none) { Vec::new() } else { clips }
 }
 
 /// The normals of the planes that are nearest to each cell, on the side that the sample's triangle faces.
-fn nearest_planes(voronoi: &Voronoi<'_>, facets: &[DVec3], progress: &dyn Progress) -> Vec<DVec3> {
+fn nearest_planes(voronoi: &Voronoi<'_>, count: usize, progress: &dyn Progress) -> Vec<DVec3> {
     let parts = voronoi.measure(progress, |sample, triangle, corners| {
         if voronoi.is_of_side(sample, triangle) { second_moments(corners) } else { Symmetric3::ZERO }
     });
-    let mut moments = vec![Symmetric3::ZERO; facets.len()];
+    let mut moments = vec![Symmetric3::ZERO; count];
     for (position, part) in parts {
         moments[position as usize] = moments[position as usize] + part;
     }
-    let normal = |(moments, &facet): (&Symmetric3, &DVec3)| {
+    let normal = |(position, moments): (usize, &Symmetric3)| {
+        let facet = voronoi.facet(position as u32);
         let ([_, width, length], [normal, ..]) = moments.eigen();
         let normal = if normal.dot(facet) < 0.0 { -normal } else { normal };
         // Without a cell, or with a needle of one, the triangle's own plane is as near as any.
         if width * LONGEST > length && normal.dot(facet) > SIDE { normal } else { facet }
     };
-    moments.par_iter().zip(facets).map(normal).collect()
+    moments.par_iter().enumerate().map(normal).collect()
 }
 
 /// The integral of `x x^T` over a convex polygon in space.
@@ -135,7 +184,7 @@ mod tests {
             Place { triangle: k % 4, weights: DVec3::new(1.0 - u - v, u, v) }
         };
         let places: Vec<Place> = (0..55).map(place).collect();
-        let (normals, radii) = disks(&surface, &places, None, &()).unwrap();
+        let Disks { normals, radii, .. } = disks(&surface, &places, &()).unwrap();
         // Sides are flat here: the nearest plane is that of the triangle.
         for (normal, place) in normals.iter().zip(&places) {
             assert!(normal.distance(surface.normal(*place)) < 1e-9, "{normal}");

@@ -6,7 +6,7 @@
 //! 4. `candidates`: each voxel's samples begin evenly spread over the triangles in it.
 //! 5. `relax`: they move apart, also from those of other voxels, and stay on the triangles.
 //! 6. `voronoi`: the part of the surface that is nearest to each sample is cut out of the triangles; and `disks`: a disk covers
-//!    it, in the plane that is nearest to it.
+//!    it, in the plane that is nearest to it; and `ends` at lines, where the surface ends.
 //!
 //! The thesis projects one point a voxel, or several, onto its triangles and does not say which. Where these lie decides
 //! how well a surface is sampled: independent random points leave gaps three times as wide as needed.
@@ -14,6 +14,7 @@
 mod candidates;
 mod disks;
 mod distribute;
+mod ends;
 mod overlap;
 pub mod priority;
 mod relax;
@@ -150,10 +151,20 @@ pub fn sample(
             let fair: Vec<f64> = priorities.iter().map(|priority| count as f64 * (usable(priority) / sum)).collect();
             let (candidates, mut places) = candidates::candidates(&voxels, &quotas, &fair, seed);
             let cells = relax::relax(&surface, &candidates, &mut places, progress)?;
-            let named = mesh.normals.as_ref().map(|_| normals_at(&surface, &places));
-            let (normals, radii) = disks::disks(&surface, &places, named, progress)?;
+            let disks = disks::disks(&surface, &places, progress)?;
             let colors = surface.is_colored().then(|| relax::colors(&surface, &candidates, &places, &cells));
-            points(&surface, &places, normals, Some(radii), colors)
+            let normals = match mesh.normals {
+                Some(_) => normals_at(&surface, &places),
+                None => disks.normals.clone(),
+            };
+            let mut points = points(&surface, &places, normals, None, colors);
+            // A plane of its own, or lines in it, need half-axes.
+            if mesh.normals.is_some() || !disks.clips.is_empty() {
+                points.axes = Some(disks.half_axes());
+            }
+            points.clips = (!disks.clips.is_empty()).then_some(disks.clips);
+            points.radii = Some(disks.radii);
+            points
         }
     };
     Ok((points, sampling))

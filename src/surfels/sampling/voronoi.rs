@@ -6,7 +6,7 @@
 //!
 //! Where a surface has a sharp edge, or is thin, the nearest sample may be one of another side, whose disk is seen edge-on from
 //! where the triangle is seen best: however large, it covers nothing there. So a triangle is shared among the samples of its own
-//! side alone, as long as there are some near enough.
+//! side alone, and of those to which the surface goes on from it without an edge, as long as there are some near enough.
 
 use std::collections::HashSet;
 
@@ -19,9 +19,15 @@ use crate::surfels::graph::NeighbourGraph;
 use crate::surfels::neighbours::{Neighbour, NeighbourSearch};
 use crate::surfels::positions::DistinctPositions;
 
-/// Neighbours that a cell is cut by at first, and among which a sample of a triangle's own side must be. All that matter are
+/// Neighbours that a cell is cut by at first, and among which a sample of a triangle's own side mostly is. All that matter are
 /// among them unless a triangle reaches far past the samples around, or these are spaced unevenly.
 const NEIGHBOURS: usize = 16;
+
+/// The same at the tip of a sharp corner, where samples of all sides crowd: one of its own side is among so many,
+const MANY: usize = 64;
+
+/// and at most so many times as far as the last of those. Others are of another part of the surface.
+const FARTHER: f64 = 1.5;
 
 /// A sample must be nearer by this part of the distance to cut off a corner: rounding decides nothing.
 const NEARER: f64 = 1e-9;
@@ -34,28 +40,47 @@ pub(super) const SIDE: f64 = 0.5736;
 pub(super) struct Voronoi<'a> {
     surface: &'a MeshSurface<'a>,
     distinct: &'a DistinctPositions,
-    /// The unit normal of the triangle that each position lies in.
-    facets: &'a [DVec3],
+    /// The triangle that each position lies in.
+    triangles: &'a [u32],
+    /// Of each triangle, which others the surface goes on to.
+    patches: &'a [u32],
     graph: NeighbourGraph,
     one: NeighbourSearch<'a>,
     several: NeighbourSearch<'a>,
+    many: NeighbourSearch<'a>,
 }
 
 impl<'a> Voronoi<'a> {
     pub fn new(
         surface: &'a MeshSurface<'a>,
         distinct: &'a DistinctPositions,
-        facets: &'a [DVec3],
+        triangles: &'a [u32],
+        patches: &'a [u32],
         progress: &dyn Progress,
     ) -> Self {
         let graph = NeighbourGraph::new(distinct, NEIGHBOURS, progress);
-        let (one, several) = (NeighbourSearch::new(distinct, 1), NeighbourSearch::new(distinct, NEIGHBOURS));
-        Self { surface, distinct, facets, graph, one, several }
+        let [one, several, many] = [1, NEIGHBOURS, MANY].map(|count| NeighbourSearch::new(distinct, count));
+        Self { surface, distinct, triangles, patches, graph, one, several, many }
+    }
+
+    /// Where a sample is, world units relative to the surface's centre.
+    pub fn position(&self, sample: u32) -> DVec3 {
+        self.distinct.position(sample) / self.scale()
+    }
+
+    /// Scaled units for each of the world's.
+    pub fn scale(&self) -> f64 {
+        self.distinct.scale()
     }
 
     /// Whether a triangle is on the side of the surface that a sample is on.
     pub fn is_of_side(&self, sample: u32, triangle: &Facet) -> bool {
-        self.facets[sample as usize].dot(triangle.normal) > SIDE
+        self.facet(sample).dot(triangle.normal) > SIDE
+    }
+
+    /// The unit normal of the triangle that a sample lies in.
+    pub fn facet(&self, sample: u32) -> DVec3 {
+        self.surface.triangles[self.triangles[sample as usize] as usize].normal
     }
 
     /// What `measure` says of each part of a cell, and whose cell that is; in the order of triangles. A part lies in one triangle
@@ -66,17 +91,23 @@ impl<'a> Voronoi<'a> {
         measure: impl Fn(u32, &Facet, &[DVec3]) -> T + Sync,
     ) -> Vec<(u32, T)> {
         progress.begin("measuring cells", self.surface.triangles.len() as u64);
-        let in_triangle = |scratch: &mut Scratch, triangle: &Facet| {
+        let in_triangle = |scratch: &mut Scratch, (index, triangle): (usize, &Facet)| {
             progress.advance(1);
-            let own = self.parts(triangle, |sample| self.is_of_side(sample, triangle), scratch);
-            let parts = own.or_else(|| self.parts(triangle, |_| true, scratch)).unwrap_or_default();
+            let patch = self.patches[index];
+            let on_patch = |sample: u32| self.patches[self.triangles[sample as usize] as usize] == patch;
+            let of_side = |sample: u32| self.is_of_side(sample, triangle);
+            let near = [&self.one, &self.several];
+            let parts = self.parts(triangle, |sample| on_patch(sample) && of_side(sample), &near, scratch);
+            let parts =
+                parts.or_else(|| self.parts(triangle, of_side, &[&self.one, &self.several, &self.many], scratch));
+            let parts = parts.or_else(|| self.parts(triangle, |_| true, &near, scratch)).unwrap_or_default();
             let measured = |(sample, mut corners): (u32, Vec<DVec3>)| {
                 corners.iter_mut().for_each(|corner| *corner -= self.distinct.position(sample));
                 (sample, measure(sample, triangle, &corners))
             };
             parts.into_iter().map(measured).collect::<Vec<_>>()
         };
-        let measured = self.surface.triangles.par_iter().map_init(Scratch::default, in_triangle);
+        let measured = self.surface.triangles.par_iter().enumerate().map_init(Scratch::default, in_triangle);
         let measured = measured.flatten_iter().collect();
         progress.end();
         measured
@@ -88,15 +119,19 @@ impl<'a> Voronoi<'a> {
         &self,
         triangle: &Facet,
         may: impl Fn(u32) -> bool,
+        searches: &[&NeighbourSearch<'_>],
         Scratch { found, seen, open }: &mut Scratch,
     ) -> Option<Vec<(u32, Vec<DVec3>)>> {
         let corners = triangle.corners.map(|corner| corner * self.distinct.scale());
         let mut nearest_to = |at: DVec3| {
-            for search in [&self.one, &self.several] {
+            let mut farthest = f64::INFINITY;
+            for search in searches {
                 search.nearest_to(at, found);
-                let nearest = found.iter().map(|neighbour| neighbour.index).find(|&sample| may(sample));
-                if nearest.is_some() {
-                    return nearest;
+                if let Some(nearest) = found.iter().find(|neighbour| may(neighbour.index)) {
+                    return (nearest.squared_distance <= farthest).then_some(nearest.index);
+                }
+                if let [_, .., last] = found.as_slice() {
+                    farthest = last.squared_distance * FARTHER * FARTHER;
                 }
             }
             None

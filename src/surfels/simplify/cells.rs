@@ -8,6 +8,7 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::borders::{Border, Polygon};
 use super::samples::Samples;
 use crate::Progress;
 use crate::surfels::neighbours::{Neighbour, NeighbourSearch};
@@ -27,15 +28,6 @@ const SPACING_NEIGHBOURS: usize = 16;
 /// Voronoi vertex in ten million lies so far from its points.
 const REACH: f64 = 2.5;
 
-/// The cosine of the elevation over the tangent plane up to which a point is beside another: 60 degrees.
-const STEEPEST: f64 = 0.5;
-
-/// A crease is at least this part of the distance of two points from either: a cell has an area.
-const NARROWEST: f64 = 0.01;
-
-/// Corners of a cell that has no neighbours.
-const OUTLINE: usize = 8;
-
 /// The largest number of [pieces](Cells::pieces) in a cell: the bits of a mask.
 pub(super) const MOST_PIECES: usize = 16;
 
@@ -50,6 +42,8 @@ pub(super) struct Cells {
     /// The edges of each cell beyond which there is no neighbour, as bits like those of [`Cells::pieces`]: the surface ends
     /// there, or has a crease that the graph has no edge across.
     ends: Vec<u16>,
+    /// The edges of each cell that lie on a sharp edge of the surface, or a line at which its surfel ends, as such bits.
+    cut: Vec<u16>,
     /// How far such a cell goes on there from its point; zero for other cells.
     pub overhangs: Vec<f64>,
     first_neighbour: Vec<usize>,
@@ -78,6 +72,7 @@ impl Cells {
             corners: Vec::new(),
             radii: Vec::with_capacity(samples.len()),
             ends: Vec::with_capacity(samples.len()),
+            cut: Vec::with_capacity(samples.len()),
             overhangs: Vec::with_capacity(samples.len()),
             first_neighbour: Vec::new(),
             neighbours: Vec::new(),
@@ -89,6 +84,7 @@ impl Cells {
             cells.corners.extend(&cell.corners);
             cells.radii.push(cell.corners.iter().map(|corner| corner.length()).fold(0.0, f64::max));
             cells.ends.push(cell.ends);
+            cells.cut.push(cell.cut);
             cells.overhangs.push(cell.overhang);
             spacings.push(cell.spacing);
         }
@@ -134,11 +130,30 @@ impl Cells {
         ((1u32 << pieces) - 1) as u16
     }
 
-    /// The unit directions, in the basis of the cell's tangent plane, in which it ends: across the edges that have no neighbour.
-    pub fn ends(&self, index: u32) -> impl Iterator<Item = DVec2> {
-        let (corners, ends) = (self.corners(index), self.ends[index as usize]);
-        let open = (0..corners.len()).filter(move |&k| ends >> piece_of(k, corners.len()) & 1 == 1);
-        open.filter_map(|k| (corners[k] - corners[(k + 1) % corners.len()]).perp().try_normalize())
+    /// The unit directions, in the basis of the cell's tangent plane, in which it ends: across the edges that have no neighbour. And
+    /// whether a splat is cut there.
+    pub fn ends(&self, index: u32) -> impl Iterator<Item = (DVec2, bool)> {
+        let (corners, ends, cut) = (self.corners(index), self.ends[index as usize], self.cut[index as usize]);
+        let bit = |bits: u16, k: usize, count: usize| bits >> piece_of(k, count) & 1 == 1;
+        let open = (0..corners.len()).filter(move |&k| bit(ends, k, corners.len()));
+        open.filter_map(move |k| {
+            let across = (corners[k] - corners[(k + 1) % corners.len()]).perp().try_normalize()?;
+            Some((across, bit(cut, k, corners.len())))
+        })
+    }
+
+    /// The edges of a cell that lie on a sharp edge of the surface, or a line at which its surfel ends, from corner to corner.
+    pub fn cut_edges(&self, index: u32) -> impl Iterator<Item = [DVec2; 2]> {
+        let (corners, cut) = (self.corners(index), self.cut[index as usize]);
+        let edges = (0..corners.len()).map(|k| (k, [corners[k], corners[(k + 1) % corners.len()]]));
+        edges.filter(move |(k, _)| cut >> piece_of(*k, corners.len()) & 1 == 1).map(|(_, edge)| edge)
+    }
+
+    /// The corners of some of its pieces, its point aside.
+    pub fn corners_of(&self, index: u32, pieces: u16) -> impl Iterator<Item = DVec2> {
+        let corners = self.corners(index);
+        let edges = (0..corners.len()).filter(move |k| pieces >> piece_of(*k, corners.len()) & 1 == 1);
+        edges.flat_map(move |k| [corners[k], corners[(k + 1) % corners.len()]])
     }
 
     /// Where the pieces of a cell lie among those of all.
@@ -177,6 +192,7 @@ struct Cell {
     /// And how far they are.
     neighbours: Vec<(u32, f64)>,
     ends: u16,
+    cut: u16,
     overhang: f64,
     spacing: f64,
 }
@@ -195,162 +211,32 @@ fn cell(
         search.nearest(index, found);
         borders.clear();
         borders.extend(found.iter().filter_map(|neighbour| Border::new(samples, index, neighbour, tolerance)));
+        let radius = samples.radii[index as usize];
+        for line in samples.lines[index as usize].iter().map(|line| Border::of_line(samples, index, line)) {
+            borders.retain(|border| !border.is_end_of(&line, radius));
+            borders.push(line);
+        }
         spacing = local_spacing(&borders);
         let polygon = Polygon::cut(REACH * spacing, &borders);
         neighbours = polygon.neighbours();
         if polygon.is_closed() {
             let overhang = polygon.farthest_at_end();
-            return Cell { ends: polygon.ends(), corners: polygon.corners, neighbours, overhang, spacing };
+            let cut = polygon.cut_sharply();
+            return Cell { ends: polygon.ends(), cut, corners: polygon.corners, neighbours, overhang, spacing };
         }
     }
     // Where the surface ends, it goes on as far as the surfel does.
     let overhang = samples.radii[index as usize];
     let polygon = Polygon::cut(overhang, &borders);
-    Cell { ends: polygon.ends(), corners: polygon.corners, neighbours, overhang, spacing }
+    let cut = polygon.cut_sharply();
+    Cell { ends: polygon.ends(), cut, corners: polygon.corners, neighbours, overhang, spacing }
 }
 
 /// The local spacing; zero without neighbours.
 fn local_spacing(borders: &[Border]) -> f64 {
-    let nearest = || borders.iter().filter_map(|border| Some(border.neighbour?.1)).take(SPACING_NEIGHBOURS);
+    let nearest = || borders.iter().filter_map(|border| Some(border.beyond.neighbour()?.1)).take(SPACING_NEIGHBOURS);
     let squares: f64 = nearest().map(|distance| distance * distance).sum();
     let count = nearest().count();
     let ranks = (count * (count + 1) / 2).max(1) as f64;
     (std::f64::consts::PI * squares / ranks).sqrt()
-}
-
-/// The line, in the tangent plane, where a cell borders on that of a neighbour.
-struct Border {
-    /// Unit.
-    toward: DVec2,
-    distance: f64,
-    /// And how far it is. None for one beyond a right angle or a sharper one: the cell ends there, the graph has no edge.
-    neighbour: Option<(u32, f64)>,
-}
-
-impl Border {
-    /// Halfway to the neighbour, at half the distance in space: as if the surface were unrolled into the plane. Across a crease
-    /// it is where the two tangent planes meet, however near to one of the points that is; else the cell of the nearer would
-    /// reach past the crease, and that of the farther fall short of it.
-    ///
-    /// None for a neighbour on another side of the surface, or above or below more than beside, without a crease between:
-    /// it bounds no cell.
-    fn new(samples: &Samples, index: u32, neighbour: &Neighbour, tolerance: f64) -> Option<Self> {
-        let offset = samples.positions.position(neighbour.index) - samples.positions.position(index);
-        let [s, t] = tangent_basis(samples.normals[index as usize]);
-        let in_plane = |v: DVec3| DVec2::new(v.dot(s), v.dot(t));
-        let distance = neighbour.squared_distance.sqrt();
-        let same_side = samples.same_side(index, neighbour.index);
-        let linked = same_side.then_some((neighbour.index, distance));
-        if let Some((toward, distance)) = crease(samples, index, neighbour.index, offset, tolerance) {
-            return Some(Self { toward: in_plane(toward), distance, neighbour: linked });
-        }
-        let flat = in_plane(offset) / distance;
-        let toward = flat.try_normalize().filter(|_| same_side && flat.length() > STEEPEST)?;
-        Some(Self { toward, distance: 0.5 * distance, neighbour: linked })
-    }
-}
-
-/// Where a crease runs between a point and another at `offset`: the unit direction from the point to it in the tangent plane, and
-/// how far that is.
-///
-/// Each of the two then lies below the plane of the other, or each above it, together by more than a surface within the
-/// tolerance bends; they face each other across the line where the planes meet, rather than along it; and each is within reach of
-/// the other's surfel, as no outlier is.
-fn crease(samples: &Samples, index: u32, other: u32, offset: DVec3, tolerance: f64) -> Option<(DVec3, f64)> {
-    let radius = samples.radii[index as usize].min(samples.radii[other as usize]);
-    if offset.length() > 2.0 * REACH * radius {
-        return None;
-    }
-    let normal = samples.normals[index as usize];
-    let agrees = samples.oriented || normal.dot(samples.normals[other as usize]) >= 0.0;
-    let other = samples.normals[other as usize] * if agrees { 1.0 } else { -1.0 };
-    // Of the other point over this one's plane, and of this one over the other's.
-    let (height, back) = (offset.dot(normal), -offset.dot(other));
-    if height * back < 0.0 || height.abs() + back.abs() <= 2.0 * tolerance {
-        return None;
-    }
-    let slope = other - normal * other.dot(normal);
-    let sine = slope.length();
-    let toward = slope.try_normalize()? * if height + back < 0.0 { 1.0 } else { -1.0 };
-    let along = offset.dot(normal.cross(toward));
-    (along.abs() * sine <= height.abs() + back.abs())
-        .then_some((toward, (back.abs() / sine).max(NARROWEST * offset.length())))
-}
-
-/// A convex polygon around the origin that remembers what cut each edge.
-#[derive(Default)]
-struct Polygon {
-    corners: Vec<DVec2>,
-    /// Of the edge from the corner of the same index to the next: the neighbour of the border. None for the outline.
-    cut_by: Vec<Option<Option<(u32, f64)>>>,
-}
-
-impl Polygon {
-    /// The outline, a regular polygon whose edges are `reach` away, cut by borders.
-    fn cut(reach: f64, borders: &[Border]) -> Self {
-        let mut polygon = Self { corners: Vec::with_capacity(12), cut_by: Vec::with_capacity(12) };
-        let edge = std::f64::consts::SQRT_2 - 1.0;
-        for (x, y) in [(1.0, -edge), (1.0, edge), (edge, 1.0), (-edge, 1.0)] {
-            polygon.corners.push(DVec2::new(x, y) * reach);
-        }
-        for k in 0..OUTLINE / 2 {
-            polygon.corners.push(-polygon.corners[k]);
-        }
-        polygon.cut_by = vec![None; OUTLINE];
-        borders.iter().for_each(|border| polygon.clip(border));
-        polygon
-    }
-
-    /// Keeps what is nearer than the border; the origin always is.
-    fn clip(&mut self, border: &Border) {
-        let beyond = |corner: DVec2| corner.dot(border.toward) - border.distance;
-        if self.corners.iter().all(|&corner| beyond(corner) <= 0.0) {
-            return;
-        }
-        let count = self.corners.len();
-        let (mut corners, mut cut_by) = (Vec::with_capacity(count + 1), Vec::with_capacity(count + 1));
-        for k in 0..count {
-            let (from, to) = (self.corners[k], self.corners[(k + 1) % count]);
-            let (a, b) = (beyond(from), beyond(to));
-            let crossing = || from + (to - from) * (a / (a - b));
-            if a <= 0.0 {
-                corners.push(from);
-                cut_by.push(self.cut_by[k]);
-                if b > 0.0 {
-                    corners.push(crossing());
-                    cut_by.push(Some(border.neighbour));
-                }
-            } else if b <= 0.0 {
-                corners.push(crossing());
-                cut_by.push(self.cut_by[k]);
-            }
-        }
-        *self = Self { corners, cut_by };
-    }
-
-    fn is_closed(&self) -> bool {
-        !self.corners.is_empty() && self.cut_by.iter().all(Option::is_some)
-    }
-
-    /// Whether the edge has no neighbour: it is the outline's, or a crease's.
-    fn is_end(&self, edge: usize) -> bool {
-        self.cut_by[edge].flatten().is_none()
-    }
-
-    /// The edges without a neighbour as bits.
-    fn ends(&self) -> u16 {
-        let count = self.corners.len();
-        (0..count).filter(|&k| self.is_end(k)).fold(0, |ends, k| ends | 1 << piece_of(k, count))
-    }
-
-    /// How far the corners are at edges without a neighbour; zero without such edges.
-    fn farthest_at_end(&self) -> f64 {
-        let count = self.corners.len();
-        let ends = (0..count).filter(|&k| self.is_end(k)).flat_map(|k| [k, (k + 1) % count]);
-        ends.map(|k| self.corners[k].length()).fold(0.0, f64::max)
-    }
-
-    fn neighbours(&self) -> Vec<(u32, f64)> {
-        self.cut_by.iter().flatten().flatten().copied().collect()
-    }
 }

@@ -18,6 +18,9 @@ use super::samples::Samples;
 const LARGEST_RATIO: f64 = 4.0;
 const SMALLEST_RATIO: f64 = 1.1;
 
+/// The cosine of the angle between ends up to which one line cuts a splat at both: 10 degrees.
+const ONE_LINE: f64 = 0.985;
+
 /// A disk or ellipse grown around a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Splat {
@@ -216,6 +219,7 @@ impl<'a> Grower<'a> {
         let (mut low, mut high) = (0f64, 0f64);
         // As large as the ends of the surface so far allow.
         let mut end = f64::INFINITY;
+        let mut lines = Vec::with_capacity(2);
         self.seen[point as usize] = self.number;
         self.confront.push(Reverse((Distance(0.0), point)));
         while let Some(Reverse((Distance(distance), next))) = self.confront.pop() {
@@ -233,7 +237,7 @@ impl<'a> Grower<'a> {
                 return distance;
             }
             self.conquered.push(Conquered { point: next, distance, height });
-            end = end.min(self.end_at(next, offset, shape));
+            end = end.min(self.end_at(next, offset, shape, &mut lines));
             for &neighbour in self.cells.neighbours(next) {
                 if self.seen[neighbour as usize] == self.number {
                     continue;
@@ -255,12 +259,26 @@ impl<'a> Grower<'a> {
     }
 
     /// How large a splat of this shape may be that holds the point `next` at `offset`, for the ends of that point's cell: it
-    /// reaches across an end, in the direction in which that lies, by no more than the cell does from its point.
-    fn end_at(&self, next: u32, offset: DVec3, shape: [DVec3; 2]) -> f64 {
+    /// reaches across an end, in the direction in which that lies, by no more than the cell does from its point. But it is cut at ends
+    /// in up to two directions, `lines`, however far it reaches.
+    fn end_at(&self, next: u32, offset: DVec3, shape: [DVec3; 2], lines: &mut Vec<DVec3>) -> f64 {
         let overhang = self.cells.overhangs[next as usize];
         let [s, t] = tangent_basis(self.samples.normals[next as usize]);
-        let ends = self.cells.ends(next).filter_map(|end| along(s * end.x + t * end.y, shape));
-        ends.map(|(toward, extent)| (offset.dot(toward).max(0.0) + overhang) / extent).fold(f64::INFINITY, f64::min)
+        let mut least = f64::INFINITY;
+        for (end, is_cut) in self.cells.ends(next) {
+            let Some((toward, extent)) = along(s * end.x + t * end.y, shape) else { continue };
+            if is_cut && offset.dot(toward) >= 0.0 {
+                if lines.iter().any(|line| line.dot(toward) > ONE_LINE) {
+                    continue;
+                }
+                if lines.len() < 2 {
+                    lines.push(toward);
+                    continue;
+                }
+            }
+            least = least.min((offset.dot(toward).max(0.0) + overhang) / extent);
+        }
+        least
     }
 
     /// How large it may be before `next`, at `offset`, which faces away from it: the surface turns in the direction in which that

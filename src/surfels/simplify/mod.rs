@@ -24,6 +24,7 @@
 //! does holds, seen along its normal, points of the other side. There the cell's own point gets a disk as large as the cell
 //! ([`Report::beyond_tolerance`] counts them), which covers nothing of cells beyond the crease.
 
+mod borders;
 mod candidates;
 mod cells;
 mod growing;

@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::Result;
-use crate::scene::Scene;
+use crate::scene::{Clip, Scene, Surfel};
 use crate::surfels::positions::DistinctPositions;
 
 /// The surfels of a scene, one for each distinct position, in an order that depends on the set of positions alone.
@@ -15,6 +15,8 @@ pub(super) struct Samples {
     pub normals: Vec<DVec3>,
     /// The largest half-axis of the surfels at a position.
     pub radii: Vec<f64>,
+    /// The lines at which the one surfel at a position ends, if it does.
+    pub lines: Vec<Vec<End>>,
     /// Mean linear colour of the surfels at a position, premultiplied by alpha.
     pub colors: Vec<[f64; 4]>,
     /// Whether the side that a normal points to means something.
@@ -46,6 +48,7 @@ impl Samples {
         let mut normals = Vec::with_capacity(count);
         let mut radii = Vec::with_capacity(count);
         let mut colors = Vec::with_capacity(count);
+        let mut lines = Vec::with_capacity(count);
         for group in of_position.chunk_by(|a, b| a.0 == b.0) {
             let (mut normal, mut color, mut radius) = (DVec3::ZERO, [0.0; 4], 0f64);
             for &(_, surfel) in group {
@@ -62,8 +65,14 @@ impl Samples {
             normals.push(if cancelled { first } else { normal.normalize() });
             radii.push(radius * positions.scale());
             colors.push(color);
+            lines.push(match (group, scene.clips.as_slice()) {
+                (&[(_, surfel)], clips @ [_, ..]) => {
+                    ends(&scene.surfels[surfel as usize], &clips[surfel as usize], positions.scale())
+                }
+                _ => Vec::new(),
+            });
         }
-        Ok(Self { positions, normals, radii, colors, oriented: scene.oriented })
+        Ok(Self { positions, normals, radii, lines, colors, oriented: scene.oriented })
     }
 
     pub fn len(&self) -> usize {
@@ -77,8 +86,30 @@ impl Samples {
     }
 }
 
+/// Where the surface ends at a line in a surfel's plane.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct End {
+    /// Unit, in the plane.
+    pub toward: DVec3,
+    /// From the surfel's centre in that direction, scaled units; not negative.
+    pub distance: f64,
+}
+
+/// Those of a surfel's lines that leave something out of it but not its centre.
+fn ends(surfel: &Surfel, clip: &Clip, scale: f64) -> Vec<End> {
+    let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
+    let end = |line: &[f32; 3]| {
+        let [x, y, z] = line.map(f64::from);
+        // Along it the line's value changes by its length for each unit.
+        let gradient = s * (x / s.length_squared()) + t * (y / t.length_squared());
+        let end = End { toward: -gradient.try_normalize()?, distance: z / gradient.length() * scale };
+        (z >= 0.0 && end.distance.is_finite() && z <= x.hypot(y)).then_some(end)
+    };
+    clip.0.iter().filter_map(end).collect()
+}
+
 /// In f64, where the product of half-axes does not underflow.
-fn unit_normal(surfel: &crate::scene::Surfel) -> DVec3 {
+fn unit_normal(surfel: &Surfel) -> DVec3 {
     let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
     s.cross(t).try_normalize().unwrap_or(DVec3::Z)
 }

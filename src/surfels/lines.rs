@@ -1,0 +1,111 @@
+//! The lines at which a disk ends: of all ends of the surface around it, the two that take most of what stands out past them.
+
+use glam::DVec2;
+
+use crate::scene::Clip;
+
+/// Lines of a disk that are looked at.
+const MOST: usize = 32;
+
+/// Of lines whose directions differ by less than this cosine says, 2 degrees, and their offsets by less than this, one is looked at: an
+/// end has a line for each triangle or point along it.
+const SAME: (f64, f64) = (0.9994, 0.02);
+
+/// A line on the unit disk, of which what has `inward . q >= offset` is kept.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Line {
+    /// Unit.
+    pub inward: DVec2,
+    /// Negative where the disk's centre is kept.
+    pub offset: f64,
+}
+
+impl Line {
+    /// Through two points, keeping what is on the left on the way from the one to the other. None if they are one.
+    pub fn through(from: DVec2, to: DVec2) -> Option<Self> {
+        let inward = (to - from).try_normalize()?.perp();
+        Some(Self { inward, offset: inward.dot(from) })
+    }
+
+    /// Moved out until it keeps the disk's centre and all of `points`, and by `margin` more.
+    ///
+    /// A disk must cover its cell: where an end bends around that, the line along one of its sides would cut off what lies past the
+    /// next.
+    pub fn keeping(self, points: impl Iterator<Item = DVec2>, margin: f64) -> Self {
+        let of_points = points.map(|point| point.dot(self.inward)).fold(0.0, f64::min);
+        Self { offset: self.offset.min(of_points) - margin, ..self }
+    }
+}
+
+/// How near the segment between two points comes to the disk's centre: the point of it, as a share of the way.
+pub(super) fn nearest_share(from: DVec2, to: DVec2) -> f64 {
+    let along = to - from;
+    let share = -from.dot(along) / along.length_squared();
+    if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) }
+}
+
+/// Of `lines` the two at most that leave out most of the disk together; none that leaves out nothing.
+pub(super) fn clip(mut lines: Vec<Line>) -> Clip {
+    lines.retain(|line| line.offset > -1.0);
+    lines.sort_by(|a, b| {
+        let ([ax, ay], [bx, by]) = (a.inward.to_array(), b.inward.to_array());
+        b.offset.total_cmp(&a.offset).then(ax.total_cmp(&bx)).then(ay.total_cmp(&by))
+    });
+    let mut apart: Vec<Line> = Vec::with_capacity(MOST);
+    for line in lines {
+        let same = |other: &Line| other.inward.dot(line.inward) > SAME.0 && (other.offset - line.offset).abs() < SAME.1;
+        if apart.len() < MOST && !apart.iter().any(same) {
+            apart.push(line);
+        }
+    }
+    let mut clip = Clip::NONE;
+    for (line, of_disk) in best(&apart).into_iter().zip(&mut clip.0) {
+        *of_disk = Clip::line(line.inward, line.offset, [DVec2::X, DVec2::Y]);
+    }
+    clip
+}
+
+/// Points of the unit disk, evenly by area, by which its parts are compared.
+const POINTS: u32 = 128;
+
+/// The first of the best, one line before two.
+fn best(lines: &[Line]) -> Vec<Line> {
+    let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
+    let point = |k: u32| DVec2::from_angle(golden * f64::from(k)) * ((f64::from(k) + 0.5) / f64::from(POINTS)).sqrt();
+    let left_out = |line: &Line| {
+        (0..POINTS).filter(|k| line.inward.dot(point(*k)) < line.offset).fold(0u128, |bits, k| bits | 1 << k)
+    };
+    let masks: Vec<u128> = lines.iter().map(left_out).collect();
+    let single = (0..lines.len()).map(|a| vec![a]);
+    let pairs = (0..lines.len()).flat_map(|a| (a + 1..lines.len()).map(move |b| vec![a, b]));
+    let count = |which: &Vec<usize>| which.iter().fold(0, |bits, k| bits | masks[*k]).count_ones();
+    let best = single.chain(pairs).rev().max_by_key(count).unwrap_or_default();
+    best.into_iter().map(|k| lines[k]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_keeps_what_must_be_covered() {
+        let end = Line::through(DVec2::new(0.5, -1.0), DVec2::new(0.5, 1.0)).map(|line| (line.inward, line.offset));
+        assert_eq!(end, Some((DVec2::NEG_X, -0.5)));
+        let end = Line { inward: DVec2::NEG_X, offset: -0.5 };
+        assert_eq!(end.keeping([DVec2::new(0.7, 0.2)].into_iter(), 0.1).offset, -0.7 - 0.1);
+        assert_eq!(end.keeping([DVec2::new(-0.7, 0.2)].into_iter(), 0.0), end);
+        assert_eq!(Line::through(DVec2::X, DVec2::X), None);
+        assert_eq!(nearest_share(DVec2::new(1.0, -1.0), DVec2::new(1.0, 3.0)), 0.25);
+    }
+
+    #[test]
+    fn of_all_lines_two_that_leave_out_most_are_taken() {
+        let line = |degrees: f64, offset: f64| Line { inward: DVec2::from_angle(degrees.to_radians()), offset };
+        let [right, above, nearly] = [line(180.0, -0.5), line(270.0, -0.6), line(181.0, -0.52)];
+        let Clip([first, second]) = clip(vec![above, nearly, right, line(0.0, -1.5)]);
+        assert_eq!((first, second[1] < -0.5), ([-1.0, first[1], 0.5], true));
+        assert_eq!(clip(vec![line(0.0, -1.5)]), Clip::NONE);
+        // One that another makes needless is left out.
+        assert_eq!(clip(vec![right, line(180.0, -0.9)]).0[1], Clip::NONE.0[0]);
+    }
+}

@@ -1,0 +1,188 @@
+//! Where a cell borders on others, or the surface ends: lines in its tangent plane, and the polygon that they leave.
+
+use glam::{DVec2, DVec3};
+
+use super::cells::{piece_of, tangent_basis};
+use super::samples::{End, Samples};
+use crate::surfels::creases::{NARROWEST, SHARP, crease};
+use crate::surfels::neighbours::Neighbour;
+
+/// The cosine of the elevation over the tangent plane up to which a point is beside another: 60 degrees.
+const STEEPEST: f64 = 0.5;
+
+/// A crease is the end that a surfel's line says, where the two run in about the same direction (cosine), and the line is at most so
+/// much farther (the crease's own distance, and of the surfel's radius).
+const SAME_END: [f64; 3] = [0.9, 0.2, 0.1];
+
+/// Corners of a cell that has no neighbours.
+const OUTLINE: usize = 8;
+
+/// The line, in the tangent plane, where a cell borders on that of a neighbour.
+pub(super) struct Border {
+    /// Unit.
+    pub toward: DVec2,
+    pub distance: f64,
+    pub beyond: Beyond,
+    /// It is where two tangent planes meet.
+    crease: bool,
+}
+
+/// What is beyond an edge of a cell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Beyond {
+    /// A neighbour, and how far it is.
+    Neighbour(u32, f64),
+    /// A sharp edge of the surface: the cell ends there, the graph has no edge.
+    Crease,
+    /// The line at which the surfel ends.
+    Line,
+    /// Nothing that is known.
+    Outline,
+}
+
+impl Beyond {
+    pub fn neighbour(self) -> Option<(u32, f64)> {
+        match self {
+            Self::Neighbour(index, distance) => Some((index, distance)),
+            Self::Crease | Self::Line | Self::Outline => None,
+        }
+    }
+}
+
+impl Border {
+    /// Halfway to the neighbour, at half the distance in space: as if the surface were unrolled into the plane. Across a crease
+    /// it is where the two tangent planes meet, however near to one of the points that is; else the cell of the nearer would
+    /// reach past the crease, and that of the farther fall short of it.
+    ///
+    /// None for a neighbour on another side of the surface, or above or below more than beside, without a crease between:
+    /// it bounds no cell.
+    pub fn new(samples: &Samples, index: u32, neighbour: &Neighbour, tolerance: f64) -> Option<Self> {
+        let offset = samples.positions.position(neighbour.index) - samples.positions.position(index);
+        let [s, t] = tangent_basis(samples.normals[index as usize]);
+        let in_plane = |v: DVec3| DVec2::new(v.dot(s), v.dot(t));
+        let distance = neighbour.squared_distance.sqrt();
+        let same_side = samples.same_side(index, neighbour.index);
+        let cosine = samples.normals[index as usize].dot(samples.normals[neighbour.index as usize]);
+        let beyond = Beyond::Neighbour(neighbour.index, distance);
+        if let Some((toward, distance)) = crease_between(samples, index, neighbour.index, offset, tolerance) {
+            let beyond = if cosine.abs() < SHARP { Beyond::Crease } else { beyond };
+            return Some(Self { toward: in_plane(toward), distance, beyond, crease: true });
+        }
+        let flat = in_plane(offset) / distance;
+        let toward = flat.try_normalize().filter(|_| same_side && flat.length() > STEEPEST)?;
+        Some(Self { toward, distance: 0.5 * distance, beyond, crease: false })
+    }
+
+    /// Whether it is a crease where the surface ends at `line`, of a surfel of this radius.
+    pub fn is_end_of(&self, line: &Self, radius: f64) -> bool {
+        let [along, share, of_radius] = SAME_END;
+        let near = line.distance <= self.distance * (1.0 + share) + radius * of_radius;
+        self.crease && near && self.toward.dot(line.toward) > along
+    }
+
+    pub fn of_line(samples: &Samples, index: u32, line: &End) -> Self {
+        let [s, t] = tangent_basis(samples.normals[index as usize]);
+        let toward = DVec2::new(line.toward.dot(s), line.toward.dot(t)).normalize_or(DVec2::X);
+        Self {
+            toward,
+            distance: line.distance.max(NARROWEST * samples.radii[index as usize]),
+            beyond: Beyond::Line,
+            crease: false,
+        }
+    }
+}
+
+/// Where a [`crease`] runs between a point and another at `offset`, which bends by more than a surface within the tolerance.
+fn crease_between(samples: &Samples, index: u32, other: u32, offset: DVec3, tolerance: f64) -> Option<(DVec3, f64)> {
+    let radius = samples.radii[index as usize].min(samples.radii[other as usize]);
+    let [normal, other] = [index, other].map(|point| samples.normals[point as usize]);
+    let agrees = samples.oriented || normal.dot(other) >= 0.0;
+    crease([normal, if agrees { other } else { -other }], offset, radius, 2.0 * tolerance)
+}
+
+/// A convex polygon around the origin that remembers what cut each edge.
+#[derive(Default)]
+pub(super) struct Polygon {
+    pub corners: Vec<DVec2>,
+    /// Of the edge from the corner of the same index to the next.
+    cut_by: Vec<Beyond>,
+}
+
+impl Polygon {
+    /// The outline, a regular polygon whose edges are `reach` away, cut by borders.
+    pub fn cut(reach: f64, borders: &[Border]) -> Self {
+        let mut polygon = Self { corners: Vec::with_capacity(12), cut_by: Vec::with_capacity(12) };
+        let edge = std::f64::consts::SQRT_2 - 1.0;
+        for (x, y) in [(1.0, -edge), (1.0, edge), (edge, 1.0), (-edge, 1.0)] {
+            polygon.corners.push(DVec2::new(x, y) * reach);
+        }
+        for k in 0..OUTLINE / 2 {
+            polygon.corners.push(-polygon.corners[k]);
+        }
+        polygon.cut_by = vec![Beyond::Outline; OUTLINE];
+        borders.iter().for_each(|border| polygon.clip(border));
+        polygon
+    }
+
+    /// Keeps what is nearer than the border; the origin always is.
+    fn clip(&mut self, border: &Border) {
+        let beyond = |corner: DVec2| corner.dot(border.toward) - border.distance;
+        if self.corners.iter().all(|&corner| beyond(corner) <= 0.0) {
+            return;
+        }
+        let count = self.corners.len();
+        let (mut corners, mut cut_by) = (Vec::with_capacity(count + 1), Vec::with_capacity(count + 1));
+        for k in 0..count {
+            let (from, to) = (self.corners[k], self.corners[(k + 1) % count]);
+            let (a, b) = (beyond(from), beyond(to));
+            let crossing = || from + (to - from) * (a / (a - b));
+            if a <= 0.0 {
+                corners.push(from);
+                cut_by.push(self.cut_by[k]);
+                if b > 0.0 {
+                    corners.push(crossing());
+                    cut_by.push(border.beyond);
+                }
+            } else if b <= 0.0 {
+                corners.push(crossing());
+                cut_by.push(self.cut_by[k]);
+            }
+        }
+        *self = Self { corners, cut_by };
+    }
+
+    pub fn is_closed(&self) -> bool {
+        !self.corners.is_empty() && !self.cut_by.contains(&Beyond::Outline)
+    }
+
+    /// Whether the edge has no neighbour.
+    fn is_end(&self, edge: usize) -> bool {
+        self.cut_by[edge].neighbour().is_none()
+    }
+
+    /// The edges without a neighbour as bits.
+    pub fn ends(&self) -> u16 {
+        self.edges(|k| self.is_end(k))
+    }
+
+    /// The edges at which the surface ends sharply, as bits.
+    pub fn cut_sharply(&self) -> u16 {
+        self.edges(|k| matches!(self.cut_by[k], Beyond::Line | Beyond::Crease))
+    }
+
+    fn edges(&self, are: impl Fn(usize) -> bool) -> u16 {
+        let count = self.corners.len();
+        (0..count).filter(|&k| are(k)).fold(0, |edges, k| edges | 1 << piece_of(k, count))
+    }
+
+    /// How far the corners are at edges without a neighbour; zero without such edges.
+    pub fn farthest_at_end(&self) -> f64 {
+        let count = self.corners.len();
+        let ends = (0..count).filter(|&k| self.is_end(k)).flat_map(|k| [k, (k + 1) % count]);
+        ends.map(|k| self.corners[k].length()).fold(0.0, f64::max)
+    }
+
+    pub fn neighbours(&self) -> Vec<(u32, f64)> {
+        self.cut_by.iter().filter_map(|beyond| beyond.neighbour()).collect()
+    }
+}

@@ -93,6 +93,7 @@ fn points(scene: &Scene, shape: SplatShape) -> Points {
             colors => Some(colors.clone()),
         },
         up: Some(scene.up),
+        closed: scene.closed,
         ..Points::default()
     }
 }

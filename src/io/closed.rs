@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 /// Whether every edge of the `triangles` is one of two of them, which go along it in opposite directions, and each of their
 /// connected parts encloses a positive volume. Vertices at one position are one.
-pub(super) fn is_closed(positions: &[[f64; 3]], triangles: &[[u32; 3]]) -> bool {
+pub(crate) fn is_closed(positions: &[[f64; 3]], triangles: &[[u32; 3]]) -> bool {
     if triangles.is_empty() {
         return false;
     }

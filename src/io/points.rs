@@ -30,7 +30,8 @@ pub struct Points {
     pub of_mesh: bool,
     /// The triangles that the points are the vertices of.
     pub faces: Option<Faces>,
-    /// They are the vertices of a mesh that is closed and faces outward: nobody sees its back who is not inside.
+    /// They are the vertices of a mesh that is closed and faces outward, or surfels that cover one: nobody sees its back who is not
+    /// inside.
     pub closed: bool,
     /// Points that the file holds and that were left out, as it marks them as withheld, which is deleted.
     pub withheld: u64,

@@ -12,7 +12,8 @@
 //! | `alpha` | as the colour | opacity, straight |
 //! | `texture_u texture_v` | `float` | texture coordinates, origin bottom left |
 //!
-//! The header has a comment `up y` or `up z` where that is known: no other program says it in a PLY file, and none stumbles over it.
+//! The header has a comment `up y` or `up z` where that is known, and `closed` for surfels that cover a closed surface: no other
+//! program says it in a PLY file, and none stumbles over it.
 //!
 //! The names of normals, colours and texture coordinates are those of MeshLab, which ignores the half-axes, as do
 //! CloudCompare and Open3D: to them such a file is a cloud with normals and colours.

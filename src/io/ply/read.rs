@@ -27,7 +27,7 @@ use std::sync::Arc;
 /// radii get them from the triangles around them, as in an OBJ file: normals weighted by area, and radii with which disks
 /// cover the triangles.
 ///
-/// A comment `up y` or `up z` in the header says which way is up.
+/// A comment `up y` or `up z` in the header says which way is up, and `closed` that surfels cover a closed surface.
 ///
 /// Other properties are skipped, and so are other elements: those before the last one that is read by their declared
 /// shape, those after it without being looked at. Zero vertices are no error here.
@@ -127,6 +127,7 @@ fn contents(input: Input, surface: bool, progress: &dyn Progress) -> Result<(Poi
     progress.end();
     let Contents { mut points, faces } = contents.map_err(in_file)?;
     points.up = header.up;
+    points.closed = header.closed;
     let triangles = faces.finish(&points.positions).map_err(in_file)?;
     Ok((points, triangles, header.textures))
 }

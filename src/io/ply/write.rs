@@ -93,6 +93,8 @@ pub struct Properties {
     pub texture: bool,
     /// `comment up y` or `comment up z` says which way is up.
     pub up: Option<Up>,
+    /// `comment closed` says that the surfels cover a closed surface, from outside.
+    pub closed: bool,
 }
 
 impl Properties {
@@ -113,6 +115,7 @@ impl Properties {
             },
             texture: points.texture.is_some(),
             up: points.up,
+            closed: points.closed,
         }
     }
 
@@ -120,6 +123,9 @@ impl Properties {
         write!(out, "ply\nformat binary_little_endian 1.0\ncomment epsplat {}\n", env!("CARGO_PKG_VERSION"))?;
         if let Some(up) = self.up {
             writeln!(out, "comment up {}", up.name())?;
+        }
+        if self.closed {
+            writeln!(out, "comment closed")?;
         }
         writeln!(out, "element vertex {count}")?;
         let mut scalars =

@@ -24,26 +24,45 @@ const LONGEST: f64 = 1e12;
 
 /// The disks of all samples, one after the other.
 pub(super) struct Disks {
-    /// Unit.
-    pub normals: Vec<DVec3>,
+    /// Directions of half-axes, unit and perpendicular; their cross product is the normal.
+    pub axes: Vec<[DVec3; 2]>,
     /// World units.
     pub radii: Vec<f32>,
-    /// Where disks end before their rims, by the half-axes that [`axes`] gives; none if no disk does.
+    /// Where disks end before their rims; none if no disk does.
     pub clips: Vec<Clip>,
 }
 
 impl Disks {
-    /// Half-axes s and t, world units.
+    /// Turns each disk to the side that the normal `named` for it is on. Whether all were.
+    pub fn turn_to(&mut self, named: &[DVec3]) -> bool {
+        let mut all = true;
+        for (index, ([s, t], named)) in self.axes.iter_mut().zip(named).enumerate() {
+            if s.cross(*t).dot(*named) < 0.0 {
+                all = false;
+                std::mem::swap(s, t);
+                if let Some(Clip(lines)) = self.clips.get_mut(index) {
+                    lines.iter_mut().for_each(|[u, v, _]| std::mem::swap(u, v));
+                }
+            }
+        }
+        all
+    }
+
+    /// Unit.
+    pub fn normals(&self) -> Vec<DVec3> {
+        self.axes.iter().map(|[s, t]| s.cross(*t)).collect()
+    }
+
+    /// Half-axes, world units.
     pub fn half_axes(&self) -> Vec<[[f32; 3]; 2]> {
-        let half = |(normal, radius): (&DVec3, &f32)| {
-            axes(*normal).map(|axis| (axis * f64::from(*radius)).as_vec3().to_array())
-        };
-        self.normals.iter().zip(&self.radii).map(half).collect()
+        let half =
+            |(axes, radius): (&[DVec3; 2], &f32)| axes.map(|axis| (axis * f64::from(*radius)).as_vec3().to_array());
+        self.axes.iter().zip(&self.radii).map(half).collect()
     }
 }
 
 /// The unit half-axes of a disk with a unit normal.
-pub(super) fn axes(normal: DVec3) -> [DVec3; 2] {
+fn axes(normal: DVec3) -> [DVec3; 2] {
     normal.any_orthonormal_pair().into()
 }
 
@@ -100,7 +119,7 @@ pub(super) fn disks(surface: &MeshSurface<'_>, samples: &[Place], progress: &dyn
     let clips = clips(&ends, &voronoi, &normals, &radii, progress);
     let of_point = distinct.of_point().iter().map(|&position| position as usize);
     Ok(Disks {
-        normals: of_point.clone().map(|position| normals[position]).collect(),
+        axes: of_point.clone().map(|position| axes(normals[position])).collect(),
         radii: of_point.clone().map(|position| radii[position]).collect(),
         clips: if clips.is_empty() { clips } else { of_point.map(|position| clips[position]).collect() },
     })
@@ -184,7 +203,8 @@ mod tests {
             Place { triangle: k % 4, weights: DVec3::new(1.0 - u - v, u, v) }
         };
         let places: Vec<Place> = (0..55).map(place).collect();
-        let Disks { normals, radii, .. } = disks(&surface, &places, &()).unwrap();
+        let made = disks(&surface, &places, &()).unwrap();
+        let (normals, radii) = (made.normals(), made.radii);
         // Sides are flat here: the nearest plane is that of the triangle.
         for (normal, place) in normals.iter().zip(&places) {
             assert!(normal.distance(surface.normal(*place)) < 1e-9, "{normal}");

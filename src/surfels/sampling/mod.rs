@@ -31,6 +31,7 @@ pub use self::priority::{Priority, PriorityFunction};
 pub use self::surface::MeshSurface;
 use self::surface::Place;
 use crate::error::{Error, Result};
+use crate::io::closed::is_closed;
 use crate::io::{Mesh, Points};
 use crate::progress::Progress;
 use crate::scene::{Colors, Up, body};
@@ -151,15 +152,15 @@ pub fn sample(
             let fair: Vec<f64> = priorities.iter().map(|priority| count as f64 * (usable(priority) / sum)).collect();
             let (candidates, mut places) = candidates::candidates(&voxels, &quotas, &fair, seed);
             let cells = relax::relax(&surface, &candidates, &mut places, progress)?;
-            let disks = disks::disks(&surface, &places, progress)?;
+            let mut disks = disks::disks(&surface, &places, progress)?;
             let colors = surface.is_colored().then(|| relax::colors(&surface, &candidates, &places, &cells));
-            let normals = match mesh.normals {
-                Some(_) => normals_at(&surface, &places),
-                None => disks.normals.clone(),
-            };
+            let named = mesh.normals.as_ref().map(|_| normals_at(&surface, &places));
+            let faces_as_named = named.as_ref().is_none_or(|named| disks.turn_to(named));
+            let normals = named.clone().unwrap_or_else(|| disks.normals());
             let mut points = points(&surface, &places, normals, None, colors);
+            points.closed = faces_as_named && is_closed(&mesh.positions, &mesh.triangles);
             // A plane of its own, or lines in it, need half-axes.
-            if mesh.normals.is_some() || !disks.clips.is_empty() {
+            if named.is_some() || !disks.clips.is_empty() {
                 points.axes = Some(disks.half_axes());
             }
             points.clips = (!disks.clips.is_empty()).then_some(disks.clips);

@@ -143,6 +143,7 @@ pub(super) fn scene(
             clips: if clips.iter().all(Clip::is_none) { Vec::new() } else { clips },
             colors,
             oriented: scene.oriented,
+            closed: scene.closed,
             up: scene.up,
             ..Scene::default()
         },

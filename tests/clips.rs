@@ -176,13 +176,17 @@ fn lines_stay_in_ply() {
         positions: vec![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]],
         axes: Some(axes),
         clips: Some(clips.clone()),
+        closed: true,
         ..Points::default()
     };
     io::ply::write_points(&path, &points, &()).unwrap();
     let again = io::read(&path, &()).unwrap();
+    assert!(again.closed);
     assert_eq!(again.clips.as_ref().unwrap(), &clips);
     assert_eq!(build(vec![again], &()).unwrap().0.clips, clips);
     // Nobody who has none writes any.
-    io::ply::write_points(&path, &Points { clips: Some(vec![Clip::NONE; 2]), ..points }, &()).unwrap();
-    assert_eq!(io::read(&path, &()).unwrap().clips, None);
+    let open = Points { clips: Some(vec![Clip::NONE; 2]), closed: false, ..points };
+    io::ply::write_points(&path, &open, &()).unwrap();
+    let again = io::read(&path, &()).unwrap();
+    assert_eq!((again.clips, again.closed), (None, false));
 }

@@ -126,6 +126,11 @@ fn a_broken_kernel_fails_a_hard_case() {
         ),
         ("color_sums.wgsl", "held.color_low + held.color_span", "held.color_span", "negative colours"),
         ("project.wgsl", "floor(h.high + margin - 0.5)", "floor(h.high + margin - 1.5)", "image edges and corners"),
+        ("clip.wgsl", "line.x * turn.x + line.y * turn.y", "line.x * turn.x - line.y * turn.y", "disks cut by lines"),
+        ("clip.wgsl", "dot(clip.second, p) < 0.0", "dot(clip.second, p) < 0.01", "disks cut by lines"),
+        ("clip.wgsl", "dot(clip.first, p) < 0.0", "dot(clip.first, p) < -0.01", "two halves of a disk"),
+        ("resolve_samples.wgsl", "f32(SAMPLES_ACROSS * SAMPLES_DOWN)", "16.001", "16 samples, thin parts"),
+        ("resolve_samples.wgsl", "color.rgb * color.a", "color.rgb", "16 samples, thin parts"),
         ("camera_orthographic.wgsl", "h.away == 0.0", "abs(h.away) < 1e-3", "edge-on, askew, orthographic"),
     ];
     let mut unnoticed = Vec::new();

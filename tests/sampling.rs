@@ -369,8 +369,9 @@ fn disks_end_at_edges_and_borders() {
         mesh.triangles.truncate(2 * sides as usize);
         mesh
     };
-    for mesh in [bar(4), bar(3), open(4)] {
+    for (mesh, closed) in [(bar(4), true), (bar(3), true), (open(4), false)] {
         let points = by(&mesh, 3000, Priority::Area);
+        assert_eq!(points.closed, closed);
         let tree = TriangleTree::new(&mesh).unwrap();
         let (scene, _) = build(vec![points.clone()], &()).unwrap();
         assert!(scene.clips.iter().filter(|clip| !clip.is_none()).count() > 100);

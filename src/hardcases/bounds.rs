@@ -8,6 +8,8 @@
 //!   attributes times `sum |dw| / sum w`; `sum w da / sum w` for wrong attributes; and the accumulator's own bound times
 //!   the range that it maps to [0, 1] (the scene's colours, 2 for normals, the accepted interval of depths).
 //! - **Colour** is then unpremultiplied and put over nothing: three more divisions and products of itself.
+//! - **Samples**: the colour of a pixel of several is the mean of theirs, and so is its bound.
+//! - **Lines** at which a disk ends: how far inside (u, v) is errs by the line's length times what (u, v) does, and 10 u of it.
 //! - **Normal**: s x t errs by 6 u |s||t|, its normalisation, mapping and normalising the mean by 12 u; the mean's error is
 //!   divided by the mean's length.
 //!
@@ -21,7 +23,7 @@ use crate::passes::footprint::footprint;
 use crate::passes::project::reference_all;
 use crate::passes::splat::Splat;
 use crate::plan::{AccumulatorRow, RenderOptions};
-use crate::scene::{Camera, Kernel, LowPass, Scene};
+use crate::scene::{Camera, Clip, Kernel, LowPass, Scene};
 
 /// What a division may err by, relative: WGSL grants 2.5 units in the last place.
 const DIVISION: f64 = 5.0 * U;
@@ -113,24 +115,9 @@ impl Pixel {
         if self.count == 0 {
             return PixelBound::default();
         }
-        let sums = (accumulator.error_bound)(f64::from(self.count), self.weight, bits) + DIVISION;
+        let sums = self.sums(accumulator, bits);
         let wrong_weights = self.weight_error / self.weight;
-        let mean = self.color.map(|c| c / self.weight);
-        let premultiplied: [f64; 4] = std::array::from_fn(|k| {
-            if range.span[k] == 0.0 {
-                return 0.0;
-            }
-            let spread = self.colors[1][k] - self.colors[0][k];
-            spread * wrong_weights + range.span[k] * (sums + 5.0 * U) + 2.0 * U * range.magnitude[k]
-        });
-        let alpha = mean[3] - premultiplied[3];
-        let color = std::array::from_fn(|k| {
-            if k == 3 {
-                return premultiplied[3] + 2.0 * U * mean[3];
-            }
-            let straight = (mean[k] / mean[3]).abs();
-            (premultiplied[k] + straight * premultiplied[3]) / alpha + straight * (2.0 * DIVISION + 4.0 * U)
-        });
+        let color = straight(self.premultiplied(accumulator, bits, range));
         let mean_normal = self.normal / self.weight;
         let spread = (self.normals[1] - self.normals[0]).length();
         let normal = spread * wrong_weights + self.normal_error / self.weight + 2.0 * sums + 6.0 * U;
@@ -153,6 +140,55 @@ impl Pixel {
     }
 }
 
+impl Pixel {
+    /// What accumulator and division add to a mean, of its range.
+    fn sums(&self, accumulator: &AccumulatorRow, bits: u32) -> f64 {
+        (accumulator.error_bound)(f64::from(self.count), self.weight, bits) + DIVISION
+    }
+
+    /// The premultiplied colour and its error; nothing where there is no fragment.
+    fn premultiplied(&self, accumulator: &AccumulatorRow, bits: u32, range: &ColorRange) -> [[f64; 4]; 2] {
+        if self.count == 0 {
+            return [[0.0; 4]; 2];
+        }
+        let (sums, wrong_weights) = (self.sums(accumulator, bits), self.weight_error / self.weight);
+        let error = |k: usize| {
+            if range.span[k] == 0.0 {
+                return 0.0;
+            }
+            let spread = self.colors[1][k] - self.colors[0][k];
+            spread * wrong_weights + range.span[k] * (sums + 5.0 * U) + 2.0 * U * range.magnitude[k]
+        };
+        [self.color.map(|c| c / self.weight), [0, 1, 2, 3].map(error)]
+    }
+}
+
+/// The bound on straight colour and alpha of a premultiplied mean and its error.
+fn straight([mean, error]: [[f64; 4]; 2]) -> [f64; 4] {
+    let alpha = mean[3] - error[3];
+    std::array::from_fn(|k| {
+        if k == 3 {
+            return error[3] + 2.0 * U * mean[3];
+        }
+        let straight = (mean[k] / mean[3]).abs();
+        (error[k] + straight * error[3]) / alpha + straight * (2.0 * DIVISION + 4.0 * U)
+    })
+}
+
+/// The bound on straight colour and alpha of a pixel of several samples: the mean of theirs. Each is unpremultiplied and premultiplied
+/// again before it is added, by two divisions and products of itself, and the sum of n errs by n roundings of itself.
+pub fn color_of_samples(samples: &[&Pixel], accumulator: &AccumulatorRow, bits: u32, range: &ColorRange) -> [f64; 4] {
+    let count = samples.len() as f64;
+    let (mut mean, mut error) = ([0.0; 4], [0.0; 4]);
+    for [of_sample, wrong] in samples.iter().map(|sample| sample.premultiplied(accumulator, bits, range)) {
+        for k in 0..4 {
+            mean[k] += of_sample[k] / count;
+            error[k] += (wrong[k] + of_sample[k].abs() * (2.0 * DIVISION + (4.0 + count) * U)) / count;
+        }
+    }
+    if mean[3] > 0.0 { straight([mean, error]) } else { [0.0; 4] }
+}
+
 /// A fragment of the twin and how far the device may be from it.
 struct Fragment {
     depth: f64,
@@ -160,16 +196,27 @@ struct Fragment {
     depth_error: f64,
     rho: f64,
     rho_error: f64,
+    /// How far inside the lines at which the disk ends.
+    inside: f64,
+    inside_error: f64,
 }
 
 impl Fragment {
+    fn hits(&self, camera: &Camera) -> bool {
+        self.rho <= 1.0 && self.inside >= 0.0 && self.depth >= camera.near
+    }
+
     fn surely_hits(&self, camera: &Camera) -> bool {
-        self.rho + self.rho_error <= 1.0 && self.depth - self.depth_error >= camera.near * (1.0 + U)
+        self.rho + self.rho_error <= 1.0
+            && self.inside - self.inside_error >= 0.0
+            && self.depth - self.depth_error >= camera.near * (1.0 + U)
     }
 
     fn may_hit(&self, camera: &Camera) -> bool {
         // An error that is not a number knows nothing.
-        !(self.rho - self.rho_error > 1.0 || self.depth + self.depth_error < camera.near * (1.0 - U))
+        !(self.rho - self.rho_error > 1.0
+            || self.inside + self.inside_error < 0.0
+            || self.depth + self.depth_error < camera.near * (1.0 - U))
     }
 }
 
@@ -190,16 +237,30 @@ fn fragments(
                 let Some(at) = footprint(splat, camera, LowPass::None, x, y).map(|(at, _)| at) else { continue };
                 let bound = precision.fragment(splat, x, y, &at);
                 let known = |error: f64| if error.is_nan() { f64::INFINITY } else { error };
+                let rho = at.rho2.sqrt();
                 let fragment = Fragment {
                     depth: at.depth,
                     depth_error: known(bound.depth * at.depth.abs()),
-                    rho: at.rho2.sqrt(),
+                    rho,
                     rho_error: known(bound.rho),
+                    inside: at.inside,
+                    inside_error: known(line_error(&splat.clip, rho, bound.rho)),
                 };
                 visit(y as usize * camera.width as usize + x as usize, splat, &surface, &fragment);
             }
         }
     }
+}
+
+/// How far the device may be off in how far inside the lines of `clip` a point is, which is `rho` from the centre and known to
+/// `rho_error`. A line grows along (u, v) by its length; it is turned with the disk by 6 u of itself, and 4 u of each of its products
+/// are lost.
+fn line_error(clip: &Clip, rho: f64, rho_error: f64) -> f64 {
+    let of_line = |[x, y, z]: [f32; 3]| {
+        let (length, z) = (f64::from(x).hypot(y.into()), f64::from(z).abs());
+        length * rho_error + U * (10.0 * length * rho + 4.0 * z)
+    };
+    if clip.is_none() { 0.0 } else { of_line(clip.0[0]).max(of_line(clip.0[1])) }
 }
 
 /// A surfel's attributes.
@@ -268,7 +329,7 @@ pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Pi
         if f.surely_hits(camera) {
             high[pixel] = high[pixel].min(f.depth + f.depth_error);
         }
-        if f.rho <= 1.0 && f.depth >= camera.near {
+        if f.hits(camera) {
             front[pixel] = front[pixel].min(f.depth);
         }
     });
@@ -285,7 +346,7 @@ pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Pi
         let rounding = 4.0 * U * f.depth.abs();
         let may = f.may_hit(camera) && f.depth - f.depth_error - rounding <= back(high[pixel]);
         let must = f.surely_hits(camera) && f.depth + f.depth_error + rounding <= back(low[pixel].beside(splat.surfel));
-        let hits = f.rho <= 1.0 && f.depth >= camera.near && f.depth <= back(front[pixel]);
+        let hits = f.hits(camera) && f.depth <= back(front[pixel]);
         let known = &mut pixels[pixel];
         known.open |= may != must;
         if !hits {

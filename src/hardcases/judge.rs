@@ -2,13 +2,13 @@
 
 use serde::Serialize;
 
-use super::bounds::{ColorRange, PixelBound};
+use super::bounds::{ColorRange, Pixel, PixelBound, color_of_samples};
 use super::{HardCase, Truth};
 use crate::frame::Frame;
 use crate::metrics::DECISION_MARGIN;
 use crate::plan::{Accumulator, AccumulatorRow};
 use crate::render::Report;
-use crate::scene::Map;
+use crate::scene::{Map, Samples};
 
 /// How a row ends.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -183,20 +183,28 @@ pub fn judge(case: &HardCase, truth: &Truth, accumulator: &AccumulatorRow, frame
         nan += here.all().iter().filter(|value| value.is_nan()).count();
         covered += usize::from(there.weight > 0.0);
         let decision = truth.frame.map(Map::Decision).and_then(|map| map.get(index)).copied().unwrap_or(0.0);
-        if known.open || decision < DECISION_MARGIN {
+        let samples = samples_of(case, truth, index);
+        if known.open || samples.iter().any(|sample| sample.open) || decision < DECISION_MARGIN {
             excused += 1;
             continue;
         }
-        match (there.weight > 0.0, here.weight > 0.0) {
+        // Samples may be covered where the pixel's centre, of which the maps are, is not.
+        let edge = !samples.is_empty() && there.weight == 0.0 && here.weight == 0.0;
+        let shown = |values: &Values| if edge { values.color[3] > 0.0 } else { values.weight > 0.0 };
+        match (shown(&there), shown(&here)) {
             (true, false) => lost += 1,
             (false, true) => invented += 1,
             (false, false) => {}
-            (true, true) => gather(
-                &mut maps,
-                (&here, &there),
-                &known.bound(exact, bits, &range),
-                &known.bound(accumulator, bits, &range),
-            ),
+            (true, true) => {
+                let bound = |row: &AccumulatorRow| {
+                    let of_center = known.bound(row, bits, &range);
+                    match samples.as_slice() {
+                        [] => of_center,
+                        all => PixelBound { color: color_of_samples(all, row, bits, &range), ..of_center },
+                    }
+                };
+                gather(&mut maps, (&here, &there), &bound(exact), &bound(accumulator));
+            }
         }
     }
     let pixels = truth.pixels.len().max(1) as f64;
@@ -222,11 +230,23 @@ pub fn judge(case: &HardCase, truth: &Truth, accumulator: &AccumulatorRow, frame
     row
 }
 
+/// The samples of a pixel; none where its centre is the only one.
+fn samples_of<'a>(case: &HardCase, truth: &'a Truth, pixel: usize) -> Vec<&'a Pixel> {
+    let Samples { across, down } = case.options.samples;
+    let (across, down, width) = (across as usize, down as usize, case.camera.width as usize);
+    let first = pixel / width * down * width * across + pixel % width * across;
+    let places = (0..down).flat_map(|row| (0..across).map(move |column| first + row * width * across + column));
+    places.filter_map(|place| truth.samples.get(place)).collect()
+}
+
 fn gather(maps: &mut [Gathered; 6], (here, there): (&Values, &Values), bound: &PixelBound, own: &PixelBound) {
     let [color, alpha, depth, normal, weight, count] = maps;
     let channels = here.color.iter().zip(&there.color).zip(bound.color.iter().zip(&own.color));
     for (k, ((here, there), (bound, own))) in channels.enumerate() {
         (if k == 3 { &mut *alpha } else { &mut *color }).add(*here, *there, *bound, *own);
+    }
+    if here.weight == 0.0 && there.weight == 0.0 {
+        return;
     }
     for (here, there) in here.normal.iter().zip(&there.normal) {
         normal.add(*here, *there, bound.normal, own.normal);
@@ -360,10 +380,9 @@ mod tests {
         assert!(matches!(verdict(&|f| f.color[decided][0] += 1e-2, one_word), Verdict::Fail(_)));
         let bits = one_word.fraction_bits(case.scene.surfels.len() as u64);
         let range = ColorRange::of(&case.scene);
-        let bounds = |pixel: &crate::hardcases::bounds::Pixel| {
-            (pixel.bound(exact, bits, &range).color[0], pixel.bound(one_word, bits, &range).color[0])
-        };
-        let worse = |pixel: &crate::hardcases::bounds::Pixel| {
+        let bounds =
+            |pixel: &Pixel| (pixel.bound(exact, bits, &range).color[0], pixel.bound(one_word, bits, &range).color[0]);
+        let worse = |pixel: &Pixel| {
             let (case, own) = bounds(pixel);
             !pixel.open && own > 3.0 * case
         };

@@ -16,6 +16,7 @@
 
 pub mod bounds;
 mod cases;
+mod ends;
 mod extremes;
 mod judge;
 pub mod precision;
@@ -30,7 +31,7 @@ use crate::frame::Frame;
 use crate::plan::{ACCUMULATORS, Accumulator, AccumulatorRow, RenderOptions, check};
 use crate::progress::Progress;
 use crate::render::{Backend, render};
-use crate::scene::{Camera, Map, Maps, Scene};
+use crate::scene::{Camera, Map, Maps, Samples, Scene};
 
 /// An accumulator that is expected to exceed a case's bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -72,6 +73,7 @@ pub struct HardCase {
 /// None that a caller could cause: the cameras are built by functions that can fail.
 pub fn cases() -> Result<Vec<HardCase>> {
     let mut all = cases::cases()?;
+    all.extend(ends::cases()?);
     all.extend(extremes::cases()?);
     Ok(all)
 }
@@ -80,8 +82,10 @@ pub fn cases() -> Result<Vec<HardCase>> {
 pub struct Truth {
     /// The f64 reference, with its map of decisions.
     pub frame: Frame,
-    /// What is known of each pixel.
+    /// What is known at each pixel's centre.
     pub pixels: Vec<bounds::Pixel>,
+    /// What is known of each sample, where a pixel has several: rows of the finer grid.
+    pub samples: Vec<bounds::Pixel>,
 }
 
 impl HardCase {
@@ -92,7 +96,12 @@ impl HardCase {
     pub fn truth(&self) -> Result<Truth> {
         let options = RenderOptions { maps: Maps::ON_DEVICE.and(&[Map::Decision]), ..self.options.clone() };
         let (frame, _) = render(&self.scene, &self.camera, &options, &Backend::Reference, &())?;
-        Ok(Truth { frame, pixels: bounds::pixels(&self.scene, &self.camera, &self.options) })
+        let known = |camera: &Camera| bounds::pixels(&self.scene, camera, &self.options);
+        let samples = match self.options.samples {
+            Samples::ONE => Vec::new(),
+            samples => known(&self.camera.sampled(samples)?),
+        };
+        Ok(Truth { frame, pixels: known(&self.camera), samples })
     }
 
     /// Renders with `accumulator` on `backend` and judges the image.

@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use super::{Expected, HardCase};
 use crate::error::Result;
 use crate::plan::{Accumulator, Optimisation, RenderOptions};
-use crate::scene::{Camera, Colors, Epsilon, Kernel, Lens, Projection, Scene, Shading, Surfel, Up};
+use crate::scene::{Camera, Clip, Colors, Epsilon, Kernel, Lens, Projection, Scene, Shading, Surfel, Up};
 
 /// Part of `x` beyond a whole number, for the k-th of a sequence that fills [0, 1) evenly along each of six axes.
 pub fn fraction(k: usize, axis: usize) -> f64 {
@@ -143,6 +143,8 @@ pub struct Filling {
     pub surfels: Vec<Surfel>,
     /// Linear colours; without any, varied ones in [0, 1].
     pub colors: Option<Vec<[f32; 4]>>,
+    /// The lines at which the surfels end; none or one for each.
+    pub clips: Vec<Clip>,
     /// The options.
     pub options: RenderOptions,
     /// Least and largest share of pixels covered.
@@ -169,7 +171,16 @@ pub fn options() -> RenderOptions {
 impl Filling {
     /// Of `surfels` that cover a share of the image between these.
     pub fn of(surfels: Vec<Surfel>, covered: (f64, f64)) -> Self {
-        Self { surfels, colors: None, options: options(), covered, excused: 0.01, expected: Vec::new(), smallest: None }
+        Self {
+            surfels,
+            colors: None,
+            clips: Vec::new(),
+            options: options(),
+            covered,
+            excused: 0.01,
+            expected: Vec::new(),
+            smallest: None,
+        }
     }
 
     /// Some pixel is reached by disks' rims alone, where sums of one word keep too few bits.
@@ -238,6 +249,7 @@ pub fn build(entries: &[Entry]) -> Result<Vec<HardCase>> {
                     origin: stage.origin,
                     surfels: filling.surfels,
                     low: vec![],
+                    clips: filling.clips,
                     colors: Colors::Linear(colors),
                     oriented: true,
                     up: Up::Z,

@@ -1,6 +1,6 @@
 //! Whether the surfels of a scene close its surface.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::estimate::median;
@@ -8,7 +8,7 @@ use super::gaps::Cell;
 use super::graph::NeighbourGraph;
 use super::neighbours::Neighbour;
 use super::positions::DistinctPositions;
-use crate::scene::{Scene, Surfel};
+use crate::scene::{Clip, Scene, Surfel};
 use crate::{Progress, Result};
 
 /// Neighbours that gaps are looked for between. Of a random sampling, 16 know too few of the wide ones.
@@ -25,7 +25,7 @@ pub struct Coverage {
     /// Share of surfels around which no gap is open.
     pub covered: f64,
     /// Surfels around which a gap is open: on the way to a corner of a centre's Voronoi cell, in the surfel's plane, is a place that
-    /// neither its own disk nor one of its 32 nearest neighbours' reaches. At a ragged boundary such a place may lie outside.
+    /// neither its own disk nor one of its 32 nearest neighbours' reaches. Past a line at which the disk ends nothing is to be reached. At a ragged boundary such a place may lie outside.
     pub open: u64,
 }
 
@@ -42,8 +42,8 @@ pub fn coverage(scene: &Scene, progress: &dyn Progress) -> Result<Option<Coverag
     if distinct.len() < 2 {
         return Ok(None);
     }
-    let largest = largest_at(&distinct, &scene.surfels);
-    let at = |position: u32| &scene.surfels[largest[position as usize] as usize];
+    let of_position = disks_of(&distinct, scene);
+    let at = |position: u32| of_position.of(position);
     progress.begin("looking for gaps", distinct.len() as u64);
     let mut found = vec![(0.0, false); distinct.len()];
     NeighbourGraph::visit(
@@ -68,41 +68,76 @@ fn has_open_gap<'a>(
     distinct: &DistinctPositions,
     position: u32,
     near: &[Neighbour],
-    at: impl Fn(u32) -> &'a Surfel,
+    at: impl Fn(u32) -> &'a [(&'a Surfel, Clip)],
 ) -> bool {
-    let own = at(position);
+    let here = at(position);
+    let Some(&own) = here.first() else { return false };
     let offsets: Vec<DVec3> =
         near.iter().map(|other| distinct.position(other.index) - distinct.position(position)).collect();
     // Within half the distance of the farthest neighbour all that bounds the cell is known.
     let known = 0.5 * offsets.last().map_or(0.0, |farthest| farthest.length());
     let closed = |place: DVec3| {
-        let reached = |surfel: &Surfel, from: DVec3| reaches(surfel, (place - from) / distinct.scale());
-        reached(own, DVec3::ZERO) || near.iter().zip(&offsets).any(|(other, from)| reached(at(other.index), *from))
+        let reached = |disks: &[(&Surfel, Clip)], from: DVec3| {
+            disks.iter().any(|disk| reaches(*disk, (place - from) / distinct.scale()))
+        };
+        is_past(own, place / distinct.scale())
+            || reached(here, DVec3::ZERO)
+            || near.iter().zip(&offsets).any(|(other, from)| reached(at(other.index), *from))
     };
-    let normal = own.normal().as_dvec3().normalize_or(DVec3::Z);
-    let rim = (1.0 + 10.0 * ROUNDING) * f64::from(own.radius()) * distinct.scale();
+    let normal = own.0.normal().as_dvec3().normalize_or(DVec3::Z);
+    let rim = (1.0 + 10.0 * ROUNDING) * f64::from(own.0.radius()) * distinct.scale();
     let corners = Cell::new(&offsets, normal, (2.0 * known, 0.0));
     let mut corners = corners.closed_corners().filter(|corner| corner.length() <= known);
     corners.any(|corner| !closed(corner) || !closed(corner.clamp_length_max(rim)))
 }
 
-/// The largest of the surfels at each position.
-fn largest_at(distinct: &DistinctPositions, surfels: &[Surfel]) -> Vec<u32> {
-    let mut largest = vec![u32::MAX; distinct.len()];
-    for (index, &position) in distinct.of_point().iter().enumerate() {
-        let known = &mut largest[position as usize];
-        if surfels.get(*known as usize).is_none_or(|known| known.radius() < surfels[index].radius()) {
-            *known = index as u32;
-        }
+/// The disks at each position, the largest first.
+struct Disks<'a> {
+    all: Vec<(&'a Surfel, Clip)>,
+    /// Where those of each position begin in `all`; one more at the end.
+    starts: Vec<usize>,
+}
+
+impl Disks<'_> {
+    fn of(&self, position: u32) -> &[(&Surfel, Clip)] {
+        &self.all[self.starts[position as usize]..self.starts[position as usize + 1]]
     }
-    largest
+}
+
+fn disks_of<'a>(distinct: &DistinctPositions, scene: &'a Scene) -> Disks<'a> {
+    let mut order: Vec<(u32, u32)> = distinct.of_point().iter().copied().zip(0..).collect();
+    let smallness = |surfel: u32| -scene.surfels[surfel as usize].radius();
+    order
+        .par_sort_unstable_by(|a, b| a.0.cmp(&b.0).then(smallness(a.1).total_cmp(&smallness(b.1))).then(a.1.cmp(&b.1)));
+    let mut starts = vec![0; distinct.len() + 1];
+    order.iter().for_each(|(position, _)| starts[*position as usize + 1] += 1);
+    (0..distinct.len()).for_each(|position| starts[position + 1] += starts[position]);
+    let disk = |&(_, surfel): &(u32, u32)| {
+        (&scene.surfels[surfel as usize], scene.clips.get(surfel as usize).copied().unwrap_or_default())
+    };
+    Disks { all: order.iter().map(disk).collect(), starts }
 }
 
 /// Whether the disk reaches the point at `offset` from its centre, as far as that is in its plane.
-fn reaches(surfel: &Surfel, offset: DVec3) -> bool {
-    let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
+fn reaches((surfel, clip): (&Surfel, Clip), offset: DVec3) -> bool {
+    let [s, t] = half_axes(surfel);
     let within = offset.length_squared() <= s.length_squared().max(t.length_squared()) * (1.0 + ROUNDING);
-    within && (offset.dot(s) / s.length_squared()).hypot(offset.dot(t) / t.length_squared()) <= 1.0 + ROUNDING
+    let at = on_disk([s, t], offset);
+    within && at.length() <= 1.0 + ROUNDING && clip.inside(at.x, at.y) >= -ROUNDING
+}
+
+/// Whether the surface ends on the way from the disk's centre to the point at `offset`, as its lines say.
+fn is_past((surfel, clip): (&Surfel, Clip), offset: DVec3) -> bool {
+    let at = on_disk(half_axes(surfel), offset);
+    clip.inside(at.x, at.y) < 0.0
+}
+
+fn half_axes(surfel: &Surfel) -> [DVec3; 2] {
+    [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)))
+}
+
+fn on_disk([s, t]: [DVec3; 2], offset: DVec3) -> DVec2 {
+    DVec2::new(offset.dot(s) / s.length_squared(), offset.dot(t) / t.length_squared())
 }
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ pub(super) const NARROWEST: f64 = 0.01;
 const REACH: f64 = 5.0;
 
 /// The cosine of the angle up to which another point is of one piece of surface with a point: 30 degrees.
-const SMOOTH: f64 = 0.866_025_403_784_438_6;
+pub(super) const SMOOTH: f64 = 0.866_025_403_784_438_6;
 
 /// A surfel is cut where it stands out past an edge by more than so many times what the points of its side stand off its plane.
 const ROUGH: f64 = 4.0;

@@ -36,6 +36,8 @@ pub(super) enum Beyond {
     Crease,
     /// The line at which the surfel ends.
     Line,
+    /// Such a line, but with a neighbour past it, and how far that is: splats grow over a bend that the tolerance allows.
+    Bend(u32, f64),
     /// Nothing that is known.
     Outline,
 }
@@ -43,7 +45,7 @@ pub(super) enum Beyond {
 impl Beyond {
     pub fn neighbour(self) -> Option<(u32, f64)> {
         match self {
-            Self::Neighbour(index, distance) => Some((index, distance)),
+            Self::Neighbour(index, distance) | Self::Bend(index, distance) => Some((index, distance)),
             Self::Crease | Self::Line | Self::Outline => None,
         }
     }
@@ -73,11 +75,18 @@ impl Border {
         Some(Self { toward, distance: 0.5 * distance, beyond, crease: false })
     }
 
-    /// Whether it is a crease where the surface ends at `line`, of a surfel of this radius.
-    pub fn is_end_of(&self, line: &Self, radius: f64) -> bool {
+    /// Whether this line of a surfel of this radius is the end that `border`, a crease, was found for. If so the line has its neighbour,
+    /// where that `is_smooth` with the point.
+    pub fn stands_for(&mut self, border: &Self, radius: f64, is_smooth: impl Fn(u32) -> bool) -> bool {
         let [along, share, of_radius] = SAME_END;
-        let near = line.distance <= self.distance * (1.0 + share) + radius * of_radius;
-        self.crease && near && self.toward.dot(line.toward) > along
+        let near = self.distance <= border.distance * (1.0 + share) + radius * of_radius;
+        let same = border.crease && near && border.toward.dot(self.toward) > along;
+        if let (true, Beyond::Line, Beyond::Neighbour(other, distance)) = (same, self.beyond, border.beyond) {
+            if is_smooth(other) {
+                self.beyond = Beyond::Bend(other, distance);
+            }
+        }
+        same
     }
 
     pub fn of_line(samples: &Samples, index: u32, line: &End) -> Self {
@@ -167,7 +176,7 @@ impl Polygon {
 
     /// The edges at which the surface ends sharply, as bits.
     pub fn cut_sharply(&self) -> u16 {
-        self.edges(|k| matches!(self.cut_by[k], Beyond::Line | Beyond::Crease))
+        self.edges(|k| matches!(self.cut_by[k], Beyond::Line | Beyond::Crease | Beyond::Bend(..)))
     }
 
     fn edges(&self, are: impl Fn(usize) -> bool) -> u16 {

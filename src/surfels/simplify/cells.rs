@@ -212,8 +212,9 @@ fn cell(
         borders.clear();
         borders.extend(found.iter().filter_map(|neighbour| Border::new(samples, index, neighbour, tolerance)));
         let radius = samples.radii[index as usize];
-        for line in samples.lines[index as usize].iter().map(|line| Border::of_line(samples, index, line)) {
-            borders.retain(|border| !border.is_end_of(&line, radius));
+        for line in &samples.lines[index as usize] {
+            let mut line = Border::of_line(samples, index, line);
+            borders.retain(|border| !line.stands_for(border, radius, |other| samples.are_smooth(index, other)));
             borders.push(line);
         }
         spacing = local_spacing(&borders);

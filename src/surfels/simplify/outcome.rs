@@ -152,7 +152,7 @@ pub(super) fn scene(
 }
 
 /// Heights of other disks by which those that end at one line may lie apart there, in deviations, and a part of the shorter half-axis.
-const MARGIN: [f64; 2] = [2.0, 0.1];
+const MARGIN: [f64; 2] = [2.0, 0.2];
 
 /// A splat is cut where it stands out past an end by more than so many deviations: less may be the roughness of the surface, whose holes
 /// disks close by their overlap.

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use crate::Result;
 use crate::scene::{Clip, Scene, Surfel};
+use crate::surfels::creases::SMOOTH;
 use crate::surfels::positions::DistinctPositions;
 
 /// The surfels of a scene, one for each distinct position, in an order that depends on the set of positions alone.
@@ -77,6 +78,11 @@ impl Samples {
 
     pub fn len(&self) -> usize {
         self.normals.len()
+    }
+
+    /// Whether the tangent planes of two points differ by less than an edge of the surface does: 30 degrees.
+    pub fn are_smooth(&self, a: u32, b: u32) -> bool {
+        self.normals[a as usize].dot(self.normals[b as usize]).abs() > SMOOTH
     }
 
     /// Whether two points may lie on one side of one surface. Points of opposite sides of a thin body, or of faces that

@@ -146,13 +146,16 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
     Ok(Surfels { points, preparation, parts, collinear: sizes.collinear })
 }
 
+/// Half-axes s and t of each point.
+type HalfAxes = Vec<[[f32; 3]; 2]>;
+
 /// The half-axes of points and the lines at which their surfels end at edges: as they are, of disks or `axes`, without an edge.
 fn cut(
     distinct: &DistinctPositions,
     graph: &NeighbourGraph,
     (normals, radii): (&[[f32; 3]], &[f32]),
-    axes: Option<Vec<[[f32; 3]; 2]>>,
-) -> (Option<Vec<[[f32; 3]; 2]>>, Option<Vec<Clip>>) {
+    axes: Option<HalfAxes>,
+) -> (Option<HalfAxes>, Option<Vec<Clip>>) {
     // Points at one position may have several normals: the first tells.
     let mut first = vec![0; distinct.len()];
     distinct.of_point().iter().enumerate().rev().for_each(|(point, position)| first[*position as usize] = point);

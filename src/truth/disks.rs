@@ -316,8 +316,8 @@ mod tests {
         let mut next = noise(5);
         let line = |angle: f64, z: f64| [angle.cos() as f32, angle.sin() as f32, z as f32];
         let mut clip = |k: u32| {
-            let (angle, z) = (4.0 * next(), if k % 7 == 0 { -0.3 } else { 0.3 * next().abs() });
-            if k % 3 == 0 { Clip::NONE } else { Clip([line(angle, z), line(angle + 1.3, 0.2)]) }
+            let (angle, z) = (4.0 * next(), if k.is_multiple_of(7) { -0.3 } else { 0.3 * next().abs() });
+            if k.is_multiple_of(3) { Clip::NONE } else { Clip([line(angle, z), line(angle + 1.3, 0.2)]) }
         };
         (0..340).map(&mut clip).collect()
     }

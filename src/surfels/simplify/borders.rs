@@ -81,10 +81,10 @@ impl Border {
         let [along, share, of_radius] = SAME_END;
         let near = self.distance <= border.distance * (1.0 + share) + radius * of_radius;
         let same = border.crease && near && border.toward.dot(self.toward) > along;
-        if let (true, Beyond::Line, Beyond::Neighbour(other, distance)) = (same, self.beyond, border.beyond) {
-            if is_smooth(other) {
-                self.beyond = Beyond::Bend(other, distance);
-            }
+        if let (true, Beyond::Line, Beyond::Neighbour(other, distance)) = (same, self.beyond, border.beyond)
+            && is_smooth(other)
+        {
+            self.beyond = Beyond::Bend(other, distance);
         }
         same
     }

@@ -11,7 +11,7 @@ use common::Random;
 use common::meshes::bar;
 use common::scenes::generated;
 use epsplat::Error;
-use epsplat::io::Points;
+use epsplat::io::{Mesh, Points};
 use epsplat::metrics::SurfaceDistances;
 use epsplat::metrics::coverage::coverage;
 use epsplat::scene::{Clip, Colors, Scene, Surfel};
@@ -319,8 +319,9 @@ fn ellipses_reach_past_an_edge_no_farther_than_disks_may() {
     for shape in [SplatShape::Disk, SplatShape::Ellipse] {
         let (simplified, _) = simplify(&sampled, &Options { shape, ..within(tolerance) }, &()).unwrap();
         let Scene { surfels, clips, .. } = simplified;
-        // As far as a cell may, and eight tolerances more.
-        let limit = 2.5 * spacing + 8.0 * tolerance;
+        // As far as a cell may, and eight tolerances more; and a fifth of a surfel's radius, by which those that are cut go past.
+        let radius = f64::from(sampled.surfels.iter().map(|surfel| surfel.radius()).fold(0.0, f32::max));
+        let limit = 2.5 * spacing + 8.0 * tolerance + 0.2 * radius;
         let farthest = surfels.iter().zip(clips).map(past).fold(0.0, f64::max);
         assert!(farthest <= limit, "{shape:?}: {farthest} of {limit}");
         // There are some on the side that end there, and they are long.
@@ -494,9 +495,34 @@ fn larger_surfels_end_where_those_did_that_they_stand_for() {
         let rims = |scene: &Scene| SurfaceDistances::of(scene, &mesh, &tree).unwrap().rims_to_mesh.unwrap();
         let spacing = with.surfels.iter().map(|s| f64::from(s.radius())).sum::<f64>() / 6_000.0;
         let (ours, theirs) = (rims(&simplified), rims(&Scene { clips: Vec::new(), ..control }));
-        assert!(ours.mean < 0.5 * theirs.mean && ours.percentile_99 < 1.2 * spacing, "{ours:?} {theirs:?} {spacing}");
+        assert!(ours.mean < 0.7 * theirs.mean && ours.percentile_99 < 0.8 * spacing, "{ours:?} {theirs:?} {spacing}");
         assert!(coverage(&tree, &simplified, 64, 128, &()).unwrap().is_hole_free());
         // The control: without its lines it stands out.
-        assert!(rims(&Scene { clips: Vec::new(), ..simplified }).mean > 5.0 * ours.mean);
+        assert!(rims(&Scene { clips: Vec::new(), ..simplified }).mean > 3.0 * ours.mean);
     }
+}
+
+#[test]
+fn no_surfel_fills_the_notch_of_a_face() {
+    // An L: the square [-1, 1] without its upper right quarter, a prism from z = 0 to 1.
+    let outline = [[-1.0, -1.0], [1.0, -1.0], [1.0, 0.0], [0.0, 0.0], [0.0, 1.0], [-1.0, 1.0]];
+    let positions = [0.0, 1.0].into_iter().flat_map(|z| outline.map(|[x, y]| [x, y, z])).collect();
+    let mut triangles = Vec::new();
+    for k in 0..6u32 {
+        let next = (k + 1) % 6;
+        triangles.extend([[k, next, next + 6], [k, next + 6, k + 6]]);
+    }
+    for [a, b, c] in [[0, 1, 2], [0, 2, 3], [0, 3, 5], [3, 4, 5]] {
+        triangles.extend([[a, c, b], [a + 6, b + 6, c + 6]]);
+    }
+    let mesh = Mesh { positions, triangles, ..Mesh::default() };
+    let tree = TriangleTree::new(&mesh).unwrap();
+    let evenly = |surface: &MeshSurface<'_>, voxels: &[Voxel]| Priority::Area.of(surface, voxels);
+    let (points, _) = sample(&mesh, 6_000, &Method::Stratified { priority: &evenly, depth: None }, 0, &()).unwrap();
+    let (sampled, _) = build(vec![points], &()).unwrap();
+    let (simplified, report) = simplify(&sampled, &within(0.001), &()).unwrap();
+    let rims = SurfaceDistances::of(&simplified, &mesh, &tree).unwrap().rims_to_mesh.unwrap();
+    let largest = sampled.surfels.iter().map(|s| f64::from(s.radius())).fold(0.0, f64::max);
+    assert!(rims.max < 1.4 * largest, "{rims:?} {largest}");
+    assert!(report.selected < 300 && coverage(&tree, &simplified, 64, 128, &()).unwrap().is_hole_free(), "{report:?}");
 }

@@ -171,7 +171,9 @@ fn straight([mean, error]: [[f64; 4]; 2]) -> [f64; 4] {
             return error[3] + 2.0 * U * mean[3];
         }
         let straight = (mean[k] / mean[3]).abs();
-        (error[k] + straight * error[3]) / alpha + straight * (2.0 * DIVISION + 4.0 * U)
+        // Where alpha may be nothing, nothing is known of the colour.
+        let of_alpha = if alpha > 0.0 { (error[k] + straight * error[3]) / alpha } else { f64::INFINITY };
+        of_alpha + straight * (2.0 * DIVISION + 4.0 * U)
     })
 }
 

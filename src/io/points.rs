@@ -53,9 +53,10 @@ pub struct Faces {
 }
 
 impl Points {
-    /// Keeps what each point has of the points whose flag is set. Which points of the file they are, [`Provenance`](crate::scene::Provenance)
+    /// Keeps what each point has of the points whose flag is set; without some of them they do not cover a closed surface. Which points of the file they are, [`Provenance`](crate::scene::Provenance)
     /// keeps.
     pub(crate) fn retain(&mut self, keep: &[bool]) {
+        self.closed &= keep.iter().all(|keep| *keep);
         retain(&mut self.positions, keep);
         self.normals.iter_mut().for_each(|all| retain(all, keep));
         self.radii.iter_mut().for_each(|all| retain(all, keep));

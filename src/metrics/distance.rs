@@ -40,8 +40,8 @@ pub struct Distances {
 pub struct SurfaceDistances {
     /// Of the surfels' centres from the mesh.
     pub centers_to_mesh: Option<Distances>,
-    /// Of eight points on each disk's rim from the mesh, where lines cut it of those at which it ends on the way to them: a disk on a
-    /// curved surface leaves it toward the rim.
+    /// Of eight points on each disk's rim from the mesh, where lines cut it of those at which it ends on the way to them, but for
+    /// one whose centre lines leave out: a disk on a curved surface leaves it toward the rim.
     pub rims_to_mesh: Option<Distances>,
     /// Of [`MESH_POINTS`] random points of the mesh, evenly by area, from the nearest surfel's centre: how finely it is sampled.
     pub mesh_to_centers: Option<Distances>,
@@ -77,11 +77,12 @@ impl SurfaceDistances {
             let surfel = &scene.surfels[index];
             let (sin, cos) = (TAU * f64::from(k) / f64::from(RIM_POINTS)).sin_cos();
             let kept = scene.clips.get(index).map_or(1.0, |clip| clip.reach(cos, sin));
-            center(index) + (world(surfel.s) * cos + world(surfel.t) * sin) * kept
+            (kept > 0.0).then(|| center(index) + (world(surfel.s) * cos + world(surfel.t) * sin) * kept)
         };
         let surfels = (0..scene.surfels.len()).into_par_iter();
         let centers = surfels.clone().map(center).map(|point| triangles.distance(point));
-        let rims = surfels.flat_map_iter(|index| (0..RIM_POINTS).map(move |k| triangles.distance(rim(index, k))));
+        let rims = surfels
+            .flat_map_iter(|index| (0..RIM_POINTS).filter_map(move |k| Some(triangles.distance(rim(index, k)?))));
         let disks = DiskTree::new(scene);
         let (on_mesh, _) = sample(mesh, MESH_POINTS, &Method::Uniform, SEED, &())?;
         let points = on_mesh.positions.par_iter().map(|point| DVec3::from_array(*point));

@@ -14,6 +14,9 @@ use crate::{Progress, Result};
 /// Neighbours that gaps are looked for between. Of a random sampling, 16 know too few of the wide ones.
 const NEIGHBOURS: usize = 32;
 
+/// The cosine of the angle between surfels of one side: 60 degrees.
+const SAME_SIDE: f64 = 0.5;
+
 /// A gap is closed by a disk that reaches it but for rounding.
 const ROUNDING: f64 = 1e-5;
 
@@ -74,13 +77,20 @@ fn has_open_gap<'a>(
     let Some(&own) = here.first() else { return false };
     let offsets: Vec<DVec3> =
         near.iter().map(|other| distinct.position(other.index) - distinct.position(position)).collect();
+    // Past its lines there is no surface, unless the next surfel of the same side is there.
+    let side = |disk: &(&Surfel, Clip)| disk.0.normal().as_dvec3().normalize_or_zero();
+    let same_side = |disk: &(&Surfel, Clip)| side(disk).dot(side(&own)) > SAME_SIDE;
+    let goes_on = |(other, offset): (&Neighbour, &DVec3)| {
+        is_past(own, *offset / distinct.scale()) && at(other.index).iter().any(same_side)
+    };
+    let ends = !near.iter().zip(&offsets).any(goes_on);
     // Within half the distance of the farthest neighbour all that bounds the cell is known.
     let known = 0.5 * offsets.last().map_or(0.0, |farthest| farthest.length());
     let closed = |place: DVec3| {
         let reached = |disks: &[(&Surfel, Clip)], from: DVec3| {
             disks.iter().any(|disk| reaches(*disk, (place - from) / distinct.scale()))
         };
-        is_past(own, place / distinct.scale())
+        ends && is_past(own, place / distinct.scale())
             || reached(here, DVec3::ZERO)
             || near.iter().zip(&offsets).any(|(other, from)| reached(at(other.index), *from))
     };

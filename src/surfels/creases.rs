@@ -15,6 +15,9 @@ pub(super) const SHARP: f64 = 0.5;
 /// A crease is at least this part of the distance of two points from either: a cell has an area.
 pub(super) const NARROWEST: f64 = 0.01;
 
+/// The sine of the angle between two planes below which rounding and noise decide where they meet: 3 degrees.
+const LEAST_SINE: f64 = 0.05;
+
 /// A point that is farther than so many radii of either's surfel is out of reach.
 const REACH: f64 = 5.0;
 
@@ -43,6 +46,9 @@ pub(super) fn crease([normal, other]: [DVec3; 2], offset: DVec3, radius: f64, le
     }
     let slope = other - normal * other.dot(normal);
     let sine = slope.length();
+    if sine < LEAST_SINE {
+        return None;
+    }
     let toward = slope.try_normalize()? * if height + back < 0.0 { 1.0 } else { -1.0 };
     let along = offset.dot(normal.cross(toward));
     (along.abs() * sine <= height.abs() + back.abs())

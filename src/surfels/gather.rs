@@ -20,8 +20,7 @@ pub(crate) struct Gathered {
 /// Joins the inputs and drops points whose coordinates are unusable.
 pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
     let (mut preparation, mut provenance) = (Preparation::default(), Provenance::default());
-    let mut points =
-        Points { closed: inputs.iter().all(|input| input.closed || input.positions.is_empty()), ..Points::default() };
+    let mut points = Points { closed: true, ..Points::default() };
     let (mut colors, mut flags, input_count) = (ColorGatherer::new(), Vec::new(), inputs.len());
     for mut input in inputs {
         let keep: Vec<bool> = input.positions.iter().map(is_usable).collect();
@@ -61,6 +60,7 @@ fn join(all: &mut Points, mut input: Points) {
     append(&mut all.axes, before, input.axes, count);
     append(&mut all.clips, before, input.clips, count);
     append(&mut all.texture, before, input.texture, count);
+    all.closed &= input.closed || count == 0;
     if before == 0 {
         all.positions = input.positions;
     } else {

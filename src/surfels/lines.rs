@@ -44,22 +44,54 @@ pub(super) fn nearest_share(from: DVec2, to: DVec2) -> f64 {
     if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) }
 }
 
-/// Of `lines` the two at most that leave out most of the disk together; none that leaves out nothing.
-pub(super) fn clip(mut lines: Vec<Line>) -> Clip {
-    lines.retain(|line| line.offset > -1.0);
-    lines.sort_by(|a, b| {
+/// The corners of the convex hull of `points`: what keeps them keeps all.
+pub(super) fn hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
+    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    let chain = |points: &mut dyn Iterator<Item = DVec2>| {
+        let mut corners: Vec<DVec2> = Vec::new();
+        for point in points {
+            while let [.., before, last] = corners.as_slice()
+                && (last - before).perp_dot(point - last) <= 0.0
+            {
+                corners.pop();
+            }
+            corners.push(point);
+        }
+        corners
+    };
+    let (lower, upper) = (chain(&mut points.iter().copied()), chain(&mut points.iter().rev().copied()));
+    [lower, upper].concat()
+}
+
+/// Of `lines` that cut the disk, each with what is known of it, those to look at: those that cut most come first, and of such that are
+/// nearly the same one is left.
+pub(super) fn apart<T: Copy>(mut lines: Vec<(Line, T)>) -> Vec<(Line, T)> {
+    lines.retain(|(line, _)| line.offset > -1.0);
+    lines.sort_by(|(a, _), (b, _)| {
         let ([ax, ay], [bx, by]) = (a.inward.to_array(), b.inward.to_array());
         b.offset.total_cmp(&a.offset).then(ax.total_cmp(&bx)).then(ay.total_cmp(&by))
     });
-    let mut apart: Vec<Line> = Vec::with_capacity(MOST);
-    for line in lines {
-        let same = |other: &Line| other.inward.dot(line.inward) > SAME.0 && (other.offset - line.offset).abs() < SAME.1;
-        if apart.len() < MOST && !apart.iter().any(same) {
-            apart.push(line);
+    let mut apart: Vec<(Line, T)> = Vec::with_capacity(MOST);
+    for (line, of_line) in lines {
+        let same = |(other, _): &(Line, T)| {
+            other.inward.dot(line.inward) > SAME.0 && (other.offset - line.offset).abs() < SAME.1
+        };
+        if apart.len() == MOST {
+            break;
+        }
+        if !apart.iter().any(same) {
+            apart.push((line, of_line));
         }
     }
+    apart
+}
+
+/// Of `lines` the two at most that leave out most of the disk together; none that leaves out nothing.
+pub(super) fn clip(lines: Vec<Line>) -> Clip {
+    let lines: Vec<Line> =
+        apart(lines.into_iter().map(|line| (line, ())).collect()).into_iter().map(|(line, ())| line).collect();
     let mut clip = Clip::NONE;
-    for (line, of_disk) in best(&apart).into_iter().zip(&mut clip.0) {
+    for (line, of_disk) in best(&lines).into_iter().flatten().zip(&mut clip.0) {
         *of_disk = Clip::line(line.inward, line.offset, [DVec2::X, DVec2::Y]);
     }
     clip
@@ -69,18 +101,24 @@ pub(super) fn clip(mut lines: Vec<Line>) -> Clip {
 const POINTS: u32 = 128;
 
 /// The first of the best, one line before two.
-fn best(lines: &[Line]) -> Vec<Line> {
+fn best(lines: &[Line]) -> [Option<Line>; 2] {
     let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
     let point = |k: u32| DVec2::from_angle(golden * f64::from(k)) * ((f64::from(k) + 0.5) / f64::from(POINTS)).sqrt();
     let left_out = |line: &Line| {
         (0..POINTS).filter(|k| line.inward.dot(point(*k)) < line.offset).fold(0u128, |bits, k| bits | 1 << k)
     };
     let masks: Vec<u128> = lines.iter().map(left_out).collect();
-    let single = (0..lines.len()).map(|a| vec![a]);
-    let pairs = (0..lines.len()).flat_map(|a| (a + 1..lines.len()).map(move |b| vec![a, b]));
-    let count = |which: &Vec<usize>| which.iter().fold(0, |bits, k| bits | masks[*k]).count_ones();
-    let best = single.chain(pairs).rev().max_by_key(count).unwrap_or_default();
-    best.into_iter().map(|k| lines[k]).collect()
+    let (mut most, mut best) = (None, [None; 2]);
+    let single = (0..lines.len()).map(|a| (a, a));
+    let pairs = (0..lines.len()).flat_map(|a| (a + 1..lines.len()).map(move |b| (a, b)));
+    for (a, b) in single.chain(pairs) {
+        let count = (masks[a] | masks[b]).count_ones();
+        if most.is_none_or(|most| count > most) {
+            most = Some(count);
+            best = [Some(lines[a]), Some(lines[b]).filter(|_| a != b)];
+        }
+    }
+    best
 }
 
 #[cfg(test)]
@@ -96,6 +134,19 @@ mod tests {
         assert_eq!(end.keeping([DVec2::new(-0.7, 0.2)].into_iter(), 0.0), end);
         assert_eq!(Line::through(DVec2::X, DVec2::X), None);
         assert_eq!(nearest_share(DVec2::new(1.0, -1.0), DVec2::new(1.0, 3.0)), 0.25);
+    }
+
+    #[test]
+    fn a_hull_keeps_what_its_points_do() {
+        let points: Vec<DVec2> = (0..50).map(|k| DVec2::from_angle(f64::from(k * k)) * f64::from(k % 7)).collect();
+        let corners = hull(points.clone());
+        assert!(corners.len() < 30, "{}", corners.len());
+        for degrees in 0..72 {
+            let toward = DVec2::from_angle(f64::from(degrees) * 0.087);
+            let least = |points: &[DVec2]| points.iter().map(|p| p.dot(toward)).fold(f64::INFINITY, f64::min);
+            assert_eq!(least(&points), least(&corners));
+        }
+        assert_eq!(hull(vec![]), vec![]);
     }
 
     #[test]

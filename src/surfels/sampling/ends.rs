@@ -16,7 +16,7 @@ use crate::error::Result;
 use crate::io::closed::distinct;
 use crate::scene::Clip;
 use crate::sets::Sets;
-use crate::surfels::lines::{self, Line, nearest_share};
+use crate::surfels::lines::{self, Line, hull, nearest_share};
 use crate::surfels::mesh::{MARGIN, TOLERANCE};
 use crate::truth::TriangleTree;
 
@@ -29,8 +29,8 @@ const HIGHEST: f64 = 0.5;
 /// The cosine of the angle between two triangles past which their common side is an end: 20 degrees.
 const EDGE: f64 = 0.939_692_620_785_908_4;
 
-/// The part of how far a disk should stand out past an end by the two triangles there that it must stand out by the whole surface:
-/// else the end is one of the roughness that disks do not follow.
+/// The part of how far a disk should stand out past an end by the two triangles there that it must stand out by the whole surface, where
+/// it is farthest past it: else the end is one of the roughness that disks do not follow, or of a slit narrower than the disk.
 const CONFIRMED: f64 = 0.5;
 
 /// A disk's cell lies so many times nearer to its plane than the disk stands out, or the end is one of that roughness too.
@@ -49,8 +49,8 @@ struct End {
 
 /// All ends of a surface.
 pub(super) struct Ends {
-    /// All triangles.
-    surface: TriangleTree,
+    /// All triangles; none where there are no ends.
+    surface: Option<TriangleTree>,
     ends: Vec<End>,
     /// Of each triangle, a number that those have that the surface goes on to without an end between.
     pub patches: Vec<u32>,
@@ -106,7 +106,7 @@ impl Ends {
         };
         Ok(Self {
             patches: patches.all(),
-            surface: TriangleTree::new(surface.mesh)?,
+            surface: if ends.is_empty() { None } else { Some(TriangleTree::new(surface.mesh)?) },
             center: surface.center,
             ends,
             tree,
@@ -126,7 +126,7 @@ impl Ends {
 
     /// How far a point is from the surface.
     fn distance(&self, point: DVec3) -> f64 {
-        self.surface.distance(self.center + point)
+        self.surface.as_ref().map_or(0.0, |surface| surface.distance(self.center + point))
     }
 
     fn near(&self, center: DVec3, radius: f64) -> Vec<&End> {
@@ -150,6 +150,8 @@ impl Ends {
         let flat = |d: DVec3| DVec2::new(d.dot(x), d.dot(y)) / radius;
         let rough = disk.cell.iter().map(|corner| corner.dot(normal).abs()).fold(0.0, f64::max);
         let least = self.tolerance.max(ROUGH * rough);
+        let cell = hull(disk.cell.iter().map(|corner| flat(*corner)).collect());
+        let past = |line: &Line, leaves: f64| (1.0 + line.offset) * radius * leaves;
         let line = |end: &End| {
             let [from, to] = end.side.map(|corner| corner - disk.center);
             let (p, q) = (flat(from), flat(to));
@@ -159,13 +161,17 @@ impl Ends {
             if !is_near || end.normal.dot(normal) <= SIDE {
                 return None;
             }
-            let line =
-                Line::through(p, q)?.keeping(disk.cell.iter().map(|corner| flat(*corner)), MARGIN + rough / radius);
-            let past = (1.0 + line.offset) * radius * end.leaves;
-            let farthest = disk.center - (x * line.inward.x + y * line.inward.y) * radius;
-            (past > least && self.distance(farthest) > CONFIRMED * past).then_some(line)
+            // Moved out it leaves out less.
+            let line = Line::through(p, q).filter(|line| past(line, end.leaves) > least)?;
+            let line = line.keeping(cell.iter().copied(), MARGIN + rough / radius);
+            (past(&line, end.leaves) > least).then_some((line, end.leaves))
         };
-        lines::clip(self.near(disk.center, radius).into_iter().filter_map(line).collect())
+        let mut lines = lines::apart(self.near(disk.center, radius).into_iter().filter_map(line).collect());
+        lines.retain(|(line, leaves)| {
+            let farthest = disk.center - (x * line.inward.x + y * line.inward.y) * radius;
+            self.distance(farthest) > CONFIRMED * past(line, *leaves)
+        });
+        lines::clip(lines.into_iter().map(|(line, _)| line).collect())
     }
 }
 

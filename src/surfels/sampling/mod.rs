@@ -158,7 +158,8 @@ pub fn sample(
             let faces_as_named = named.as_ref().is_none_or(|named| disks.turn_to(named));
             let normals = named.clone().unwrap_or_else(|| disks.normals());
             let mut points = points(&surface, &places, normals, None, colors);
-            points.closed = faces_as_named && is_closed(&mesh.positions, &mesh.triangles);
+            let whole = surface.dropped_non_finite == 0;
+            points.closed = whole && faces_as_named && is_closed(&mesh.positions, &mesh.triangles);
             // A plane of its own, or lines in it, need half-axes.
             if named.is_some() || !disks.clips.is_empty() {
                 points.axes = Some(disks.half_axes());

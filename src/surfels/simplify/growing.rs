@@ -21,6 +21,25 @@ const SMALLEST_RATIO: f64 = 1.1;
 /// The cosine of the angle between ends up to which one line cuts a splat at both: 10 degrees.
 const ONE_LINE: f64 = 0.985;
 
+/// A line in a splat's plane at which it will be cut.
+struct Ended {
+    /// Unit.
+    toward: DVec3,
+    /// From the splat's point; the surface ends there, or before.
+    distance: f64,
+}
+
+impl Ended {
+    fn is_past(&self, offset: DVec3) -> bool {
+        offset.dot(self.toward) > self.distance
+    }
+
+    /// Whether the two are one, but for so much in distance.
+    fn is_near(&self, other: &Self, distance: f64) -> bool {
+        self.toward.dot(other.toward) > ONE_LINE && (self.distance - other.distance).abs() <= distance
+    }
+}
+
 /// A disk or ellipse grown around a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Splat {
@@ -236,6 +255,12 @@ impl<'a> Grower<'a> {
                 self.confront.push(Reverse((Distance(distance), next)));
                 return distance;
             }
+            if lines.iter().any(|line: &Ended| line.is_past(offset)) {
+                // The surface goes round the end of a line: what is past it would be kept, and nothing cut.
+                end = end.min(distance);
+                self.conquered.retain(|conquered| conquered.distance < distance);
+                return end;
+            }
             self.conquered.push(Conquered { point: next, distance, height });
             end = end.min(self.end_at(next, offset, shape, &mut lines));
             for &neighbour in self.cells.neighbours(next) {
@@ -259,26 +284,34 @@ impl<'a> Grower<'a> {
     }
 
     /// How large a splat of this shape may be that holds the point `next` at `offset`, for the ends of that point's cell: it
-    /// reaches across an end, in the direction in which that lies, by no more than the cell does from its point. But it is cut at ends
-    /// in up to two directions, `lines`, however far it reaches.
-    fn end_at(&self, next: u32, offset: DVec3, shape: [DVec3; 2], lines: &mut Vec<DVec3>) -> f64 {
+    /// reaches across an end, in the direction in which that lies, by no more than the cell does from its point. But it is cut at up to
+    /// two ends, `lines`, that no point inside lies past, however far it reaches.
+    fn end_at(&self, next: u32, offset: DVec3, shape: [DVec3; 2], lines: &mut Vec<Ended>) -> f64 {
         let overhang = self.cells.overhangs[next as usize];
         let [s, t] = tangent_basis(self.samples.normals[next as usize]);
         let mut least = f64::INFINITY;
         for (end, is_cut) in self.cells.ends(next) {
             let Some((toward, extent)) = along(s * end.x + t * end.y, shape) else { continue };
+            let ended = Ended { toward, distance: offset.dot(toward) + overhang };
             if is_cut && offset.dot(toward) >= 0.0 {
-                if lines.iter().any(|line| line.dot(toward) > ONE_LINE) {
+                if lines.iter().any(|line| line.is_near(&ended, overhang)) {
                     continue;
                 }
-                if lines.len() < 2 {
-                    lines.push(toward);
+                if lines.len() < 2 && !self.is_any_past(next, offset, &ended) {
+                    lines.push(ended);
                     continue;
                 }
             }
             least = least.min((offset.dot(toward).max(0.0) + overhang) / extent);
         }
         least
+    }
+
+    /// Whether a conquered point lies past an end, relative to the splat's point; the last of them, `next`, lies at `offset`.
+    fn is_any_past(&self, next: u32, offset: DVec3, ended: &Ended) -> bool {
+        let center = self.samples.positions.position(next) - offset;
+        let mut points = self.conquered.iter().map(|conquered| self.samples.positions.position(conquered.point));
+        points.any(|point| ended.is_past(point - center))
     }
 
     /// How large it may be before `next`, at `offset`, which faces away from it: the surface turns in the direction in which that

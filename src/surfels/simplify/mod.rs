@@ -20,7 +20,7 @@
 //! diagonals, one finds a hole.
 //!
 //! **Edges.** Where the surfels that came in end at lines, and at creases of more than 60 degrees, cells end and the graph has no
-//! edge; disks are cut there, as far as what they cover allows. As they are cut they may grow past ends in two directions.
+//! edge; disks that stand for several surfels are cut there, as far as what they cover allows. As they are cut they may grow past two ends.
 //!
 //! **Within the tolerance.** A disk covers the cells of those points in it that it grew over, none of which is farther off than
 //! the tolerance. Where the surface bends by more than that within a cell no disk covers all of it so, and at a crease any that

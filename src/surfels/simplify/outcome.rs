@@ -11,7 +11,7 @@ use super::samples::Samples;
 use crate::scene::color::linear_to_srgb;
 use crate::scene::scene::low_parts;
 use crate::scene::{Clip, Colors, Scene, Surfel};
-use crate::surfels::lines::{self, Line, nearest_share};
+use crate::surfels::lines::{self, Line, hull, nearest_share};
 
 /// A half-axis is written longer than it grew by at most this part of itself,
 const LARGEST_OVERLAP: f64 = 0.4;
@@ -196,8 +196,8 @@ fn clip(
     if edges.peek().is_none() {
         return Clip::NONE;
     }
-    let kept: Vec<DVec2> =
-        covers.iter().flat_map(|c| cells.corners_of(c.cell, c.pieces).map(|corner| place(c.cell, corner))).collect();
+    let kept = covers.iter().flat_map(|c| cells.corners_of(c.cell, c.pieces).map(|corner| place(c.cell, corner)));
+    let kept = hull(kept.collect());
     let shortest = axes[0].length().min(axes[1].length());
     let margin = (MARGIN[0] * deviation + MARGIN[1] * radius) / shortest;
     let line = |[from, to]: [DVec2; 2]| {

@@ -66,7 +66,9 @@ fn coverage_tells_a_whole_surface_from_one_with_holes() {
     assert!((1839..=3 * 3674).contains(&whole["surfels"].as_u64().unwrap()), "{whole}");
     assert!(whole["hole_free"] == true && whole["holes"] == 0 && whole["worst_view"].is_null(), "{whole}");
     assert!(whole["centers_to_mesh"]["max"].as_f64().unwrap() < 1e-6 && whole["rays"].as_u64().unwrap() > 4000);
-    assert!(whole["rims_to_mesh"]["mean"].as_f64().unwrap() > 1e-3);
+    // Half of a rim that a line cuts ends at the vertex; the other half leaves a surface that bends.
+    let rims = |of: &str| whole["rims_to_mesh"][of].as_f64().unwrap();
+    assert!(rims("max") > 1e-3 && rims("mean") > 1e-4, "{whole}");
     // Disks too small to touch each other.
     let text_of = std::fs::read_to_string(&bunny).unwrap();
     let vertices: Vec<&str> = text_of.lines().filter_map(|line| line.strip_prefix("v ")).collect();

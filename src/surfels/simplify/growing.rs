@@ -257,9 +257,8 @@ impl<'a> Grower<'a> {
             }
             if lines.iter().any(|line: &Ended| line.is_past(offset)) {
                 // The surface goes round the end of a line: what is past it would be kept, and nothing cut.
-                end = end.min(distance);
                 self.conquered.retain(|conquered| conquered.distance < distance);
-                return end;
+                return end.min(distance);
             }
             self.conquered.push(Conquered { point: next, distance, height });
             end = end.min(self.end_at(next, offset, shape, &mut lines));

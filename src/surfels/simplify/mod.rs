@@ -30,6 +30,7 @@
 mod borders;
 mod candidates;
 mod cells;
+mod cut;
 mod growing;
 mod outcome;
 mod relaxation;

@@ -1,17 +1,16 @@
 //! Selected splats as surfels, and how far from them the points lie.
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::candidates::Candidates;
-use super::cells::{Cells, tangent_basis};
-use super::growing::Cover;
+use super::cells::Cells;
+use super::cut::clip;
 use super::samples::Samples;
 use crate::scene::color::linear_to_srgb;
 use crate::scene::scene::low_parts;
 use crate::scene::{Clip, Colors, Scene, Surfel};
-use crate::surfels::lines::{self, Line, hull, nearest_share};
 
 /// A half-axis is written longer than it grew by at most this part of itself,
 const LARGEST_OVERLAP: f64 = 0.4;
@@ -69,27 +68,22 @@ pub(super) struct Deviations {
     pub mean: f64,
 }
 
-/// The selected splats as a scene like `scene`; the tolerance in scaled units.
-pub(super) fn scene(
-    scene: &Scene,
-    samples: &Samples,
-    cells: &Cells,
-    candidates: &Candidates,
-    selected: &[u32],
-    tolerance: f64,
-) -> (Scene, Deviations) {
-    struct Chosen {
-        center: DVec3,
-        surfel: Surfel,
-        clip: Clip,
-        color: [f32; 4],
-        /// Area times deviation, and area.
-        sums: [f64; 2],
-        /// The largest deviation.
-        largest: f64,
-    }
-    let scale = samples.positions.scale();
-    let choose = |&index: &u32| {
+/// A selected splat as it is written.
+struct Chosen {
+    /// Of the scene, world units.
+    center: DVec3,
+    surfel: Surfel,
+    clip: Clip,
+    color: [f32; 4],
+    /// Area times deviation, and area.
+    sums: [f64; 2],
+    /// The largest deviation.
+    largest: f64,
+}
+
+impl Chosen {
+    fn of(index: u32, samples: &Samples, cells: &Cells, candidates: &Candidates, tolerance: f64) -> Self {
+        let scale = samples.positions.scale();
         let splat = &candidates.splats[index as usize];
         let normal = samples.normals[splat.point as usize];
         let center = samples.positions.position(splat.point) + normal * splat.shift;
@@ -121,9 +115,21 @@ pub(super) fn scene(
         let [r, g, b, alpha] = color;
         let opaque = if alpha > 0.0 { alpha } else { f64::INFINITY };
         let color = [r / opaque, g / opaque, b / opaque, alpha / sums[1]].map(|c| c as f32);
-        Chosen { center: center / scale, surfel: Surfel { center: world(center), s, t }, clip, color, sums, largest }
-    };
-    let chosen: Vec<Chosen> = selected.par_iter().map(choose).collect();
+        Self { center: center / scale, surfel: Surfel { center: world(center), s, t }, clip, color, sums, largest }
+    }
+}
+
+/// The selected splats as a scene like `scene`; the tolerance in scaled units.
+pub(super) fn scene(
+    scene: &Scene,
+    samples: &Samples,
+    cells: &Cells,
+    candidates: &Candidates,
+    selected: &[u32],
+    tolerance: f64,
+) -> (Scene, Deviations) {
+    let chosen: Vec<Chosen> =
+        selected.par_iter().map(|&index| Chosen::of(index, samples, cells, candidates, tolerance)).collect();
     let colors = match scene.colors {
         Colors::Constant(color) => Colors::Constant(color),
         Colors::Srgb8(_) => Colors::Srgb8(chosen.iter().map(|chosen| srgb8(chosen.color)).collect()),
@@ -149,63 +155,6 @@ pub(super) fn scene(
         },
         deviations,
     )
-}
-
-/// Heights of other disks by which those that end at one line may lie apart there, in deviations, and a part of the shorter half-axis.
-const MARGIN: [f64; 2] = [2.0, 0.2];
-
-/// A splat is cut where it stands out past an end by more than so many deviations: less may be the roughness of the surface, whose holes
-/// disks close by their overlap.
-const ROUGH: f64 = 4.0;
-
-/// The lines at which a splat of these half-axes ends: those at which the surfels end that it stands for, and what lies around them. It
-/// keeps what it covers, of which the points lie up to `deviation` from its plane.
-fn clip(
-    samples: &Samples,
-    cells: &Cells,
-    covers: &[Cover],
-    (center, axes): (DVec3, [DVec3; 2]),
-    (deviation, radius): (f64, f64),
-) -> Clip {
-    let inverse = axes.map(|axis| axis / axis.length_squared());
-    let on_disk = |at: DVec3| DVec2::new((at - center).dot(inverse[0]), (at - center).dot(inverse[1]));
-    let place = |cell: u32, corner: DVec2| {
-        let [s, t] = tangent_basis(samples.normals[cell as usize]);
-        on_disk(samples.positions.position(cell) + s * corner.x + t * corner.y)
-    };
-    if let [only] = covers {
-        // What stands for one surfel ends where that did.
-        let own = samples.lines[only.cell as usize].iter().map(|end| {
-            let inward = DVec2::new(-end.toward.dot(axes[0]), -end.toward.dot(axes[1]));
-            let offset = -(end.distance + (samples.positions.position(only.cell) - center).dot(end.toward));
-            Line { inward: inward.normalize_or(DVec2::X), offset: offset / inward.length() }
-        });
-        return lines::clip(own.collect());
-    }
-    let normal = axes[0].cross(axes[1]);
-    let faces = |cell: u32| samples.normals[cell as usize].dot(normal) > 0.5 * normal.length();
-    let mut around: Vec<u32> =
-        covers.iter().flat_map(|cover| [&[cover.cell], cells.neighbours(cover.cell)].concat()).collect();
-    around.sort_unstable();
-    around.dedup();
-    let edges = around
-        .iter()
-        .filter(|cell| faces(**cell))
-        .flat_map(|&cell| cells.cut_edges(cell).map(move |edge| (cell, edge)));
-    let mut edges = edges.map(|(cell, edge)| edge.map(|corner| place(cell, corner))).peekable();
-    if edges.peek().is_none() {
-        return Clip::NONE;
-    }
-    let kept = covers.iter().flat_map(|c| cells.corners_of(c.cell, c.pieces).map(|corner| place(c.cell, corner)));
-    let kept = hull(kept.collect());
-    let shortest = axes[0].length().min(axes[1].length());
-    let margin = (MARGIN[0] * deviation + MARGIN[1] * radius) / shortest;
-    let line = |[from, to]: [DVec2; 2]| {
-        let is_near = from.lerp(to, nearest_share(from, to)).length() < 1.0;
-        let line = Line::through(from, to).filter(|_| is_near)?.keeping(kept.iter().copied(), margin);
-        ((1.0 + line.offset) * shortest > ROUGH * deviation).then_some(line)
-    };
-    lines::clip(edges.filter_map(line).collect())
 }
 
 /// The nearest 8-bit codes: a file that came with such colours keeps them.

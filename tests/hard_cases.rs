@@ -113,11 +113,14 @@ fn a_broken_kernel_fails_a_hard_case() {
         ("center.wgsl", "surfel.center[i] * held.unit", "surfel.center[i]", "coordinates of 1e12"),
         ("visibility.wgsl", "kept_depth(", "NOTHING - kept_depth(", "intersecting sheets"),
         (
-            "accumulate.wgsl",
+            "side.wgsl",
             "fragment.depth <= farthest",
             "fragment.depth * 1.000004 <= farthest",
             "sheets 3e-6 about epsilon",
         ),
+        ("side.wgsl", "same_side && ", "", "fronts and backs that cross"),
+        ("side.wgsl", "select(0u, SIDE_BIT,", "select(SIDE_BIT, 0u,", "fronts and backs that cross"),
+        ("side.wgsl", "~SIDE_BIT", "~(64u * SIDE_BIT)", "fronts and backs that cross"),
         (
             "blend.wgsl",
             "clamp(kernel_weight(fragment.rho2), LEAST_WEIGHT, 1.0)",

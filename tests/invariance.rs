@@ -251,11 +251,8 @@ fn unmapped(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu) 
         PixelSums {
             weight,
             color: [0, 1, 2, 3].map(color),
-            turned: if device.sums.pixel.depth_channel > device.sums.pixel.side_channel {
-                sum(device.sums.pixel.side_channel)
-            } else {
-                0.0
-            },
+            // The last bit of a nearest depth, kept as what it lacks to +inf, whose own is 0.
+            back: scene.oriented && device.sums.nearest[pixel] % 2 == 1,
             normal: [0, 1, 2].map(normal),
             place: [0.0; 4],
             depth: weight * front + common::depth_span(&device.view, front) * sum(device.sums.pixel.depth_channel),

@@ -180,7 +180,7 @@ fn tiles_of_a_software_adapter_gather_splats_that_are_not_tiny() {
 fn small_buffers_make_bands_and_pages() {
     let scene = sphere(3000, 1.5);
     let small = AdapterDescription { max_storage_buffer_binding_size: 100_000, ..AdapterDescription::core() };
-    let culled = RenderOptions { maps: Maps::of(&[Map::Depth, Map::Normal]), ..Default::default() };
+    let culled = RenderOptions { maps: Maps::of(&[Map::Depth, Map::Normal, Map::Count]), ..Default::default() };
     let options = RenderOptions { without: vec![Optimisation::Culling], ..culled.clone() };
     let known = Known { large: Some(true), entries: [Some(10), None], ..Known::default() };
     let plan = planned(&scene, 64, &small, &options, &known);

@@ -209,6 +209,32 @@ fn given_normals_stay_and_say_which_side_is_which() {
     }
 }
 
+#[test]
+fn normals_whose_sides_are_random_have_none() {
+    let mut random = noise(7);
+    let mut of = |(positions, truth): (Vec<[f64; 3]>, Vec<[f32; 3]>), share: f64| {
+        let normals = truth.iter().map(|n| if random() < share { n.map(|c| -c) } else { *n }).collect();
+        let points = Points { normals: Some(normals), ..cloud(positions) };
+        let made = surfels(points.clone(), &FromPoints::default());
+        let (scene, preparation) = build(vec![points], &()).unwrap();
+        assert_eq!(made.preparation.opposed_normals, preparation.opposed_normals);
+        let told = preparation.notes().iter().any(|note| note.contains("face either way"));
+        assert_eq!(told, !scene.oriented);
+        (scene.oriented, preparation.opposed_normals)
+    };
+    for shape in [Shape::Sphere, Shape::Torus] {
+        assert_eq!(of(samples(shape, 4000), 0.0), (true, 0));
+        let (oriented, opposed) = of(samples(shape, 4000), 0.5);
+        assert!(!oriented && (1800..2200).contains(&opposed), "{opposed}");
+        assert!(of(samples(shape, 4000), 0.05).0);
+    }
+    // Two sheets nearer to each other than their points are apart: opposed, but not beside each other.
+    let (mut positions, mut normals) = samples(Shape::Plane, 2000);
+    positions.extend(positions.clone().iter().map(|[x, y, z]| [*x, *y, z - 0.01]));
+    normals.extend(normals.clone().iter().map(|n| n.map(|c| -c)));
+    assert!(of((positions, normals), 0.0).0);
+}
+
 const SIZES: [Size; 4] = [Size::Knn, Size::Ellipse, Size::Bsp(Triangle::MeanEdge), Size::Bsp(Triangle::Circumsphere)];
 
 /// Checks that all is finite, and gives the surfels.

@@ -100,11 +100,12 @@ const ALTERNATIVES: [&[&str]; 6] = [
 ];
 
 /// Needs that no render has together (`src/plan/check.rs`, `src/plan/needs.rs`).
-const EXCLUSIVE: [(&str, &[&str]); 5] = [
+const EXCLUSIVE: [(&str, &[&str]); 6] = [
     ("samples", &["count", "depth", "index", "normal-map", "weight-map"]),
     ("color-textured", &["tiles", "gather", "copies", "raster-exact", "raster-offset", "raster-ray"]),
     ("copies", &["tiles", "gather", "cull", "atomics-u64"]),
     ("color-constant", &["alpha"]),
+    ("sides", &["cull-back", "raster-offset", "raster-ray"]),
     ("raster", &["wide-sums", "atomics-u64", "copies", "cull", "tiles", "gather", "index"]),
 ];
 
@@ -215,7 +216,6 @@ fn the_channels_of_a_pixel_do_not_overlap() {
             (0, 1),
             (COLOR_CHANNEL, color_channels(&needs)),
             (pixel.normal_channel, of(needs.normal, 3)),
-            (pixel.side_channel, of(needs.sides, 1)),
             (pixel.depth_channel, of(needs.maps.has(Map::Depth), 1)),
             (pixel.count_channel, of(needs.maps.has(Map::Count), 1)),
             (pixel.place_channel, of(needs.color == ColorNeed::Textured, 4)),

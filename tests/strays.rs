@@ -11,7 +11,7 @@ use epsplat::io::Points;
 use epsplat::metrics::{Comparison, compare};
 use epsplat::plan::{Organisation, RenderOptions};
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Epsilon, Lens, LowPass, Map, Maps, Scene, Texture, Up};
+use epsplat::scene::{Camera, Cull, Epsilon, Lens, LowPass, Map, Maps, Scene, Texture, Up};
 use epsplat::surfels::analytic::{Shape, generate};
 use epsplat::surfels::{Preparation, build, build_textured};
 use glam::DVec3;
@@ -70,8 +70,9 @@ fn against_alone(scene: &Scene, center: DVec3, away: f64, options: &RenderOption
 
 fn is_the_same(name: &str, scene: &Scene, center: DVec3, away: f64) {
     for low_pass in [LowPass::None, LowPass::Ewa] {
-        // From far away a tolerance of a radius would be within the digits of depths.
-        let options = RenderOptions { low_pass, epsilon: Epsilon::Relative(0.01), ..RenderOptions::default() };
+        // From far away a tolerance of a radius would be within the digits of depths, and the sphere's back within 1e-6 of its front.
+        let (epsilon, cull) = (Epsilon::Relative(0.01), if away > 1e5 { Cull::Back } else { Cull::Auto });
+        let options = RenderOptions { low_pass, epsilon, cull, ..RenderOptions::default() };
         let Some(comparison) = against_alone(scene, center, away, &options) else { return };
         assert!(comparison.rmse_decided.unwrap() < 1e-6, "{name}: {comparison:?}");
         assert!(comparison.excused.unwrap() < 0.02, "{name}: {comparison:?}");

@@ -2,7 +2,7 @@
 // splat, one workgroup a large splat. Each fragment's terms are quantised before they are added, so the sums do not
 // depend on the order.
 // Twin: src/passes/accumulate.rs.
-// All loops end, by 2, 4 of src/gpu/loops.rs: 0xdfa8c1a9482b34ad
+// All loops end, by 2, 4 of src/gpu/loops.rs: 0x9ef926c3f0fe2460
 
 @group(0) @binding(7) var<storage, read> visible: array<u32>;
 
@@ -34,7 +34,7 @@ fn accumulate_splat(surfel: u32, splat: Splat, filter_: Filter, pixels: Rectangl
         }
         let pixel = pixel_index(place.x, place.y);
         let front = front_at(pixel);
-        if (fragment.depth <= farthest_accepted(front, attributes.radius)) {
+        if (is_shown(fragment, front, attributes.radius)) {
             blend(pixel, fragment, front, attributes);
         }
     }

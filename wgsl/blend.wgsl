@@ -8,7 +8,7 @@ const LEAST_FILTERED_WEIGHT: f32 = 5.9604644775390625e-8;
 
 struct Attributes {
     color: vec4<f32>,
-    normal: vec4<f32>,
+    normal: vec3<f32>,
     // Device units; 0 where epsilon does not depend on it.
     radius: f32,
     // In a texture.
@@ -21,7 +21,7 @@ fn attributes_of(index: u32, splat: Splat) -> Attributes {
 }
 
 // Those that a tile's list or the rasteriser hands on, neither of which draws textures.
-fn attributes_without_place(color: vec4<f32>, normal: vec4<f32>, radius: f32) -> Attributes {
+fn attributes_without_place(color: vec4<f32>, normal: vec3<f32>, radius: f32) -> Attributes {
     var nowhere: Place;
     return Attributes(color, normal, radius, nowhere);
 }

@@ -52,7 +52,9 @@ fn footprint(splat: Splat, filter_: Filter, x: u32, y: u32) -> Fragment {
         splat.b[0] * d.x + (splat.b[1] * d.y + splat.b[2]),
         splat.c[0] * d.x + (splat.c[1] * d.y + splat.c[2]),
     );
-    return clipped(filtered(intersect(abc), abc, filter_, d), splat.clip, abc);
+    var fragment = clipped(filtered(intersect(abc), abc, filter_, d), splat.clip, abc);
+    fragment.depth = sided(fragment.depth, splat);
+    return fragment;
 }
 
 // Depths times this power of two lie in (0, 1).

@@ -1,29 +1,30 @@
 // Normals, each turned toward the viewer and mapped from [-1, 1] to [0, 1] before they are summed: those of the front and the back
 // of a thin part would cancel.
 // Twin: src/passes/accumulate.rs, src/passes/resolve.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x7cce3e5f76821828
+// All loops end, by 1 of src/gpu/loops.rs: 0xfe653ea67318e300
 
 override NORMAL_CHANNEL: u32;
+// The rasteriser's own depth test blends both sides of a surface, and normals as they are given (src/passes/raster.rs).
+override TURNS: bool;
 
-// World space, unit, mapped to [0, 1]; w: 1 if it was turned.
-fn normal_of(index: u32, splat: Splat) -> vec4<f32> {
+// World space, unit, mapped to [0, 1].
+fn normal_of(index: u32, splat: Splat) -> vec3<f32> {
     let unit_normal = surfel_normal(index);
-    let turned = (splat.bounds_last & AWAY) != 0u;
-    return vec4<f32>(select(unit_normal, -unit_normal, turned) * 0.5 + 0.5, select(0.0, 1.0, turned));
+    let turned = TURNS && (splat.bounds_last & AWAY) != 0u;
+    return select(unit_normal, -unit_normal, turned) * 0.5 + 0.5;
 }
 
-fn accumulate_normal(pixel: u32, weight: Term, normal: vec4<f32>) {
+fn accumulate_normal(pixel: u32, weight: Term, normal: vec3<f32>) {
     add_pair(pixel, NORMAL_CHANNEL, term(weight, normal.x), term(weight, normal.y));
     add(pixel, NORMAL_CHANNEL + 2u, term(weight, normal.z));
-    accumulate_side(pixel, weight, normal.w);
 }
 
 // The normalised mean, on the side that is seen; 0 where opposite normals cancel.
-fn resolve_normal(pixel: u32, weight: f32) -> vec3<f32> {
+fn resolve_normal(pixel: u32, weight: f32, front: f32) -> vec3<f32> {
     var mean: vec3<f32>;
     for (var k = 0u; k < 3u; k++) {
         mean[k] = sum_at(pixel, NORMAL_CHANNEL + k) / weight * 2.0 - 1.0;
     }
     let length_2 = dot(mean, mean);
-    return select(vec3<f32>(0.0), mean * (side_at(pixel, weight) * inverseSqrt(length_2)), length_2 > 1e-12);
+    return select(vec3<f32>(0.0), mean * (side_of(front) * inverseSqrt(length_2)), length_2 > 1e-12);
 }

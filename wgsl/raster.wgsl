@@ -9,13 +9,14 @@
 struct Corner {
     @builtin(position) position: vec4<f32>,
     @location(0) @interpolate(flat) index: u32,
-    @location(1) @interpolate(flat) anchor: vec2<i32>,
+    // And bounds_last.
+    @location(1) @interpolate(flat) anchor: vec3<i32>,
     @location(2) @interpolate(flat) a: vec3<f32>,
     @location(3) @interpolate(flat) b: vec3<f32>,
     @location(4) @interpolate(flat) c: vec3<f32>,
     @location(5) @interpolate(flat) a_low: vec3<f32>,
     @location(6) @interpolate(flat) color: vec4<f32>,
-    @location(7) @interpolate(flat) normal: vec4<f32>,
+    @location(7) @interpolate(flat) normal: vec3<f32>,
     @location(8) @interpolate(flat) radius: f32,
 }
 
@@ -85,7 +86,7 @@ fn corner_of(vertex: u32) -> Corner {
         corner.position = vec4<f32>(clip, corner_depth(splat, image, index), 1.0);
     }
     corner.index = index;
-    corner.anchor = vec2<i32>(splat.anchor_x, splat.anchor_y);
+    corner.anchor = vec3<i32>(splat.anchor_x, splat.anchor_y, bitcast<i32>(splat.bounds_last));
     corner.a = vec3<f32>(splat.a[0], splat.a[1], splat.a[2]);
     corner.b = vec3<f32>(splat.b[0], splat.b[1], splat.b[2]);
     corner.c = vec3<f32>(splat.c[0], splat.c[1], splat.c[2]);
@@ -113,6 +114,7 @@ fn fragment_of(corner: Corner) -> Fragment {
     var splat: Splat;
     splat.anchor_x = corner.anchor.x;
     splat.anchor_y = corner.anchor.y;
+    splat.bounds_last = bitcast<u32>(corner.anchor.z);
     splat.a = array<f32, 3>(corner.a.x, corner.a.y, corner.a.z);
     splat.b = array<f32, 3>(corner.b.x, corner.b.y, corner.b.z);
     splat.c = array<f32, 3>(corner.c.x, corner.c.y, corner.c.z);

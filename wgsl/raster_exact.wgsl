@@ -29,7 +29,7 @@ fn raster_attributes(corner: Corner) -> Targets {
     let pixel = vec2<u32>(corner.position.xy);
     let place = pixel_index(pixel.x, pixel.y);
     let front = front_at(place);
-    if (!fragment.hit || fragment.depth > farthest_accepted(front, corner.radius)) {
+    if (!is_shown(fragment, front, corner.radius)) {
         discard;
     }
     blend(place, fragment, front, carried(corner));

@@ -1,5 +1,5 @@
 // Where each pixel has one sample: its colour and maps. One invocation a pixel of a covered tile. Twin: src/passes/resolve.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x0b14a14ca66b9797
+// All loops end, by 1 of src/gpu/loops.rs: 0xfe0aad96954b729a
 
 // One workgroup a covered tile.
 @compute @workgroup_size(WORKGROUP)
@@ -34,7 +34,7 @@ fn resolve_pixel(sums_of: u32, pixel: u32, x: u32, y: u32) {
         write_count(out, sums_of);
         return;
     }
-    let normal = resolve_normal(sums_of, weight);
+    let normal = resolve_normal(sums_of, weight, front);
     write_color(out, shown_color(sums_of, weight, normal, x, y));
     write_normal(out, normal);
     write_depth(out, sums_of, weight, front);

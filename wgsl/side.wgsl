@@ -1,15 +1,26 @@
-// Which side of an oriented surface a pixel sees: beside the normal, the weight of the fragments whose normals were turned.
-// Twin: src/passes/accumulate.rs, src/passes/resolve.rs.
+// A pixel shows one side of a surface: that of its nearest fragment. What lies within epsilon behind it and faces the other way, at
+// an outline or in a thin part, is left out.
+// Twin: src/passes/accumulate.rs.
 
-override SIDE_CHANNEL: u32;
+// The last bit of a depth says on which side it is, so that the nearest depth says which side is nearest. Only where surfels have
+// sides, and both may be seen.
+override SIDES: bool;
 
-fn accumulate_side(pixel: u32, weight: Term, turned: f32) {
-    if (turned > 0.0) {
-        add(pixel, SIDE_CHANNEL, term(weight, turned));
-    }
+const SIDE_BIT: u32 = 1u;
+
+// Off by one unit in the last place at most. Of two depths that differ in this bit alone, the front's is nearer.
+fn sided(depth: f32, splat: Splat) -> f32 {
+    let bits = (bitcast<u32>(depth) & ~SIDE_BIT) | select(0u, SIDE_BIT, (splat.bounds_last & AWAY) != 0u);
+    return select(depth, bitcast<f32>(bits), SIDES);
 }
 
-// -1 where most of the weight has been turned, so that the mean is turned back.
-fn side_at(pixel: u32, weight: f32) -> f32 {
-    return select(1.0, -1.0, sum_at(pixel, SIDE_CHANNEL) > 0.5 * weight);
+// Whether the fragment belongs to the surface whose nearest depth is `front`.
+fn is_shown(fragment: Fragment, front: f32, radius: f32) -> bool {
+    let same_side = !SIDES || ((bitcast<u32>(fragment.depth) ^ bitcast<u32>(front)) & SIDE_BIT) == 0u;
+    return fragment.hit && same_side && fragment.depth <= farthest_accepted(front, radius);
+}
+
+// -1 where a back is seen.
+fn side_of(front: f32) -> f32 {
+    return select(1.0, -1.0, SIDES && (bitcast<u32>(front) & SIDE_BIT) != 0u);
 }

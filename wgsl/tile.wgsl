@@ -3,7 +3,7 @@
 // eight rows are drawn apart, each by the splats that reach them. The footprint, and so every bit, is that of visibility.wgsl
 // and accumulate.wgsl.
 // Host side: src/passes/tiles.rs.
-// All loops end, by 1, 3 of src/gpu/loops.rs: 0xdfc7b2ab965521e1
+// All loops end, by 1, 3 of src/gpu/loops.rs: 0x974179426f11ed56
 
 // The lists of the large splats.
 @group(0) @binding(27) var<storage, read> large_lists: array<u32>;
@@ -85,6 +85,9 @@ fn handed_splat(from_: u32) -> Splat {
     var splat: Splat;
     splat.anchor_x = bitcast<i32>(handed(bitcast<u32>(own_splat.anchor_x), from_));
     splat.anchor_y = bitcast<i32>(handed(bitcast<u32>(own_splat.anchor_y), from_));
+    if (SIDES) {
+        splat.bounds_last = handed(own_splat.bounds_last, from_);
+    }
     splat.a = handed_row(own_splat.a, from_);
     splat.b = handed_row(own_splat.b, from_);
     splat.c = handed_row(own_splat.c, from_);
@@ -103,12 +106,7 @@ fn handed_attributes(own: Attributes, from_: u32) -> Attributes {
             handed_number(c.z, from_),
             handed_number(c.w, from_),
         ),
-        vec4<f32>(
-            handed_number(n.x, from_),
-            handed_number(n.y, from_),
-            handed_number(n.z, from_),
-            handed_number(n.w, from_),
-        ),
+        vec3<f32>(handed_number(n.x, from_), handed_number(n.y, from_), handed_number(n.z, from_)),
         handed_number(own.radius, from_),
     );
 }
@@ -205,7 +203,7 @@ fn fronts_of(column: Column, k: u32) -> vec4<f32> {
 fn gather(slot: u32, splat: Splat, filter_: Filter, attributes: Attributes, front: f32, column: Column) {
     let fragment = footprint(splat, filter_, column.x, column.y + slot);
     // Selected, as a branch would select what is stored of each sum.
-    let accepted = fragment.hit && fragment.depth <= farthest_accepted(front, attributes.radius);
+    let accepted = is_shown(fragment, front, attributes.radius);
     let weight = select(Term(0), weight_of(fragment), accepted);
     blend_weighted(slot, weight, select(front, fragment.depth, accepted), front, attributes);
 }

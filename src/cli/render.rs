@@ -100,8 +100,9 @@ pub struct Arguments {
     /// Smallest depth drawn, world units [default: a millionth of the scene]
     #[arg(long)]
     near: Option<f64>,
-    /// Depth tolerance: rel:E (fraction of the depth), abs:E (world units) or radius:K (times the surfel's own)
-    #[arg(long, default_value = "rel:0.01")]
+    /// Depth tolerance: rel:E (fraction of the depth), abs:E (world units), radius:K (times the surfel's own shorter
+    /// half-axis), or radius:K,rel:E (the lesser of the two)
+    #[arg(long, default_value = "radius:1,rel:0.01")]
     epsilon: Epsilon,
     /// Blending kernel over the disk: gaussian[:SIGMA], ellipse:A,N[,smooth] (exp(-A rho^N)), hat or constant
     #[arg(long, default_value = "ellipse:6,3")]
@@ -113,7 +114,8 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value = "4", help_heading = "Surface")]
     samples: Samples,
     /// auto: surfels that face away from the eye are left out where the scene is a closed mesh seen from outside, as nobody
-    /// sees them but past its outline; back: they are left out of any scene whose normals have a side; none
+    /// sees them but past its outline; back: they are left out of any scene whose normals have a side; none: a pixel shows
+    /// the side that is nearest
     #[arg(long, value_name = "auto|none|back", default_value = "auto", help_heading = "Surface")]
     cull: Cull,
     /// How sums are kept on the device: fixed, fixed32, fixed64, packed64, float or cas (see the README)
@@ -343,5 +345,30 @@ fn backend(arguments: &Arguments) -> Result<Backend> {
             Ok(Backend::Reference)
         }
         Err(error) => Err(error),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Alone {
+        #[command(flatten)]
+        arguments: Arguments,
+    }
+
+    #[test]
+    fn what_nobody_asks_for_is_the_librarys_default_but_for_samples() {
+        let of = |given: &[&str]| {
+            let all = ["render", "in.ply", "-o", "out.exr"].iter().chain(given);
+            options(&Alone::try_parse_from(all).unwrap().arguments, Format::Exr).unwrap()
+        };
+        let samples: Samples = "4".parse().unwrap();
+        assert_eq!(of(&[]), RenderOptions { samples, ..RenderOptions::default() });
+        assert_ne!(of(&["--epsilon", "rel:0.01"]).epsilon, RenderOptions::default().epsilon);
     }
 }

@@ -13,7 +13,7 @@
 //! - **Normal**: s x t errs by 6 u |s||t|, its normalisation, mapping and normalising the mean by 12 u; the mean's error is
 //!   divided by the mean's length.
 //!
-//! A pixel is **open** if these bounds leave it undecided whether some fragment belongs to it: there f32 may rightly
+//! A pixel is **open** if these bounds leave it undecided whether some fragment belongs to it, or which side is nearest: there f32 may rightly
 //! decide otherwise, and the pixel is excused.
 
 use glam::{DVec2, DVec3, Vec3};
@@ -22,7 +22,8 @@ use super::precision::{E as U, Precision};
 use crate::passes::footprint::footprint;
 use crate::passes::project::reference_all;
 use crate::passes::splat::Splat;
-use crate::plan::{AccumulatorRow, RenderOptions};
+use crate::passes::visibility::Nearest;
+use crate::plan::{AccumulatorRow, Facts, RenderOptions, Sides};
 use crate::scene::{Camera, Clip, Kernel, LowPass, Scene};
 
 /// What a division may err by, relative: WGSL grants 2.5 units in the last place.
@@ -47,8 +48,6 @@ pub struct Pixel {
     color: [f64; 4],
     /// Sum of weight times normal, turned toward the viewer.
     normal: DVec3,
-    /// Sum of the weights of those that were turned.
-    turned: f64,
     /// Smallest and largest premultiplied colour.
     colors: [[f64; 4]; 2],
     /// Smallest and largest normal.
@@ -68,7 +67,6 @@ const NOTHING: Pixel = Pixel {
     normal_error: 0.0,
     color: [0.0; 4],
     normal: DVec3::ZERO,
-    turned: 0.0,
     colors: [[f64::INFINITY; 4], [f64::NEG_INFINITY; 4]],
     normals: [DVec3::INFINITY, DVec3::NEG_INFINITY],
     depths: [f64::INFINITY, f64::NEG_INFINITY],
@@ -122,9 +120,6 @@ impl Pixel {
         let spread = (self.normals[1] - self.normals[0]).length();
         let normal = spread * wrong_weights + self.normal_error / self.weight + 2.0 * sums + 6.0 * U;
         let normal_length = mean_normal.length() - normal;
-        // Which side is seen is decided by half of the weight.
-        let undecided = self.turned > 0.0
-            && (2.0 * self.turned - self.weight).abs() <= 3.0 * (self.weight_error + self.weight * (sums + 4.0 * U));
         let farthest = self.depths[1].abs();
         let depth = (self.depths[1] - self.depths[0]) * wrong_weights
             + self.depth_error / self.weight
@@ -134,7 +129,7 @@ impl Pixel {
             color,
             depth,
             // Where the mean is no longer than its error, it may point anywhere.
-            normal: if normal_length > 0.0 && !undecided { 2.0 * normal / normal_length + 6.0 * U } else { 2.0 },
+            normal: if normal_length > 0.0 { 2.0 * normal / normal_length + 6.0 * U } else { 2.0 },
             weight: self.weight_error + self.weight * (sums + 4.0 * U),
         }
     }
@@ -226,9 +221,11 @@ impl Fragment {
 fn fragments(
     splats: &[Splat],
     scene: &Scene,
-    camera: &Camera,
+    (camera, sides): (&Camera, Sides),
     mut visit: impl FnMut(usize, &Splat, &Surface, &Fragment),
 ) {
+    // A depth whose last bit tells the side is off by a unit in the last place.
+    let of_side = if sides == Sides::Nearest { 2.0 * U } else { 0.0 };
     // A disk seen exactly edge-on has no rows, and without a low-pass no fragment.
     let edge_on = |splat: &&Splat| splat.a.truncate() == DVec2::ZERO && splat.b == DVec3::ZERO;
     for splat in splats.iter().filter(|splat| !edge_on(splat)) {
@@ -242,7 +239,7 @@ fn fragments(
                 let rho = at.rho2.sqrt();
                 let fragment = Fragment {
                     depth: at.depth,
-                    depth_error: known(bound.depth * at.depth.abs()),
+                    depth_error: known((bound.depth + of_side) * at.depth.abs()),
                     rho,
                     rho_error: known(bound.rho),
                     inside: at.inside,
@@ -269,7 +266,6 @@ fn line_error(clip: &Clip, rho: f64, rho_error: f64) -> f64 {
 struct Surface {
     color: [f64; 4],
     normal: DVec3,
-    turned: bool,
     normal_error: f64,
     radius: f64,
 }
@@ -283,31 +279,64 @@ impl Surface {
         let skew = s.length() * t.length() / s.cross(t).length();
         Self {
             color: [r * a, g * a, b * a, a],
-            normal: if splat.away { -splat.normal } else { splat.normal },
-            turned: splat.away,
+            normal: splat.normal,
             normal_error: 6.0 * U * skew + 12.0 * U,
             radius: f64::from(surfel.shorter()),
         }
     }
 }
 
-/// The two smallest depths that the fragments of a pixel may have, and whose the first is.
+/// What is known of the nearest depth of a pixel.
 #[derive(Clone, Copy)]
-struct Nearest {
+struct Depths {
+    /// The two smallest depths that its fragments may have, and whose the first is.
     surfel: u32,
     first: f64,
     second: f64,
+    /// Of fronts and of backs, the smallest depth that one may have, and that one surely has.
+    sides: [[f64; 2]; 2],
+    /// What the twin finds.
+    found: Nearest,
 }
 
-impl Nearest {
-    const NOTHING: Self = Self { surfel: u32::MAX, first: f64::INFINITY, second: f64::INFINITY };
+impl Depths {
+    const NOTHING: Self = Self {
+        surfel: u32::MAX,
+        first: f64::INFINITY,
+        second: f64::INFINITY,
+        sides: [[f64::INFINITY; 2]; 2],
+        found: Nearest::NOTHING,
+    };
 
-    fn add(&mut self, surfel: u32, depth: f64) {
-        if depth < self.first {
-            *self = Self { surfel, first: depth, second: self.first };
-        } else {
-            self.second = self.second.min(depth);
+    fn add(&mut self, splat: &Splat, camera: &Camera, f: &Fragment) {
+        let [may, surely] = &mut self.sides[usize::from(splat.back)];
+        if f.may_hit(camera) {
+            let depth = (f.depth - f.depth_error).max(camera.near * (1.0 - U));
+            *may = may.min(depth);
+            if depth < self.first {
+                (self.surfel, self.first, self.second) = (splat.surfel, depth, self.first);
+            } else {
+                self.second = self.second.min(depth);
+            }
         }
+        if f.surely_hits(camera) {
+            *surely = surely.min(f.depth + f.depth_error);
+        }
+        if f.hits(camera) {
+            self.found = self.found.with(f.depth, splat.back);
+        }
+    }
+
+    /// No nearest depth is larger.
+    fn high(&self) -> f64 {
+        self.sides[0][1].min(self.sides[1][1])
+    }
+
+    /// Whether it is not known if a front or a back is nearest.
+    fn side_is_open(&self) -> bool {
+        let [front, back] = self.sides;
+        let nearer = |a: [f64; 2], b: [f64; 2]| a[1] * (1.0 + 4.0 * U) < b[0];
+        !nearer(front, back) && !nearer(back, front)
     }
 
     /// The smallest of the others: a fragment is not too far behind itself, however little its depth is known.
@@ -320,21 +349,9 @@ impl Nearest {
 pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Pixel> {
     let splats = reference_all(scene, camera, options);
     let (relative, absolute, of_radius) = options.epsilon.parts();
-    // The nearest depth lies between these.
-    let mut low = vec![Nearest::NOTHING; camera.pixels()];
-    let mut high = vec![f64::INFINITY; camera.pixels()];
-    let mut front = vec![f64::INFINITY; camera.pixels()];
-    fragments(&splats, scene, camera, |pixel, splat, _, f| {
-        if f.may_hit(camera) {
-            low[pixel].add(splat.surfel, (f.depth - f.depth_error).max(camera.near * (1.0 - U)));
-        }
-        if f.surely_hits(camera) {
-            high[pixel] = high[pixel].min(f.depth + f.depth_error);
-        }
-        if f.hits(camera) {
-            front[pixel] = front[pixel].min(f.depth);
-        }
-    });
+    let view = (camera, Sides::of(&Facts::of(scene), camera, options));
+    let mut depths = vec![Depths::NOTHING; camera.pixels()];
+    fragments(&splats, scene, view, |pixel, splat, _, f| depths[pixel].add(splat, camera, f));
     let deepest = f64::from(scene.largest_shorter()) * of_radius + absolute;
     let farthest = splats.iter().fold(0.0, |far: f64, splat| {
         let surfel = &scene.surfels[splat.surfel as usize];
@@ -343,14 +360,15 @@ pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Pi
     });
     let farthest = (farthest + f64::from(scene.largest_radius())) * 1.001;
     let mut pixels = vec![NOTHING; camera.pixels()];
-    fragments(&splats, scene, camera, |pixel, splat, surface, f| {
-        let back = |front: f64| options.epsilon.farthest(front, surface.radius);
+    fragments(&splats, scene, view, |pixel, splat, surface, f| {
+        let behind = |front: f64| options.epsilon.farthest(front, surface.radius);
         let rounding = 4.0 * U * f.depth.abs();
-        let may = f.may_hit(camera) && f.depth - f.depth_error - rounding <= back(high[pixel]);
-        let must = f.surely_hits(camera) && f.depth + f.depth_error + rounding <= back(low[pixel].beside(splat.surfel));
-        let hits = f.hits(camera) && f.depth <= back(front[pixel]);
+        let (near, front) = (&depths[pixel], depths[pixel].found);
+        let may = f.may_hit(camera) && f.depth - f.depth_error - rounding <= behind(near.high());
+        let must = f.surely_hits(camera) && f.depth + f.depth_error + rounding <= behind(near.beside(splat.surfel));
+        let hits = f.hits(camera) && front.shows(splat, f.depth, behind(front.depth));
         let known = &mut pixels[pixel];
-        known.open |= may != must;
+        known.open |= may && near.side_is_open() || splat.back == front.back && may != must;
         if !hits {
             return;
         }
@@ -361,7 +379,6 @@ pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Pi
         known.depth_error += weight * f.depth_error;
         known.normal_error += weight * surface.normal_error;
         known.normal += weight * surface.normal;
-        known.turned += if surface.turned { weight } else { 0.0 };
         known.normals = [known.normals[0].min(surface.normal), known.normals[1].max(surface.normal)];
         known.depths = [known.depths[0].min(f.depth), known.depths[1].max(f.depth)];
         for (k, value) in surface.color.into_iter().enumerate() {
@@ -369,7 +386,7 @@ pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Pi
             known.colors[0][k] = known.colors[0][k].min(value);
             known.colors[1][k] = known.colors[1][k].max(value);
         }
-        let near = front[pixel];
+        let near = front.depth;
         known.interval = (near * relative + deepest.min(near * options.epsilon.most())).min(farthest - near).max(0.0);
     });
     pixels

@@ -1,4 +1,4 @@
-//! Hard outlines: disks that end at lines in their planes, and pixels of many samples.
+//! Hard outlines: disks that end at lines in their planes, surfaces of two sides, and pixels of many samples.
 
 use std::f64::consts::{PI, TAU};
 
@@ -53,6 +53,15 @@ const LIST: &[Entry] = &[
         size: (64, 48),
         stage: Stage::askew,
         fill: halves,
+        projections: BOTH,
+    },
+    Entry {
+        name: "fronts and backs that cross",
+        about: "Two sheets of opposite sides that pass through each other aslant, all within epsilon: each pixel shows the nearer side.",
+        bound: "which side is nearest, known but for the depths' bounds and one unit in their last place",
+        size: (64, 48),
+        stage: Stage::askew,
+        fill: sides_that_cross,
         projections: BOTH,
     },
     Entry {
@@ -160,6 +169,16 @@ fn halves(stage: &Stage) -> Filling {
         }
     }
     Filling { clips, excused: 0.02, ..Filling::of(surfels, (0.6, 1.0)).with_lone_rims() }
+}
+
+fn sides_that_cross(stage: &Stage) -> Filling {
+    let mut surfels = stage.sheet(5.0, 0.2, |x, y| 3.0 + 0.01 * (x - 32.0) / 32.0 + 0.004 * (y - 24.0) / 24.0);
+    let fronts = surfels.len();
+    surfels.extend(stage.sheet(4.0, 0.2, |x, _| 3.0 - 0.01 * (x - 32.0) / 32.0));
+    for back in &mut surfels[fronts..] {
+        std::mem::swap(&mut back.s, &mut back.t);
+    }
+    Filling { excused: 0.02, ..Filling::of(surfels, (0.99, 1.0)).with_lone_rims() }
 }
 
 fn thin_parts(stage: &Stage) -> Filling {

@@ -1,4 +1,4 @@
-//! Stage 3: over the fragments within epsilon of the nearest depth, the sums of weight and of weight times attribute
+//! Stage 3: over the fragments within epsilon of the nearest depth, and on its side of the surface, the sums of weight and of weight times attribute
 //! (paper 000, Eq. 9 and 10).
 //!
 //! # Accumulators
@@ -32,6 +32,7 @@
 
 use super::footprint::footprint;
 use super::splat::{Intersection, Splat};
+use super::visibility::Nearest;
 use crate::gpu::layout::TILE;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
@@ -115,8 +116,8 @@ pub struct PixelSums {
     pub color: [f64; 4],
     /// Of the normal, turned toward the viewer: those of the front and the back of a thin part would cancel.
     pub normal: [f64; 3],
-    /// Of the weights of those that were turned.
-    pub turned: f64,
+    /// The side that is seen is the back.
+    pub back: bool,
     /// Of the depth.
     pub depth: f64,
     /// Of [`Textured::terms`](crate::scene::Textured::terms), places in a texture.
@@ -133,7 +134,7 @@ impl PixelSums {
         weight: 0.0,
         color: [0.0; 4],
         normal: [0.0; 3],
-        turned: 0.0,
+        back: false,
         depth: 0.0,
         place: [0.0; 4],
         count: 0,
@@ -151,7 +152,7 @@ pub fn reference<'a>(
     camera: &Camera,
     options: &RenderOptions,
     first_row: u32,
-    nearest: &[f64],
+    nearest: &[Nearest],
 ) -> Vec<PixelSums> {
     let width = camera.width as usize;
     let rows = (nearest.len() / width) as u32;
@@ -163,20 +164,23 @@ pub fn reference<'a>(
         let center = scene.origin + scene.center(splat.surfel as usize);
         let radius = f64::from(surfel.shorter());
         let times = f64::from(splat.copies);
-        let normal = if splat.away { -splat.normal } else { splat.normal };
         for y in splat.first[1].max(first_row)..=splat.last[1].min(first_row + rows - 1) {
             let row = (y - first_row) as usize * width;
             for x in splat.first[0]..=splat.last[0] {
                 let Some((at, gain)) = footprint(splat, camera, options.low_pass, x, y) else { continue };
                 let pixel = row + x as usize;
-                let back = options.epsilon.farthest(nearest[pixel], radius);
+                let front = nearest[pixel];
+                let behind = options.epsilon.farthest(front.depth, radius);
                 let sum = &mut sums[pixel];
                 if options.maps.has(Map::Decision) {
-                    sum.decision = sum.decision.min(decision(at, back, camera.near));
+                    // What shows the other side is out unless it is nearest.
+                    let behind = if splat.back == front.back { behind } else { front.depth };
+                    sum.decision = sum.decision.min(decision(at, behind, camera.near));
                 }
-                if !(at.hit(camera) && at.depth <= back) {
+                if !(at.hit(camera) && front.shows(splat, at.depth, behind)) {
                     continue;
                 }
+                sum.back = front.back;
                 let weight = times * (gain * options.kernel.weight(at.rho2)).max(LEAST_FILTERED_WEIGHT);
                 sum.weight += weight;
                 for (total, value) in sum.color.iter_mut().zip(color) {
@@ -190,10 +194,9 @@ pub fn reference<'a>(
                         *total += weight * value;
                     }
                 }
-                for (total, value) in sum.normal.iter_mut().zip(normal.to_array()) {
+                for (total, value) in sum.normal.iter_mut().zip(splat.normal.to_array()) {
                     *total += weight * value;
                 }
-                sum.turned += if splat.away { weight } else { 0.0 };
                 sum.depth += weight * at.depth;
                 sum.count += splat.copies;
             }
@@ -204,9 +207,9 @@ pub fn reference<'a>(
 
 /// The relative distance to the nearest decision that could turn the fragment's fate: it is in or out by rim, near
 /// depth and epsilon together, so a fragment that fails one of them clearly is not undecided by the others.
-fn decision(at: Intersection, back: f64, near: f64) -> f64 {
-    let behind = if back.is_finite() { back / at.depth - 1.0 } else { f64::INFINITY };
-    let margins = [1.0 - at.rho2.sqrt(), at.inside, at.depth / near - 1.0, behind];
+fn decision(at: Intersection, behind: f64, near: f64) -> f64 {
+    let before = if behind.is_finite() { behind / at.depth - 1.0 } else { f64::INFINITY };
+    let margins = [1.0 - at.rho2.sqrt(), at.inside, at.depth / near - 1.0, before];
     if margins.iter().any(|m| *m < -NEARBY) {
         f64::INFINITY
     } else {
@@ -260,7 +263,7 @@ mod tests {
     #[test]
     fn a_decision_is_near_only_if_nothing_else_decides() {
         let at = |rho: f64| Intersection { depth: 2.0, rho2: rho * rho, inside: 1.0 };
-        let of = |rho: f64, back: f64| decision(at(rho), back, 0.1);
+        let of = |rho: f64, behind: f64| decision(at(rho), behind, 0.1);
         // Just inside the rim, well inside the tolerance.
         assert!((of(1.0 - 1e-7, 2.2) - 1e-7).abs() < 1e-12);
         // At the rim, but far behind the tolerance: out either way.

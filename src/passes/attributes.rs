@@ -2,7 +2,7 @@
 //! terms to a pixel's sums and one that resolves them, or an absent one.
 
 use crate::plan::pass::Pass;
-use crate::plan::{ColorNeed, PixelLayout, RasterDepth, SurfelLayout, color_channels};
+use crate::plan::{ColorNeed, PixelLayout, RasterDepth, Sides, SurfelLayout, color_channels};
 use crate::scene::Map;
 
 /// The files and constants.
@@ -14,7 +14,6 @@ pub const PASS: Pass = Pass {
         let mut files = vec![
             pick(needs.normal, "normal.wgsl", "normal_absent.wgsl"),
             pick(needs.own_normals, "normal_own.wgsl", "normal_plane.wgsl"),
-            pick(needs.sides, "side.wgsl", "side_absent.wgsl"),
             pick(needs.maps.has(Map::Count), "count.wgsl", "count_absent.wgsl"),
             pick(needs.maps.has(Map::Depth), pick(whole, "depth_whole.wgsl", "depth.wgsl"), "depth_absent.wgsl"),
             pick(needs.color == ColorNeed::Textured, "texture.wgsl", "texture_absent.wgsl"),
@@ -39,8 +38,8 @@ pub const PASS: Pass = Pass {
             ("CLIP_WORD", surfel.clip.into()),
             ("NORMAL_WORD", surfel.normal.into()),
             ("COLOR_CHANNELS", color_channels(making.needs).into()),
+            ("TURNS", u32::from(making.needs.sides != Sides::Both).into()),
             ("NORMAL_CHANNEL", layout.normal_channel.into()),
-            ("SIDE_CHANNEL", layout.side_channel.into()),
             ("DEPTH_CHANNEL", layout.depth_channel.into()),
             ("COUNT_CHANNEL", layout.count_channel.into()),
             ("PLACE_CHANNEL", layout.place_channel.into()),

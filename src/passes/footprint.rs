@@ -2,6 +2,7 @@
 
 use super::lowpass::filtered;
 use super::splat::{Intersection, Splat};
+use crate::plan::Sides;
 use crate::plan::pass::Pass;
 use crate::scene::{Camera, Kernel, KernelShape, LowPass, Projection};
 
@@ -15,6 +16,7 @@ pub const PASS: Pass = Pass {
                 Projection::Orthographic => "camera_orthographic.wgsl",
             },
             "footprint.wgsl",
+            "side.wgsl",
             "blend.wgsl",
             if needs.epsilon_radius { "epsilon_radius.wgsl" } else { "epsilon.wgsl" },
             match needs.kernel {
@@ -26,13 +28,17 @@ pub const PASS: Pass = Pass {
         ]
     },
     kernels: |_| Vec::new(),
-    constants: |making| match making.options.kernel {
-        Kernel::Gaussian { sigma } => vec![("KERNEL_FALL", 0.5 / (sigma * sigma))],
-        Kernel::Ellipse { a, n, smooth } => {
-            let step = if smooth { (-a).exp() } else { 0.0 };
-            vec![("KERNEL_A", a), ("KERNEL_N", n), ("KERNEL_STEP", step)]
-        }
-        Kernel::Hat | Kernel::Constant => Vec::new(),
+    constants: |making| {
+        let mut constants = vec![("SIDES", u32::from(making.needs.sides == Sides::Nearest).into())];
+        constants.extend(match making.options.kernel {
+            Kernel::Gaussian { sigma } => vec![("KERNEL_FALL", 0.5 / (sigma * sigma))],
+            Kernel::Ellipse { a, n, smooth } => {
+                let step = if smooth { (-a).exp() } else { 0.0 };
+                vec![("KERNEL_A", a), ("KERNEL_N", n), ("KERNEL_STEP", step)]
+            }
+            Kernel::Hat | Kernel::Constant => Vec::new(),
+        });
+        constants
     },
 };
 

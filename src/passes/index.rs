@@ -5,6 +5,7 @@
 //! Two sweeps over the fragments keep the greatest weight, then the first of those that have it, in the map's own words of the image.
 
 use super::footprint::footprint;
+use super::visibility::Nearest;
 use super::{MapPass, Strip};
 use crate::frame::Frame;
 use crate::gpu::layout::TILE;
@@ -59,7 +60,7 @@ fn finish(words: &mut [f32], provenance: &Provenance, order: &[u32]) {
 }
 
 /// The twin.
-fn reference(strip: &Strip<'_>, nearest: &[f64], frame: &mut Frame) {
+fn reference(strip: &Strip<'_>, nearest: &[Nearest], frame: &mut Frame) {
     let Strip { scene, camera, options, first_row, rows, .. } = *strip;
     let (Some(ranks), Some(map)) = (strip.ranks, frame.map_mut(Map::Index)) else { return };
     let mut strongest = vec![(0.0, NOTHING, NOTHING); nearest.len()];
@@ -70,7 +71,8 @@ fn reference(strip: &Strip<'_>, nearest: &[f64], frame: &mut Frame) {
             for x in splat.first[0]..=splat.last[0] {
                 let pixel = ((y - first_row) * camera.width + x) as usize;
                 let Some((at, gain)) = footprint(splat, camera, options.low_pass, x, y) else { continue };
-                if !at.hit(camera) || at.depth > options.epsilon.farthest(nearest[pixel], radius) {
+                let front = nearest[pixel];
+                if !at.hit(camera) || !front.shows(splat, at.depth, options.epsilon.farthest(front.depth, radius)) {
                     continue;
                 }
                 let weight = (gain * options.kernel.weight(at.rho2)).max(LEAST_FILTERED_WEIGHT);

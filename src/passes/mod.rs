@@ -73,8 +73,8 @@ pub struct MapPass {
     pub runs: fn(&Plan, usize) -> Stage,
     /// What the host makes of a pixel's words, of the numbers of the surfels in the order in which they are stored.
     pub finish: fn(&mut [f32], &Provenance, &[u32]),
-    /// The twin, of nearest depths.
-    pub reference: fn(&Strip<'_>, &[f64], &mut Frame),
+    /// The twin, of what is nearest.
+    pub reference: fn(&Strip<'_>, &[visibility::Nearest], &mut Frame),
 }
 
 /// Those maps.

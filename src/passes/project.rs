@@ -12,9 +12,9 @@ use super::splat::Splat;
 use crate::gpu::layout::QUEUE_START;
 use crate::plan::pass::{Making, Pass};
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
-use crate::plan::{Facts, RenderOptions, culls_back};
+use crate::plan::{Facts, RenderOptions, Sides, culls_back};
 use crate::plan::{Organisation, Plan, tuning};
-use crate::scene::{Camera, Clip, Cull, LowPass, Scene, Surfel, copies, has_copies};
+use crate::scene::{Camera, Clip, LowPass, Scene, Surfel, copies, has_copies};
 
 /// The twin of `wgsl/project.wgsl` for one surfel, whose centre is at `relative` (world units) from the camera's eye; `None` if no
 /// pixel can be touched.
@@ -77,6 +77,7 @@ pub(super) fn projected(
         b: projected.b,
         c: projected.c,
         away: projected.away,
+        back: false,
         normal,
         filter,
         clip: Clip::NONE,
@@ -90,17 +91,23 @@ pub fn reference_all(scene: &Scene, camera: &Camera, options: &RenderOptions) ->
     let design = Design::of(options);
     let surfels = scene.surfels.par_iter().enumerate();
     let eye = camera.eye - scene.origin;
-    let cull_back = options.cull != Cull::None && culls_back(&Facts::of(scene), camera, options);
+    let facts = Facts::of(scene);
+    let (cull_back, sides) = (culls_back(&facts, camera, options), Sides::of(&facts, camera, options));
     let copies = (has_copies(scene) && options.draws_copies_once()).then(|| copies(scene));
     let project = |(index, surfel): (usize, &Surfel)| {
         let copies = copies.as_ref().map_or(1, |copies| copies[index]);
         let splat = || reference((index as u32, surfel), scene.center(index) - eye, camera, &design);
         let splat = (copies > 0).then(splat).flatten().filter(|splat| !(cull_back && splat.away));
-        let own = |splat: Splat| Splat {
-            copies,
-            clip: scene.clips.get(index).copied().unwrap_or_default(),
-            normal: scene.normals.get(index).map_or(splat.normal, |normal| Vec3::from_array(*normal).as_dvec3()),
-            ..splat
+        let own = |splat: Splat| {
+            let given = scene.normals.get(index).map(|normal| Vec3::from_array(*normal).as_dvec3());
+            let normal = given.unwrap_or(splat.normal);
+            Splat {
+                copies,
+                clip: scene.clips.get(index).copied().unwrap_or_default(),
+                back: splat.away && sides == Sides::Nearest,
+                normal: if splat.away && sides != Sides::Both { -normal } else { normal },
+                ..splat
+            }
         };
         splat.map(own)
     };

@@ -7,7 +7,7 @@
 //!
 //! - **exact**: fragments write their own depth, scaled by a power of two, and the attribute pass compares in the shader.
 //!   It accepts the very fragments that compute accepts.
-//! - **offset**, **ray**: the quads lie in the disks' planes, the rasteriser interpolates and compares. Depths err by its
+//! - **offset**, **ray**: both sides of a surface are blended, and normals as they are given, as in the papers. The quads lie in the disks' planes, the rasteriser interpolates and compares. Depths err by its
 //!   interpolation (a fragment within about 2^-20 of epsilon may be decided otherwise), absolute tolerances are applied at
 //!   the quads' corners, and a plane that passes the eye within its quad is bent. OpenGL has no such depths: it takes them
 //!   from -1 to 1, of which those far from the eye, all near the end that is 0 elsewhere, keep no digits.

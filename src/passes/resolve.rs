@@ -34,8 +34,8 @@ pub fn reference(
             let alpha = mean[3];
             let straight = DVec3::new(mean[0], mean[1], mean[2]) / if alpha > 0.0 { alpha } else { f64::INFINITY };
             normal = unit_or_zero(DVec3::from_array(sum.normal) / sum.weight);
-            // Given normals keep their side where mostly one is seen.
-            if scene.oriented && 2.0 * sum.turned > sum.weight {
+            // Each was turned toward the viewer.
+            if sum.back {
                 normal = -normal;
             }
             let shaded = shade(straight, normal, camera, options, DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5));
@@ -51,13 +51,8 @@ pub fn reference(
         set(Map::Normal, &normal.to_array());
         set(Map::Weight, &[sum.weight]);
         set(Map::Count, &[f64::from(sum.count)]);
-        set(Map::Decision, &[sum.decision.min(side_decision(sum, scene))]);
+        set(Map::Decision, &[sum.decision]);
     }
-}
-
-/// How near the weight that was turned is to half of all, where that decides the normal's side.
-fn side_decision(sum: &PixelSums, scene: &Scene) -> f64 {
-    if scene.oriented && sum.turned > 0.0 { (2.0 * sum.turned / sum.weight - 1.0).abs() } else { f64::INFINITY }
 }
 
 /// The normalised mean; 0 where opposite normals cancel.

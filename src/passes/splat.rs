@@ -23,7 +23,9 @@ pub struct Splat {
     pub c: DVec3,
     /// The normal points away from the viewer.
     pub away: bool,
-    /// World space, unit, as light sees the surfel.
+    /// It is a back in a view in which pixels show one side of a surface ([`Sides::Nearest`](crate::plan::Sides)).
+    pub back: bool,
+    /// World space, unit, as light sees the surfel: turned toward the viewer unless the view blends both sides as they are.
     pub normal: DVec3,
     /// The low-pass, if there is one.
     pub filter: Option<Filter>,

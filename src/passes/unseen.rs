@@ -6,7 +6,7 @@ use super::lowpass::Design;
 use super::project::{Missed, projected};
 use crate::frame::Frame;
 use crate::plan::{Facts, RenderOptions, culls_back};
-use crate::scene::{Camera, Cull, Scene, Surfel};
+use crate::scene::{Camera, Scene, Surfel};
 
 /// The surfels of a scene in a view that shows none of them, by the reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -28,7 +28,7 @@ impl Unseen {
     pub fn of(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Self {
         let eye = camera.eye - scene.origin;
         let design = Design::of(options);
-        let cull_back = options.cull != Cull::None && culls_back(&Facts::of(scene), camera, options);
+        let cull_back = culls_back(&Facts::of(scene), camera, options);
         let look = |(index, surfel): (usize, &Surfel)| {
             let seen = projected((0, surfel), scene.center(index) - eye, camera, &design);
             let reasons = [Some(Missed::Behind), Some(Missed::Outside), Some(Missed::Between), None];

@@ -3,7 +3,8 @@
 //!
 //! On the device depths are positive f32, whose bits order as u32: an atomic min. They are kept as what they lack to +inf, so
 //! that it is an atomic max over a buffer of zeros. What is then farthest in each tile of
-//! pixels lets the next pass leave out splats that are hidden altogether.
+//! pixels lets the next pass leave out splats that are hidden altogether. Where surfels have sides and both may be seen, the last bit of
+//! a depth says on which it is (side.wgsl).
 
 use super::covered;
 use super::footprint::footprint;
@@ -14,22 +15,48 @@ use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
 use crate::plan::{Band, Optimisation, Plan};
 use crate::scene::{Camera, LowPass};
 
-/// The twin: nearest depths of the rows `first_row..first_row + rows`, +inf where nothing is.
+/// What is nearest at a pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Nearest {
+    /// Camera-space z, world units; +inf where nothing is.
+    pub depth: f64,
+    /// It is the back of a surface that has sides ([`Splat::back`]); of a front and a back at one depth the front is nearest.
+    pub back: bool,
+}
+
+impl Nearest {
+    /// Nothing is.
+    pub const NOTHING: Self = Self { depth: f64::INFINITY, back: false };
+
+    /// With a fragment.
+    pub fn with(self, depth: f64, back: bool) -> Self {
+        let nearer = depth < self.depth || (depth == self.depth && !back);
+        if nearer { Self { depth, back } } else { self }
+    }
+
+    /// Whether a fragment of `splat` at `depth` belongs to this surface: it lies no farther than the tolerance `behind` and shows the
+    /// same side.
+    pub fn shows(self, splat: &Splat, depth: f64, behind: f64) -> bool {
+        depth <= behind && splat.back == self.back
+    }
+}
+
+/// The twin: what is nearest in the rows `first_row..first_row + rows`.
 pub fn reference<'a>(
     splats: impl Iterator<Item = &'a Splat>,
     camera: &Camera,
     low_pass: LowPass,
     first_row: u32,
     rows: u32,
-) -> Vec<f64> {
-    let mut nearest = vec![f64::INFINITY; camera.width as usize * rows as usize];
+) -> Vec<Nearest> {
+    let mut nearest = vec![Nearest::NOTHING; camera.width as usize * rows as usize];
     for splat in splats {
         for y in splat.first[1].max(first_row)..=splat.last[1].min(first_row + rows - 1) {
             let row = (y - first_row) as usize * camera.width as usize;
             for x in splat.first[0]..=splat.last[0] {
                 if let Some((hit, _)) = footprint(splat, camera, low_pass, x, y).filter(|(i, _)| i.hit(camera)) {
                     let pixel = &mut nearest[row + x as usize];
-                    *pixel = pixel.min(hit.depth);
+                    *pixel = pixel.with(hit.depth, splat.back);
                 }
             }
         }

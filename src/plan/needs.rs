@@ -2,7 +2,7 @@
 
 use super::{Accumulator, ColorNeed, Facts, Optimisation, Organisation, Raster, RasterDepth, RenderOptions, tuning};
 use crate::gpu::adapter::AdapterDescription;
-use crate::scene::{Camera, Cull, Epsilon, KernelShape, Light, LowPass, Map, Maps, Projection, Samples, Shading};
+use crate::scene::{Camera, Cull, Epsilon, KernelShape, LowPass, Map, Maps, Projection, Samples, Shading};
 
 /// What exists in this render: it chooses the WGSL files that are joined, and so the bindings, buffers and sums.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -48,8 +48,8 @@ pub struct SceneNeeds {
     pub alpha: bool,
     /// Normals are accumulated: pixels are lit, or a normal map is written.
     pub normal: bool,
-    /// Which side of a surface is seen is summed too: normals have a consistent one, which a map or a directional light tells.
-    pub sides: bool,
+    /// What is seen of surfels whose normals have a side.
+    pub sides: Sides,
     /// Normals are summed that are others than those of the disks' planes.
     pub own_normals: bool,
     /// Surfels that face away are left out.
@@ -86,9 +86,27 @@ pub fn culls_back(facts: &Facts, camera: &Camera, options: &RenderOptions) -> bo
     }
 }
 
-/// Whether a light tells the two sides of a surface apart.
-fn sided(options: &RenderOptions) -> bool {
-    options.lights.iter().any(|light| matches!(light, Light::Directional { .. }))
+/// What is seen of surfels whose normals have a side.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Sides {
+    /// None has one, or all that are drawn face the viewer.
+    None,
+    /// A pixel shows one side: that of its nearest fragment. At outlines and in thin parts the back lies within epsilon of the front.
+    Nearest,
+    /// Both, and normals are blended as they are given: the rasteriser's own depth test does not say what is nearest.
+    Both,
+}
+
+impl Sides {
+    /// Those in a picture.
+    pub fn of(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Self {
+        let tells_nearest = options.raster.is_none_or(|raster| raster.depth == RasterDepth::Exact);
+        match facts.oriented && !culls_back(facts, camera, options) {
+            true if tells_nearest => Self::Nearest,
+            true => Self::Both,
+            false => Self::None,
+        }
+    }
 }
 
 impl SceneNeeds {
@@ -117,7 +135,7 @@ impl SceneNeeds {
             color: facts.colors,
             alpha: low[3] != high[3],
             normal: lit || options.maps.has(Map::Normal),
-            sides: facts.oriented && (options.maps.has(Map::Normal) || lit && sided(options)),
+            sides: Sides::of(facts, camera, options),
             own_normals: facts.own_normals && (lit || options.maps.has(Map::Normal)),
             cull_back: culls_back(facts, camera, options),
             clips: facts.clips,
@@ -181,7 +199,7 @@ impl SceneNeeds {
             (self.epsilon_radius, "epsilon-radius"),
             (self.alpha, "alpha"),
             (self.normal, "normal"),
-            (self.sides, "sides"),
+            (self.sides == Sides::Nearest, "sides"),
             (self.own_normals, "own-normals"),
             (self.cull_back, "cull-back"),
             (self.clips, "clips"),

@@ -10,8 +10,6 @@ pub struct PixelLayout {
     pub channels: u32,
     /// The first of the normal's three channels.
     pub normal_channel: u32,
-    /// That of the side that is seen, which follows them.
-    pub side_channel: u32,
     /// The depth's channel.
     pub depth_channel: u32,
     /// The fragment count's channel.
@@ -36,8 +34,7 @@ impl PixelLayout {
         let channels = |needed: bool, count: u32| if needed { count } else { 0 };
         // The normal's x and y are a pair, and pairs start at even channels.
         let normal_channel = (COLOR_CHANNEL + color_channels(needs)).next_multiple_of(2);
-        let side_channel = normal_channel + channels(needs.normal, 3);
-        let depth_channel = side_channel + channels(needs.sides, 1);
+        let depth_channel = normal_channel + channels(needs.normal, 3);
         let count_channel = depth_channel + channels(needs.maps.has(Map::Depth), 1);
         let place_channel = (count_channel + channels(needs.maps.has(Map::Count), 1)).next_multiple_of(2);
         let mut image_words = COLOR_WORDS;
@@ -49,7 +46,6 @@ impl PixelLayout {
         Self {
             channels: place_channel + channels(needs.color == ColorNeed::Textured, 4),
             normal_channel,
-            side_channel,
             depth_channel,
             count_channel,
             place_channel,

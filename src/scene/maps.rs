@@ -11,7 +11,7 @@ pub enum Map {
     /// Camera-space z, world units; +inf where nothing is.
     Depth,
     /// Unit normal in world space; 0 where nothing is. Normals that were estimated have no side of their own and are
-    /// turned toward the viewer; given ones stay as they are.
+    /// turned toward the viewer; given ones stay as they are, and those of the pixel's side alone are blended ([`Sides`](crate::plan::Sides)).
     Normal,
     /// The sum of weights; 0 where nothing is.
     Weight,

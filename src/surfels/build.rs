@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::estimate::{self, Estimate, Estimates};
 use super::gather::{self, Gathered};
+use super::orient::opposed;
 use super::outliers::drop_outliers;
 use super::positions::DistinctPositions;
 use super::{
@@ -126,7 +127,7 @@ fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Progress) -> Re
     let relative = |index: usize| DVec3::from_array(gathered.points.positions[index]) - origin;
     let low = low_parts(&surfels, relative);
     preparation.rounding = rounding(&surfels, &low, relative);
-    let oriented = preparation.estimated_normals == 0;
+    let oriented = preparation.estimated_normals == 0 && !preparation.has_random_sides();
     let normals = own_normals(&given, &surfels);
     let Gathered { points: Points { colors, closed, clips, texture, .. }, provenance, .. } = gathered;
     let (colors, closed) = (colors::folded(colors), closed && oriented);
@@ -210,13 +211,16 @@ fn estimated(
         }
         wanted
     });
-    let Estimates { of_position, median_spacing, limited } =
+    let Estimates { of_position, median_spacing, limited, graph } =
         estimate::estimate(distinct, wanted.as_deref(), (up, largest_ratio), progress);
     preparation.distinct_positions = Some(distinct.len() as u64);
     preparation.median_spacing = median_spacing;
     let smaller = |(i, &position): (usize, &u32)| limited[position as usize] && given.lacks_radius(i);
     preparation.limited_by_neighbours =
         distinct.of_point().par_iter().enumerate().filter(|point| smaller(*point)).count() as u64;
+    if preparation.estimated_normals == 0 {
+        preparation.opposed_normals = opposed(distinct, &graph, |point| given.normal(point));
+    }
     of_position
 }
 

@@ -66,6 +66,8 @@ pub(crate) struct Estimates {
     pub median_spacing: Option<f64>,
     /// Of each position, whether its radius would have been larger.
     pub limited: Vec<bool>,
+    /// The neighbours of the wanted positions, the nearest first.
+    pub graph: NeighbourGraph,
 }
 
 /// Estimates a normal and a radius at each position where `wanted` says so (everywhere for None), from all positions.
@@ -93,7 +95,7 @@ pub(crate) fn estimate(
     progress.end();
     if distinct.len() < 2 {
         let limited = vec![false; distinct.len()];
-        return Estimates { of_position, median_spacing: None, limited };
+        return Estimates { of_position, median_spacing: None, limited, graph };
     }
     let radii: Vec<f64> = of_position.par_iter().map(|e| e.radius.into()).collect();
     let limits = local_limits(&graph, &radii, largest_ratio);
@@ -101,7 +103,7 @@ pub(crate) fn estimate(
     of_position.par_iter_mut().zip(limits).for_each(|(e, limit)| e.radius = e.radius.min(limit as f32));
     let spacings = of_position.par_iter().enumerate().filter(|(index, _)| wanted(*index));
     let median_spacing = median(&mut spacings.map(|(_, e)| e.spacing.into()).collect::<Vec<f64>>());
-    Estimates { of_position, median_spacing, limited }
+    Estimates { of_position, median_spacing, limited, graph }
 }
 
 fn estimate_at(distinct: &DistinctPositions, index: u32, neighbours: &[Neighbour], up: DVec3) -> Estimate {

@@ -107,6 +107,10 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
         ..gathered.preparation.clone()
     };
 
+    if preparation.estimated_normals == 0 {
+        let of_point = |point: usize| given.as_ref()?.get(point).copied()?.map(Vec3::from_array);
+        preparation.opposed_normals = orient::opposed(&distinct, &graph, of_point);
+    }
     progress.begin("fitting planes", 0);
     let mut normals = fit_normals(&distinct, &graph, up);
     progress.end();
@@ -133,9 +137,9 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
         None => of_point.par_iter().map(|&position| sizes.length(position) as f32).collect(),
     };
     progress.end();
-    let (axes, clips) = match preparation.estimated_normals {
-        0 => cut(&distinct, &graph, (&point_normals, &radii), axes),
-        _ => (axes, None),
+    let (axes, clips) = match preparation.estimated_normals == 0 && !preparation.has_random_sides() {
+        true => cut(&distinct, &graph, (&point_normals, &radii), axes),
+        false => (axes, None),
     };
     let Points { positions, colors, texture, .. } = gathered.points;
     let (normals, radii, up) = (Some(point_normals), Some(radii), Some(known_up));

@@ -1,6 +1,6 @@
 //! Which side of the surface a normal points to.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::forest::{Link, Membership, spanning_forest};
@@ -30,6 +30,27 @@ const NEAREST: usize = 6;
 
 /// Where a mean normal is at least this long, the surface is a sheet and not closed: half a sphere's is 0.5.
 const SHEET: f64 = 0.5;
+
+/// A neighbour lies beside a point, and not on another sheet, up to this sine of the angle with the point's plane.
+const BESIDE: f64 = 0.25;
+
+/// The points whose normal, a unit vector, faces the other way than that of the nearest point elsewhere, which lies beside it.
+pub(crate) fn opposed(
+    distinct: &DistinctPositions,
+    graph: &NeighbourGraph,
+    normal: impl Fn(usize) -> Option<Vec3> + Sync,
+) -> u64 {
+    let mut at_position = vec![0; distinct.len()];
+    distinct.of_point().iter().enumerate().for_each(|(point, position)| at_position[*position as usize] = point);
+    let faces_away = |(point, position): (usize, &u32)| {
+        let nearest = *graph.of(*position).first()?;
+        let offset = distinct.position(nearest) - distinct.position(*position);
+        let own = normal(point)?;
+        let beside = own.as_dvec3().dot(offset).abs() < BESIDE * offset.length();
+        Some(beside && own.dot(normal(at_position[nearest as usize])?) < 0.0)
+    };
+    distinct.of_point().par_iter().enumerate().filter(|point| faces_away(*point) == Some(true)).count() as u64
+}
 
 /// Signs `normals` (unit vectors, one for each position) so that neighbours agree and the surface faces outward. Gives the
 /// number of its connected parts, each of which is oriented on its own.

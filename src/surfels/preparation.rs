@@ -22,6 +22,9 @@ pub struct Preparation {
     pub surfels: u64,
     /// Surfels whose normal was missing, zero or not finite, and was estimated from neighbours.
     pub estimated_normals: u64,
+    /// Surfels whose given normal faces the other way than that of the nearest point beside them; counted where radii were estimated. If they
+    /// are more than a quarter, normals have no side ([`Scene::oriented`]): half of them would have, were sides random.
+    pub opposed_normals: u64,
     /// Surfels whose radius was missing, not positive or not finite, and was estimated from neighbours.
     pub estimated_radii: u64,
     /// Surfels whose colour was not finite and was replaced by [`DEFAULT_COLOR`](crate::scene::color::DEFAULT_COLOR).
@@ -47,6 +50,11 @@ pub struct Preparation {
 }
 
 impl Preparation {
+    /// Whether given normals face either way, as a fit of planes leaves them.
+    pub(crate) fn has_random_sides(&self) -> bool {
+        4 * self.opposed_normals > self.surfels
+    }
+
     /// What a user should hear of: a sentence for everything that was lost or replaced.
     pub fn notes(&self) -> Vec<String> {
         let counted = |count: u64, what: &str| (count > 0).then(|| format!("{count} points {what}"));
@@ -64,11 +72,15 @@ impl Preparation {
         let strays = counted(self.strays, "stray: they lie far away from all others, outside of the default view");
         let by_neighbours =
             counted(self.limited_by_neighbours, "would have had larger surfels than their neighbours allow");
+        let random = self.has_random_sides().then(|| {
+            let (opposed, all) = (self.opposed_normals, self.surfels);
+            format!("normals face either way: {opposed} of {all} are opposed to the nearest one's, so they have no side (epsplat surfels --estimate-normals gives them one)")
+        });
         let limited =
             counted(self.limited_radii, "had a radius of more than a million times the scene and became that large");
         let rounding = self.rounding.map(|error| {
             format!("the smallest surfels lie so far from others that their coordinates err by up to {error:.2e} world units")
         });
-        notes.into_iter().chain([strays, by_neighbours, limited, rounding]).flatten().collect()
+        notes.into_iter().chain([strays, by_neighbours, random, limited, rounding]).flatten().collect()
     }
 }

@@ -4,7 +4,7 @@
 
 use epsplat::passes::footprint::footprint;
 use epsplat::passes::splat::Splat;
-use epsplat::plan::RenderOptions;
+use epsplat::plan::{Facts, RenderOptions, Sides};
 use epsplat::scene::{Camera, Kernel, LowPass, Scene};
 
 use super::UNIT;
@@ -48,9 +48,18 @@ pub struct Pixel {
     pub depth: Interval,
     /// Largest relative error of the depth of one of its fragments.
     pub depth_error: f64,
+    /// Of fronts and of backs, the least depth that one may have and the greatest that the nearest surely has.
+    pub sides: [Interval; 2],
 }
 
 impl Pixel {
+    /// Whether its nearest fragment is a back, if that is known.
+    fn back(&self) -> Option<bool> {
+        let [front, back] = self.sides;
+        let nearer = |a: Interval, b: Interval| a.high < b.low;
+        if nearer(front, back) { Some(false) } else { nearer(back, front).then_some(true) }
+    }
+
     /// All its fragments are surely in or surely out.
     pub fn decided(&self) -> bool {
         self.count.0 == self.count.1
@@ -95,7 +104,11 @@ pub fn enclose(scene: &Scene, camera: &Camera, options: &RenderOptions, splats: 
         normal: [Interval::ZERO; 3],
         depth: Interval { low: f64::INFINITY, high: f64::NEG_INFINITY },
         depth_error: 0.0,
+        sides: [Interval { low: f64::INFINITY, high: f64::INFINITY }; 2],
     };
+    // A bit of a depth says which side it is of.
+    let sided = Sides::of(&Facts::of(scene), camera, options) == Sides::Nearest;
+    let of_side = if sided { 2.0 * E } else { 0.0 };
     let mut pixels = vec![blank; camera.pixels()];
     let mut candidates = Vec::new();
     let mut open = vec![false; splats.len()];
@@ -109,7 +122,7 @@ pub fn enclose(scene: &Scene, camera: &Camera, options: &RenderOptions, splats: 
                 let bound = precision.fragment(splat, x, y, &at);
                 let rho = at.rho2.sqrt();
                 let rho = Interval { low: (rho - bound.rho).max(0.0), high: rho + bound.rho };
-                let span = at.depth.abs() * bound.depth;
+                let span = at.depth.abs() * (bound.depth + of_side);
                 let depth = Interval { low: at.depth - span, high: at.depth + span };
                 let near = camera.near;
                 if rho.low > 1.0 || depth.high < near * (1.0 - 4.0 * E) || rho.low.is_nan() {
@@ -117,10 +130,18 @@ pub fn enclose(scene: &Scene, camera: &Camera, options: &RenderOptions, splats: 
                 }
                 let sure = rho.high <= 1.0 && depth.low >= near * (1.0 + 4.0 * E) && !open[index];
                 let pixel = y as usize * width as usize + x as usize;
-                let nearest = &mut pixels[pixel].nearest;
-                nearest.low = nearest.low.min(depth.low.max(near * (1.0 - 4.0 * E)));
+                let Pixel { nearest, sides, .. } = &mut pixels[pixel];
+                let least = depth.low.max(near * (1.0 - 4.0 * E));
+                nearest.low = nearest.low.min(least);
+                for (_, side) in
+                    sides.iter_mut().enumerate().filter(|(k, _)| open[index] || *k == usize::from(splat.back))
+                {
+                    side.low = side.low.min(least);
+                }
                 if sure {
                     nearest.high = nearest.high.min(depth.high);
+                    let side = &mut sides[usize::from(splat.back)];
+                    side.high = side.high.min(depth.high);
                 }
                 candidates.push(Candidate { pixel, depth, rho, sure, splat: index });
             }
@@ -150,8 +171,13 @@ fn accumulate(
         if candidate.depth.low > back(pixel.nearest.high) * (1.0 + rounding) {
             continue;
         }
+        let side = pixel.back();
+        if side.is_some_and(|back| back != splat.back) && !open[candidate.splat] {
+            continue;
+        }
         // What is nearest itself is accepted whatever its depth is.
-        let sure = candidate.sure && candidate.depth.high <= back(pixel.nearest.low) * (1.0 - rounding);
+        let sure =
+            candidate.sure && side.is_some() && candidate.depth.high <= back(pixel.nearest.low) * (1.0 - rounding);
         let weight_at = |rho: f64| options.kernel.weight(rho.min(1.0).powi(2));
         let error_at = |rho: f64| weight_error(options.kernel, rho.min(1.0));
         let (near_rim, near_center) = (candidate.rho.high, candidate.rho.low);
@@ -172,8 +198,7 @@ fn accumulate(
             let blur = if span > 0.0 { 2.0 * E * f64::from(low[k].abs().max(high[k].abs())) / span } else { 0.0 };
             add(&mut pixel.color[k], Interval { low: mapped - blur, high: mapped + blur }, 2.0);
         }
-        let turned = if splat.away { -splat.normal } else { splat.normal };
-        for (k, value) in turned.to_array().into_iter().enumerate() {
+        for (k, value) in splat.normal.to_array().into_iter().enumerate() {
             let size = if open[candidate.splat] && !scene.oriented { value.abs() } else { f64::NAN };
             let mapped = match size.is_nan() {
                 true => Interval { low: value * 0.5 + 0.5 - 4.0 * E, high: value * 0.5 + 0.5 + 4.0 * E },

@@ -17,7 +17,7 @@ use epsplat::gpu::Gpu;
 use epsplat::gpu::layout::{ONE, View};
 use epsplat::plan::{
     ACCUMULATORS, Accumulator, AccumulatorRow, BlendFormat, ColorNeed, Facts, Raster, RasterDepth, RenderOptions,
-    SceneNeeds, check,
+    SceneNeeds, Sides, check,
 };
 use epsplat::scene::{KernelShape, LowPass, Map, Maps, Projection, Samples, Shading};
 
@@ -114,12 +114,14 @@ pub fn all_needs() -> Vec<SceneNeeds> {
         let low_pass = [LowPass::None, LowPass::Max, LowPass::Ewa][step / 3 % 3];
         let raster = Some(Raster { format: BlendFormat::ALL[step / 7 % 3].0, depth: *depth });
         let triangles = step / 2 % 2 == 0;
+        let unknown = base.sides == Sides::Nearest && *depth != RasterDepth::Exact;
         all.push(SceneNeeds {
             raster,
             triangles,
             kernel,
             low_pass,
             epsilon_radius: step % 5 == 0,
+            sides: if unknown { Sides::Both } else { base.sides },
             cull: false,
             tiles: false,
             gather: false,
@@ -149,7 +151,7 @@ fn base_needs() -> Vec<SceneNeeds> {
             (true, false) => Shading::Phong,
         };
         for color in [ColorNeed::Constant, ColorNeed::Srgb8, ColorNeed::Linear, ColorNeed::Textured] {
-            if (sides && !normal) || (alpha && color == ColorNeed::Constant) {
+            if alpha && color == ColorNeed::Constant {
                 continue;
             }
             let projection = if bit(4) { Projection::Pinhole } else { Projection::Orthographic };
@@ -175,7 +177,7 @@ fn base_needs() -> Vec<SceneNeeds> {
                 color,
                 alpha,
                 normal,
-                sides,
+                sides: if sides && !mixed(27) { Sides::Nearest } else { Sides::None },
                 own_normals: normal && mixed(26),
                 clips: mixed(28),
                 cull_back: mixed(27),

@@ -56,7 +56,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     outputs::check(&arguments.inputs, [&arguments.output].into_iter().chain(&arguments.json))?;
     let bars = Bars::new();
     let inputs = arguments.reading.all(&arguments.inputs, &bars)?;
-    let (scene, preparation) = surfels::build(inputs, &bars).map_err(|error| named(error, &arguments.inputs))?;
+    let (scene, preparation) =
+        surfels::build_at_vertices(inputs, &bars).map_err(|error| named(error, &arguments.inputs))?;
     preparation.notes().iter().for_each(|line| note(line));
     if preparation.estimated_normals > 0 {
         note(&format!(

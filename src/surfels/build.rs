@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::estimate::{self, Estimate, Estimates};
 use super::gather::{self, Gathered};
+use super::mesh::By;
 use super::orient::opposed;
 use super::outliers::drop_outliers;
 use super::positions::DistinctPositions;
@@ -60,7 +61,7 @@ pub fn build_within(
     progress: &dyn Progress,
 ) -> Result<(Scene, Preparation)> {
     limits.check()?;
-    let inputs: Vec<Points> = inputs.into_iter().map(mesh::of_vertices).collect();
+    let inputs: Vec<Points> = inputs.into_iter().map(|input| mesh::of_mesh(input, By::Looks)).collect();
     let Some(texture) = texture else { return built(gather::gather(inputs)?, limits, progress).map(|(made, _)| made) };
     if inputs.iter().any(|input| input.texture.is_none() && !input.positions.is_empty()) {
         return Err(Error::Usage("a texture paints points that have texture coordinates, and some have none".into()));
@@ -74,6 +75,16 @@ pub fn build_within(
     let ((mut scene, preparation), places) = built(gathered, limits, progress)?;
     scene.colors = Colors::Textured(texture::painted(&scene, texture.into(), &places.unwrap_or_default(), progress)?);
     Ok((scene, preparation))
+}
+
+/// [`build`], where the surfels of a mesh are at its vertices however it looks, for what takes surfels as samples of a surface.
+///
+/// # Errors
+///
+/// Those of [`build`].
+pub fn build_at_vertices(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Preparation)> {
+    let inputs = inputs.into_iter().map(|input| mesh::of_mesh(input, By::Vertices)).collect();
+    built(gather::gather(inputs)?, &Limits::default(), progress).map(|(made, _)| made)
 }
 
 /// The scene, and the texture coordinates of its surfels.

@@ -31,7 +31,7 @@ mod texture;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-pub use self::build::{build, build_textured, build_within};
+pub use self::build::{build, build_at_vertices, build_textured, build_within};
 pub use self::coverage::{Coverage, coverage};
 pub use self::from_points::{FromPoints, Surfels, from_points};
 pub use self::limits::Limits;

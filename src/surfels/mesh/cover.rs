@@ -7,6 +7,7 @@ use glam::{DMat2, DVec2, DVec3};
 use super::fans::{Fan, MANY};
 use crate::io::triangles::covering_radius;
 use crate::scene::Clip;
+use crate::surfels::gather::is_usable;
 
 /// A triangle with an area.
 #[derive(Clone, Copy, Debug)]
@@ -17,7 +18,7 @@ pub(super) struct Facet {
     pub area: f64,
     /// At its corners, radians.
     pub angles: [f64; 3],
-    corners: [DVec3; 3],
+    pub corners: [DVec3; 3],
     /// The smallest radius with which disks at the corners cover it, world units.
     radius: f64,
     /// It is covered with less by ellipses of its own shape.
@@ -28,9 +29,13 @@ pub(super) struct Facet {
 const WORTH: f64 = 0.8;
 
 impl Facet {
-    /// The triangle of these vertices; none if it has no area or a coordinate is not finite.
+    /// The triangle of these vertices; none if it has no area or a vertex is nowhere that is drawn.
     pub fn of(positions: &[[f64; 3]], corners: [u32; 3]) -> Option<Self> {
-        let [a, b, c] = corners.map(|corner| DVec3::from(positions[corner as usize]));
+        let corners = corners.map(|corner| positions[corner as usize]);
+        if !corners.iter().all(is_usable) {
+            return None;
+        }
+        let [a, b, c] = corners.map(DVec3::from);
         let double = (b - a).cross(c - a);
         let radius = covering_radius(a, b, c)?;
         let normal = double.try_normalize()?;

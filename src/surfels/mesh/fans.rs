@@ -149,6 +149,11 @@ impl Around {
         }
     }
 
+    /// The sides of a triangle, each from its corner on, past which the surface does not go on.
+    pub fn ends(&self, triangle: u32) -> [bool; 3] {
+        self.beyond[triangle as usize].map(|beyond| beyond == Beyond::Edge)
+    }
+
     fn corner(&self, triangle: u32, vertex: u32, triangles: &[[u32; 3]]) -> Option<Corner> {
         let corners = triangles[triangle as usize];
         let place = corners.iter().position(|&corner| corner == vertex)?;

@@ -1,13 +1,16 @@
-//! Surfels of a mesh: disks at its vertices that cover its triangles and end where the surface does.
+//! Surfels of a mesh, which cover it and end where the surface does.
 //!
-//! The triangles around a vertex make a fan, or several where the surface has an edge or a border there ([`fans`]). Each fan has a
-//! surfel in its own plane, the least ellipse with which those of all corners cover the triangles ([`cover`]), cut along the fan's
-//! two sides ([`Clip`]): else disks would stand out past edges and borders by up to their radius.
+//! Where the mesh says nothing of its vertices but where they are, each triangle has a surfel, cut along its sides ([`triangles`]). Where
+//! vertices have colours or normals of their own, surfels at them blend those from one to the next: the triangles around a vertex make a
+//! fan, or several where the surface has an edge or a border there ([`fans`]). Each fan has a surfel in its own plane, the least ellipse
+//! with which those of all corners cover the triangles ([`cover`]), cut along the fan's two sides ([`Clip`]): else disks would stand out
+//! past edges and borders by up to their radius.
 
 mod cover;
 mod fans;
+mod triangles;
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec2};
 use rayon::prelude::*;
 
 use self::cover::{Ellipse, Facet};
@@ -26,22 +29,41 @@ pub(super) const MARGIN: f64 = 0.02;
 
 /// One surfel.
 struct Made {
-    vertex: u32,
+    /// The vertex, or the triangle.
+    of: u32,
+    center: DVec3,
     normal: DVec3,
     s: DVec3,
     t: DVec3,
     clip: Clip,
 }
 
-/// The vertices of a mesh that no triangle with an area names cover nothing, and the others have a surfel for each of their fans. A
-/// cloud, or one with a few triangles, stays as it is, and so does a mesh whose file says radii.
-pub(super) fn of_vertices(mut points: Points) -> Points {
+/// What the surfels of a mesh stand for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum By {
+    /// Its triangles where these are all there is to see, else its vertices.
+    Looks,
+    /// Its vertices.
+    Vertices,
+}
+
+/// The surfels of a mesh; the vertices that no triangle with an area names cover nothing. A cloud, or one with a few triangles, stays as
+/// it is, and so does a mesh whose file says radii.
+pub(super) fn of_mesh(mut points: Points, by: By) -> Points {
     let Some(faces) = points.faces.take().filter(|_| points.of_mesh) else { return points };
     let facets: Vec<Option<Facet>> = faces.triangles.par_iter().map(|t| Facet::of(&points.positions, *t)).collect();
     let around = Around::new(points.positions.len(), &faces.triangles, &facets);
-    let loose = around.loose();
-    if 2 * loose > points.positions.len() {
+    if 2 * around.loose() > points.positions.len() {
         return points;
+    }
+    points.loose = around.loose() as u64;
+    if by == By::Looks && triangles::are_plain(&points, &faces, &facets) {
+        let made = |(number, facet): (usize, &Option<Facet>)| {
+            let ends = around.ends(number as u32);
+            facet.as_ref().map(|facet| triangles::surfels(number as u32, facet, ends)).unwrap_or_default()
+        };
+        let all: Vec<Made> = facets.par_iter().enumerate().flat_map_iter(made).collect();
+        return of_triangles(points, &faces.triangles, &all);
     }
     let tolerance = TOLERANCE * crate::surfels::bounds(&points).extent().length();
     let made = |vertex: u32| {
@@ -53,7 +75,26 @@ pub(super) fn of_vertices(mut points: Points) -> Points {
         fans.into_iter().flat_map(of_fan).collect::<Vec<_>>()
     };
     let all: Vec<Made> = (0..points.positions.len() as u32).into_par_iter().flat_map_iter(made).collect();
-    let of: Vec<u32> = all.iter().map(|made| made.vertex).collect();
+    let vertices = all.iter().map(|made| made.of).collect();
+    shaped(taken(points, vertices), &all)
+}
+
+/// The surfels of triangles. Each has the number and the colour of its first corner, and the mean place in the texture.
+fn of_triangles(points: Points, triangles: &[[u32; 3]], all: &[Made]) -> Points {
+    let corners = |made: &Made| triangles[made.of as usize];
+    let place = |texture: &Vec<[f32; 2]>| {
+        let mean =
+            |made: &Made| corners(made).map(|corner| Vec2::from(texture[corner as usize])).iter().sum::<Vec2>() / 3.0;
+        all.iter().map(|made| mean(made).to_array()).collect()
+    };
+    let texture = points.texture.as_ref().map(place);
+    let first = all.iter().map(|made| corners(made)[0]).collect();
+    let positions = all.iter().map(|made| made.center.to_array()).collect();
+    shaped(Points { positions, texture, ..taken(points, first) }, all)
+}
+
+/// `points`, one for each surfel, in the surfels' shapes.
+fn shaped(points: Points, all: &[Made]) -> Points {
     let axes = |made: &Made| [made.s, made.t].map(|axis| axis.as_vec3().to_array());
     let radius = |made: &Made| made.s.length().max(made.t.length()) as f32;
     Points {
@@ -61,8 +102,7 @@ pub(super) fn of_vertices(mut points: Points) -> Points {
         radii: Some(all.iter().map(radius).collect()),
         axes: Some(all.iter().map(axes).collect()),
         clips: Some(all.iter().map(|made| made.clip).collect()),
-        loose: loose as u64,
-        ..taken(points, of)
+        ..points
     }
 }
 
@@ -86,7 +126,7 @@ fn surfels((vertex, normal): (u32, DVec3), fan: &Fan, positions: &[[f64; 3]], fa
         for (line, of_disk) in lines.iter().zip(&mut clip.0) {
             *of_disk = line.on_disk(major, minor, MARGIN * minor.length());
         }
-        Made { vertex, normal, s: world(major), t: world(minor), clip }
+        Made { of: vertex, center, normal, s: world(major), t: world(minor), clip }
     };
     cover::lines(fan, &corners, major.length()).into_iter().map(made).collect()
 }

@@ -1,0 +1,80 @@
+//! A surfel for each triangle, cut along its sides: where a mesh says nothing of its vertices but where they are, each triangle is as it
+//! is, and nothing is blended across its sides.
+//!
+//! A disk can end at two lines, and a triangle has three sides. The ellipse of a triangle's surfel is flat along the third, which it
+//! bounds as an arc: in the affine image that is equilateral, of side 1 and height h, its half-axes are [`LONGER`] along the side and
+//! `h / 2 / sqrt(1 - 1 / (4 LONGER^2))` across, about the middle of the height, so that it goes through the side's ends and 0.08 h past its
+//! middle. The arc lies where the surface goes on. A triangle with an edge or a border on every side is divided at its centroid.
+
+use glam::{DVec2, DVec3};
+
+use super::cover::Facet;
+use super::{MARGIN, Made};
+use crate::io::Points;
+use crate::io::points::Faces;
+use crate::scene::{Clip, Colors};
+
+/// The half-axis along the arc's side, in sides. Of 0.75, 1 and 1.5, over eight meshes of 512x512 with 8 samples, pictures are 46.4, 47.2
+/// and 47.4 dB from 16 rays a pixel, in 0.80, 1 and 1.18 of the time.
+const LONGER: f64 = 1.0;
+
+/// A corner's normal is its triangle's up to this cosine: 2 degrees.
+const OWN: f64 = 0.9994;
+
+/// Whether the triangles of a mesh look as their planes do: no corner names another normal, and each triangle has one colour.
+pub(super) fn are_plain(points: &Points, faces: &Faces, facets: &[Option<Facet>]) -> bool {
+    let colors = |[a, b, c]: [u32; 3]| match &points.colors {
+        Some(Colors::Srgb8(codes)) => codes[a as usize] == codes[b as usize] && codes[b as usize] == codes[c as usize],
+        Some(Colors::Linear(all)) => all[a as usize] == all[b as usize] && all[b as usize] == all[c as usize],
+        _ => true,
+    };
+    let own = |index: usize, facet: &Facet| {
+        let named = |normal: [f32; 3]| DVec3::from(normal.map(f64::from)).try_normalize();
+        let normals = faces.normals.as_ref().map_or([[0.0; 3]; 3], |normals| normals[index]);
+        normals.into_iter().filter_map(named).all(|normal| normal.dot(facet.normal) > OWN)
+    };
+    let plain = |(index, facet): (usize, &Option<Facet>)| {
+        facet.as_ref().is_none_or(|facet| own(index, facet) && colors(faces.triangles[index]))
+    };
+    facets.iter().enumerate().all(plain)
+}
+
+/// The surfels of the triangle `number`, of which the sides `ends` are edges or borders; a side goes from its corner to the next.
+pub(super) fn surfels(number: u32, facet: &Facet, ends: [bool; 3]) -> Vec<Made> {
+    let [a, b, c] = facet.corners;
+    let made = |corners: [DVec3; 3], ends: [bool; 3]| {
+        let side = |k: usize| corners[k].distance_squared(corners[(k + 1) % 3]);
+        let longest = |k: &usize, other: &usize| side(*k).total_cmp(&side(*other)).then(other.cmp(k));
+        let arc = (0..3).filter(|k| !ends[*k]).max_by(longest)?;
+        surfel(number, facet.normal, [arc, (arc + 1) % 3, (arc + 2) % 3].map(|k| corners[k]))
+    };
+    if ends != [true; 3] {
+        return made([a, b, c], ends).into_iter().collect();
+    }
+    let mean = (a + b + c) / 3.0;
+    [[a, b], [b, c], [c, a]].into_iter().filter_map(|[from, to]| made([from, to, mean], [true, false, false])).collect()
+}
+
+/// The surfel of a triangle whose first side is an arc, and the others lines.
+fn surfel(number: u32, normal: DVec3, [a, b, c]: [DVec3; 3]) -> Option<Made> {
+    // Conjugate half-axes: along the side, and from its middle to the corner across.
+    let middle = 0.5 * (a + b);
+    let across = 0.5 / (1.0 - 0.25 / (LONGER * LONGER)).sqrt();
+    let (p, q) = ((b - a) * LONGER * (1.0 + MARGIN), (c - middle) * across * (1.0 + MARGIN));
+    let center = middle.midpoint(c);
+    // Turned within the ellipse until they are perpendicular.
+    let (sin, cos) = (0.5 * (2.0 * p.dot(q)).atan2(p.length_squared() - q.length_squared())).sin_cos();
+    let [s, t] = [p * cos + q * sin, q * cos - p * sin];
+    let (x, y) = (s.try_normalize()?, t.try_normalize()?);
+    let in_plane = |point: DVec3| DVec2::new((point - center).dot(x), (point - center).dot(y));
+    let [a, b, c] = [a, b, c].map(in_plane);
+    // The corner between the lines moves out by no more than the margin.
+    let sharp = (0.5 * (a - c).angle_to(b - c)).sin().abs();
+    let margin = MARGIN * sharp * s.length().min(t.length());
+    let line = |from: DVec2, to: DVec2| {
+        let inward = (to - from).perp().try_normalize()?;
+        Some(Clip::line(inward, inward.dot(from) - margin, [DVec2::X * s.length(), DVec2::Y * t.length()]))
+    };
+    let clip = Clip([line(b, c)?, line(c, a)?]);
+    Some(Made { of: number, center, normal, s, t, clip })
+}

@@ -245,7 +245,7 @@ fn sound(positions: Vec<[f64; 3]>, size: Size) -> Surfels {
     let vector = |n: &[f32; 3]| DVec3::from_array(n.map(f64::from));
     assert!(normals.as_ref().unwrap().iter().all(|n| (vector(n).length() - 1.0).abs() < 1e-6), "{size:?}");
     assert!(radii.as_ref().unwrap().iter().all(|r| r.is_finite() && *r > 0.0), "{size:?} {radii:?}");
-    assert_eq!(axes.is_some(), size == Size::Ellipse);
+    assert_eq!(axes.is_some(), matches!(size, Size::Knn | Size::Ellipse));
     for (([s, t], normal), radius) in axes.iter().flatten().zip(normals.as_ref().unwrap()).zip(radii.as_ref().unwrap())
     {
         let [s, t] = [vector(s), vector(t)];
@@ -333,13 +333,14 @@ fn a_scene_of_points_has_the_same_limits() {
     let limited = scene(cloud(positions.clone()), Limits::default());
     let changed = radii(&free).iter().zip(radii(&limited)).filter(|(free, limited)| *free > limited).count() as u64;
     assert!(changed > 0 && changed < 100, "{changed}");
-    // That of the median of all holds in any case.
-    assert_eq!(limited.1.limited_by_neighbours, changed + free.1.limited_by_neighbours);
+    // That of the median of all holds in any case, and may hold for some of them too.
+    let counted = changed.max(free.1.limited_by_neighbours)..=changed + free.1.limited_by_neighbours;
+    assert!(counted.contains(&limited.1.limited_by_neighbours), "{counted:?}");
     assert!(limited.1.notes().iter().any(|note| note.contains("neighbours allow")), "{:?}", limited.1.notes());
     assert!(radii(&limited).iter().zip(radii(&free)).all(|(limited, free)| *limited <= free));
     // A point that is far off has no larger disk than those it sees.
     let typical = radii(&limited)[count / 2];
-    assert!(radii(&limited)[count + 40] <= 2.1 * typical, "{} {typical}", radii(&limited)[count + 40]);
+    assert!(radii(&limited)[count + 40] <= 3.1 * typical, "{} {typical}", radii(&limited)[count + 40]);
     // Given radii are no matter of it, however large; those of the others are limited as before.
     let mut given = vec![0.0; positions.len()];
     given[count + 40] = 7.5;

@@ -34,8 +34,8 @@ pub(super) struct LimitArguments {
     /// Drop points whose mean distance to 16 neighbours exceeds the mean of all by K standard deviations
     #[arg(long, value_name = "K")]
     outliers: Option<f64>,
-    /// No estimated radius above FACTOR times the median of the neighbours'; inf for no limit
-    #[arg(long, value_name = "FACTOR", default_value = "2")]
+    /// No estimated half-axis above FACTOR times the median of the neighbours'; inf for no limit
+    #[arg(long, value_name = "FACTOR", default_value = "3")]
     max_radius: f64,
 }
 

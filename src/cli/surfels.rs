@@ -26,8 +26,8 @@ pub struct Arguments {
     /// The file: .ply
     #[arg(short, long)]
     output: PathBuf,
-    /// knn: disks of the mean distance to 8 neighbours, larger where gaps are wider; ellipse: the ellipse that bounds 8 neighbours in the
-    /// tangent plane; bsp, bsp:circumsphere: disks from clusters of three points, by their mean edge or circumsphere
+    /// knn: the ellipse that holds what is nearer to a point than to its neighbours; ellipse: the one that bounds 8 neighbours in the tangent
+    /// plane; bsp, bsp:circumsphere: disks from clusters of three points, by their mean edge or circumsphere
     #[arg(long, default_value = "knn")]
     size: Size,
     /// Which side estimated normals point to: propagate from neighbour to neighbour, outward; X,Y,Z, toward the nearest

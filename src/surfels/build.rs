@@ -128,9 +128,15 @@ fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Progress) -> Re
         if let Some([s, t]) = given.axes(i) {
             return Surfel::ellipse(center, s, t);
         }
-        let normal = given.normal(i).unwrap_or_else(|| Vec3::from_array(estimate_of(i).normal));
-        let radius = given.radius(i).unwrap_or_else(|| estimate_of(i).radius);
-        Surfel::disk(center, normal, radius)
+        match (given.normal(i), given.radius(i)) {
+            (Some(normal), Some(radius)) => Surfel::disk(center, normal, radius),
+            (None, Some(radius)) => Surfel::disk(center, estimate_of(i).normal(), radius),
+            (Some(normal), None) => laid(center, estimate_of(i).axes, normal),
+            (None, None) => {
+                let [s, t] = estimate_of(i).axes.map(Vec3::from_array);
+                Surfel::ellipse(center, s, t)
+            }
+        }
     };
     let mut surfels: Vec<Surfel> = gathered.points.positions.par_iter().enumerate().map(surfel).collect();
     drop(estimated);
@@ -149,6 +155,15 @@ fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Progress) -> Re
     // As the default view sees it.
     preparation.strays = scene.framed().1;
     Ok(((scene, preparation), texture))
+}
+
+/// The ellipse of these half-axes, turned into the plane across a unit normal; its half-axes keep their lengths.
+fn laid(center: Vec3, axes: [[f32; 3]; 2], normal: Vec3) -> Surfel {
+    let [s, t] = axes.map(|axis| DVec3::from_array(axis.map(f64::from)));
+    let normal = normal.as_dvec3().normalize();
+    let along = s.reject_from_normalized(normal).try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());
+    let [s, t] = [along * s.length(), normal.cross(along) * t.length()];
+    Surfel::ellipse(center, s.as_vec3(), t.as_vec3())
 }
 
 /// A given normal that is turned by less from the half-axes' is theirs, radians.

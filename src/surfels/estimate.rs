@@ -1,14 +1,13 @@
 //! Normals and radii for points that come without.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::eigen::Symmetric3;
-use super::gaps::Cell;
 use super::graph::NeighbourGraph;
 use super::neighbours::Neighbour;
 use super::positions::DistinctPositions;
-use super::sizes::local_limits;
+use super::sizes::{RADIUS_NEIGHBOURS, cell_ellipse, local_limits};
 use crate::Progress;
 
 /// How many neighbours a plane is fitted to. Few follow edges and curvature, many average noise. Measured on spheres of
@@ -16,26 +15,6 @@ use crate::Progress;
 /// 0.1 spacings 4.6, 2.8, 2.0, 1.3; with 0.3 spacings 17, 9.2, 6.3, 4.0; 2,000 points without noise 1.8, 1.5, 1.4, 1.3.
 /// From 16 on more neighbours buy little that their wider rounding of edges does not cost.
 pub(crate) const NORMAL_NEIGHBOURS: usize = 16;
-
-/// How many neighbours a radius is the mean distance of: the first two rings of a square grid.
-pub(crate) const RADIUS_NEIGHBOURS: usize = 8;
-
-/// Disk radius for each unit of mean distance to [`RADIUS_NEIGHBOURS`] neighbours: 1.2 spacings on a square grid. Disks of it would
-/// leave 0.4 % of a random (Poisson) plane uncovered; wider gaps than it closes are measured one by one.
-const RADIUS_FACTOR: f64 = 1.0;
-
-/// A disk reaches past the farthest corner of its cell by this factor, as surfaces are not flat and normals not exact.
-const PAST_CORNER: f64 = 1.05;
-
-/// Where the cell ends that no neighbour bounds, in distances to the farthest neighbour: a corner beyond is of no gap that they know.
-const CELL_REACH: f64 = 1.5;
-
-/// For the sake of its cell, a disk becomes larger by at most this factor. At a ragged boundary corners lie outside of the surface.
-const LARGEST_FOR_CELL: f64 = 1.8;
-
-/// A radius is at most this many times the mean distance of its neighbours from their own centre. That distance is a
-/// point's own mean distance where points surround it, and stays small for an outlier that sees a far surface.
-const LARGEST_LOCAL_RATIO: f64 = 2.0;
 
 /// A radius is at most this many times the median of the estimated ones, so that sparse noise does not hide the scene.
 pub(crate) const LARGEST_MEDIAN_RATIO: f64 = 8.0;
@@ -49,12 +28,28 @@ pub(crate) const RADIUS_RANGE: (f64, f64) = (1e-18, 1e18);
 /// What the surroundings of a position suggest.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Estimate {
-    /// Unit normal, in the half-space of the up axis.
-    pub normal: [f32; 3],
-    /// Disk radius, world units, within [`RADIUS_RANGE`].
-    pub radius: f32,
+    /// Half-axes s, the longer one, and t, world units, of lengths within [`RADIUS_RANGE`]; s x t points into the half-space of up.
+    pub axes: [[f32; 3]; 2],
     /// Distance to the nearest neighbour, world units; zero where there is none.
     spacing: f32,
+}
+
+impl Estimate {
+    /// The unit normal, in the half-space of up.
+    pub fn normal(&self) -> Vec3 {
+        let [s, t] = self.axes.map(|axis| DVec3::from_array(axis.map(f64::from)));
+        s.cross(t).normalize_or(DVec3::Z).as_vec3()
+    }
+
+    /// The longer half-axis, world units.
+    fn radius(&self) -> f64 {
+        DVec3::from_array(self.axes[0].map(f64::from)).length()
+    }
+}
+
+/// `axis`, not longer than `limit`.
+fn at_most(axis: [f32; 3], limit: f64) -> [f32; 3] {
+    DVec3::from_array(axis.map(f64::from)).clamp_length_max(limit).as_vec3().to_array()
 }
 
 /// Estimates for a set of distinct positions.
@@ -64,18 +59,18 @@ pub(crate) struct Estimates {
     /// Median over the wanted positions of the distance to the nearest other position, world units; None if there is
     /// one position only.
     pub median_spacing: Option<f64>,
-    /// Of each position, whether its radius would have been larger.
+    /// Of each position, whether its disk would have been larger.
     pub limited: Vec<bool>,
     /// The neighbours of the wanted positions, the nearest first.
     pub graph: NeighbourGraph,
 }
 
-/// Estimates a normal and a radius at each position where `wanted` says so (everywhere for None), from all positions.
+/// Estimates the half-axes of a disk at each position where `wanted` says so (everywhere for None), from all positions.
 ///
 /// The normal is the direction of least variance of the position and its [`NORMAL_NEIGHBOURS`] nearest others (Hoppe et
 /// al. 1992), turned toward `up`: the renderer turns normals to the viewer, so the sign only has to be definite.
-/// The radius is that of [`fitted_radius`], and at most `largest_ratio` times the median of those of the neighbours that have one, as
-/// [`local_limits`] says.
+/// The half-axes are those of [`cell_ellipse`], and at most `largest_ratio` times the median of the longer ones of the neighbours that
+/// have some, as [`local_limits`] says.
 pub(crate) fn estimate(
     distinct: &DistinctPositions,
     wanted: Option<&[bool]>,
@@ -97,10 +92,10 @@ pub(crate) fn estimate(
         let limited = vec![false; distinct.len()];
         return Estimates { of_position, median_spacing: None, limited, graph };
     }
-    let radii: Vec<f64> = of_position.par_iter().map(|e| e.radius.into()).collect();
+    let radii: Vec<f64> = of_position.par_iter().map(Estimate::radius).collect();
     let limits = local_limits(&graph, &radii, largest_ratio);
     let limited = limits.par_iter().zip(&radii).map(|(limit, radius)| radius > limit).collect();
-    of_position.par_iter_mut().zip(limits).for_each(|(e, limit)| e.radius = e.radius.min(limit as f32));
+    of_position.par_iter_mut().zip(limits).for_each(|(e, limit)| e.axes = e.axes.map(|axis| at_most(axis, limit)));
     let spacings = of_position.par_iter().enumerate().filter(|(index, _)| wanted(*index));
     let median_spacing = median(&mut spacings.map(|(_, e)| e.spacing.into()).collect::<Vec<f64>>());
     Estimates { of_position, median_spacing, limited, graph }
@@ -116,38 +111,16 @@ fn estimate_at(distinct: &DistinctPositions, index: u32, neighbours: &[Neighbour
         count += 1;
     }
     let offsets = &offsets[..count];
-    let world = |length: f64| (length / distinct.scale()).clamp(RADIUS_RANGE.0, RADIUS_RANGE.1) as f32;
+    let world = |length: f64| (length / distinct.scale()).clamp(RADIUS_RANGE.0, RADIUS_RANGE.1);
     let Some(nearest) = neighbours.first() else {
-        return Estimate { normal: up.as_vec3().to_array(), radius: LONE_RADIUS as f32, spacing: 0.0 };
+        let (s, t) = up.any_orthonormal_pair();
+        return Estimate { axes: [s, t].map(|axis| (axis * LONE_RADIUS).as_vec3().to_array()), spacing: 0.0 };
     };
-    let normal = fitted_normal(offsets, up);
+    let axes = cell_ellipse(&offsets[1..], fitted_normal(offsets, up));
     Estimate {
-        normal: normal.as_vec3().to_array(),
-        radius: world(fitted_radius(&offsets[1..], normal)),
-        spacing: world(nearest.squared_distance.sqrt()),
+        axes: axes.map(|axis| (axis.normalize() * world(axis.length())).as_vec3().to_array()),
+        spacing: world(nearest.squared_distance.sqrt()) as f32,
     }
-}
-
-/// A radius from the offsets of the nearest neighbours, the nearest first, in their unit, and the unit normal across which they lie:
-/// [`RADIUS_FACTOR`] times the mean distance to [`RADIUS_NEIGHBOURS`] of them, within [`LARGEST_LOCAL_RATIO`], or more where the
-/// point's [cell](Cell) reaches farther.
-///
-/// Measured on random points of a sphere, 1,000,000, and on the vertices of igea, the Stanford bunny and the Dragon (1024x1024, PSNR
-/// against rays with `radius:1`): 1.2 times the mean distance alone leaves 3.7e-4 of the sphere's pixels to its back, and gives 31.2,
-/// 24.3 and 31.8 dB; this 5e-6, and 32.3, 25.5 and 33.0 dB, as disks are smaller where points are evenly spaced.
-pub(crate) fn fitted_radius(offsets: &[DVec3], normal: DVec3) -> f64 {
-    let near = &offsets[..offsets.len().min(RADIUS_NEIGHBOURS)];
-    let count = near.len() as f64;
-    let mean_distance = near.iter().map(|o| o.length()).sum::<f64>() / count;
-    if near.len() < RADIUS_NEIGHBOURS {
-        return RADIUS_FACTOR * mean_distance;
-    }
-    let center = near.iter().sum::<DVec3>() / count;
-    let spread = near.iter().map(|o| o.distance(center)).sum::<f64>() / count;
-    let radius = RADIUS_FACTOR * mean_distance.min(LARGEST_LOCAL_RATIO * spread);
-    let reach = CELL_REACH * offsets.last().map_or(0.0, |farthest| farthest.length());
-    let of_cell = PAST_CORNER * Cell::new(offsets, normal, (reach, radius / PAST_CORNER)).farthest_corner();
-    radius.max(of_cell.min(LARGEST_FOR_CELL * radius))
 }
 
 /// The direction in which the offsets vary least, in the half-space of `up` (a unit vector). For offsets on a line it

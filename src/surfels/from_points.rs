@@ -11,7 +11,7 @@ use super::orient::{self, Orientation};
 use super::outliers::drop_outliers;
 use super::positions::DistinctPositions;
 use super::sheets;
-use super::sizes::{Size, bsp_radii, ellipse_at, knn_radii, local_limits, offsets};
+use super::sizes::{RADIUS_NEIGHBOURS, Size, bsp_radii, half_axes_at, local_limits, offsets, open_radius};
 use super::{Limits, Preparation, guess_up, origin_for, unit, usable_axes};
 use crate::io::Points;
 use crate::scene::{Bounds, Clip, Surfel, body, framed};
@@ -31,7 +31,7 @@ pub struct FromPoints {
 }
 
 impl Default for FromPoints {
-    /// Disks by the distances of neighbours, normals outward, all points, no half-axis above twice those around it.
+    /// Disks that hold their points' cells, normals outward, all points, no half-axis above three times those around it.
     fn default() -> Self {
         Self {
             size: Size::Knn,
@@ -45,8 +45,8 @@ impl Default for FromPoints {
 /// The surfels of a cloud, and what was done to its points on the way.
 #[derive(Clone, Debug)]
 pub struct Surfels {
-    /// One surfel for each point that was kept, in the points' order, with normals and radii, and for
-    /// [`Size::Ellipse`] half-axes. Colours and texture coordinates are those given.
+    /// One surfel for each point that was kept, in the points' order, with normals and radii, and half-axes but for
+    /// [`Size::Bsp`]. Colours and texture coordinates are those given.
     pub points: Points,
     /// The counts that every scene has; its `surfels` are those kept.
     pub preparation: Preparation,
@@ -128,19 +128,20 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
     };
     let of_point = distinct.of_point();
     let point_normals: Vec<[f32; 3]> = of_point.par_iter().enumerate().map(normal_of).collect();
-    let axes = (options.size == Size::Ellipse).then(|| {
+    let axes = (!sizes.ellipses.is_empty()).then(|| {
         let ellipse = |(&position, &normal)| sizes.ellipse((&distinct, &graph), &normals, position, normal);
         of_point.par_iter().zip(&point_normals).map(ellipse).collect::<Vec<_>>()
     });
     let radii: Vec<f32> = match &axes {
-        Some(axes) => axes.par_iter().map(|[s, _]| DVec3::from_array(s.map(f64::from)).length() as f32).collect(),
+        Some(axes) => longer(axes),
         None => of_point.par_iter().map(|&position| sizes.length(position) as f32).collect(),
     };
     progress.end();
     let (axes, clips) = match preparation.estimated_normals == 0 && !preparation.has_random_sides() {
-        true => cut(&distinct, &graph, (&point_normals, &radii), axes),
+        true => cut(&distinct, &graph, (&point_normals, &radii), (options.size, axes)),
         false => (axes, None),
     };
+    let radii = axes.as_ref().map_or(radii, longer);
     let Points { positions, colors, texture, .. } = gathered.points;
     let (normals, radii, up) = (Some(point_normals), Some(radii), Some(known_up));
     let points = Points { positions, normals, radii, axes, clips, colors, texture, up, ..Points::default() };
@@ -153,21 +154,32 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
 /// Half-axes s and t of each point.
 type HalfAxes = Vec<[[f32; 3]; 2]>;
 
-/// The half-axes of points and the lines at which their surfels end at edges: as they are, of disks or `axes`, without an edge.
+/// The lengths of the half-axes s, of which t is not longer.
+fn longer(axes: &HalfAxes) -> Vec<f32> {
+    axes.par_iter().map(|[s, _]| DVec3::from_array(s.map(f64::from)).length() as f32).collect()
+}
+
+/// The half-axes of points and the lines at which their surfels end at edges: as they are, of disks or `axes`, without an edge. Ellipses
+/// that hold cells are made round where they end at one, as points across an edge bound no cell of this side.
 fn cut(
     distinct: &DistinctPositions,
     graph: &NeighbourGraph,
     (normals, radii): (&[[f32; 3]], &[f32]),
-    axes: Option<HalfAxes>,
+    (size, axes): (Size, Option<HalfAxes>),
 ) -> (Option<HalfAxes>, Option<Vec<Clip>>) {
     // Points at one position may have several normals: the first tells.
     let mut first = vec![0; distinct.len()];
     distinct.of_point().iter().enumerate().rev().for_each(|(point, position)| first[*position as usize] = point);
     let wide = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
     let half_axes = |point: usize| match &axes {
-        Some(axes) => axes[point],
-        None => {
-            let Surfel { s, t, .. } = Surfel::disk(Vec3::ZERO, Vec3::from_array(normals[point]), radii[point]);
+        Some(axes) if size != Size::Knn => axes[point],
+        _ => {
+            let open = match size {
+                Size::Knn => open_radius(offsets(distinct, graph, distinct.of_point()[point], RADIUS_NEIGHBOURS)),
+                _ => 0.0,
+            };
+            let radius = radii[point].max((open / distinct.scale()) as f32);
+            let Surfel { s, t, .. } = Surfel::disk(Vec3::ZERO, Vec3::from_array(normals[point]), radius);
             [s, t]
         }
     };
@@ -180,8 +192,12 @@ fn cut(
     let clip = |(point, position): (usize, &u32)| {
         if is_first((point, position)) { clips[*position as usize] } else { Clip::NONE }
     };
-    let of_points = distinct.of_point().par_iter().enumerate().map(clip).collect();
-    (Some((0..normals.len()).into_par_iter().map(half_axes).collect()), Some(of_points))
+    let of_points: Vec<Clip> = distinct.of_point().par_iter().enumerate().map(clip).collect();
+    let at_lines = |point: usize| match &axes {
+        Some(axes) if of_points[point].is_none() => axes[point],
+        _ => half_axes(point),
+    };
+    (Some((0..normals.len()).into_par_iter().map(at_lines).collect()), Some(of_points))
 }
 
 /// Turns the `normals` of positions to one side; the connected parts of the surface, if they were looked for.
@@ -213,6 +229,7 @@ fn oriented(
 
 /// How large the surfels of positions are, in the units of [`DistinctPositions`].
 struct Sizes {
+    size: Size,
     /// The longer half-axes.
     radii: Vec<f64>,
     /// What their neighbours allow.
@@ -235,20 +252,21 @@ impl Sizes {
     ) -> Self {
         let (mut ellipses, mut collinear) = (Vec::new(), 0);
         let radii: Vec<f64> = match options.size {
-            Size::Knn => knn_radii(distinct, graph, normals),
-            Size::Ellipse => {
-                let own = normals.par_iter().zip(0..distinct.len() as u32);
-                ellipses = own.map(|(normal, position)| ellipse_at(distinct, graph, position, *normal)).collect();
-                ellipses.par_iter().map(|[s, _]| s.length()).collect()
-            }
             Size::Bsp(triangle) => {
                 let (radii, degenerate) = bsp_radii(distinct, triangle, progress);
                 collinear = degenerate;
                 radii
             }
+            size => {
+                let own = normals.par_iter().zip(0..distinct.len() as u32);
+                let at =
+                    |(normal, position): (&[f32; 3], u32)| half_axes_at(size, (distinct, graph), position, *normal);
+                ellipses = own.map(at).collect();
+                ellipses.par_iter().map(|[s, _]| s.length()).collect()
+            }
         };
         let limits = local_limits(graph, &radii, options.limits.largest_ratio);
-        Self { radii, limits, ellipses, collinear, scale: distinct.scale() }
+        Self { size: options.size, radii, limits, ellipses, collinear, scale: distinct.scale() }
     }
 
     /// Points, at these positions, whose surfels would be larger than their neighbours allow.
@@ -277,14 +295,14 @@ impl Sizes {
         normal: [f32; 3],
     ) -> [[f32; 3]; 2] {
         let own = normal == normals[position as usize];
-        let [s, t] = if own { self.ellipses[position as usize] } else { ellipse_at(distinct, graph, position, normal) };
+        let at = || half_axes_at(self.size, (distinct, graph), position, normal);
+        let axes = if own { self.ellipses[position as usize] } else { at() };
         let length = self.length(position);
-        let axes = if s == DVec3::ZERO {
+        let axes = if axes[0] == DVec3::ZERO {
             let (a, b) = DVec3::from_array(normal.map(f64::from)).normalize().any_orthonormal_pair();
             [a * length, b * length]
         } else {
-            let factor = length.min(self.world(s.length())) / s.length();
-            [s * factor, t * factor]
+            axes.map(|axis| axis.normalize() * self.world(axis.length()).min(length))
         };
         axes.map(|axis| axis.as_vec3().to_array())
     }

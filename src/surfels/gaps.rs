@@ -86,17 +86,22 @@ impl Cell {
         self.count += 1;
     }
 
-    /// The corners between two neighbours, in the tangent plane relative to the point.
-    fn closed(&self) -> impl Iterator<Item = DVec2> {
+    /// Whether neighbours bound it all around.
+    pub fn is_closed(&self) -> bool {
+        self.corners().iter().all(|corner| corner.across.is_some())
+    }
+
+    /// The unit vectors x and y of the tangent plane, of which x × y is its normal.
+    pub fn basis(&self) -> [DVec3; 2] {
+        self.basis
+    }
+
+    /// The corners between two neighbours, (x, y) in the tangent plane relative to the point.
+    pub fn closed(&self) -> impl Iterator<Item = DVec2> {
         let corners = self.corners();
         let before = |k: usize| corners[if k > 0 { k - 1 } else { corners.len() - 1 }].across;
         let closed = move |(k, corner): (usize, &Corner)| before(k).and(corner.across).map(|_| corner.at);
         corners.iter().enumerate().filter_map(closed)
-    }
-
-    /// The distance to the farthest corner between two neighbours; zero if there is none.
-    pub fn farthest_corner(&self) -> f64 {
-        self.closed().fold(0.0, |m: f64, corner| m.max(corner.length_squared())).sqrt()
     }
 
     /// The corners between two neighbours, relative to the point.
@@ -110,6 +115,10 @@ impl Cell {
 mod tests {
     use super::*;
 
+    fn farthest_corner(cell: &Cell) -> f64 {
+        cell.closed().fold(0.0, |m, corner| m.max(corner.length()))
+    }
+
     #[test]
     fn the_cell_of_a_grid_is_a_square_and_a_missing_point_widens_it() {
         let ring = |missing: usize| -> Vec<DVec3> {
@@ -121,10 +130,10 @@ mod tests {
             all
         };
         for normal in [DVec3::Z, -DVec3::Z, DVec3::new(0.1, 0.05, 1.0).normalize()] {
-            let whole = Cell::new(&ring(12), normal, (3.0, 0.0)).farthest_corner();
+            let whole = farthest_corner(&Cell::new(&ring(12), normal, (3.0, 0.0)));
             assert!((whole - 0.5f64.sqrt()).abs() < 0.02, "{whole}");
             // Without the point at (1, 0) the cell goes on to (1, 0.0), the middle of what is missing.
-            let wider = Cell::new(&ring(13), normal, (3.0, 0.0)).farthest_corner();
+            let wider = farthest_corner(&Cell::new(&ring(13), normal, (3.0, 0.0)));
             assert!((wider - 1.0).abs() < 0.02, "{wider}");
         }
         assert_eq!(Cell::new(&ring(12), DVec3::Z, (3.0, 0.0)).closed_corners().count(), 4);
@@ -139,10 +148,10 @@ mod tests {
         assert_eq!(cell.closed_corners().count(), 2);
         assert!(cell.closed_corners().all(|corner| corner.y > 0.0));
         let line: Vec<_> = (1..9).map(|k| DVec3::X * f64::from(k)).collect();
-        assert_eq!(Cell::new(&line, DVec3::Z, (5.0, 0.0)).farthest_corner(), 0.0);
-        assert_eq!(Cell::new(&[], DVec3::Z, (5.0, 0.0)).farthest_corner(), 0.0);
+        assert_eq!(farthest_corner(&Cell::new(&line, DVec3::Z, (5.0, 0.0))), 0.0);
+        assert_eq!(farthest_corner(&Cell::new(&[], DVec3::Z, (5.0, 0.0))), 0.0);
         // Another sheet right above and below bounds nothing.
         let sheets = [DVec3::Z * 0.1, -DVec3::Z * 0.1, DVec3::X, DVec3::Y, -DVec3::X, -DVec3::Y];
-        assert!((Cell::new(&sheets, DVec3::Z, (5.0, 0.0)).farthest_corner() - 0.5f64.sqrt()).abs() < 1e-12);
+        assert!((farthest_corner(&Cell::new(&sheets, DVec3::Z, (5.0, 0.0))) - 0.5f64.sqrt()).abs() < 1e-12);
     }
 }

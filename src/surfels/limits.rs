@@ -13,9 +13,9 @@ pub struct Limits {
 }
 
 impl Default for Limits {
-    /// All points, and no half-axis above twice those around it.
+    /// All points, and no half-axis above three times those around it.
     fn default() -> Self {
-        Self { outliers: None, largest_ratio: 2.0 }
+        Self { outliers: None, largest_ratio: 3.0 }
     }
 }
 

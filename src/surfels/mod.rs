@@ -6,6 +6,7 @@ mod colors;
 mod coverage;
 mod creases;
 mod eigen;
+mod ellipse;
 mod estimate;
 mod forest;
 mod from_points;

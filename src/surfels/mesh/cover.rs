@@ -4,9 +4,10 @@ use std::f64::consts::PI;
 
 use glam::{DMat2, DVec2, DVec3};
 
-use super::fans::{Fan, MANY};
+use super::fans::Fan;
 use crate::io::triangles::covering_radius;
 use crate::scene::Clip;
+use crate::surfels::ellipse::outer;
 use crate::surfels::gather::is_usable;
 
 /// A triangle with an area.
@@ -65,49 +66,7 @@ pub(super) fn wanted(facet: &Facet, [p, q]: [DVec2; 2]) -> DMat2 {
         return DMat2::from_diagonal(DVec2::splat(facet.radius * facet.radius));
     }
     let mean = (p + q) / 3.0;
-    let square = |d: DVec2| DMat2::from_cols(d * d.x, d * d.y);
-    (square(mean) + square(p - mean) + square(q - mean)) * (2.0 / 3.0)
-}
-
-/// An ellipse around the origin: `q^T S^-1 q <= 1`.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Ellipse(DMat2);
-
-impl Ellipse {
-    /// A small one that holds all of `ellipses`: of the shape of a circle, of one of them, or of their sum, whichever is least.
-    pub fn around(ellipses: &[DMat2]) -> Option<Self> {
-        let sum = ellipses.iter().fold(DMat2::ZERO, |sum, one| sum + *one);
-        let own = if ellipses.len() <= MANY { ellipses } else { &[] };
-        let shapes = own.iter().copied().chain([DMat2::IDENTITY, sum]);
-        let scaled = shapes.filter_map(|shape| {
-            let inverse = shape.inverse();
-            // The largest eigenvalue of shape^-1 S: how much the shape is to be enlarged.
-            let factor = ellipses.iter().map(|one| largest_eigenvalue(inverse * *one)).fold(0.0, f64::max);
-            let scaled = shape * factor;
-            (scaled.is_finite() && scaled.determinant() > 0.0).then_some(scaled)
-        });
-        scaled.min_by(|a, b| a.determinant().total_cmp(&b.determinant())).map(Self)
-    }
-
-    /// The product of the half-axes.
-    pub fn square(&self) -> f64 {
-        self.0.determinant().max(0.0).sqrt()
-    }
-
-    /// The half-axes, the longer one first; the second is the first one turned to the left.
-    pub fn half_axes(&self) -> [DVec2; 2] {
-        let [a, b, c] = [self.0.x_axis.x, self.0.x_axis.y, self.0.y_axis.y];
-        let angle = 0.5 * (2.0 * b).atan2(a - c);
-        let along = DVec2::from_angle(angle);
-        let length = |d: DVec2| d.dot(self.0 * d).max(0.0).sqrt();
-        [along * length(along), along.perp() * length(along.perp())]
-    }
-}
-
-/// Of a matrix whose eigenvalues are real.
-fn largest_eigenvalue(m: DMat2) -> f64 {
-    let half = 0.5 * (m.x_axis.x + m.y_axis.y);
-    half + (half * half - m.determinant()).max(0.0).sqrt()
+    (outer(mean) + outer(p - mean) + outer(q - mean)) * (2.0 / 3.0)
 }
 
 /// A line in a surfel's plane: what is kept has `normal . q >= offset`, world units from the surfel's centre.

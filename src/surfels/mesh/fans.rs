@@ -3,7 +3,8 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::cover::{self, Ellipse, Facet};
+use super::cover::{self, Facet};
+use crate::surfels::ellipse::Ellipse;
 
 /// The cosine of the angle between the normals of two triangles past which their common edge is one of the surface: 30 degrees. Of 20
 /// to 60 degrees fewer gave better pictures of more surfels.
@@ -17,7 +18,7 @@ pub(in crate::surfels) const TOLERANCE: f64 = 2e-4;
 const WASTE: [f64; 2] = [2.0, 6.0];
 
 /// Fans of more triangles are cut in halves, wherever they turn: nobody should wait for the middle of a disk of a million.
-pub(super) const MANY: usize = 32;
+const MANY: usize = 32;
 
 /// A triangle at a vertex: its two other corners, counter-clockwise seen from outside.
 #[derive(Clone, Copy, Debug)]

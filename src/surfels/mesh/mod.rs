@@ -13,12 +13,13 @@ mod triangles;
 use glam::{DVec2, DVec3, Vec2};
 use rayon::prelude::*;
 
-use self::cover::{Ellipse, Facet};
+use self::cover::Facet;
 pub(super) use self::fans::TOLERANCE;
 use self::fans::{Around, Fan};
 use crate::io::Points;
 use crate::io::points::taken;
 use crate::scene::Clip;
+use crate::surfels::ellipse::Ellipse;
 
 /// How much larger disks are than needed to cover: a blending kernel fades towards its rim.
 const OVERLAP: f64 = 1.1;

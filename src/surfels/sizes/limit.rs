@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use crate::surfels::estimate::{LARGEST_MEDIAN_RATIO, RADIUS_NEIGHBOURS, median};
+use super::RADIUS_NEIGHBOURS;
+use crate::surfels::estimate::{LARGEST_MEDIAN_RATIO, median};
 use crate::surfels::graph::NeighbourGraph;
 
 /// The largest radius of each position's disk: `factor` times the median of its neighbours' radii, and never more than

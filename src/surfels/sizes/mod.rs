@@ -1,18 +1,19 @@
 //! How large the surfel of a point is.
 
 mod bsp;
+mod cell;
 mod ellipse;
 mod limit;
 
 use std::str::FromStr;
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 pub(crate) use self::bsp::bsp_radii;
+pub(crate) use self::cell::{RADIUS_NEIGHBOURS, cell_ellipse, open_radius};
 use self::ellipse::{ELLIPSE_NEIGHBOURS, bounding_ellipse};
 pub(crate) use self::limit::local_limits;
-use super::estimate::{NORMAL_NEIGHBOURS, fitted_radius};
+use super::estimate::NORMAL_NEIGHBOURS;
 use super::graph::NeighbourGraph;
 use super::positions::DistinctPositions;
 use crate::{Error, Result};
@@ -20,8 +21,7 @@ use crate::{Error, Result};
 /// How the size of a surfel follows from the points around it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Size {
-    /// A disk of the mean distance to 8 neighbours, or more where the gap to the next point is wider: it holds the point's Voronoi
-    /// cell in the tangent plane.
+    /// The least ellipse that holds the point's Voronoi cell in the tangent plane, which is what is nearer to it than to any neighbour.
     #[default]
     Knn,
     /// The ellipse that bounds 8 neighbours in the tangent plane, with the half-axes of their covariance there (Pajarola et
@@ -74,27 +74,19 @@ pub(crate) fn offsets<'a>(
     graph.of(index).iter().take(count).map(move |&other| distinct.position(other) - center)
 }
 
-/// The radius of each position's disk by the mean distance of its neighbours, scaled units; zero where it has none.
-pub(crate) fn knn_radii(distinct: &DistinctPositions, graph: &NeighbourGraph, normals: &[[f32; 3]]) -> Vec<f64> {
-    (0..distinct.len() as u32)
-        .into_par_iter()
-        .map_init(Vec::new, |near, index| {
-            near.clear();
-            near.extend(offsets(distinct, graph, index, NORMAL_NEIGHBOURS));
-            let normal = DVec3::from_array(normals[index as usize].map(f64::from));
-            if near.is_empty() { 0.0 } else { fitted_radius(near, normal.normalize()) }
-        })
-        .collect()
-}
-
-/// The half-axes of the ellipse that bounds the neighbourhood of position `index` across `normal`, scaled units: see
-/// [`bounding_ellipse`].
-pub(crate) fn ellipse_at(
-    distinct: &DistinctPositions,
-    graph: &NeighbourGraph,
+/// The half-axes of position `index` across `normal`, by its neighbours, scaled units: s, the longer one, and t. Zero where nothing
+/// says how long they are, and of a size by clusters.
+pub(crate) fn half_axes_at(
+    size: Size,
+    (distinct, graph): (&DistinctPositions, &NeighbourGraph),
     index: u32,
     normal: [f32; 3],
 ) -> [DVec3; 2] {
     let normal = DVec3::from_array(normal.map(f64::from)).normalize();
-    bounding_ellipse(offsets(distinct, graph, index, ELLIPSE_NEIGHBOURS), normal)
+    let near: Vec<DVec3> = offsets(distinct, graph, index, NORMAL_NEIGHBOURS).collect();
+    match size {
+        Size::Knn if !near.is_empty() => cell_ellipse(&near, normal),
+        Size::Ellipse => bounding_ellipse(near.iter().copied().take(ELLIPSE_NEIGHBOURS), normal),
+        Size::Knn | Size::Bsp(_) => [DVec3::ZERO; 2],
+    }
 }

@@ -181,7 +181,9 @@ fn a_random_plane_is_covered() {
             .any(|surfel| holds(surfel, [x, y]));
         holes += u32::from(!covered);
     }
-    let mean_radius = scene.surfels.iter().map(|s| f64::from(s.radius())).sum::<f64>() / f64::from(count);
+    // Of the circle of the same area.
+    let mean_radius =
+        scene.surfels.iter().map(|s| f64::from(s.normal().length()).sqrt()).sum::<f64>() / f64::from(count);
     println!(
         "holes {} mean radius {} spacings",
         f64::from(holes) / f64::from(samples),

@@ -25,7 +25,8 @@ impl Ellipse {
         scaled.min_by(|a, b| a.determinant().total_cmp(&b.determinant())).map(Self)
     }
 
-    /// The least one that holds all `points`, whose half-axes are then made at least `least` long.
+    /// The least one of half-axes of at least the length `least` that holds all `points`; where that length bounds it, the least of some
+    /// directions.
     ///
     /// An ellipse around the origin that cannot shrink goes through two points that are its conjugate half-diameters, or through three;
     /// where the points lie on a line, through the farthest.
@@ -38,7 +39,7 @@ impl Ellipse {
         let mut square = best.square();
         let mut take = |shape: Option<Self>| {
             let Some(shape) = shape.filter(|shape| shape.square() < square) else { return };
-            let thick = shape.at_least(least);
+            let thick = shape.at_least(least, points);
             if thick.square() < square && points.iter().all(|point| thick.holds(*point)) {
                 (best, square) = (thick, thick.square());
             }
@@ -63,15 +64,18 @@ impl Ellipse {
         (a > 0.0 && shape.determinant() > 0.0).then(|| Self(shape.inverse())).filter(|found| found.0.is_finite())
     }
 
-    /// With half-axes of at least this length.
-    fn at_least(self, least: f64) -> Self {
+    /// With half-axes of at least the length `least`: where the shorter one is made longer, the other one is as short as the `points` let
+    /// it be, in its direction.
+    fn at_least(self, least: f64, points: &[DVec2]) -> Self {
         let [major, minor] = self.half_axes();
         if minor.length() >= least {
             return self;
         }
         let along = major.normalize_or(DVec2::X);
-        let lengths = [major, minor].map(|axis| axis.length().max(least));
-        Self(outer(along * lengths[0]) + outer(along.perp() * lengths[1]))
+        // x^2 / s^2 + y^2 / least^2 <= 1. Beside the ellipse it is not a number, which the maximum passes over and `holds` finds.
+        let reach = |point: &DVec2| point.dot(along).abs() / (1.0 - (point.dot(along.perp()) / least).powi(2)).sqrt();
+        let length = points.iter().map(reach).fold(least, f64::max);
+        Self(outer(along * length) + outer(along.perp() * least))
     }
 
     /// Whether a point lies within, but for rounding.
@@ -130,8 +134,8 @@ mod tests {
                 let major = points.iter().map(reach).fold(0.0, f64::max);
                 tried = tried.min(major.max(0.1) * (major * slim).max(0.1));
             }
-            // Half-axes that are made longer are no more the least that hold the points and are so long.
-            let lost = if found.half_axes()[1].length() > 0.1 + 1e-9 { 1.0 + 1e-9 } else { 1.6 };
+            // Where `least` bounds the shorter half-axis, only some directions of the longer one are tried.
+            let lost = if found.half_axes()[1].length() > 0.1 + 1e-9 { 1.0 + 1e-9 } else { 1.2 };
             assert!(found.square() <= tried * lost, "{} {tried} {points:?}", found.square());
         }
     }

@@ -5,6 +5,9 @@ use glam::{DMat2, DMat3, DVec2, DVec3};
 /// Of more ellipses none is tried as the shape of the one around them.
 const MANY: usize = 32;
 
+/// A point lies within up to this value of `q^T S^-1 q`, but for rounding.
+const HELD: f64 = 1.0 + 1e-9;
+
 /// An ellipse around the origin: `q^T S^-1 q <= 1`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ellipse(DMat2);
@@ -28,9 +31,26 @@ impl Ellipse {
     /// The least one of half-axes of at least the length `least` that holds all `points`; where that length bounds it, the least of some
     /// directions.
     ///
+    /// What is least for some of the points and holds the others is least for all: points are taken in one by one, each time the one that
+    /// stands out farthest.
+    pub fn around_points(points: &[DVec2], least: f64) -> Self {
+        let mut some = Vec::with_capacity(points.len().min(8));
+        loop {
+            let found = Self::of_few(&some, least);
+            let inverse = found.0.inverse();
+            let outside = points.iter().map(|point| (point.dot(inverse * *point), point));
+            match outside.max_by(|a, b| a.0.total_cmp(&b.0)) {
+                Some((value, point)) if value > HELD && !some.contains(point) => some.push(*point),
+                _ => return found,
+            }
+        }
+    }
+
+    /// The same of a few points, by trying.
+    ///
     /// An ellipse around the origin that cannot shrink goes through two points that are its conjugate half-diameters, or through three;
     /// where the points lie on a line, through the farthest.
-    pub fn around_points(points: &[DVec2], least: f64) -> Self {
+    fn of_few(points: &[DVec2], least: f64) -> Self {
         let farthest = points.iter().fold(0.0, |m: f64, point| m.max(point.length()));
         let mut best = Self(DMat2::from_diagonal(DVec2::splat(farthest.max(least).powi(2))));
         if farthest <= least {
@@ -80,7 +100,7 @@ impl Ellipse {
 
     /// Whether a point lies within, but for rounding.
     fn holds(&self, point: DVec2) -> bool {
-        point.dot(self.0.inverse() * point) <= 1.0 + 1e-9
+        point.dot(self.0.inverse() * point) <= HELD
     }
 
     /// The product of the half-axes.

@@ -54,13 +54,20 @@ pub(super) fn points(entry: &SceneEntry) -> Vec<Point> {
     each(&entry.count).into_iter().flat_map(of).filter(small_enough).collect()
 }
 
-/// Makes the scene.
+/// Makes the scene; of a file that has nothing to show its errors tell.
 pub(super) fn stage(
     definition: &Definition,
     entry: &SceneEntry,
     point: Point,
     progress: &dyn Progress,
 ) -> Result<Staged> {
+    made(definition, entry, point, progress).map_err(|error| match (error, &entry.file) {
+        (Error::EmptyScene(what), Some(file)) => Error::malformed(&definition.path_of(file), what),
+        (error, _) => error,
+    })
+}
+
+fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dyn Progress) -> Result<Staged> {
     let texture = entry.texture.as_ref().map(|file| Texture::read(&present(definition, entry, file)?)).transpose()?;
     let (points, surface) = match (&entry.file, entry.shape) {
         (Some(file), _) => {
@@ -246,6 +253,23 @@ mod tests {
         assert!((ratio(&far) - 0.1).abs() < 0.02, "{}", ratio(&far));
         let (_, flat) = staged("shape = \"plane\"\ncount = 100\northo = 4\nfill = 0.5");
         assert!((flat[0].footprint_px - 0.3 * 100.0 / 4.0 * 0.5).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_file_without_points_is_named() {
+        let file = std::env::temp_dir().join(format!("epsplat-staging-{}.ply", std::process::id()));
+        let header = "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
+        std::fs::write(&file, header).unwrap();
+        let text = format!(
+            "name = \"n\"\nabout = \"a\"\nsize = [9, 9]\n[[scene]]\nname = \"s\"\nfile = '{}'\n\
+             [[config]]\nname = \"c\"\nbackend = \"reference\"",
+            file.display()
+        );
+        let definition = Definition::parse(&text, Path::new("x.toml")).unwrap();
+        let entry = &definition.scenes[0];
+        let error = stage(&definition, entry, points(entry)[0], &()).err().unwrap().to_string();
+        std::fs::remove_file(&file).unwrap();
+        assert!(error.contains("epsplat-staging") && error.contains("no points"), "{error}");
     }
 
     #[test]

@@ -65,9 +65,8 @@ pub(super) struct Ends {
 /// A disk, and the corners of the cell that it must cover, relative to its centre. World units.
 pub(super) struct Covering<'a> {
     pub center: DVec3,
-    /// Unit half-axes; their cross product is the normal.
+    /// Half-axes, the longer one first; their cross product is along the normal.
     pub axes: [DVec3; 2],
-    pub radius: f64,
     pub cell: &'a [DVec3],
 }
 
@@ -145,13 +144,16 @@ impl Ends {
     /// A line runs along an end, or as far outside as the cell's farthest corner beyond it: at an end that bends around the
     /// disk's cell the line through one of its sides would cut off what lies in the cell past the next.
     pub fn clip(&self, disk: &Covering<'_>) -> Clip {
-        let [x, y] = disk.axes;
-        let (normal, radius) = (x.cross(y), disk.radius);
-        let flat = |d: DVec3| DVec2::new(d.dot(x), d.dot(y)) / radius;
+        let [s, t] = disk.axes;
+        let normal = s.normalize().cross(t.normalize());
+        let (radius, least_radius) = (s.length(), t.length());
+        let flat = |d: DVec3| DVec2::new(d.dot(s) / s.length_squared(), d.dot(t) / t.length_squared());
         let rough = disk.cell.iter().map(|corner| corner.dot(normal).abs()).fold(0.0, f64::max);
         let least = self.tolerance.max(ROUGH * rough);
         let cell = hull(disk.cell.iter().map(|corner| flat(*corner)).collect());
-        let past = |line: &Line, leaves: f64| (1.0 + line.offset) * radius * leaves;
+        // The distance of the rim's farthest point from the line, in the plane.
+        let across = |line: &Line| 1.0 / DVec2::new(line.inward.x / radius, line.inward.y / least_radius).length();
+        let past = |line: &Line, leaves: f64| (1.0 + line.offset) * across(line) * leaves;
         let line = |end: &End| {
             let [from, to] = end.side.map(|corner| corner - disk.center);
             let (p, q) = (flat(from), flat(to));
@@ -163,12 +165,12 @@ impl Ends {
             }
             // Moved out it leaves out less.
             let line = Line::through(p, q).filter(|line| past(line, end.leaves) > least)?;
-            let line = line.keeping(cell.iter().copied(), MARGIN + rough / radius);
+            let line = line.keeping(cell.iter().copied(), MARGIN + rough / least_radius);
             (past(&line, end.leaves) > least).then_some((line, end.leaves))
         };
         let mut lines = lines::apart(self.near(disk.center, radius).into_iter().filter_map(line).collect());
         lines.retain(|(line, leaves)| {
-            let farthest = disk.center - (x * line.inward.x + y * line.inward.y) * radius;
+            let farthest = disk.center - (s * line.inward.x + t * line.inward.y);
             self.distance(farthest) > CONFIRMED * past(line, *leaves)
         });
         lines::clip(lines.into_iter().map(|(line, _)| line).collect())

@@ -160,12 +160,8 @@ pub fn sample(
             let mut points = points(&surface, &places, normals, None, colors);
             let whole = surface.dropped_non_finite == 0;
             points.closed = whole && faces_as_named && is_closed(&mesh.positions, &mesh.triangles);
-            // A plane of its own, or lines in it, need half-axes.
-            if named.is_some() || !disks.clips.is_empty() {
-                points.axes = Some(disks.half_axes());
-            }
+            (points.axes, points.radii) = (Some(disks.half_axes()), Some(disks.radii()));
             points.clips = (!disks.clips.is_empty()).then_some(disks.clips);
-            points.radii = Some(disks.radii);
             points
         }
     };

@@ -128,19 +128,19 @@ pub enum Making {
     /// By all that it says, as `epsplat render` does.
     #[default]
     File,
-    /// By its points alone, as `epsplat render` does: radii from the distances of neighbours, normals turned to the viewer.
+    /// By its points alone, as `epsplat render` does: ellipses that hold their cells, normals turned to the viewer.
     Points,
     /// By its points and the normals that its triangles have there: what a scanner's software exports.
     Normals,
-    /// By its points alone, as `epsplat surfels` does: normals that agree, disks.
+    /// By its points alone, as `epsplat surfels` does: normals that agree, ellipses that hold their cells.
     Knn,
-    /// The same with ellipses.
+    /// The same with ellipses that bound neighbours.
     Ellipse,
     /// The same with disks from clusters of three.
     Bsp,
-    /// As `epsplat sample` does: `count` of a mesh, with radii that cover it.
+    /// As `epsplat sample` does: `count` of a mesh, with ellipses that cover it.
     Sample,
-    /// Independent random points of a mesh, `count` of them, with its normals, and radii from the distances of neighbours.
+    /// Independent random points of a mesh, `count` of them, with its normals, and ellipses that hold their cells.
     Uniform,
 }
 

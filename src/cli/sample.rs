@@ -11,7 +11,7 @@ use super::progress::Bars;
 use super::reading::{InputFormat, named};
 use super::{note, outputs};
 
-/// Write surfels that cover a mesh as PLY: on its triangles, with normals, radii, and its colours and texture coordinates.
+/// Write surfels that cover a mesh as PLY: on its triangles, with half-axes, and its colours, normals and texture coordinates.
 ///
 /// The mesh is divided into voxels, and a heap hands out the samples by the voxels' priority: triangles (as many as the
 /// mesh has there), area (evenly), curvature (where the surface bends) or texture (where the colour changes).

@@ -18,12 +18,12 @@ pub const DEFAULT_VIEWS: u32 = 64;
 /// Rays along each side of a view when nobody says how many.
 pub const DEFAULT_SIDE: u32 = 512;
 
-/// How far before or behind the surface, along the ray, a disk may lie to cover it: this many of its own longer half-axes,
+/// How far before or behind the surface, along the ray, a disk may lie to cover it: this many of its own shorter half-axes,
 /// as with the epsilon `radius:1`, within which a renderer takes depths for one surface. A disk on the far side of the
 /// body is no cover, however many lie there; one that is off by the sag of a curved surface is.
 pub const REACH: f64 = 1.0;
 
-/// The width of the strip along an outline that flat disks may cut off, in radii of the disk that is nearest there.
+/// The width of the strip along an outline that flat disks may cut off, in longer half-axes of the disk that is nearest there.
 const EDGE: f64 = 0.5;
 
 /// The surface has a step between two rays if one meets it deeper than the plane through the other's hit by more than so

@@ -144,7 +144,7 @@ impl Kept {
             accumulator: raster.map_or(plan.needs.accumulator.name(), |raster| raster.format.name()),
             overflows: self.known.overflows,
             surfels: self.facts.surfels,
-            splats_drawn,
+            splats_drawn: splats_drawn.min(self.facts.surfels),
             width: camera.width,
             height: camera.height,
             passes: passes.into_iter().map(|(stage, ms)| (format!("{stage}_ms"), ms)).collect(),

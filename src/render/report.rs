@@ -18,8 +18,8 @@ pub struct Report {
     pub overflows: u64,
     /// Surfels in the scene.
     pub surfels: u64,
-    /// Splats that may touch a pixel, of an image that is drawn in bands those of the band that has most. Those that were left out because
-    /// they are hidden are not counted.
+    /// Splats that may touch a pixel; of an image that is drawn in bands a splat counts in each that it touches, up to as many as there
+    /// are surfels. Those that were left out because they are hidden are not counted.
     pub splats_drawn: u64,
     /// Image width.
     pub width: u32,

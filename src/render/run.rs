@@ -21,8 +21,8 @@ use crate::progress::Progress;
 /// How many splats a frame has.
 #[derive(Clone, Copy, Debug)]
 pub struct Tally {
-    /// Those that may touch a pixel of the image, and are not known to be hidden; where bands have splats of their own, those of the band
-    /// that has most.
+    /// Those that may touch a pixel of the image, and are not known to be hidden; where bands have splats of their own, each counts in
+    /// every band that it is drawn in.
     pub drawn: u64,
     /// The image is right. If it is not, what is known now makes the next one right.
     pub complete: bool,
@@ -136,14 +136,13 @@ impl<'a> Run<'a> {
         let all: Vec<&Buffer<u32>> = of_pages.chain([large, small, sums]).flatten().collect();
         let mut counted = counts(self.gpu, &all)?.into_iter();
         let mut next = || counted.next().unwrap_or_default();
-        let (mut drawn, mut most_large, mut slots) = (0, 0, true);
+        let (mut most_large, mut slots) = (0, true);
         for page in &self.store.pages {
             let ([large, unseen], [_, batches]) = (next(), next());
-            drawn += page.stand_for.saturating_sub(unseen.into());
+            self.tally.drawn += page.stand_for.saturating_sub(unseen.into());
             most_large = most_large.max(large);
             slots &= !self.plan.needs.cull || u64::from(batches) * u64::from(BATCH) <= page.slots;
         }
-        self.tally.drawn = self.tally.drawn.max(drawn);
         let mut lists = true;
         for (of, _) in [(Listed::Large, large), (Listed::Small, small)].into_iter().filter(|(_, list)| list.is_some()) {
             let [entries, longest] = next().map(u64::from);

@@ -10,6 +10,12 @@ use glam::{DVec2, DVec3};
 /// The cosine of the elevation over the tangent plane up to which a point is beside another: 60 degrees.
 const STEEPEST: f64 = 0.5;
 
+/// Whether a neighbour at this offset is beside a point in the plane across the unit vector `normal`, and not over or under it.
+pub(crate) fn is_beside(offset: DVec3, normal: DVec3) -> bool {
+    let squared = offset.length_squared();
+    squared - offset.dot(normal).powi(2) > STEEPEST * STEEPEST * squared
+}
+
 /// Corners of a cell that is cut by as many borders as there are neighbours, and four of its outline.
 const MOST_CORNERS: usize = 32;
 
@@ -45,7 +51,7 @@ impl Cell {
             if squared > 4.0 * farthest || farthest <= enough * enough {
                 break;
             }
-            if neighbour.length_squared() > STEEPEST * STEEPEST * squared && cell.clip(neighbour) {
+            if is_beside(*offset, normal) && cell.clip(neighbour) {
                 farthest = cell.corners().iter().fold(0.0, |m: f64, corner| m.max(corner.at.length_squared()));
             }
         }

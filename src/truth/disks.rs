@@ -28,8 +28,8 @@ pub struct DiskTree {
     center: DVec3,
     /// Half the diagonal of their bounds, world units.
     radius: f64,
-    /// The longest half-axis, in units of `radius`.
-    longest: f64,
+    /// The longest of the shorter half-axes, in units of `radius`.
+    widest: f64,
 }
 
 /// In units of the tree's radius, relative to its centre.
@@ -101,8 +101,8 @@ impl DiskTree {
         } else {
             build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut Duration::default())
         };
-        let longest = disks.iter().map(|disk| disk.half[0]).fold(0.0, f64::max);
-        Self { tree, disks, center: scene.origin + center, radius, longest }
+        let widest = disks.iter().map(|disk| disk.half[1]).fold(0.0, f64::max);
+        Self { tree, disks, center: scene.origin + center, radius, widest }
     }
 
     /// How many disks there are.
@@ -116,10 +116,10 @@ impl DiskTree {
     }
 
     /// Whether the line through `point` along `direction` (of unit length) meets a disk, no farther from `point` than
-    /// `reach` times the disk's own longer half-axis. World coordinates.
+    /// `reach` times the disk's own shorter half-axis. World coordinates.
     pub fn covers(&self, point: DVec3, direction: DVec3, reach: f64) -> bool {
         let point = (point - self.center) / self.radius;
-        let farthest = reach * self.longest + f64::from(PADDING);
+        let farthest = reach * self.widest + f64::from(PADDING);
         // Nothing is met from outside the ball of the boxes; the f32 numbers below are thus small.
         if self.is_empty() || point.is_nan() || point.length() > 1.1 + farthest {
             return false;
@@ -128,7 +128,7 @@ impl DiskTree {
         let segment = Ray::new(start, direction.as_vec3a(), 0.0, (2.0 * farthest) as f32);
         !self.tree.ray_traverse_miss(segment, |_, entry| {
             let disk = &self.disks[self.tree.primitive_indices[entry] as usize];
-            if disk.met_at(point, direction).is_some_and(|t| t.abs() <= reach * disk.half[0]) {
+            if disk.met_at(point, direction).is_some_and(|t| t.abs() <= reach * disk.half[1]) {
                 0.0
             } else {
                 f32::INFINITY
@@ -375,8 +375,8 @@ mod tests {
                 let v = offset.dot((-direction).cross(s)) / determinant;
                 let along = offset.dot(s.cross(t)) / determinant;
                 let half = [s.length_squared(), t.length_squared(), 2.0 * s.dot(t)];
-                let longest = (0.5 * (half[0] + half[1] + (half[0] - half[1]).hypot(half[2]))).sqrt();
-                (u * u + v * v <= 1.0).then_some(along.abs() / longest)
+                let shorter = (0.5 * (half[0] + half[1] - (half[0] - half[1]).hypot(half[2]))).sqrt();
+                (u * u + v * v <= 1.0).then_some(along.abs() / shorter)
             };
             let reaches = scene.surfels.iter().filter_map(met).fold(f64::INFINITY, f64::min);
             for reach in [0.5, 1.0, 30.0] {

@@ -29,8 +29,8 @@ const LONGEST: f64 = 1e12;
 /// The shorter half-axis is at least this part of how far the cell reaches: a needle would be covered by its neighbours' heights alone.
 const THINNEST: f64 = 0.25;
 
-/// In how many directions, evenly over half a turn, a cell's reach is measured. The polygon that they bound holds the cell, and is at
-/// most 1 / cos(PI / 16), 2 %, wider.
+/// In how many directions, evenly over half a turn, a cell's reach is measured. The polygon that they bound holds the cell;
+/// it is at most 1 / cos(PI / 16), 2 %, wider than a round one, and of one that is four times as long as wide by a quarter.
 const DIRECTIONS: usize = 8;
 
 /// How far a cell reaches in its disk's plane from the sample, in either sense of each direction: the unit of [`Voronoi`].
@@ -96,7 +96,8 @@ fn plane(normal: DVec3) -> [DVec3; 2] {
 /// ends h tan(phi) beyond it, from an angle phi off the normal. So it reaches, in each direction of its plane, as far as the corners
 /// of its cell and their height more: from up to 45 degrees off its normal it covers all of its cell, whatever the others do, and
 /// where the cell is flat from everywhere. A part that slopes against the disk by more than 45 degrees is seen straight on from
-/// farther off, so it takes the tangent of that slope for each unit of height. It is the least ellipse that does.
+/// farther off, so it takes the tangent of that slope for each unit of height. It is the least ellipse that holds
+/// the polygon of those reaches in a few directions.
 ///
 /// From farther off, cells that are not flat are covered by the disks around them too, if [`OVERLAP`] makes all a little
 /// larger. Of 30 million rays at samples of ten models, from 64 views each, 9 find a hole with 1.25 and 5 with 1.28, none of them at the
@@ -300,7 +301,7 @@ mod tests {
         for (k, [s, t]) in made.axes.iter().enumerate() {
             let wide = PI / (2.0 * DIRECTIONS as f64);
             assert!(filled[k] > wide.cos() - 0.03 - step / t.length(), "{} of {s} {t}", filled[k]);
-            assert!(s.length() >= t.length() && t.length() > 0.99 * THINNEST * reached[k], "{s} {t}");
+            assert!(s.length() >= t.length() && t.length() > 0.95 * OVERLAP * THINNEST * reached[k], "{s} {t}");
             of_rounds = (of_rounds.0 + s.length() * t.length(), of_rounds.1 + (OVERLAP * reached[k]).powi(2));
         }
         assert!(of_rounds.0 < 0.85 * of_rounds.1, "{of_rounds:?}");

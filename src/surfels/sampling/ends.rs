@@ -23,7 +23,7 @@ use crate::truth::TriangleTree;
 /// How much larger a box of the tree is than its side, in diagonals of the surface: more than the rounding of f32.
 const PADDING: f64 = 1e-6;
 
-/// A side that lies farther above or below a disk than so many of its radii is one of another part of the surface.
+/// A side that lies farther above or below a disk than so many of its longer half-axes is one of another part of the surface.
 const HIGHEST: f64 = 0.5;
 
 /// The cosine of the angle between two triangles past which their common side is an end: 20 degrees.
@@ -151,7 +151,7 @@ impl Ends {
         let rough = disk.cell.iter().map(|corner| corner.dot(normal).abs()).fold(0.0, f64::max);
         let least = self.tolerance.max(ROUGH * rough);
         let cell = hull(disk.cell.iter().map(|corner| flat(*corner)).collect());
-        // The distance of the rim's farthest point from the line, in the plane.
+        // How far apart two lines of this direction are in the plane whose offsets differ by 1.
         let across = |line: &Line| 1.0 / DVec2::new(line.inward.x / radius, line.inward.y / least_radius).length();
         let past = |line: &Line, leaves: f64| (1.0 + line.offset) * across(line) * leaves;
         let line = |end: &End| {
@@ -165,7 +165,8 @@ impl Ends {
             }
             // Moved out it leaves out less.
             let line = Line::through(p, q).filter(|line| past(line, end.leaves) > least)?;
-            let line = line.keeping(cell.iter().copied(), MARGIN + rough / least_radius);
+            let margin = (MARGIN * least_radius + rough) / across(&line);
+            let line = line.keeping(cell.iter().copied(), margin);
             (past(&line, end.leaves) > least).then_some((line, end.leaves))
         };
         let mut lines = lines::apart(self.near(disk.center, radius).into_iter().filter_map(line).collect());

@@ -102,7 +102,7 @@ impl Sampling {
 }
 
 /// Samples a mesh at `count` points: with positions on its triangles, normals, texture coordinates and colours as far as the
-/// mesh has them, and, by [`Method::Stratified`], radii with which the disks cover it. Without normals of the mesh those are
+/// mesh has them, and, by [`Method::Stratified`], half-axes with which the disks cover it. Without normals of the mesh those are
 /// those of the disks' planes, which lie nearest to the part that each sample stands for, or of [`Method::Uniform`] of triangles.
 ///
 /// The same seed gives the same points, whatever the machine's number of threads.
@@ -133,7 +133,7 @@ pub fn sample(
         Method::Uniform => {
             let places = uniform::places(&surface, count, seed);
             let colors = surface.is_colored().then(|| places.par_iter().map(|place| surface.color(*place)).collect());
-            points(&surface, &places, normals_at(&surface, &places), None, colors)
+            points(&surface, &places, normals_at(&surface, &places), colors)
         }
         Method::Stratified { priority, depth } => {
             progress.begin("dividing the mesh", 0);
@@ -157,7 +157,7 @@ pub fn sample(
             let named = mesh.normals.as_ref().map(|_| normals_at(&surface, &places));
             let faces_as_named = named.as_ref().is_none_or(|named| disks.turn_to(named));
             let normals = named.clone().unwrap_or_else(|| disks.normals());
-            let mut points = points(&surface, &places, normals, None, colors);
+            let mut points = points(&surface, &places, normals, colors);
             let whole = surface.dropped_non_finite == 0;
             points.closed = whole && faces_as_named && is_closed(&mesh.positions, &mesh.triangles);
             (points.axes, points.radii) = (Some(disks.half_axes()), Some(disks.radii()));
@@ -177,18 +177,11 @@ fn guessed_up(mesh: &Mesh) -> Up {
     guess_up(&body(mesh.positions.len(), |index| DVec3::from_array(mesh.positions[index])).0)
 }
 
-fn points(
-    surface: &MeshSurface<'_>,
-    places: &[Place],
-    normals: Vec<DVec3>,
-    radii: Option<Vec<f32>>,
-    colors: Option<Vec<[f32; 4]>>,
-) -> Points {
+fn points(surface: &MeshSurface<'_>, places: &[Place], normals: Vec<DVec3>, colors: Option<Vec<[f32; 4]>>) -> Points {
     let places = places.par_iter();
     Points {
         positions: places.clone().map(|place| (surface.center + surface.point(*place)).to_array()).collect(),
         normals: Some(normals.into_iter().map(|normal| normal.as_vec3().to_array()).collect()),
-        radii,
         colors: colors.map(Colors::Linear),
         texture: places.map(|place| surface.texture(*place)).collect(),
         up: Some(surface.mesh.up.unwrap_or_else(|| guessed_up(surface.mesh))),

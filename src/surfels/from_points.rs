@@ -17,6 +17,10 @@ use crate::io::Points;
 use crate::scene::{Bounds, Clip, Surfel, body, framed};
 use crate::{Error, Progress, Result};
 
+/// A disk that ends at an edge is larger by this factor, as neither cells nor planes are certain there: of 4.0 million rays at 60,000
+/// points of the fandisk with normals 9 find a hole, and 126 without it.
+const AT_EDGE: f32 = 1.2;
+
 /// How surfels are made of points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FromPoints {
@@ -178,7 +182,7 @@ fn cut(
                 Size::Knn => open_radius(offsets(distinct, graph, distinct.of_point()[point], RADIUS_NEIGHBOURS)),
                 _ => 0.0,
             };
-            let radius = radii[point].max((open / distinct.scale()) as f32);
+            let radius = AT_EDGE * radii[point].max((open / distinct.scale()) as f32);
             let Surfel { s, t, .. } = Surfel::disk(Vec3::ZERO, Vec3::from_array(normals[point]), radius);
             [s, t]
         }

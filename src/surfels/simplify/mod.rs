@@ -145,7 +145,8 @@ pub fn simplify(scene: &Scene, options: &Options, progress: &dyn Progress) -> Re
         before_relaxation,
         tolerance,
         max_deviation: deviations.max,
-        mean_deviation: deviations.mean,
+        // Where all are the same, a mean may be more by rounding.
+        mean_deviation: deviations.mean.min(deviations.max),
         beyond_tolerance,
     };
     Ok((simplified, report))

@@ -92,7 +92,7 @@ fn render_limits_radii_and_drops_outliers_as_surfels_does() {
     let folder = Folder::new();
     let image = folder.path("i.png");
     let rows: String = (0..900).map(|i| format!("{} {} {}\n", i % 30, i / 30, (i % 7) as f64 * 0.01)).collect();
-    let cloud = folder.file("cloud.ply", ply("x y z", 902, &(rows + "15 15 9\n36 15 0\n")));
+    let cloud = folder.file("cloud.ply", ply("x y z", 902, &(rows + "15 15 9\n40 15 0\n")));
     let told = |more: &[&str]| {
         let small = ["--size", "32x32", "--backend", "reference"];
         let output = succeeds(&[&["render", text(&cloud), "-o", text(&image)], &small[..], more].concat());

@@ -101,20 +101,7 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
     let graph = NeighbourGraph::new(&distinct, NORMAL_NEIGHBOURS, progress);
     let given = given_normals(&gathered);
     let count = gathered.points.positions.len();
-    let mut preparation = Preparation {
-        surfels: count as u64,
-        estimated_normals: given.as_ref().map_or(count, |all| all.iter().filter(|n| n.is_none()).count()) as u64,
-        estimated_radii: count as u64,
-        guessed_up: gathered.points.up.is_none(),
-        distinct_positions: Some(distinct.len() as u64),
-        median_spacing: median_spacing(&distinct, &graph),
-        ..gathered.preparation.clone()
-    };
-
-    if preparation.estimated_normals == 0 {
-        let of_point = |point: usize| given.as_ref()?.get(point).copied()?.map(Vec3::from_array);
-        preparation.opposed_normals = orient::opposed(&distinct, &graph, of_point);
-    }
+    let mut preparation = prepared(&gathered, given.as_deref(), (&distinct, &graph));
     progress.begin("fitting planes", 0);
     let mut normals = fit_normals(&distinct, &graph, up);
     progress.end();
@@ -132,14 +119,7 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
     };
     let of_point = distinct.of_point();
     let point_normals: Vec<[f32; 3]> = of_point.par_iter().enumerate().map(normal_of).collect();
-    let axes = (!sizes.ellipses.is_empty()).then(|| {
-        let ellipse = |(&position, &normal)| sizes.ellipse((&distinct, &graph), &normals, position, normal);
-        of_point.par_iter().zip(&point_normals).map(ellipse).collect::<Vec<_>>()
-    });
-    let radii: Vec<f32> = match &axes {
-        Some(axes) => longer(axes),
-        None => of_point.par_iter().map(|&position| sizes.length(position) as f32).collect(),
-    };
+    let (axes, radii) = sizes.of_points((&distinct, &graph), &normals, &point_normals);
     progress.end();
     let (axes, clips) = match preparation.estimated_normals == 0 && !preparation.has_random_sides() {
         true => cut(&distinct, &graph, (&point_normals, &radii), (options.size, axes)),
@@ -153,6 +133,29 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
     let radius = |index: usize| points.radii.as_ref().map_or(0.0, |radii| f64::from(radii[index]));
     preparation.strays = framed(count, |index| (DVec3::from_array(points.positions[index]), radius(index))).1;
     Ok(Surfels { points, preparation, parts, collinear: sizes.collinear })
+}
+
+/// What is known of the points before anything is made of them.
+fn prepared(
+    gathered: &Gathered,
+    given: Option<&[Option<[f32; 3]>]>,
+    (distinct, graph): (&DistinctPositions, &NeighbourGraph),
+) -> Preparation {
+    let count = gathered.points.positions.len();
+    let mut preparation = Preparation {
+        surfels: count as u64,
+        estimated_normals: given.map_or(count, |all| all.iter().filter(|n| n.is_none()).count()) as u64,
+        estimated_radii: count as u64,
+        guessed_up: gathered.points.up.is_none(),
+        distinct_positions: Some(distinct.len() as u64),
+        median_spacing: median_spacing(distinct, graph),
+        ..gathered.preparation.clone()
+    };
+    if preparation.estimated_normals == 0 {
+        let of_point = |point: usize| given?.get(point).copied()?.map(Vec3::from_array);
+        preparation.opposed_normals = orient::opposed(distinct, graph, of_point);
+    }
+    preparation
 }
 
 /// Half-axes s and t of each point.
@@ -271,6 +274,23 @@ impl Sizes {
         };
         let limits = local_limits(graph, &radii, options.limits.largest_ratio);
         Self { size: options.size, radii, limits, ellipses, collinear, scale: distinct.scale() }
+    }
+
+    /// The half-axes of points of these normals, but for disks, and their longer ones, world units.
+    fn of_points(
+        &self,
+        (distinct, graph): (&DistinctPositions, &NeighbourGraph),
+        normals: &[[f32; 3]],
+        point_normals: &[[f32; 3]],
+    ) -> (Option<HalfAxes>, Vec<f32>) {
+        let positions = distinct.of_point().par_iter();
+        if self.ellipses.is_empty() {
+            return (None, positions.map(|&position| self.length(position) as f32).collect());
+        }
+        let ellipse = |(&position, &normal)| self.ellipse((distinct, graph), normals, position, normal);
+        let axes: HalfAxes = positions.zip(point_normals).map(ellipse).collect();
+        let radii = longer(&axes);
+        (Some(axes), radii)
     }
 
     /// Points, at these positions, whose surfels would be larger than their neighbours allow.

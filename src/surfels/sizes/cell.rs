@@ -65,8 +65,8 @@ pub(crate) fn cell_ellipse(offsets: &[DVec3], normal: DVec3) -> [DVec3; 2] {
     let mean = mean.min(LARGEST_LOCAL_RATIO * spread).max(SMALLEST * mean);
     let reach = CELL_REACH * offsets.last().map_or(0.0, |farthest| farthest.length());
     let cell = Cell::new(offsets, normal, (reach, LEAST * mean / MOST_PAST_CORNER));
-    // In mean distances: the squares of areas neither overflow nor underflow.
     let past_corner = past_corner(near, normal, &cell, mean);
+    // In mean distances: the squares of areas neither overflow nor underflow.
     let corners = cell.closed().map(|corner| (past_corner / mean * corner).clamp_length_max(LARGEST));
     let least = if cell.is_closed() { LEAST } else { LEAST_OPEN };
     let [x, y] = cell.basis();

@@ -6,15 +6,16 @@ use super::RADIUS_NEIGHBOURS;
 use crate::surfels::estimate::{LARGEST_MEDIAN_RATIO, median};
 use crate::surfels::graph::NeighbourGraph;
 
-/// The largest radius of each position's disk: `factor` times the median of its neighbours' radii, and never more than
-/// [`LARGEST_MEDIAN_RATIO`] times that of all, in the unit of `radii`. Where a radius is zero, the position has none, and says
+/// The largest radius of each position's disk: `factor` times the median of its neighbours' radii, and, unless it is infinite, never more
+/// than [`LARGEST_MEDIAN_RATIO`] times that of all, in the unit of `radii`. Where a radius is zero, the position has none, and says
 /// nothing of others.
 ///
 /// At a boundary and around an outlier, points have neighbours on one side only, or far away, and so large radii; their
 /// neighbours' do not, wherever those have points around them. Densities that differ from place to place do not matter.
 pub(crate) fn local_limits(graph: &NeighbourGraph, radii: &[f64], factor: f64) -> Vec<f64> {
     let mut any: Vec<f64> = radii.par_iter().copied().filter(|radius| *radius > 0.0).collect();
-    let global = median(&mut any).map_or(f64::INFINITY, |median| median * LARGEST_MEDIAN_RATIO);
+    let ratio = if factor.is_finite() { LARGEST_MEDIAN_RATIO } else { factor };
+    let global = median(&mut any).map_or(f64::INFINITY, |median| median * ratio);
     (0..radii.len() as u32)
         .into_par_iter()
         .map_init(Vec::new, |near, index| {

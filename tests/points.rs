@@ -54,7 +54,7 @@ fn flipped(angles: &[f64]) -> usize {
 }
 
 fn within(outliers: Option<f64>, largest_ratio: f64) -> FromPoints {
-    FromPoints { limits: Limits { outliers, largest_ratio }, ..FromPoints::default() }
+    FromPoints { limits: Limits { outliers, largest_ratio, ..Limits::default() }, ..FromPoints::default() }
 }
 
 fn up() -> FromPoints {
@@ -329,7 +329,7 @@ fn a_scene_of_points_has_the_same_limits() {
     positions.push([0.0, 0.0, 0.6]);
     let scene = |points: Points, limits: Limits| build_within(vec![points], None, &limits, &()).unwrap();
     let radii = |made: &(Scene, Preparation)| made.0.surfels.iter().map(|s| s.radius()).collect::<Vec<_>>();
-    let free = scene(cloud(positions.clone()), Limits { largest_ratio: f64::INFINITY, outliers: None });
+    let free = scene(cloud(positions.clone()), Limits { largest_ratio: f64::INFINITY, ..Limits::default() });
     let limited = scene(cloud(positions.clone()), Limits::default());
     let changed = radii(&free).iter().zip(radii(&limited)).filter(|(free, limited)| *free > limited).count() as u64;
     assert!(changed > 0 && changed < 100, "{changed}");

@@ -259,6 +259,11 @@ fn absent_parts_have_their_partners_signatures() {
     assert!(absent.len() >= 5);
     let mut pairs: Vec<(&str, Vec<String>)> =
         absent.into_iter().map(|name| (name, vec![name.replace("_absent", "")])).collect();
+    let normals = pairs.iter_mut().filter(|(name, _)| *name == "normal_absent.wgsl");
+    normals.for_each(|(_, partners)| partners.push("normal_flat.wgsl".into()));
+    for name in ["flat.wgsl", "normal_flat.wgsl", "tile_flat.wgsl"] {
+        pairs.push((name, vec![name.replace("flat", "curved")]));
+    }
     pairs.push(("color_constant.wgsl", vec!["color_srgb8.wgsl".into(), "color_sums.wgsl".into()]));
     pairs.push(("color_constant.wgsl", vec!["color_linear.wgsl".into(), "color_sums.wgsl".into()]));
     pairs.push(("color_constant.wgsl", vec!["color_textured.wgsl".into(), "color_sums.wgsl".into()]));

@@ -9,6 +9,7 @@ const LEAST_FILTERED_WEIGHT: f32 = 5.9604644775390625e-8;
 struct Attributes {
     color: vec4<f32>,
     normal: vec3<f32>,
+    bend: Bend,
     // Device units; 0 where epsilon does not depend on it.
     radius: f32,
     // In a texture.
@@ -17,13 +18,13 @@ struct Attributes {
 
 fn attributes_of(index: u32, splat: Splat) -> Attributes {
     hold_copies(index);
-    return Attributes(color_of(index), normal_of(index, splat), radius_of(index), place_of(index));
+    return Attributes(color_of(index), normal_of(index, splat), bend_of(index), radius_of(index), place_of(index));
 }
 
 // Those that a tile's list or the rasteriser hands on, neither of which draws textures.
-fn attributes_without_place(color: vec4<f32>, normal: vec3<f32>, radius: f32) -> Attributes {
+fn attributes_without_place(color: vec4<f32>, normal: vec3<f32>, bend: Bend, radius: f32) -> Attributes {
     var nowhere: Place;
-    return Attributes(color, normal, radius, nowhere);
+    return Attributes(color, normal, bend, radius, nowhere);
 }
 
 fn fragment_weight(fragment: Fragment) -> f32 {
@@ -36,13 +37,20 @@ fn weight_of(fragment: Fragment) -> Term {
 }
 
 fn blend(pixel: u32, fragment: Fragment, front: f32, attributes: Attributes) {
-    blend_weighted(pixel, weight_of(fragment), fragment.depth, front, attributes);
+    blend_weighted(pixel, weight_of(fragment), fragment.depth, front, normal_at(attributes, fragment.spot), attributes);
 }
 
 // A weight of 0 adds nothing to any sum.
-fn blend_weighted(pixel: u32, weight: Term, depth: f32, front: f32, attributes: Attributes) {
+fn blend_weighted(
+    pixel: u32,
+    weight: Term,
+    depth: f32,
+    front: f32,
+    normal: vec3<f32>,
+    attributes: Attributes,
+) {
     accumulate_color(pixel, weight, attributes.color);
-    accumulate_normal(pixel, weight, attributes.normal);
+    accumulate_normal(pixel, weight, normal);
     accumulate_depth(pixel, weight, depth, front);
     accumulate_count(pixel, weight);
     accumulate_place(pixel, weight, attributes.place, depth);

@@ -49,9 +49,6 @@ fn homography(
     let y = image_of(center[1], 1u);
     let image = vec2<f32>(x.high, y.high);
     let slope = sqrt(s.z * s.z + t.z * t.z);
-    if (p_z + slope < held.near) {
-        return h;
-    }
     let focal = held.intrinsics.xy;
     // Edge-on the rows vanish, and then u is set to 2: outside the disk.
     let edge_on = h.away == 0.0;
@@ -59,10 +56,14 @@ fn homography(
     // A centre farther out than this is no better an anchor for the pixels of the image, and whole numbers stay exact.
     let pixel = clamp(floor(image), vec2<f32>(-4194304.0), vec2<f32>(4194303.0));
     let offset = (image - pixel) + vec2<f32>(x.low, y.low) - 0.5;
+    h.anchor = vec2<i32>(pixel);
+    h.offset = offset;
+    if (p_z + slope < held.near) {
+        return h;
+    }
     let a = vec2<f32>(t.y, -t.x) * scale;
     let b = vec2<f32>(-s.y, s.x) * scale;
     let c = s.z * a + t.z * b;
-    h.anchor = vec2<i32>(pixel);
     h.a = vec3<f32>(a, select(-dot(a, offset), 2.0, edge_on));
     h.b = vec3<f32>(b, -dot(b, offset));
     h.c = vec3<f32>(c, p_z - dot(c, offset));
@@ -80,7 +81,6 @@ fn homography(
         h.turn = rows.turn;
     }
     h.centered = true;
-    h.offset = offset;
     h.s_image = focal * s.xy;
     h.t_image = focal * t.xy;
     h.depth_low = p_z - slope;
@@ -96,11 +96,13 @@ struct Fragment {
     depth: f32,
     rho2: f32,
     gain: f32,
+    spot: Spot,
 }
 
 fn intersect(abc: vec3<f32>) -> Fragment {
     let rho2 = dot(abc.xy, abc.xy);
-    return Fragment(rho2 <= 1.0 && abc.z >= held.near, abc.z, rho2, 1.0);
+    var spot: Spot;
+    return Fragment(rho2 <= 1.0 && abc.z >= held.near, abc.z, rho2, 1.0, spot);
 }
 
 fn homogeneous(abc: vec3<f32>) -> vec3<f32> {
@@ -143,4 +145,33 @@ fn depth_order(z: f32) -> f32 {
 
 fn along_axis(image: vec2<f32>) -> f32 {
     return 1.0;
+}
+
+// For caps (curved.wgsl): see camera_pinhole.wgsl.
+fn holds_center(h: Homography) -> bool {
+    return true;
+}
+
+fn widening(depth: f32) -> f32 {
+    return 1.0;
+}
+
+fn toward(p: vec3<f32>, depth: f32) -> vec3<f32> {
+    return vec3<f32>(0.0, 0.0, 1.0);
+}
+
+fn spread_of(r: f32, depth: f32) -> f32 {
+    return 0.0;
+}
+
+fn shear(p: vec3<f32>) -> vec2<f32> {
+    return vec2<f32>(0.0);
+}
+
+fn image_step(x: vec2<f32>, depths: vec2<f32>) -> vec2<f32> {
+    return x * held.intrinsics.xy;
+}
+
+fn third_row(depth: f32) -> f32 {
+    return depth;
 }

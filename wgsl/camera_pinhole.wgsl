@@ -1,6 +1,6 @@
 // The pinhole camera x = fx X/Z + cx: homography and bounds of a disk, and the evaluation at a pixel.
 // Twin: src/passes/homography.rs and src/passes/footprint.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xd9cd1378ca59384f
+// All loops end, by 1 of src/gpu/loops.rs: 0x578ed3a388fe5d71
 
 fn image_of(position: Double, depth: Double, axis: u32) -> Double {
     let focal = Double(held.intrinsics[axis], held.intrinsics_low[axis]);
@@ -228,6 +228,7 @@ struct Fragment {
     rho2: f32,
     // Factor on the kernel's weight.
     gain: f32,
+    spot: Spot,
 }
 
 // The intersection of the ray through d (relative to the anchor's centre) with the splat's disk, and its weight's rho.
@@ -237,7 +238,8 @@ fn intersect(abc: vec3<f32>) -> Fragment {
     let uv = abc.xy * depth;
     // Behind the camera rho is infinite.
     let rho2 = select(3e38, dot(uv, uv), abc.z > 0.0);
-    return Fragment(reached && depth >= held.near, depth, select(rho2, min(rho2, 1.0), reached), 1.0);
+    var spot: Spot;
+    return Fragment(reached && depth >= held.near, depth, select(rho2, min(rho2, 1.0), reached), 1.0, spot);
 }
 
 // (u, v, 1) times a factor that is positive before the camera.
@@ -291,4 +293,36 @@ fn depth_order(z: f32) -> f32 {
 fn along_axis(image: vec2<f32>) -> f32 {
     let d = (image - held.intrinsics.zw) / held.intrinsics.xy;
     return inverseSqrt(1.0 + dot(d, d));
+}
+
+// For caps (curved.wgsl): whether the anchor's pixel holds the splat's centre; how much wider than at a depth of 1 the image is at
+// `depth`; the way along the ray through p for each r of depth, where `spread_of` a length r is r / depth; X/Z at p; and the image of a
+// step across the axis at a depth.
+fn holds_center(h: Homography) -> bool {
+    return h.centered;
+}
+
+fn widening(depth: f32) -> f32 {
+    return depth;
+}
+
+fn toward(p: vec3<f32>, depth: f32) -> vec3<f32> {
+    return p / depth;
+}
+
+fn spread_of(r: f32, depth: f32) -> f32 {
+    return r / depth;
+}
+
+fn shear(p: vec3<f32>) -> vec2<f32> {
+    return select(vec2<f32>(0.0), p.xy / p.z, p.z > held.near);
+}
+
+fn image_step(x: vec2<f32>, depths: vec2<f32>) -> vec2<f32> {
+    return x / depths * held.intrinsics.xy;
+}
+
+// The third of a homography's rows at a depth.
+fn third_row(depth: f32) -> f32 {
+    return 1.0 / depth;
 }

@@ -42,8 +42,13 @@ fn clip_in(record: SplatRecord) -> Clip {
     return Clip(first.xyz, vec3<f32>(first.w, second.xy));
 }
 
+// Whether a line has the point, (u, v, 1) times a positive factor, on its far side.
+fn cuts(clip: Clip, p: vec3<f32>) -> bool {
+    return p.z > 0.0 && (dot(clip.first, p) < 0.0 || dot(clip.second, p) < 0.0);
+}
+
 fn clipped(fragment: Fragment, clip: Clip, abc: vec3<f32>) -> Fragment {
-    let p = homogeneous(abc);
-    let far_side = p.z > 0.0 && (dot(clip.first, p) < 0.0 || dot(clip.second, p) < 0.0);
-    return Fragment(fragment.hit && !far_side, fragment.depth, fragment.rho2, fragment.gain);
+    var kept = fragment;
+    kept.hit = fragment.hit && !cuts(clip, homogeneous(abc));
+    return kept;
 }

@@ -16,6 +16,10 @@ fn clip_in(record: SplatRecord) -> Clip {
     return Clip(0u);
 }
 
+fn cuts(clip: Clip, p: vec3<f32>) -> bool {
+    return false;
+}
+
 fn clipped(fragment: Fragment, clip: Clip, abc: vec3<f32>) -> Fragment {
     return fragment;
 }

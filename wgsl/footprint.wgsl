@@ -45,15 +45,8 @@ fn large_splat(place: u32) -> u32 {
 
 fn footprint(splat: Splat, filter_: Filter, x: u32, y: u32) -> Fragment {
     let d = vec2<f32>(f32(i32(x) - splat.anchor_x), f32(i32(y) - splat.anchor_y));
-    let abc = vec3<f32>(
-        // The leading parts of a thin splat sum exactly, so the order of these two sums matters (rows.wgsl).
-        (splat.a[0] * d.x + (splat.a[1] * d.y + splat.a[2]))
-            + (splat.a_low[0] * d.x + (splat.a_low[1] * d.y + splat.a_low[2])),
-        splat.b[0] * d.x + (splat.b[1] * d.y + splat.b[2]),
-        splat.c[0] * d.x + (splat.c[1] * d.y + splat.c[2]),
-    );
-    var fragment = clipped(filtered(intersect(abc), abc, filter_, d), splat.clip, abc);
-    fragment.depth = sided(fragment.depth, splat);
+    var fragment = met(splat, filter_, d);
+    fragment.depth = sided(fragment.depth, is_away(splat, fragment));
     return fragment;
 }
 

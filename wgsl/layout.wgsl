@@ -80,6 +80,8 @@ struct Splat {
     a_low: array<f32, 3>,
     // Where the disk ends before its rim.
     clip: Clip,
+    // How it curves; then a, b, c and a_low have other meanings (curved.wgsl).
+    cap: Cap,
 }
 
 const AWAY: u32 = 0x80000000u;

@@ -42,5 +42,5 @@ fn filtered(fragment: Fragment, abc: vec3<f32>, filter_: Filter, d: vec2<f32>) -
         return fragment;
     }
     let rho2 = filter_rho2(filter_, d);
-    return Fragment(rho2 <= 1.0, plane_depth(abc, filter_.depth_low, filter_.depth_high), rho2, filter_.gain);
+    return Fragment(rho2 <= 1.0, plane_depth(abc, filter_.depth_low, filter_.depth_high), rho2, filter_.gain, fragment.spot);
 }

@@ -22,5 +22,5 @@ fn filtered(fragment: Fragment, abc: vec3<f32>, filter_: Filter, d: vec2<f32>) -
     if (filter_.gain == 0.0 || rho2 > 1.0 || rho2 >= fragment.rho2) {
         return fragment;
     }
-    return Fragment(true, plane_depth(abc, filter_.depth_low, filter_.depth_high), rho2, 1.0);
+    return Fragment(true, plane_depth(abc, filter_.depth_low, filter_.depth_high), rho2, 1.0, fragment.spot);
 }

@@ -1,18 +1,11 @@
 // Normals, each turned toward the viewer and mapped from [-1, 1] to [0, 1] before they are summed: those of the front and the back
 // of a thin part would cancel.
 // Twin: src/passes/accumulate.rs, src/passes/resolve.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xfe653ea67318e300
+// All loops end, by 1 of src/gpu/loops.rs: 0xef9a56c180a9394f
 
 override NORMAL_CHANNEL: u32;
 // The rasteriser's own depth test blends both sides of a surface, and normals as they are given (src/passes/raster.rs).
 override TURNS: bool;
-
-// World space, unit, mapped to [0, 1].
-fn normal_of(index: u32, splat: Splat) -> vec3<f32> {
-    let unit_normal = surfel_normal(index);
-    let turned = TURNS && (splat.bounds_last & AWAY) != 0u;
-    return select(unit_normal, -unit_normal, turned) * 0.5 + 0.5;
-}
 
 fn accumulate_normal(pixel: u32, weight: Term, normal: vec3<f32>) {
     add_pair(pixel, NORMAL_CHANNEL, term(weight, normal.x), term(weight, normal.y));

@@ -1,7 +1,7 @@
 // Stage 2, its end: the farthest of the nearest depths in each tile of pixels, by which stage 3 tells splats that are
 // hidden altogether without a look at their pixels. No image depends on it.
 // Host side: src/passes/visibility.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x8cebd33d7b32f738
+// All loops end, by 1 of src/gpu/loops.rs: 0xaf7294a9f0816c46
 
 const OCCLUSION_TILE: u32 = 8u;
 
@@ -87,11 +87,5 @@ fn hidden(splat: Splat, filter_: Filter, pixels: Rectangle, radius: f32) -> bool
 fn nearest_reached(splat: Splat, filter_: Filter, pixels: Rectangle) -> f32 {
     let first = vec2<f32>(vec2<i32>(pixels.first) - vec2<i32>(splat.anchor_x, splat.anchor_y));
     let last = vec2<f32>(vec2<i32>(pixels.last) - vec2<i32>(splat.anchor_x, splat.anchor_y));
-    let c = vec2<f32>(splat.c[0], splat.c[1]);
-    let low = min(c * first, c * last);
-    let high = max(c * first, c * last);
-    // The two products and two sums of `footprint` round by less than 4 * 2^-24 of these magnitudes: a sixteenth of this.
-    let slack = 4e-6 * (dot(max(abs(low), abs(high)), vec2<f32>(1.0)) + abs(splat.c[2]));
-    let depth = nearest_between(low.x + low.y + splat.c[2] - slack, high.x + high.y + splat.c[2] + slack);
-    return min(depth, least_filtered(filter_)) * (1.0 - 1e-6);
+    return min(nearest_on(splat, first, last), least_filtered(filter_)) * (1.0 - 1e-6);
 }

@@ -1,7 +1,7 @@
 // Stage 1: every surfel becomes a splat, once. One invocation a surfel; the rare ones that take longer (thin splats, disks
 // that reach the near depth, large splats) are listed and done together, so that the others of a subgroup need not wait.
 // Twin: src/passes/project.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x30b9ab5a3833468c
+// All loops end, by 1 of src/gpu/loops.rs: 0x59063df4bc45a100
 
 @group(0) @binding(3) var<storage, read_write> splats: array<SplatRecord>;
 // Word 0 counts the large splats, word 1 all that are out of view; three words from QUEUE_GRID on are a grid with a workgroup
@@ -65,6 +65,7 @@ fn project_into(slot: u32, every: bool) -> u32 {
     if (h.rare) {
         return RARE;
     }
+    let cap = curve(&h, index, center, s, t);
     let filter_ = low_pass(&h);
 
     // Bounds are conservative: the margin covers the rounding of the extent, and `intersect` decides.
@@ -73,7 +74,7 @@ fn project_into(slot: u32, every: bool) -> u32 {
     let first = max(ceil(h.low - margin - 0.5), vec2<f32>(0.0));
     let last = min(floor(h.high + margin - 0.5), size - 1.0);
     let exists = index < surfels_held();
-    let faces = !(CULL_BACK && h.away > 0.0);
+    let faces = !(CULL_BACK && is_back(h, cap));
     let visible = exists && faces && all(first <= last);
 
     var splat: Splat;
@@ -88,6 +89,7 @@ fn project_into(slot: u32, every: bool) -> u32 {
         splat.b = array<f32, 3>(h.b.x, h.b.y, h.b.z);
         splat.c = array<f32, 3>(h.c.x, h.c.y, h.c.z);
         splat.clip = clip_of(index, h.turn);
+        splat.cap = cap;
         splat.a_low = array<f32, 3>(h.a_low.x, h.a_low.y, h.a_low.z);
     }
     if (visible && is_large(splat)) {

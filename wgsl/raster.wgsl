@@ -124,5 +124,7 @@ fn fragment_of(corner: Corner) -> Fragment {
 }
 
 fn carried(corner: Corner) -> Attributes {
-    return attributes_without_place(corner.color, corner.normal, corner.radius);
+    // The rasteriser draws flat disks (src/plan/needs.rs).
+    var flat_: Bend;
+    return attributes_without_place(corner.color, corner.normal, flat_, corner.radius);
 }

@@ -9,8 +9,8 @@ override SIDES: bool;
 const SIDE_BIT: u32 = 1u;
 
 // Off by one unit in the last place at most. Of two depths that differ in this bit alone, the front's is nearer.
-fn sided(depth: f32, splat: Splat) -> f32 {
-    let bits = (bitcast<u32>(depth) & ~SIDE_BIT) | select(0u, SIDE_BIT, (splat.bounds_last & AWAY) != 0u);
+fn sided(depth: f32, away: bool) -> f32 {
+    let bits = (bitcast<u32>(depth) & ~SIDE_BIT) | select(0u, SIDE_BIT, away);
     return select(depth, bitcast<f32>(bits), SIDES);
 }
 

@@ -3,7 +3,7 @@
 // eight rows are drawn apart, each by the splats that reach them. The footprint, and so every bit, is that of visibility.wgsl
 // and accumulate.wgsl.
 // Host side: src/passes/tiles.rs.
-// All loops end, by 1, 3 of src/gpu/loops.rs: 0x974179426f11ed56
+// All loops end, by 1, 3 of src/gpu/loops.rs: 0xdcc9f17e3d75b9d7
 
 // The lists of the large splats.
 @group(0) @binding(27) var<storage, read> large_lists: array<u32>;
@@ -93,6 +93,7 @@ fn handed_splat(from_: u32) -> Splat {
     splat.c = handed_row(own_splat.c, from_);
     splat.a_low = handed_row(own_splat.a_low, from_);
     splat.clip = handed_clip(own_splat.clip, from_);
+    splat.cap = handed_cap(own_splat.cap, from_);
     return splat;
 }
 
@@ -107,6 +108,7 @@ fn handed_attributes(own: Attributes, from_: u32) -> Attributes {
             handed_number(c.w, from_),
         ),
         vec3<f32>(handed_number(n.x, from_), handed_number(n.y, from_), handed_number(n.z, from_)),
+        handed_bend(own.bend, from_),
         handed_number(own.radius, from_),
     );
 }
@@ -205,7 +207,8 @@ fn gather(slot: u32, splat: Splat, filter_: Filter, attributes: Attributes, fron
     // Selected, as a branch would select what is stored of each sum.
     let accepted = is_shown(fragment, front, attributes.radius);
     let weight = select(Term(0), weight_of(fragment), accepted);
-    blend_weighted(slot, weight, select(front, fragment.depth, accepted), front, attributes);
+    let normal = normal_at(attributes, fragment.spot);
+    blend_weighted(slot, weight, select(front, fragment.depth, accepted), front, normal, attributes);
 }
 
 // The column's pixels from `slot` on, four with each of `a` and `b`. Written out, so that no register is indexed by a number

@@ -10,6 +10,7 @@
 //! - **Colour** is then unpremultiplied and put over nothing: three more divisions and products of itself.
 //! - **Samples**: the colour of a pixel of several is the mean of theirs, and so is its bound.
 //! - **Lines** at which a disk ends: how far inside (u, v) is errs by the line's length times what (u, v) does, and 10 u of it.
+//! - **Caps** turn the normal by what their slopes do over the error of (u, v), and 30 u of it.
 //! - **Normal**: s x t errs by 6 u |s||t|, its normalisation, mapping and normalising the mean by 12 u; the mean's error is
 //!   divided by the mean's length.
 //!
@@ -196,6 +197,11 @@ struct Fragment {
     /// How far inside the lines at which the disk ends.
     inside: f64,
     inside_error: f64,
+    /// It shows the back of a surface that has sides.
+    back: bool,
+    /// What light sees.
+    normal: DVec3,
+    normal_error: f64,
 }
 
 impl Fragment {
@@ -228,13 +234,16 @@ fn fragments(
     let of_side = if sides == Sides::Nearest { 2.0 * U } else { 0.0 };
     // A disk seen exactly edge-on has no rows, and without a low-pass no fragment.
     let edge_on = |splat: &&Splat| splat.a.truncate() == DVec2::ZERO && splat.b == DVec3::ZERO;
-    for splat in splats.iter().filter(|splat| !edge_on(splat)) {
+    for splat in splats.iter().filter(|splat| splat.curve.is_some() || !edge_on(splat)) {
         let precision = Precision::of(splat, scene, camera);
         let surface = Surface::of(splat, scene);
         for y in splat.first[1]..=splat.last[1] {
             for x in splat.first[0]..=splat.last[0] {
                 let Some(at) = footprint(splat, camera, LowPass::None, x, y).map(|(at, _)| at) else { continue };
-                let bound = precision.fragment(splat, x, y, &at);
+                let bound = match &splat.curve {
+                    Some(curve) => precision.cap(curve, splat, (x, y), &at),
+                    None => precision.fragment(splat, x, y, &at),
+                };
                 let known = |error: f64| if error.is_nan() { f64::INFINITY } else { error };
                 let rho = at.rho2.sqrt();
                 let fragment = Fragment {
@@ -243,7 +252,13 @@ fn fragments(
                     rho,
                     rho_error: known(bound.rho),
                     inside: at.inside,
-                    inside_error: known(line_error(&splat.clip, rho, bound.rho)),
+                    // Of a cap it may be how little the ray's other meeting misses.
+                    inside_error: known(
+                        line_error(&splat.clip, rho, bound.rho) + splat.curve.map_or(0.0, |_| bound.rho),
+                    ),
+                    back: splat.shows_back(&at),
+                    normal: splat.normal_at(&at),
+                    normal_error: surface.normal_error + turned_error(splat, bound.rho),
                 };
                 visit(y as usize * camera.width as usize + x as usize, splat, &surface, &fragment);
             }
@@ -262,10 +277,14 @@ fn line_error(clip: &Clip, rho: f64, rho_error: f64) -> f64 {
     if clip.is_none() { 0.0 } else { of_line(clip.0[0]).max(of_line(clip.0[1])) }
 }
 
+/// How far the device may be off in a cap's normal, by how far it is in (u, v): what it turns by, and 30 u of that.
+fn turned_error(splat: &Splat, rho_error: f64) -> f64 {
+    splat.curve.map_or(0.0, |curve| curve.slopes.map(DVec3::length).iter().sum::<f64>() * (rho_error + 30.0 * U))
+}
+
 /// A surfel's attributes.
 struct Surface {
     color: [f64; 4],
-    normal: DVec3,
     normal_error: f64,
     radius: f64,
 }
@@ -279,7 +298,6 @@ impl Surface {
         let skew = s.length() * t.length() / s.cross(t).length();
         Self {
             color: [r * a, g * a, b * a, a],
-            normal: splat.normal,
             normal_error: 6.0 * U * skew + 12.0 * U,
             radius: f64::from(surfel.shorter()),
         }
@@ -309,7 +327,7 @@ impl Depths {
     };
 
     fn add(&mut self, splat: &Splat, camera: &Camera, f: &Fragment) {
-        let [may, surely] = &mut self.sides[usize::from(splat.back)];
+        let [may, surely] = &mut self.sides[usize::from(f.back)];
         if f.may_hit(camera) {
             let depth = (f.depth - f.depth_error).max(camera.near * (1.0 - U));
             *may = may.min(depth);
@@ -323,7 +341,7 @@ impl Depths {
             *surely = surely.min(f.depth + f.depth_error);
         }
         if f.hits(camera) {
-            self.found = self.found.with(f.depth, splat.back);
+            self.found = self.found.with(f.depth, f.back);
         }
     }
 
@@ -366,9 +384,9 @@ pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Pi
         let (near, front) = (&depths[pixel], depths[pixel].found);
         let may = f.may_hit(camera) && f.depth - f.depth_error - rounding <= behind(near.high());
         let must = f.surely_hits(camera) && f.depth + f.depth_error + rounding <= behind(near.beside(splat.surfel));
-        let hits = f.hits(camera) && front.shows(splat, f.depth, behind(front.depth));
+        let hits = f.hits(camera) && front.shows(f.depth, f.back, behind(front.depth));
         let known = &mut pixels[pixel];
-        known.open |= may && near.side_is_open() || splat.back == front.back && may != must;
+        known.open |= may && near.side_is_open() || f.back == front.back && may != must;
         if !hits {
             return;
         }
@@ -377,9 +395,9 @@ pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Pi
         known.weight += weight;
         known.weight_error += weight_error(options.kernel, f);
         known.depth_error += weight * f.depth_error;
-        known.normal_error += weight * surface.normal_error;
-        known.normal += weight * surface.normal;
-        known.normals = [known.normals[0].min(surface.normal), known.normals[1].max(surface.normal)];
+        known.normal_error += weight * f.normal_error;
+        known.normal += weight * f.normal;
+        known.normals = [known.normals[0].min(f.normal), known.normals[1].max(f.normal)];
         known.depths = [known.depths[0].min(f.depth), known.depths[1].max(f.depth)];
         for (k, value) in surface.color.into_iter().enumerate() {
             known.color[k] += weight * value;

@@ -16,6 +16,7 @@
 
 pub mod bounds;
 mod cases;
+mod curved;
 mod ends;
 mod extremes;
 mod judge;
@@ -74,6 +75,7 @@ pub struct HardCase {
 pub fn cases() -> Result<Vec<HardCase>> {
     let mut all = cases::cases()?;
     all.extend(ends::cases()?);
+    all.extend(curved::cases()?);
     all.extend(extremes::cases()?);
     Ok(all)
 }

@@ -39,19 +39,19 @@ pub struct Bound {
 
 /// What the bounds of a splat's record depend on.
 pub struct Precision {
-    projection: Projection,
+    pub(super) projection: Projection,
     /// As defined above.
     pub cosine: f64,
-    s: DVec3,
-    t: DVec3,
-    distance: f64,
+    pub(super) s: DVec3,
+    pub(super) t: DVec3,
+    pub(super) distance: f64,
     center_z: f64,
     /// The splat's centre in the image; only where the record is anchored there.
-    center: Option<DVec2>,
+    pub(super) center: Option<DVec2>,
     /// The direction through the anchor, for records that are anchored in the image.
-    anchor_ray: DVec3,
-    principal: DVec2,
-    focal: f64,
+    pub(super) anchor_ray: DVec3,
+    pub(super) principal: DVec2,
+    pub(super) focal: f64,
     /// Frobenius norm of the coefficients of x and y in rows a and b, and the smaller singular value.
     change: f64,
     least_change: f64,

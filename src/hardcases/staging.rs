@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use super::{Expected, HardCase};
 use crate::error::Result;
 use crate::plan::{Accumulator, Optimisation, RenderOptions};
-use crate::scene::{Camera, Clip, Colors, Epsilon, Kernel, Lens, Projection, Scene, Shading, Surfel, Up};
+use crate::scene::{Camera, Cap, Clip, Colors, Epsilon, Kernel, Lens, Projection, Scene, Shading, Surfel, Up};
 
 /// Part of `x` beyond a whole number, for the k-th of a sequence that fills [0, 1) evenly along each of six axes.
 pub fn fraction(k: usize, axis: usize) -> f64 {
@@ -145,6 +145,8 @@ pub struct Filling {
     pub colors: Option<Vec<[f32; 4]>>,
     /// The lines at which the surfels end; none or one for each.
     pub clips: Vec<Clip>,
+    /// How they curve; none or one for each.
+    pub caps: Vec<Cap>,
     /// The options.
     pub options: RenderOptions,
     /// Least and largest share of pixels covered.
@@ -175,6 +177,7 @@ impl Filling {
             surfels,
             colors: None,
             clips: Vec::new(),
+            caps: Vec::new(),
             options: options(),
             covered,
             excused: 0.01,
@@ -250,6 +253,7 @@ pub fn build(entries: &[Entry]) -> Result<Vec<HardCase>> {
                     surfels: filling.surfels,
                     low: vec![],
                     clips: filling.clips,
+                    caps: filling.caps,
                     colors: Colors::Linear(colors),
                     oriented: true,
                     up: Up::Z,

@@ -1,7 +1,7 @@
 //! What one input file holds, before it becomes surfels.
 
 pub use crate::scene::Up;
-use crate::scene::{Clip, Colors};
+use crate::scene::{Cap, Clip, Colors};
 
 /// Points as a file gives them: f64 world coordinates and whatever attributes exist.
 ///
@@ -20,6 +20,8 @@ pub struct Points {
     pub axes: Option<Vec<[[f32; 3]; 2]>>,
     /// Where the disks of the half-axes end before their rims.
     pub clips: Option<Vec<Clip>>,
+    /// How the disks of the half-axes curve.
+    pub caps: Option<Vec<Cap>>,
     /// Colours, [`Colors::Srgb8`] or [`Colors::Linear`].
     pub colors: Option<Colors>,
     /// Texture coordinates (u, v), origin bottom left as in OBJ.
@@ -62,6 +64,7 @@ impl Points {
         self.radii.iter_mut().for_each(|all| retain(all, keep));
         self.axes.iter_mut().for_each(|all| retain(all, keep));
         self.clips.iter_mut().for_each(|all| retain(all, keep));
+        self.caps.iter_mut().for_each(|all| retain(all, keep));
         self.texture.iter_mut().for_each(|all| retain(all, keep));
         self.colors.iter_mut().for_each(|all| retain_colors(all, keep));
     }

@@ -168,16 +168,16 @@ pub fn reference<'a>(
             let row = (y - first_row) as usize * width;
             for x in splat.first[0]..=splat.last[0] {
                 let Some((at, gain)) = footprint(splat, camera, options.low_pass, x, y) else { continue };
-                let pixel = row + x as usize;
+                let (pixel, back) = (row + x as usize, splat.shows_back(&at));
                 let front = nearest[pixel];
                 let behind = options.epsilon.farthest(front.depth, radius);
                 let sum = &mut sums[pixel];
                 if options.maps.has(Map::Decision) {
                     // What shows the other side is out unless it is nearest.
-                    let behind = if splat.back == front.back { behind } else { front.depth };
+                    let behind = if back == front.back { behind } else { front.depth };
                     sum.decision = sum.decision.min(decision(at, behind, camera.near));
                 }
-                if !(at.hit(camera) && front.shows(splat, at.depth, behind)) {
+                if !(at.hit(camera) && front.shows(at.depth, back, behind)) {
                     continue;
                 }
                 sum.back = front.back;
@@ -194,7 +194,7 @@ pub fn reference<'a>(
                         *total += weight * value;
                     }
                 }
-                for (total, value) in sum.normal.iter_mut().zip(splat.normal.to_array()) {
+                for (total, value) in sum.normal.iter_mut().zip(splat.normal_at(&at).to_array()) {
                     *total += weight * value;
                 }
                 sum.depth += weight * at.depth;
@@ -258,11 +258,14 @@ pub fn large(band: usize) -> Stage {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec2;
+
     use super::*;
 
     #[test]
     fn a_decision_is_near_only_if_nothing_else_decides() {
-        let at = |rho: f64| Intersection { depth: 2.0, rho2: rho * rho, inside: 1.0 };
+        let at =
+            |rho: f64| Intersection { depth: 2.0, rho2: rho * rho, inside: 1.0, uv: DVec2::new(rho, 0.0), away: false };
         let of = |rho: f64, behind: f64| decision(at(rho), behind, 0.1);
         // Just inside the rim, well inside the tolerance.
         assert!((of(1.0 - 1e-7, 2.2) - 1e-7).abs() < 1e-12);

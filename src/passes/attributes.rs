@@ -12,12 +12,13 @@ pub const PASS: Pass = Pass {
         let pick = |needed, file, absent| if needed { file } else { absent };
         let whole = needs.raster.is_some_and(|raster| raster.depth != RasterDepth::Exact);
         let mut files = vec![
-            pick(needs.normal, "normal.wgsl", "normal_absent.wgsl"),
+            pick(needs.normal, pick(needs.curved, "normal_curved.wgsl", "normal_flat.wgsl"), "normal_absent.wgsl"),
             pick(needs.own_normals, "normal_own.wgsl", "normal_plane.wgsl"),
             pick(needs.maps.has(Map::Count), "count.wgsl", "count_absent.wgsl"),
             pick(needs.maps.has(Map::Depth), pick(whole, "depth_whole.wgsl", "depth.wgsl"), "depth_absent.wgsl"),
             pick(needs.color == ColorNeed::Textured, "texture.wgsl", "texture_absent.wgsl"),
         ];
+        files.extend(needs.normal.then_some("normal.wgsl"));
         files.push("attributes.wgsl");
         files.extend(match needs.color {
             ColorNeed::Constant => &["color_constant.wgsl"][..],
@@ -36,6 +37,7 @@ pub const PASS: Pass = Pass {
             ("COPIES_WORD", surfel.copies.into()),
             ("LOW_WORD", surfel.low.into()),
             ("CLIP_WORD", surfel.clip.into()),
+            ("CAP_WORD", surfel.cap.into()),
             ("NORMAL_WORD", surfel.normal.into()),
             ("COLOR_CHANNELS", color_channels(making.needs).into()),
             ("TURNS", u32::from(making.needs.sides != Sides::Both).into()),

@@ -23,14 +23,16 @@ use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage};
 use crate::scene::{Camera, LowPass, Projection, Surfel};
 
-/// A ball around disks, each with its centre: centre x, y, z and radius, world units relative to the scene's origin.
-pub(crate) fn ball<'a>(surfels: impl Iterator<Item = (DVec3, &'a Surfel)> + Clone) -> [f32; 4] {
+/// A ball around disks, each with its centre and the height of its cap: centre x, y, z and radius, world units relative to the scene's origin.
+pub(crate) fn ball<'a>(surfels: impl Iterator<Item = (DVec3, &'a Surfel, f64)> + Clone) -> [f32; 4] {
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for (center, _) in surfels.clone() {
+    for (center, ..) in surfels.clone() {
         (low, high) = (low.min(center), high.max(center));
     }
     let middle = (low + (high - low) * 0.5).as_vec3();
-    let radius = surfels.map(|(center, surfel)| center.distance(middle.as_dvec3()) + reach(surfel)).fold(0.0, f64::max);
+    let far =
+        |(center, surfel, height): (DVec3, &Surfel, f64)| center.distance(middle.as_dvec3()) + reach(surfel) + height;
+    let radius = surfels.map(far).fold(0.0, f64::max);
     // Up to the next f32 and past the rounding of these lengths.
     middle.extend((radius * (1.0 + 1e-6)) as f32).to_array()
 }
@@ -117,7 +119,7 @@ mod tests {
     /// Whether the image of a ball holds what `surfel` may touch.
     fn holds([low, high]: [DVec2; 2], surfel: &Surfel, camera: &Camera, design: &Design) -> bool {
         let center = Vec3::from_array(surfel.center).as_dvec3();
-        project::reference((0, surfel), center - camera.eye, camera, design).is_none_or(|splat| {
+        project::reference((0, surfel, None), center - camera.eye, camera, design).is_none_or(|splat| {
             (0..2).all(|k| low[k] <= f64::from(splat.first[k]) && f64::from(splat.last[k]) <= high[k])
         })
     }
@@ -141,7 +143,7 @@ mod tests {
                     t: (Vec3::from_slice(&v[6..]) * *size).to_array(),
                 })
                 .collect();
-            let [x, y, z, radius] = ball(surfels.iter().map(|surfel| (Vec3::from_array(surfel.center).as_dvec3(), surfel))).map(f64::from);
+            let [x, y, z, radius] = ball(surfels.iter().map(|surfel| (Vec3::from_array(surfel.center).as_dvec3(), surfel, 0.0))).map(f64::from);
             let design = Design::of(&RenderOptions { low_pass, ..RenderOptions::default() });
             if let Some(pixels) = reference(DVec3::new(x, y, z), radius, &camera, filter_reach(&design)) {
                 for surfel in &surfels {

@@ -1,5 +1,8 @@
 //! A splat at a pixel: coverage, depth and rho. The twin of `wgsl/footprint.wgsl`.
 
+use glam::DVec2;
+
+use super::curved;
 use super::lowpass::filtered;
 use super::splat::{Intersection, Splat};
 use crate::plan::Sides;
@@ -46,6 +49,10 @@ pub const PASS: Pass = Pass {
 /// kernel's weight; `None` behind the camera.
 pub fn footprint(splat: &Splat, camera: &Camera, low_pass: LowPass, x: u32, y: u32) -> Option<(Intersection, f64)> {
     let (dx, dy) = ((i64::from(x) - splat.anchor[0]) as f64, (i64::from(y) - splat.anchor[1]) as f64);
+    if let Some(curve) = &splat.curve {
+        let (cap, plane) = curved::meet(curve, splat, camera, DVec2::new(dx, dy));
+        return filtered(splat, camera, low_pass, Some(cap), plane, (dx, dy));
+    }
     let at = |row: glam::DVec3| row.x * dx + (row.y * dy + row.z);
     let (a, b, c) = (at(splat.a), at(splat.b), at(splat.c));
     let (before, u, v, rho2, depth) = match camera.projection {
@@ -53,6 +60,6 @@ pub fn footprint(splat: &Splat, camera: &Camera, low_pass: LowPass, x: u32, y: u
         Projection::Orthographic => (true, a, b, a * a + b * b, c),
     };
     let inside = if before { splat.clip.inside(u, v) } else { f64::INFINITY };
-    let disk = before.then_some(Intersection { depth, rho2, inside });
-    filtered(splat, camera, low_pass, disk, c, (dx, dy)).map(|(at, gain)| (Intersection { inside, ..at }, gain))
+    let disk = before.then_some(Intersection { depth, rho2, inside, uv: DVec2::new(u, v), away: splat.away });
+    filtered(splat, camera, low_pass, disk, (c, inside), (dx, dy))
 }

@@ -72,7 +72,9 @@ fn reference(strip: &Strip<'_>, nearest: &[Nearest], frame: &mut Frame) {
                 let pixel = ((y - first_row) * camera.width + x) as usize;
                 let Some((at, gain)) = footprint(splat, camera, options.low_pass, x, y) else { continue };
                 let front = nearest[pixel];
-                if !at.hit(camera) || !front.shows(splat, at.depth, options.epsilon.farthest(front.depth, radius)) {
+                if !at.hit(camera)
+                    || !front.shows(at.depth, splat.shows_back(&at), options.epsilon.farthest(front.depth, radius))
+                {
                     continue;
                 }
                 let weight = (gain * options.kernel.weight(at.rho2)).max(LEAST_FILTERED_WEIGHT);

@@ -105,13 +105,13 @@ pub fn filter(design: &Design, center: DVec2, s: DVec2, t: DVec2, depths: [f64; 
 
 /// A splat at a pixel as the low-pass shows it: the intersection, and the factor on its weight.
 ///
-/// `plane` is the third row at the pixel: 1/z (pinhole) or z.
+/// `plane` is the third row at the pixel: 1/z (pinhole) or z of the disk's plane; `inside` how far inside the disk's lines its point is.
 pub fn filtered(
     splat: &Splat,
     camera: &Camera,
     low_pass: LowPass,
     disk: Option<Intersection>,
-    plane: f64,
+    (plane, inside): (f64, f64),
     (dx, dy): (f64, f64),
 ) -> Option<(Intersection, f64)> {
     let Some(filter) = &splat.filter else { return disk.map(|disk| (disk, 1.0)) };
@@ -122,7 +122,7 @@ pub fn filtered(
         Projection::Pinhole => 1.0 / plane.clamp(1.0 / high, 1.0 / low),
         Projection::Orthographic => plane.clamp(low, high),
     };
-    let round = Intersection { depth, rho2, inside: f64::INFINITY };
+    let round = Intersection { depth, rho2, inside, uv: DVec2::ZERO, away: splat.away };
     match (low_pass, disk) {
         (LowPass::Max, Some(disk)) if rho2 > 1.0 || rho2 >= disk.rho2 => Some((disk, 1.0)),
         _ => Some((round, filter.gain)),

@@ -22,6 +22,7 @@ pub mod accumulate;
 pub mod attributes;
 pub mod covered;
 pub mod cull;
+pub mod curved;
 pub mod footprint;
 pub mod homography;
 pub mod index;

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::gpu::layout::BATCH;
 use crate::morton;
-use crate::scene::{Bounds, Clip, Scene, Surfel};
+use crate::scene::{Bounds, Cap, Clip, Scene, Surfel};
 
 /// Surfels of a run: whole batches. Of 64, 512 and 4096 the middle gave the shortest frames on a software adapter.
 const RUN: usize = 512;
@@ -50,13 +50,14 @@ pub fn order(scene: &Scene, core: &Bounds) -> Vec<u32> {
 }
 
 /// The bits of a surfel and its colour.
-fn content(scene: &Scene, index: usize) -> ([[u32; 3]; 7], [u32; 4]) {
+fn content(scene: &Scene, index: usize) -> ([[u32; 3]; 8], [u32; 4]) {
     let Surfel { center, s, t } = scene.surfels[index];
     let low = scene.low.get(index).copied().unwrap_or_default();
     let normal = scene.normals.get(index).copied().unwrap_or_default();
     let Clip([first, second]) = scene.clips.get(index).copied().unwrap_or_default();
+    let Cap(cap) = scene.caps.get(index).copied().unwrap_or_default();
     (
-        [center, low, s, t, first, second, normal].map(|part| part.map(f32::to_bits)),
+        [center, low, s, t, first, second, cap, normal].map(|part| part.map(f32::to_bits)),
         scene.colors.linear(index).map(f32::to_bits),
     )
 }

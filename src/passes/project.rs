@@ -6,6 +6,7 @@
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::curved::{self, Curve, Seen};
 use super::homography::{self, slope};
 use super::lowpass::{self, Design};
 use super::splat::Splat;
@@ -14,11 +15,14 @@ use crate::plan::pass::{Making, Pass};
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
 use crate::plan::{Facts, RenderOptions, Sides, culls_back};
 use crate::plan::{Organisation, Plan, tuning};
-use crate::scene::{Camera, Clip, LowPass, Scene, Surfel, copies, has_copies};
+use crate::scene::{Camera, Cap, Clip, LowPass, Scene, Surfel, copies, has_copies};
+
+/// A surfel with its index; and its cap, in a scene in which some surfel curves.
+pub type Indexed<'a> = (u32, &'a Surfel, Option<Cap>);
 
 /// The twin of `wgsl/project.wgsl` for one surfel, whose centre is at `relative` (world units) from the camera's eye; `None` if no
 /// pixel can be touched.
-pub fn reference(of: (u32, &Surfel), relative: DVec3, camera: &Camera, design: &Design) -> Option<Splat> {
+pub fn reference(of: Indexed<'_>, relative: DVec3, camera: &Camera, design: &Design) -> Option<Splat> {
     projected(of, relative, camera, design).ok()
 }
 
@@ -35,7 +39,7 @@ pub(super) enum Missed {
 
 /// The splat of [`reference`], or why there is none.
 pub(super) fn projected(
-    (index, surfel): (u32, &Surfel),
+    (index, surfel, cap): Indexed<'_>,
     relative: DVec3,
     camera: &Camera,
     design: &Design,
@@ -43,12 +47,19 @@ pub(super) fn projected(
     let vector = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
     let (s_world, t_world) = (vector(surfel.s), vector(surfel.t));
     let (p, s, t) = (camera.rotation * relative, camera.rotation * s_world, camera.rotation * t_world);
-    if p.z + slope(s, t) < camera.near {
+    // The ellipse of `ewa` is that of a flat disk.
+    let seen = cap.filter(|_| design.low_pass != LowPass::Ewa).map(|cap| Seen { p, s, t, cap });
+    let depths = seen.as_ref().map_or([p.z - slope(s, t), p.z + slope(s, t)], Seen::depths);
+    if depths[1] < camera.near {
         return Err(Missed::Behind);
     }
     let mut projected = homography::projected(camera, p, s, t);
-    let near = (p.z - slope(s, t)).max(camera.near);
-    let depths = [near, (p.z + slope(s, t)).max(near)];
+    let near = depths[0].max(camera.near);
+    let depths = [near, depths[1].max(near)];
+    let curve = seen.as_ref().map(|seen| {
+        [projected.low, projected.high] = seen.extent(camera);
+        Curve { slopes: curved::normal_slopes(s_world, t_world, seen.cap), ..curved::curve(camera, seen, &projected) }
+    });
     let filter = projected.images.and_then(|[center, s, t]| lowpass::filter(design, center, s, t, depths));
     if let Some(filter) = &filter {
         let center = DVec2::new(projected.anchor[0] as f64, projected.anchor[1] as f64) + 0.5 + filter.center;
@@ -77,10 +88,11 @@ pub(super) fn projected(
         b: projected.b,
         c: projected.c,
         away: projected.away,
-        back: false,
+        sides: Sides::None,
         normal,
         filter,
         clip: Clip::NONE,
+        curve,
         copies: 1,
     })
 }
@@ -96,16 +108,24 @@ pub fn reference_all(scene: &Scene, camera: &Camera, options: &RenderOptions) ->
     let copies = (has_copies(scene) && options.draws_copies_once()).then(|| copies(scene));
     let project = |(index, surfel): (usize, &Surfel)| {
         let copies = copies.as_ref().map_or(1, |copies| copies[index]);
-        let splat = || reference((index as u32, surfel), scene.center(index) - eye, camera, &design);
-        let splat = (copies > 0).then(splat).flatten().filter(|splat| !(cull_back && splat.away));
+        let splat = || {
+            reference(
+                (index as u32, surfel, scene.caps.get(index).copied()),
+                scene.center(index) - eye,
+                camera,
+                &design,
+            )
+        };
+        let splat = (copies > 0).then(splat).flatten().filter(|splat| !(cull_back && splat.faces_away()));
         let own = |splat: Splat| {
             let given = scene.normals.get(index).map(|normal| Vec3::from_array(*normal).as_dvec3());
             let normal = given.unwrap_or(splat.normal);
             Splat {
                 copies,
                 clip: scene.clips.get(index).copied().unwrap_or_default(),
-                back: splat.away && sides == Sides::Nearest,
-                normal: if splat.away && sides != Sides::Both { -normal } else { normal },
+                sides,
+                normal: if splat.away && sides != Sides::Both && splat.curve.is_none() { -normal } else { normal },
+                curve: splat.curve.map(|curve| Curve { culls: cull_back, ..curve }),
                 ..splat
             }
         };

@@ -12,6 +12,7 @@ pub const PASS: Pass = Pass {
             pick(needs.long_words, "words_long.wgsl", "words.wgsl"),
             "records.wgsl",
             pick(needs.clips, "clip.wgsl", "clip_absent.wgsl"),
+            pick(needs.curved, "curved.wgsl", "flat.wgsl"),
             "double.wgsl",
             "rows.wgsl",
             pick(needs.doubled, "center_doubled.wgsl", "center.wgsl"),
@@ -19,5 +20,5 @@ pub const PASS: Pass = Pass {
         ]
     },
     kernels: |_| Vec::new(),
-    constants: |_| Vec::new(),
+    constants: |making| vec![("CULLS", u32::from(making.needs.cull_back).into())],
 };

@@ -11,7 +11,7 @@ use super::cull::ball;
 use super::order::order;
 use crate::gpu::layout::BATCH;
 use crate::plan::{ColorNeed, Facts, SceneNeeds, SurfelLayout};
-use crate::scene::{Colors, Provenance, Scene, Surfel, Texture, copies};
+use crate::scene::{Cap, Colors, Provenance, Scene, Surfel, Texture, copies};
 
 /// Surfels, page by page.
 pub trait Source: Send + Sync {
@@ -157,6 +157,10 @@ impl ScenePage<'_> {
             let into = &mut into[self.layout.clip as usize..];
             clip.0.iter().flatten().zip(into).for_each(|(value, into)| *into = value.to_bits());
         }
+        if let (true, Some(cap)) = (self.needs.curved, self.scene.caps.get(index)) {
+            let into = &mut into[self.layout.cap as usize..];
+            cap.0.iter().zip(into).for_each(|(value, into)| *into = value.to_bits());
+        }
     }
 }
 
@@ -178,7 +182,11 @@ impl Page for ScenePage<'_> {
     }
 
     fn balls(&self) -> Vec<[f32; 4]> {
-        let disk = |&index: &u32| (self.scene.center(index as usize), &self.scene.surfels[index as usize]);
+        let disk = |&index: &u32| {
+            let index = index as usize;
+            let height = self.scene.caps.get(index).map_or(0.0, Cap::highest);
+            (self.scene.center(index), &self.scene.surfels[index], height)
+        };
         self.indices.par_chunks(BATCH as usize).map(|batch| ball(batch.iter().map(disk))).collect()
     }
 

@@ -2,6 +2,8 @@
 
 use glam::{DVec2, DVec3};
 
+use super::curved::Curve;
+use crate::plan::Sides;
 use crate::scene::{Camera, Clip};
 
 /// A projected surfel in f64: the twin of [`crate::gpu::layout::Splat`], in world units.
@@ -23,14 +25,17 @@ pub struct Splat {
     pub c: DVec3,
     /// The normal points away from the viewer.
     pub away: bool,
-    /// It is a back in a view in which pixels show one side of a surface ([`Sides::Nearest`](crate::plan::Sides)).
-    pub back: bool,
-    /// World space, unit, as light sees the surfel: turned toward the viewer unless the view blends both sides as they are.
+    /// What is seen of the surfels of the view.
+    pub sides: Sides,
+    /// World space, unit, as light sees the surfel: turned toward the viewer unless the view blends both sides as they are. Of one that
+    /// curves that of its centre, as it was given.
     pub normal: DVec3,
     /// The low-pass, if there is one.
     pub filter: Option<Filter>,
     /// Where the disk ends before its rim.
     pub clip: Clip,
+    /// How it curves, in a scene in which some surfel does.
+    pub curve: Option<Curve>,
     /// Surfels that it stands for.
     pub copies: u32,
 }
@@ -59,6 +64,29 @@ pub struct Intersection {
     pub rho2: f64,
     /// How far inside the disk's lines ([`Clip::inside`]); it ends at 0.
     pub inside: f64,
+    /// (u, v) on the unit disk; of a fragment of the low-pass that of the disk's centre.
+    pub uv: DVec2,
+    /// The surfel's back is seen there.
+    pub away: bool,
+}
+
+impl Splat {
+    /// Whether `at` is of a back, in a view in which pixels show one side of a surface ([`Sides::Nearest`]).
+    pub fn shows_back(&self, at: &Intersection) -> bool {
+        at.away && self.sides == Sides::Nearest
+    }
+
+    /// Whether no pixel shows its front.
+    pub fn faces_away(&self) -> bool {
+        self.curve.as_ref().map_or(self.away, Curve::faces_away)
+    }
+
+    /// The normal that light sees at `at`, world space, unit.
+    pub fn normal_at(&self, at: &Intersection) -> DVec3 {
+        let Some(curve) = &self.curve else { return self.normal };
+        let normal = (self.normal + curve.slopes[0] * at.uv.x + curve.slopes[1] * at.uv.y).normalize_or_zero();
+        if at.away && self.sides != Sides::Both { -normal } else { normal }
+    }
 }
 
 impl Intersection {

@@ -32,6 +32,7 @@ pub const PASS: Pass = Pass {
             "tile_reach.wgsl",
             pick(needs.low_pass == LowPass::None, "tile_filter_absent.wgsl", "tile_filter.wgsl"),
             pick(needs.clips, "tile_clip.wgsl", "tile_clip_absent.wgsl"),
+            pick(needs.curved, "tile_curved.wgsl", "tile_flat.wgsl"),
             pick(needs.gather, "tile_small.wgsl", "tile_small_absent.wgsl"),
             pick(needs.samples == Samples::ONE, "tile_pixels.wgsl", "tile_samples.wgsl"),
             pick(needs.subgroups, "splat_shared.wgsl", "splat_plain.wgsl"),
@@ -70,7 +71,7 @@ pub fn touched(facts: &Facts, camera: &Camera, options: &RenderOptions) -> f64 {
     let splats = facts
         .sample
         .iter()
-        .filter_map(|(surfel, center)| project::reference((0, surfel), *center - eye, camera, &design));
+        .filter_map(|(surfel, center)| project::reference((0, surfel, None), *center - eye, camera, &design));
     let across = |first: u32, last: u32, size: u32| 1.0 + f64::from(last.saturating_sub(first)) / f64::from(size);
     let touched = splats.map(|splat| {
         let ([left, top], [right, bottom]) = (splat.first, splat.last);

@@ -20,7 +20,7 @@ use crate::scene::{Camera, LowPass};
 pub struct Nearest {
     /// Camera-space z, world units; +inf where nothing is.
     pub depth: f64,
-    /// It is the back of a surface that has sides ([`Splat::back`]); of a front and a back at one depth the front is nearest.
+    /// It is the back of a surface that has sides ([`Splat::shows_back`]); of a front and a back at one depth the front is nearest.
     pub back: bool,
 }
 
@@ -34,10 +34,10 @@ impl Nearest {
         if nearer { Self { depth, back } } else { self }
     }
 
-    /// Whether a fragment of `splat` at `depth` belongs to this surface: it lies no farther than the tolerance `behind` and shows the
-    /// same side.
-    pub fn shows(self, splat: &Splat, depth: f64, behind: f64) -> bool {
-        depth <= behind && splat.back == self.back
+    /// Whether a fragment at `depth`, of a `back` or not, belongs to this surface: it lies no farther than the tolerance `behind` and
+    /// shows the same side.
+    pub fn shows(self, depth: f64, back: bool, behind: f64) -> bool {
+        depth <= behind && back == self.back
     }
 }
 
@@ -56,7 +56,7 @@ pub fn reference<'a>(
             for x in splat.first[0]..=splat.last[0] {
                 if let Some((hit, _)) = footprint(splat, camera, low_pass, x, y).filter(|(i, _)| i.hit(camera)) {
                     let pixel = &mut nearest[row + x as usize];
-                    *pixel = pixel.with(hit.depth, splat.back);
+                    *pixel = pixel.with(hit.depth, splat.shows_back(&hit));
                 }
             }
         }

@@ -50,6 +50,8 @@ pub struct Facts {
     pub closed: bool,
     /// Disks end at lines, [`Scene::clips`].
     pub clips: bool,
+    /// Disks curve, [`Scene::caps`].
+    pub caps: bool,
     /// Surfels have normals of their own, [`Scene::normals`].
     pub own_normals: bool,
     /// Centres have trailing parts, [`Scene::low`].
@@ -88,6 +90,7 @@ impl Facts {
             oriented: scene.oriented,
             closed: scene.closed,
             clips: !scene.clips.is_empty(),
+            caps: !scene.caps.is_empty(),
             own_normals: !scene.normals.is_empty(),
             doubled: !scene.low.is_empty(),
             copies: has_copies(scene),

@@ -56,6 +56,8 @@ pub struct SceneNeeds {
     pub cull_back: bool,
     /// Disks end at lines in their planes.
     pub clips: bool,
+    /// Disks curve: neither the rasteriser nor the ellipse of `ewa` does that.
+    pub curved: bool,
     /// Samples of a pixel. The kernels' pixels are samples, but for those that they are resolved to.
     pub samples: Samples,
     /// How pixels are lit.
@@ -139,6 +141,7 @@ impl SceneNeeds {
             own_normals: facts.own_normals && (lit || options.maps.has(Map::Normal)),
             cull_back: culls_back(facts, camera, options),
             clips: facts.clips,
+            curved: facts.caps && options.low_pass != LowPass::Ewa && options.raster.is_none(),
             samples: options.samples,
             shading: options.shading,
             maps: options.maps,
@@ -203,6 +206,7 @@ impl SceneNeeds {
             (self.own_normals, "own-normals"),
             (self.cull_back, "cull-back"),
             (self.clips, "clips"),
+            (self.curved, "curved"),
             (self.samples != Samples::ONE, "samples"),
             (self.shading == Shading::Lambert, "lambert"),
             (self.shading == Shading::Phong, "phong"),

@@ -15,6 +15,8 @@ pub struct SurfelLayout {
     pub low: u32,
     /// The first of the six words of the lines at which it ends.
     pub clip: u32,
+    /// The first of the three words of its cap.
+    pub cap: u32,
     /// The first of the three words of its own normal.
     pub normal: u32,
 }
@@ -31,17 +33,22 @@ impl SurfelLayout {
         };
         let low = copies + u32::from(needs.copies);
         let clip = low + if needs.doubled { 3 } else { 0 };
-        let normal = clip + if needs.clips { 6 } else { 0 };
-        Self { words: normal + if needs.own_normals { 3 } else { 0 }, copies, low, clip, normal }
+        let cap = clip + if needs.clips { 6 } else { 0 };
+        let normal = cap + if needs.curved { 3 } else { 0 };
+        Self { words: normal + if needs.own_normals { 3 } else { 0 }, copies, low, clip, cap, normal }
     }
 }
 
-/// Words of a splat's record, of which those of its low-pass and its lines come last.
+/// Words of a splat's record, of which those of its low-pass, its lines and its cap come last.
 pub fn splat_words(needs: &SceneNeeds) -> u64 {
     let filter = if needs.low_pass == LowPass::None { 0 } else { size_of::<Filter>() };
     let clip = if needs.clips { CLIP_WORDS } else { 0 };
-    (size_of::<Splat>() + filter) as u64 / 4 + clip
+    let cap = if needs.curved { CAP_WORDS } else { 0 };
+    (size_of::<Splat>() + filter) as u64 / 4 + clip + cap
 }
 
 /// Words of a splat's lines: whole rows of four, as all of its record.
 const CLIP_WORDS: u64 = 8;
+
+/// Words of a splat's cap.
+const CAP_WORDS: u64 = 8;

@@ -52,12 +52,17 @@ fn by_content(scene: &Scene, a: usize, b: usize) -> Ordering {
         [surfel.center, surfel.s, surfel.t, low, normal].map(|v| v.map(f32::to_bits))
     };
     let clip = |index: usize| scene.clips.get(index).copied().unwrap_or_default().0.map(|line| line.map(f32::to_bits));
+    let cap = |index: usize| scene.caps.get(index).copied().unwrap_or_default().0.map(f32::to_bits);
     let color = |index: usize| match &scene.colors {
         Colors::Constant(_) | Colors::Textured(_) => [0; 4],
         Colors::Srgb8(codes) => codes[index].map(u32::from),
         Colors::Linear(colors) => colors[index].map(f32::to_bits),
     };
-    bits(a).cmp(&bits(b)).then_with(|| clip(a).cmp(&clip(b))).then_with(|| color(a).cmp(&color(b)))
+    bits(a)
+        .cmp(&bits(b))
+        .then_with(|| clip(a).cmp(&clip(b)))
+        .then_with(|| cap(a).cmp(&cap(b)))
+        .then_with(|| color(a).cmp(&color(b)))
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 mod apart;
 mod body;
 pub mod camera;
+pub mod cap;
 pub mod clip;
 pub mod color;
 mod copies;
@@ -19,6 +20,7 @@ pub mod texture;
 
 pub(crate) use body::{SMALLEST_SCENE, body, framed};
 pub use camera::{Camera, Lens, Projection};
+pub use cap::Cap;
 pub use clip::Clip;
 pub use color::Colors;
 pub(crate) use copies::{copies, has_copies};

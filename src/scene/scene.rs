@@ -3,7 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{Clip, Colors, Provenance, Surfel};
+use super::{Cap, Clip, Colors, Provenance, Surfel};
 
 /// The world axis that points up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -56,6 +56,8 @@ pub struct Scene {
     pub low: Vec<[f32; 3]>,
     /// Where disks end before their rims: one for each surfel, or none at all.
     pub clips: Vec<Clip>,
+    /// How disks curve: one for each surfel, or none at all where all are flat.
+    pub caps: Vec<Cap>,
     /// The unit normals that light sees, where they are others than those of the disks' planes: one for each surfel, or none at all.
     pub normals: Vec<[f32; 3]>,
     /// One colour for all, or one for each surfel in the same order.
@@ -206,9 +208,12 @@ impl Scene {
         self.surfels.par_iter().map(Surfel::shorter).reduce(|| 0.0, f32::max)
     }
 
-    /// The largest [`Surfel::radius`], world units; zero for a scene without surfels.
+    /// The largest [`Surfel::radius`] with the height of its cap, world units: no point of a surfel is farther from its centre. Zero for
+    /// a scene without surfels.
     pub fn largest_radius(&self) -> f32 {
-        self.surfels.par_iter().map(Surfel::radius).reduce(|| 0.0, f32::max)
+        let height = |index: usize| self.caps.get(index).map_or(0.0, |cap| cap.highest() as f32);
+        let reach = |(index, surfel): (usize, &Surfel)| surfel.radius() + height(index);
+        self.surfels.par_iter().enumerate().map(reach).reduce(|| 0.0, f32::max)
     }
 }
 

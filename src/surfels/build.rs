@@ -3,8 +3,10 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::curvature::Around;
 use super::estimate::{self, Estimate, Estimates};
 use super::gather::{self, Gathered};
+use super::graph::NeighbourGraph;
 use super::mesh::By;
 use super::orient::opposed;
 use super::outliers::drop_outliers;
@@ -15,7 +17,7 @@ use super::{
 };
 use crate::io::Points;
 use crate::scene::scene::{low_parts, shows};
-use crate::scene::{Bounds, Clip, Colors, SMALLEST_SCENE, Scene, Surfel, Texture, body};
+use crate::scene::{Bounds, Cap, Clip, Colors, SMALLEST_SCENE, Scene, Surfel, Texture, body};
 use crate::{Error, Progress, Result};
 
 /// The largest radius of a disk, in extents of the scene: from anywhere near the scene it is a plane without an end, and depths
@@ -117,7 +119,8 @@ fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Progress) -> Re
     let estimated = if preparation.estimated_normals > 0 || preparation.estimated_radii > 0 {
         let distinct = distinct.map_or_else(|| sorted(&gathered.points.positions), Ok)?;
         let how = (up.axis(), limits.largest_ratio);
-        Some(Estimated { of_position: estimated(&given, &distinct, how, &mut preparation, progress), distinct })
+        let (of_position, graph) = estimated(&given, &distinct, how, &mut preparation, progress);
+        Some(Estimated { of_position, distinct, graph })
     } else {
         None
     };
@@ -139,22 +142,37 @@ fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Progress) -> Re
         }
     };
     let mut surfels: Vec<Surfel> = gathered.points.positions.par_iter().enumerate().map(surfel).collect();
+    let oriented = preparation.estimated_normals == 0 && !preparation.has_random_sides();
+    let caps = match &estimated {
+        Some(estimated) if limits.curved && preparation.estimated_radii > 0 => {
+            estimated.caps(&given, &surfels, oriented)
+        }
+        _ if gathered.points.caps.is_some() => (0..count).map(|i| given.cap(i).unwrap_or_default()).collect(),
+        _ => Vec::new(),
+    };
     drop(estimated);
+    let caps = usable_caps(caps, &surfels);
     preparation.limited_radii = limit_radii(&mut surfels, body.extent().max_element())?;
     let relative = |index: usize| DVec3::from_array(gathered.points.positions[index]) - origin;
     let low = low_parts(&surfels, relative);
     preparation.rounding = rounding(&surfels, &low, relative);
-    let oriented = preparation.estimated_normals == 0 && !preparation.has_random_sides();
     let normals = own_normals(&given, &surfels);
     let Gathered { points: Points { colors, closed, clips, texture, .. }, provenance, .. } = gathered;
     let (colors, closed) = (colors::folded(colors), closed && oriented);
     // Most scenes have no disk that ends before its rim.
     let clips: Vec<Clip> = clips.unwrap_or_default().into_iter().map(Clip::usable).collect();
     let clips = if clips.iter().all(Clip::is_none) { Vec::new() } else { clips };
-    let scene = Scene { origin, surfels, low, clips, normals, colors, oriented, closed, up, provenance };
+    let scene = Scene { origin, surfels, low, clips, caps, normals, colors, oriented, closed, up, provenance };
     // As the default view sees it.
     preparation.strays = scene.framed().1;
     Ok(((scene, preparation), texture))
+}
+
+/// The caps of these surfels; none where all are flat, as they are in most scenes.
+fn usable_caps(caps: Vec<Cap>, surfels: &[Surfel]) -> Vec<Cap> {
+    let caps = caps.into_iter().zip(surfels);
+    let caps: Vec<Cap> = caps.map(|(cap, surfel)| cap.usable(surfel.radius().into())).collect();
+    if caps.iter().all(Cap::is_flat) { Vec::new() } else { caps }
 }
 
 /// The ellipse of these half-axes, turned into the plane across a unit normal; its half-axes keep their lengths.
@@ -200,6 +218,11 @@ impl Given<'_> {
         usable_radius(*self.0.points.radii.as_ref()?.get(i)?)
     }
 
+    /// How the disk of its half-axes curves.
+    fn cap(&self, i: usize) -> Option<Cap> {
+        self.axes(i).and(self.0.points.caps.as_ref()?.get(i).copied())
+    }
+
     fn lacks_normal(&self, i: usize) -> bool {
         self.normal(i).is_none() && self.axes(i).is_none()
     }
@@ -213,11 +236,30 @@ impl Given<'_> {
 struct Estimated {
     distinct: DistinctPositions,
     of_position: Vec<Estimate>,
+    graph: NeighbourGraph,
 }
 
 impl Estimated {
     fn of_point(&self, i: usize) -> Estimate {
         self.of_position[self.distinct.of_point()[i] as usize]
+    }
+
+    /// The caps of surfels of points whose sizes are estimated; normals tell sides if they are `sided`.
+    fn caps(&self, given: &Given<'_>, surfels: &[Surfel], sided: bool) -> Vec<Cap> {
+        let of_point = self.distinct.of_point();
+        // Points at one position may have several normals: the first tells.
+        let first = self.distinct.first_points();
+        let normal = |position: u32| {
+            let given = given.normal(first[position as usize] as usize);
+            given.unwrap_or_else(|| self.of_position[position as usize].normal()).as_dvec3()
+        };
+        let around = Around { distinct: &self.distinct, graph: &self.graph, normal, sided };
+        let cap = |(i, surfel): (usize, &Surfel)| match given.cap(i) {
+            Some(cap) => cap,
+            None if given.lacks_radius(i) => around.cap(of_point[i], [surfel.s, surfel.t]),
+            None => Cap::FLAT,
+        };
+        surfels.par_iter().enumerate().map(cap).collect()
     }
 }
 
@@ -228,7 +270,7 @@ fn estimated(
     (up, largest_ratio): (DVec3, f64),
     preparation: &mut Preparation,
     progress: &dyn Progress,
-) -> Vec<Estimate> {
+) -> (Vec<Estimate>, NeighbourGraph) {
     let all = preparation.estimated_normals.max(preparation.estimated_radii) == preparation.surfels;
     let wanted = (!all).then(|| {
         let mut wanted = vec![false; distinct.len()];
@@ -247,7 +289,7 @@ fn estimated(
     if preparation.estimated_normals == 0 {
         preparation.opposed_normals = opposed(distinct, &graph, |point| given.normal(point));
     }
-    of_position
+    (of_position, graph)
 }
 
 /// Limits disks to [`LARGEST_IN_EXTENTS`] and says how many were larger.

@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::creases::clips;
+use super::curvature::Around;
 use super::estimate::{LONE_RADIUS, NORMAL_NEIGHBOURS, RADIUS_RANGE, fitted_normal};
 use super::gather::{Gathered, gather};
 use super::graph::NeighbourGraph;
@@ -14,7 +15,7 @@ use super::sheets;
 use super::sizes::{RADIUS_NEIGHBOURS, Size, bsp_radii, half_axes_at, local_limits, offsets, open_radius};
 use super::{Limits, Preparation, guess_up, origin_for, unit, usable_axes};
 use crate::io::Points;
-use crate::scene::{Bounds, Clip, Surfel, body, framed};
+use crate::scene::{Bounds, Cap, Clip, Surfel, body, framed};
 use crate::{Error, Progress, Result};
 
 /// A disk that ends at an edge is larger by this factor, as neither cells nor planes are certain there: of 4.0 million rays at 60,000
@@ -126,9 +127,12 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
         false => (axes, None),
     };
     let radii = axes.as_ref().map_or(radii, longer);
+    let caps = axes.as_ref().filter(|_| options.limits.curved);
+    let sided = !preparation.has_random_sides();
+    let caps = caps.map(|axes| caps_of((&distinct, &graph), (&point_normals, sided), axes));
     let Points { positions, colors, texture, .. } = gathered.points;
     let (normals, radii, up) = (Some(point_normals), Some(radii), Some(known_up));
-    let points = Points { positions, normals, radii, axes, clips, colors, texture, up, ..Points::default() };
+    let points = Points { positions, normals, radii, axes, clips, caps, colors, texture, up, ..Points::default() };
     preparation.limited_by_neighbours = sizes.limited(distinct.of_point());
     let radius = |index: usize| points.radii.as_ref().map_or(0.0, |radii| f64::from(radii[index]));
     preparation.strays = framed(count, |index| (DVec3::from_array(points.positions[index]), radius(index))).1;
@@ -175,8 +179,7 @@ fn cut(
     (size, axes): (Size, Option<HalfAxes>),
 ) -> (Option<HalfAxes>, Option<Vec<Clip>>) {
     // Points at one position may have several normals: the first tells.
-    let mut first = vec![0; distinct.len()];
-    distinct.of_point().iter().enumerate().rev().for_each(|(point, position)| first[*position as usize] = point);
+    let first = distinct.first_points();
     let wide = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
     let half_axes = |point: usize| match &axes {
         Some(axes) if size != Size::Knn => axes[point],
@@ -190,12 +193,14 @@ fn cut(
             [s, t]
         }
     };
-    let of_positions: Vec<DVec3> = first.iter().map(|point| wide(normals[*point]).normalize_or_zero()).collect();
-    let clips = clips(distinct, graph, &of_positions, |position| half_axes(first[position as usize]).map(wide));
+    let of_positions: Vec<DVec3> =
+        first.iter().map(|point| wide(normals[*point as usize]).normalize_or_zero()).collect();
+    let clips =
+        clips(distinct, graph, &of_positions, |position| half_axes(first[position as usize] as usize).map(wide));
     if clips.is_empty() {
         return (axes, None);
     }
-    let is_first = |(point, position): (usize, &u32)| normals[point] == normals[first[*position as usize]];
+    let is_first = |(point, position): (usize, &u32)| normals[point] == normals[first[*position as usize] as usize];
     let clip = |(point, position): (usize, &u32)| {
         if is_first((point, position)) { clips[*position as usize] } else { Clip::NONE }
     };
@@ -205,6 +210,21 @@ fn cut(
         _ => half_axes(point),
     };
     (Some((0..normals.len()).into_par_iter().map(at_lines).collect()), Some(of_points))
+}
+
+/// The caps of points of these normals, which tell sides if they are `sided`, and half-axes.
+fn caps_of(
+    (distinct, graph): (&DistinctPositions, &NeighbourGraph),
+    (normals, sided): (&[[f32; 3]], bool),
+    axes: &HalfAxes,
+) -> Vec<Cap> {
+    let first = distinct.first_points();
+    let normal = |position: u32| {
+        let normal = normals[first[position as usize] as usize];
+        DVec3::from_array(normal.map(f64::from)).normalize_or_zero()
+    };
+    let around = Around { distinct, graph, normal, sided };
+    axes.par_iter().zip(distinct.of_point()).map(|(axes, &position)| around.cap(position, *axes)).collect()
 }
 
 /// Turns the `normals` of positions to one side; the connected parts of the surface, if they were looked for.

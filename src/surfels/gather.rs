@@ -59,6 +59,7 @@ fn join(all: &mut Points, mut input: Points) {
     append(&mut all.radii, before, input.radii, count);
     append(&mut all.axes, before, input.axes, count);
     append(&mut all.clips, before, input.clips, count);
+    append(&mut all.caps, before, input.caps, count);
     append(&mut all.texture, before, input.texture, count);
     all.closed &= input.closed || count == 0;
     if before == 0 {

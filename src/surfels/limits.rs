@@ -2,7 +2,7 @@
 
 use crate::{Error, Result};
 
-/// Which points of a cloud become surfels, and how large those of them may be whose radius is estimated.
+/// Which points of a cloud become surfels, and how large those of them may be whose radius is estimated, and whether those curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// Points are left out whose mean distance to 16 neighbours exceeds the mean of all by more than so many standard
@@ -10,12 +10,14 @@ pub struct Limits {
     pub outliers: Option<f64>,
     /// No estimated half-axis is longer than this times the median of those of the neighbours; infinite for no limit.
     pub largest_ratio: f64,
+    /// Disks of estimated sizes curve as the surface around them does ([`Cap`](crate::scene::Cap)); else they are flat.
+    pub curved: bool,
 }
 
 impl Default for Limits {
-    /// All points, and no half-axis above three times those around it.
+    /// All points, no half-axis above three times those around it, and curved disks.
     fn default() -> Self {
-        Self { outliers: None, largest_ratio: 3.0 }
+        Self { outliers: None, largest_ratio: 3.0, curved: true }
     }
 }
 

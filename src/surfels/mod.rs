@@ -5,6 +5,7 @@ mod build;
 mod colors;
 mod coverage;
 mod creases;
+mod curvature;
 mod eigen;
 mod ellipse;
 mod estimate;

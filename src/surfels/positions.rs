@@ -97,6 +97,13 @@ impl DistinctPositions {
         DVec3::from_array(self.positions[index as usize])
     }
 
+    /// Of each position the first of its points.
+    pub fn first_points(&self) -> Vec<u32> {
+        let mut first = vec![0; self.len()];
+        self.of_point().iter().enumerate().rev().for_each(|(point, position)| first[*position as usize] = point as u32);
+        first
+    }
+
     /// For each point that was given, which position it has.
     pub fn of_point(&self) -> &[u32] {
         &self.of_point

@@ -134,13 +134,13 @@ pub fn enclose(scene: &Scene, camera: &Camera, options: &RenderOptions, splats: 
                 let least = depth.low.max(near * (1.0 - 4.0 * E));
                 nearest.low = nearest.low.min(least);
                 for (_, side) in
-                    sides.iter_mut().enumerate().filter(|(k, _)| open[index] || *k == usize::from(splat.back))
+                    sides.iter_mut().enumerate().filter(|(k, _)| open[index] || *k == usize::from(sided && splat.away))
                 {
                     side.low = side.low.min(least);
                 }
                 if sure {
                     nearest.high = nearest.high.min(depth.high);
-                    let side = &mut sides[usize::from(splat.back)];
+                    let side = &mut sides[usize::from(sided && splat.away)];
                     side.high = side.high.min(depth.high);
                 }
                 candidates.push(Candidate { pixel, depth, rho, sure, splat: index });
@@ -172,7 +172,7 @@ fn accumulate(
             continue;
         }
         let side = pixel.back();
-        if side.is_some_and(|back| back != splat.back) && !open[candidate.splat] {
+        if side.is_some_and(|back| back != (splat.away && splat.sides == Sides::Nearest)) && !open[candidate.splat] {
             continue;
         }
         // What is nearest itself is accepted whatever its depth is.

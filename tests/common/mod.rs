@@ -180,6 +180,7 @@ fn base_needs() -> Vec<SceneNeeds> {
                 sides: if sides && !mixed(27) { Sides::Nearest } else { Sides::None },
                 own_normals: normal && mixed(26),
                 clips: mixed(28),
+                curved: mixed(25),
                 cull_back: mixed(27),
                 samples: Samples::ONE,
                 shading,

@@ -207,11 +207,13 @@ pub fn differences(module: &Module, accumulator: &str) -> Vec<String> {
         let filtered = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some("Filter"));
         let filtered =
             filtered.is_some_and(|(_, ty)| matches!(&ty.inner, TypeInner::Struct { members, .. } if members.len() > 1));
-        // And so do its lines, in two rows of four words.
-        let clipped = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some("Clip"));
-        let clipped =
-            clipped.is_some_and(|(_, ty)| matches!(&ty.inner, TypeInner::Struct { members, .. } if members.len() > 1));
-        let beside = if filtered { mirrors["Filter"].size } else { 0 } + if clipped { 32 } else { 0 };
+        // And so do its lines and its cap, in two rows of four words each.
+        let has = |name: &str| {
+            let found = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some(name));
+            found.is_some_and(|(_, ty)| matches!(&ty.inner, TypeInner::Struct { members, .. } if members.len() > 1))
+        };
+        let rows = 32 * (usize::from(has("Clip")) + usize::from(has("Cap")));
+        let beside = if filtered { mirrors["Filter"].size } else { 0 } + rows;
         let record = |of: &str| mirrors[of].size + if of == "Splat" { beside } else { 0 };
         match (&module.types[ty].inner, element) {
             (TypeInner::Struct { members, span }, Element::Struct(expected) | Element::Words(expected)) => {
@@ -273,9 +275,11 @@ fn compare(
     found: &mut Vec<String>,
 ) {
     let mut device = Vec::new();
-    // The lines of a splat are a member in WGSL alone: in its record they come after its filter.
+    // The lines and the cap of a splat are members in WGSL alone: in its record they come after its filter.
     let (members, span) = match members {
-        [own @ .., last] if name == "Splat" && last.name.as_deref() == Some("clip") => {
+        [own @ .., clip, cap]
+            if name == "Splat" && [clip, cap].map(|m| m.name.as_deref()) == [Some("clip"), Some("cap")] =>
+        {
             let end = own
                 .last()
                 .map_or(0, |member| member.offset as usize + shape(module, member.ty).map_or(0, |shape| shape.bytes()));

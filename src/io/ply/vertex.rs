@@ -5,7 +5,7 @@ use crate::io::Points;
 use crate::io::fault::{Fault, reserve};
 use crate::io::values::{SRGB16_TO_LINEAR, finite};
 use crate::scene::color::SRGB8_TO_LINEAR;
-use crate::scene::{Clip, Colors};
+use crate::scene::{Cap, Clip, Colors};
 
 /// A property that is used, by where it lies among the row's numbers.
 #[derive(Clone, Copy, Debug)]
@@ -67,6 +67,7 @@ pub(super) struct Layout {
     radius: Option<usize>,
     axes: Option<[[usize; 3]; 2]>,
     clip: Option<[usize; 6]>,
+    cap: Option<[usize; 3]>,
     color: Option<[(usize, Coding); 3]>,
     alpha: Option<(usize, Coding)>,
     texture: Option<[usize; 2]>,
@@ -74,6 +75,9 @@ pub(super) struct Layout {
 
 /// The lines at which an ellipse ends ([`Clip`]), in units of its half-axes.
 pub(super) const CLIP_NAMES: [&str; 6] = ["clip1_u", "clip1_v", "clip1_w", "clip2_u", "clip2_v", "clip2_w"];
+
+/// How an ellipse curves ([`Cap`]), world units.
+pub(super) const CAP_NAMES: [&str; 3] = ["cap_uu", "cap_uv", "cap_vv"];
 
 /// What programs call texture coordinates, the most telling names first.
 const TEXTURE_NAMES: [[&str; 2]; 5] =
@@ -115,6 +119,7 @@ impl Layout {
         let radius = column(&["radius", "scale"]);
         let mut axis = |names: [&str; 3]| Some([column(&names[..1])?, column(&names[1..2])?, column(&names[2..])?]);
         let axes = axis(["sx", "sy", "sz"]).zip(axis(["tx", "ty", "tz"])).map(<[_; 2]>::from);
+        let cap = axes.and_then(|_| axis(CAP_NAMES));
         let clip = axes.and_then(|_| {
             let found: Vec<usize> = CLIP_NAMES.iter().filter_map(|name| column(&[name])).collect();
             <[usize; 6]>::try_from(found).ok()
@@ -131,6 +136,7 @@ impl Layout {
             radius,
             axes,
             clip,
+            cap,
             color,
             alpha,
             texture,
@@ -152,6 +158,7 @@ pub(super) struct Vertices<'a> {
     radii: Vec<f32>,
     axes: Vec<[[f32; 3]; 2]>,
     clips: Vec<Clip>,
+    caps: Vec<Cap>,
     texture: Vec<[f32; 2]>,
     srgb8: Vec<[u8; 4]>,
     linear: Vec<[f32; 4]>,
@@ -161,13 +168,14 @@ impl<'a> Vertices<'a> {
     /// Room for `rows`, which must be a number that the file's length allows.
     pub(super) fn with_capacity(layout: &'a Layout, rows: u64) -> Result<Self, Fault> {
         let (mut positions, mut normals, mut radii) = (Vec::new(), Vec::new(), Vec::new());
-        let (mut axes, mut clips, mut texture) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut axes, mut clips, mut caps, mut texture) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let (mut srgb8, mut linear) = (Vec::new(), Vec::new());
         reserve(&mut positions, rows)?;
         reserve(&mut normals, if layout.normal.is_some() { rows } else { 0 })?;
         reserve(&mut radii, if layout.radius.is_some() { rows } else { 0 })?;
         reserve(&mut axes, if layout.axes.is_some() { rows } else { 0 })?;
         reserve(&mut clips, if layout.clip.is_some() { rows } else { 0 })?;
+        reserve(&mut caps, if layout.cap.is_some() { rows } else { 0 })?;
         reserve(&mut texture, if layout.texture.is_some() { rows } else { 0 })?;
         let (codes, lights) = match (layout.color.is_some(), layout.is_srgb8()) {
             (false, _) => (0, 0),
@@ -176,7 +184,7 @@ impl<'a> Vertices<'a> {
         };
         reserve(&mut srgb8, codes)?;
         reserve(&mut linear, lights)?;
-        Ok(Self { layout, positions, normals, radii, axes, clips, texture, srgb8, linear })
+        Ok(Self { layout, positions, normals, radii, axes, clips, caps, texture, srgb8, linear })
     }
 
     pub(super) fn len(&self) -> u64 {
@@ -202,6 +210,9 @@ impl<'a> Vertices<'a> {
                 let line = |first: usize| [0, 1, 2].map(|k| value(clip[first + k], row) as f32);
                 Clip([line(0), line(3)])
             }));
+        }
+        if let Some(cap) = layout.cap {
+            self.caps.extend((0..rows).map(|row| Cap(cap.map(|column| value(column, row) as f32))));
         }
         if let Some(texture) = layout.texture {
             self.texture.extend((0..rows).map(|row| texture.map(|column| value(column, row) as f32)));
@@ -234,6 +245,7 @@ impl<'a> Vertices<'a> {
             radii: layout.radius.map(|_| self.radii),
             axes: layout.axes.map(|_| self.axes),
             clips: layout.clip.map(|_| self.clips),
+            caps: layout.cap.map(|_| self.caps),
             colors,
             texture: layout.texture.map(|_| self.texture),
             up: None,

@@ -1,10 +1,10 @@
 //! From surfels to PLY bytes.
 
-use super::vertex::CLIP_NAMES;
+use super::vertex::{CAP_NAMES, CLIP_NAMES};
 use crate::io::atomic::{Output, write_whole};
 use crate::io::{Points, Up};
 use crate::scene::color::{DEFAULT_COLOR, SRGB8_TO_LINEAR, linear_to_srgb};
-use crate::scene::{Clip, Colors};
+use crate::scene::{Cap, Clip, Colors};
 use crate::{Error, Progress, Result};
 use std::io::{self, Write};
 use std::path::Path;
@@ -22,6 +22,8 @@ pub struct Vertex {
     pub axes: [[f32; 3]; 2],
     /// Where their ellipse ends before its rim.
     pub clip: Clip,
+    /// How it curves.
+    pub cap: Cap,
     /// Where colours are written, a surfel without one gets [`DEFAULT_COLOR`].
     pub color: Option<Color>,
     /// Texture coordinates (u, v), origin bottom left.
@@ -87,6 +89,8 @@ pub struct Properties {
     pub axes: bool,
     /// `float clip1_u clip1_v clip1_w clip2_u clip2_v clip2_w` are written.
     pub clips: bool,
+    /// `float cap_uu cap_uv cap_vv` are written.
+    pub caps: bool,
     /// How `red green blue` and `alpha` are written.
     pub colors: ColorProperties,
     /// `float texture_u texture_v` are written.
@@ -107,6 +111,7 @@ impl Properties {
             radii: points.radii.is_some() || points.axes.is_some(),
             axes: points.axes.is_some(),
             clips: points.axes.is_some() && points.clips.iter().flatten().any(|clip| !clip.is_none()),
+            caps: points.axes.is_some() && points.caps.iter().flatten().any(|cap| !cap.is_flat()),
             colors: match &points.colors {
                 None => ColorProperties::Absent,
                 Some(Colors::Srgb8(codes)) if codes.iter().all(|code| code[3] == 255) => ColorProperties::Srgb8,
@@ -131,11 +136,12 @@ impl Properties {
         let mut scalars =
             |kind: &str, names: &[&str]| names.iter().try_for_each(|name| writeln!(out, "property {kind} {name}"));
         scalars(if self.double_coordinates { "double" } else { "float" }, &["x", "y", "z"])?;
-        let groups: [(bool, &[&str]); 4] = [
+        let groups: [(bool, &[&str]); 5] = [
             (self.normals, &["nx", "ny", "nz"]),
             (self.radii, &["radius"]),
             (self.axes, &["sx", "sy", "sz", "tx", "ty", "tz"]),
             (self.clips, &CLIP_NAMES),
+            (self.caps, &CAP_NAMES),
         ];
         for (_, names) in groups.into_iter().filter(|(written, _)| *written) {
             scalars("float", names)?;
@@ -174,6 +180,9 @@ impl Properties {
         }
         if self.clips {
             floats(vertex.clip.0.as_flattened());
+        }
+        if self.caps {
+            floats(&vertex.cap.0);
         }
         let color = vertex.color.unwrap_or(Color::Linear(DEFAULT_COLOR));
         match self.colors {
@@ -239,6 +248,7 @@ pub fn write_points(path: &Path, points: &Points, progress: &dyn Progress) -> Re
         Vertex {
             position: *position,
             clip: of(&points.clips, index).unwrap_or_default(),
+            cap: of(&points.caps, index).unwrap_or_default(),
             normal: of(&points.normals, index).unwrap_or_else(|| axes.map_or([0.0; 3], normal)),
             radius: of(&points.radii, index).unwrap_or_else(|| axes.map_or(0.0, longer)),
             axes: axes.unwrap_or_default(),

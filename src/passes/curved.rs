@@ -1,0 +1,222 @@
+//! A cap at a pixel: a surfel that curves out of its plane ([`Cap`]). The twin of `wgsl/curved.wgsl`.
+//!
+//! **Rows.** With N the inverse of [s t n], n the unit normal, a point q relative to the surfel's centre has the coordinates
+//! `(u, v, w) = N q`, and the cap is `w = (uu u² + 2 uv u v + vv v²) / 2`. Of the ray through a pixel take the point at the depth of
+//! the centre: its (U, V, W) are affine in the pixel, and 0 where the centre is seen, so they are stored relative to the pixel that
+//! holds the centre, as the rows of a [homography](super::homography) are. From there the ray goes on, for each longer half-axis r
+//! that its depth grows by, by `(U, V, W) r/z + D` with D = N p r/z (pinhole), or by D = N e r (orthographic, e its direction). All of
+//! these numbers are near 1 whatever the scene's scale, if the surfel's image is not as wide as the image.
+//!
+//! **Intersection.** `a σ² + b σ + c = 0` for σ, the way along the ray in r of depth. Of its roots the nearest counts that lies on
+//! the cap, inside its lines and past the near depth; the sign of the slope there tells the side. Where the disk is flat the
+//! equation is that of its plane. (Specified after paper 001, which gives no formula.)
+
+use glam::{DVec2, DVec3};
+
+use super::homography::Projected;
+use super::splat::{Intersection, Splat};
+use crate::scene::{Camera, Cap, Projection};
+
+/// How a splat curves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Curve {
+    /// `u . (dx, dy, 1)` is U at a pixel (dx, dy) from the anchor; so `v`, and `w` in units of [`Self::radius`].
+    pub u: DVec3,
+    /// V.
+    pub v: DVec3,
+    /// W.
+    pub w: DVec3,
+    /// D.
+    pub along: DVec3,
+    /// r/z; 0 for an orthographic camera.
+    pub spread: f64,
+    /// r: the longer half-axis, world units.
+    pub radius: f64,
+    /// The depth at which U, V and W are taken, world units.
+    pub depth: f64,
+    /// Depths on the cap, world units.
+    pub depths: [f64; 2],
+    /// The cap's heights in units of r.
+    pub heights: [f64; 3],
+    /// What the normal gains for a unit of u and of v, world space, where that of the centre is 1 long.
+    pub slopes: [DVec3; 2],
+    /// Backs are left out.
+    pub culls: bool,
+}
+
+impl Curve {
+    /// Whether every point of the cap shows its back. With P = N p its normal's product with the way from the eye is
+    /// `P_w - h - slope . (P_u, P_v)` at a height h; here over z / r.
+    pub fn faces_away(&self) -> bool {
+        let cap = Cap(self.heights.map(|height| height as f32));
+        self.along.z - cap.extremes()[1] * self.spread - cap.slope(self.along.x, self.along.y).length() > 0.0
+    }
+}
+
+/// A surfel as a camera sees it, camera space: its centre p, half-axes s and t and cap, world units.
+pub(super) struct Seen {
+    pub p: DVec3,
+    pub s: DVec3,
+    pub t: DVec3,
+    pub cap: Cap,
+}
+
+impl Seen {
+    /// The least and the largest depth of the box of the cap.
+    pub fn depths(&self) -> [f64; 2] {
+        let slope = self.s.z.hypot(self.t.z);
+        let [low, high] = self.shifts().map(|shift| shift.z);
+        [self.p.z - slope + low.min(high), self.p.z + slope + low.max(high)]
+    }
+
+    /// Where the disk's centre comes to at the cap's least and largest height, relative to it.
+    fn shifts(&self) -> [DVec3; 2] {
+        let normal = self.s.cross(self.t).normalize_or_zero();
+        self.cap.extremes().map(|height| normal * height)
+    }
+
+    /// The first and last point of the image that the cap can touch past the near depth: those of a sheared box around it, pixels.
+    pub fn extent(&self, camera: &Camera) -> [DVec2; 2] {
+        let shifts = self.shifts();
+        let focal = DVec2::new(camera.fx, camera.fy);
+        let image = |point: DVec2| point * focal + DVec2::new(camera.cx, camera.cy);
+        let around = |x: fn(DVec3) -> f64, ratio: f64| {
+            let of = |v: DVec3| x(v) - ratio * v.z;
+            let half = of(self.s).hypot(of(self.t));
+            let [a, b] = shifts.map(of);
+            [of(self.p) - half + a.min(b), of(self.p) + half + a.max(b)]
+        };
+        match camera.projection {
+            Projection::Orthographic => {
+                let ([x0, x1], [y0, y1]) = (around(|v| v.x, 0.0), around(|v| v.y, 0.0));
+                [DVec2::new(x0, y0), DVec2::new(x1, y1)].map(image)
+            }
+            Projection::Pinhole => {
+                let depths = self.depths().map(|depth| depth.max(camera.near));
+                // Sheared along the ray through the centre, where there is one.
+                let ratio = if self.p.z > camera.near { self.p.truncate() / self.p.z } else { DVec2::ZERO };
+                let along = |[low, high]: [f64; 2], ratio: f64| {
+                    let of = |x: f64, nearest: bool| x / depths[usize::from(!nearest)] + ratio;
+                    [of(low, low < 0.0), of(high, high > 0.0)]
+                };
+                let ([x0, x1], [y0, y1]) =
+                    (along(around(|v| v.x, ratio.x), ratio.x), along(around(|v| v.y, ratio.y), ratio.y));
+                [DVec2::new(x0, y0), DVec2::new(x1, y1)].map(image)
+            }
+        }
+    }
+}
+
+/// The inverse of [s t n] by rows, n the unit normal of s and t, which need not be perpendicular.
+fn inverse(s: DVec3, t: DVec3) -> [DVec3; 3] {
+    let cross = s.cross(t);
+    let n = cross.normalize_or_zero();
+    [t.cross(n) / cross.length(), n.cross(s) / cross.length(), n]
+}
+
+/// The curve of a surfel whose disk is `projected`.
+pub(super) fn curve(camera: &Camera, seen: &Seen, projected: &Projected) -> Curve {
+    let [m_s, m_t, n] = inverse(seen.s, seen.t);
+    let radius = seen.s.length().max(seen.t.length());
+    let rows = [m_s, m_t, n / radius];
+    let depths = seen.depths();
+    // Past the near depth, and past the middle of a cap that crosses it, so that r / z is not large.
+    let depth = if projected.images.is_some() { seen.p.z } else { camera.near.max(depths[1]) };
+    let focal = DVec2::new(camera.fx, camera.fy);
+    let principal = DVec2::new(camera.cx, camera.cy);
+    let pixel = DVec2::new(projected.anchor[0] as f64, projected.anchor[1] as f64) + 0.5;
+    let d = ((pixel - principal) / focal).extend(1.0);
+    // The point of the anchor's ray at that depth, from the centre.
+    let (start, scale, spread) = match camera.projection {
+        Projection::Pinhole => (d * depth - seen.p, depth, radius / depth),
+        Projection::Orthographic => (d.truncate().extend(depth) - seen.p, 1.0, 0.0),
+    };
+    let row = |m: DVec3| (m.truncate() / focal * scale).extend(m.dot(start));
+    let along = |m: DVec3| match camera.projection {
+        Projection::Pinhole => m.dot(seen.p) * spread,
+        Projection::Orthographic => m.z * radius,
+    };
+    Curve {
+        u: row(rows[0]),
+        v: row(rows[1]),
+        w: row(rows[2]),
+        along: DVec3::new(along(rows[0]), along(rows[1]), along(rows[2])),
+        spread,
+        radius,
+        depth,
+        depths: depths.map(|depth| depth.max(camera.near)),
+        heights: seen.cap.0.map(|height| f64::from(height) / radius),
+        slopes: [DVec3::ZERO; 2],
+        culls: false,
+    }
+}
+
+/// What the normal gains for a unit of u and of v, world space, for a normal of unit length: minus the gradient of the height.
+pub(super) fn normal_slopes(s: DVec3, t: DVec3, cap: Cap) -> [DVec3; 2] {
+    let [m_s, m_t, _] = inverse(s, t);
+    let [uu, uv, vv] = cap.0.map(f64::from);
+    [-(m_s * uu + m_t * uv), -(m_s * uv + m_t * vv)]
+}
+
+/// Where the ray through a pixel at `d` from the anchor meets the cap; and for the low-pass, where it meets the plane that touches the
+/// cap at its centre: 1/z (pinhole) or z, and how far inside the lines.
+pub(super) fn meet(curve: &Curve, splat: &Splat, camera: &Camera, d: DVec2) -> (Intersection, (f64, f64)) {
+    let at = |row: DVec3| row.x * d.x + (row.y * d.y + row.z);
+    let start = DVec3::new(at(curve.u), at(curve.v), at(curve.w));
+    let step = start * curve.spread + curve.along;
+    let to_plane = -start.z / step.z;
+    let depth = curve.depth + curve.radius * to_plane;
+    let inside = splat.clip.inside(start.x + to_plane * step.x, start.y + to_plane * step.y);
+    let plane = match camera.projection {
+        Projection::Pinhole => (1.0 / depth, inside),
+        Projection::Orthographic => (depth, inside),
+    };
+    let Way { first, second } = Way::of(curve, splat, (start, step));
+    let [out, out_of_second] = [&first, &second].map(|at| outside(curve, camera, at));
+    let met = if out <= 0.0 {
+        first
+    } else if out_of_second <= 0.0 {
+        // It is decided no better than that the first is none.
+        Intersection { inside: second.inside.min(out), ..second }
+    } else {
+        // As far outside of the disk as the nearer of the two is of anything.
+        let (nearer, missed) = if out_of_second < out { (second, out_of_second) } else { (first, out) };
+        Intersection { rho2: (1.0 + missed).powi(2), inside: f64::INFINITY, ..nearer }
+    };
+    (met, plane)
+}
+
+/// A ray's two meetings with the paraboloid of a cap, the nearer one first.
+struct Way {
+    first: Intersection,
+    second: Intersection,
+}
+
+impl Way {
+    fn of(curve: &Curve, splat: &Splat, (start, step): (DVec3, DVec3)) -> Self {
+        let [uu, uv, vv] = curve.heights;
+        let bent = |a: DVec3, b: DVec3| uu * a.x * b.x + uv * (a.x * b.y + a.y * b.x) + vv * a.y * b.y;
+        let [a, b, c] = [0.5 * bent(step, step), bent(start, step) - step.z, 0.5 * bent(start, start) - start.z];
+        let discriminant = b * b - 4.0 * a * c;
+        // How far it is from 0, of its terms: beside an outline nothing is known of it.
+        let margin = discriminant / (b * b + (4.0 * a * c).abs());
+        let root = discriminant.max(0.0).sqrt();
+        let far = -0.5 * (b + root.copysign(b));
+        // Where the slope has the sign of b, and where it has the other one.
+        let roots = [(c / far, b < 0.0), (far / a, b >= 0.0)];
+        let [first, second] = roots.map(|(sigma, away)| {
+            let (u, v) = (start.x + sigma * step.x, start.y + sigma * step.y);
+            let depth = curve.depth + curve.radius * sigma;
+            let inside = splat.clip.inside(u, v).min(margin);
+            Intersection { depth, rho2: u * u + v * v, inside, uv: DVec2::new(u, v), away }
+        });
+        if second.depth < first.depth { Self { first: second, second: first } } else { Self { first, second } }
+    }
+}
+
+/// How far a meeting is from being a hit, of the unit disk, of its lines' lengths, or of the near depth: not positive for a hit.
+fn outside(curve: &Curve, camera: &Camera, at: &Intersection) -> f64 {
+    let never = curve.culls && at.away || at.rho2.is_nan();
+    let margins = [at.rho2.sqrt() - 1.0, -at.inside, 1.0 - at.depth / camera.near];
+    if never { f64::INFINITY } else { margins.into_iter().fold(f64::NEG_INFINITY, f64::max) }
+}

@@ -1,0 +1,122 @@
+//! How a surface curves at a point, by the points around it: the caps of surfels.
+
+use glam::{DMat3, DVec3};
+
+use super::gaps::is_beside;
+use super::graph::NeighbourGraph;
+use super::positions::DistinctPositions;
+use super::sizes::{RADIUS_NEIGHBOURS, offsets};
+use crate::scene::Cap;
+
+/// The cosine of the angle up to which another point is of one piece of surface with a point: 60 degrees.
+const ONE_PIECE: f64 = 0.5;
+
+/// A cap is made where it leaves at most this part of the squares of the heights and slopes that a disk leaves.
+const LEFT: f64 = 0.8;
+
+/// The surface around a position, by the positions around it and their normals.
+pub(crate) struct Around<'a, N: Fn(u32) -> DVec3> {
+    pub distinct: &'a DistinctPositions,
+    pub graph: &'a NeighbourGraph,
+    /// The unit normal at a position.
+    pub normal: N,
+    /// Normals tell the two sides of the surface apart: one that points the other way is of another sheet.
+    pub sided: bool,
+}
+
+impl<N: Fn(u32) -> DVec3> Around<'_, N> {
+    /// The cap of a surfel at a position, of these half-axes, world units.
+    pub fn cap(&self, position: u32, axes: [[f32; 3]; 2]) -> Cap {
+        let [s, t] = axes.map(|axis| DVec3::from_array(axis.map(f64::from)) * self.distinct.scale());
+        let own = s.cross(t);
+        let facing = |normal: DVec3| if !self.sided && normal.dot(own) < 0.0 { -normal } else { normal };
+        let near = self.graph.of(position).iter().take(RADIUS_NEIGHBOURS);
+        let offsets = offsets(self.distinct, self.graph, position, RADIUS_NEIGHBOURS);
+        let Cap(heights) = fitted(offsets.zip(near.map(|&other| facing((self.normal)(other)))), [s, t]);
+        Cap(heights.map(|height| (f64::from(height) / self.distinct.scale()) as f32))
+    }
+}
+
+/// The cap of a surfel with these half-axes, which touches the surface with its plane, by the offsets of neighbours on the surface and
+/// their unit normals: the paraboloid of the least squares of heights and of slopes, both by the distance. Flat where it leaves too
+/// much of them, or would be higher than [`Cap::HIGHEST`]. All in one unit of length.
+fn fitted(near: impl Iterator<Item = (DVec3, DVec3)> + Clone, [s, t]: [DVec3; 2]) -> Cap {
+    let normal = s.cross(t).normalize_or_zero();
+    let (a, b) = (s / s.length_squared(), t / t.length_squared());
+    let near = near.filter(|(offset, other)| is_beside(*offset, normal) && other.dot(normal) > ONE_PIECE);
+    // On the unit disk, heights in units of the longer half-axis: three equations each, of which the coefficients are uu, uv and vv.
+    let unit = s.length().max(t.length());
+    let equations = |(offset, other): (DVec3, DVec3)| {
+        let (u, v) = (offset.dot(a), offset.dot(b));
+        let rise = -other / (other.dot(normal) * unit);
+        // Of a unit of curvature a height is half the distance's square, and a slope the distance. A height counts a quarter: where
+        // planes are estimated, a point lies off its own.
+        let (far, farther) = (u.hypot(v).recip(), (u * u + v * v).recip());
+        [
+            (DVec3::new(0.5 * u * u, u * v, 0.5 * v * v) * farther, offset.dot(normal) / unit * farther),
+            (DVec3::new(u, v, 0.0) * far, rise.dot(s) * far),
+            (DVec3::new(0.0, u, v) * far, rise.dot(t) * far),
+        ]
+    };
+    let (mut matrix, mut right, mut squares) = (DMat3::ZERO, DVec3::ZERO, 0.0);
+    for (row, value) in near.clone().flat_map(equations) {
+        matrix += DMat3::from_cols(row * row.x, row * row.y, row * row.z);
+        right += row * value;
+        squares += value * value;
+    }
+    let found = matrix.inverse() * right;
+    let left = |(row, value): (DVec3, f64)| (row.dot(found) - value).powi(2);
+    let cap = Cap((found * unit).as_vec3().to_array());
+    let fits = found.is_finite()
+        && cap.highest() <= Cap::HIGHEST * unit
+        && near.flat_map(equations).map(left).sum::<f64>() <= LEFT * squares;
+    if fits { cap } else { Cap::FLAT }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points around one of a paraboloid, with the surface's normals.
+    fn near(heights: [f64; 3], count: u32) -> Vec<(DVec3, DVec3)> {
+        let [xx, xy, yy] = heights;
+        let at = |k: u32| {
+            let (sin, cos) = (f64::from(k) * 2.4).sin_cos();
+            let (x, y) = ((0.5 + 0.1 * f64::from(k)) * cos, (0.5 + 0.1 * f64::from(k)) * sin);
+            let slope = DVec3::new(-(xx * x + xy * y), -(xy * x + yy * y), 1.0);
+            (DVec3::new(x, y, 0.5 * (xx * x * x + yy * y * y) + xy * x * y), slope.normalize())
+        };
+        (0..count).map(at).collect()
+    }
+
+    #[test]
+    fn the_cap_of_a_paraboloid_is_it() {
+        let heights = [-0.4, 0.15, 0.25];
+        let (s, t) = (DVec3::new(0.8, 0.3, 0.0), DVec3::new(-0.15, 0.4, 0.0));
+        let cap = fitted(near(heights, 8).into_iter(), [s, t]);
+        let height = |p: DVec3| 0.5 * (heights[0] * p.x * p.x + heights[2] * p.y * p.y) + heights[1] * p.x * p.y;
+        for (u, v) in [(1.0, 0.0), (0.0, 1.0), (0.6, -0.7)] {
+            assert!((cap.height(u, v) - height(s * u + t * v)).abs() < 1e-6, "{cap:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_paraboloid_stays_flat() {
+        let axes = [DVec3::X, DVec3::Y];
+        // Nothing around, and too little.
+        assert_eq!(fitted([].into_iter(), axes), Cap::FLAT);
+        assert_eq!(fitted([(DVec3::X, DVec3::new(-0.1, 0.0, 1.0).normalize())].into_iter(), axes), Cap::FLAT);
+        // A wave: slopes up and down in turn.
+        let wave = near([0.0; 3], 8).into_iter().enumerate().map(|(k, (offset, _))| {
+            (offset, (DVec3::Z + offset.normalize() * if k % 2 == 0 { 0.5 } else { -0.5 }).normalize())
+        });
+        assert_eq!(fitted(wave.collect::<Vec<_>>().into_iter(), axes), Cap::FLAT);
+        // More than half a sphere.
+        assert_eq!(fitted(near([3.0, 0.0, 3.0], 4).into_iter(), axes), Cap::FLAT);
+        // Another sheet, whose normals point away, says nothing.
+        let other = near([0.3, 0.0, 0.3], 8).into_iter().map(|(offset, normal)| (offset, -normal));
+        let one = near([0.1, 0.0, 0.1], 8);
+        let both: Vec<_> = one.iter().copied().chain(other).collect();
+        assert_eq!(fitted(both.into_iter(), axes), fitted(one.into_iter(), axes));
+    }
+}

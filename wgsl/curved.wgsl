@@ -1,0 +1,238 @@
+// Surfels that curve out of their planes: paraboloids over their disks, met exactly. How the numbers of a record are meant says the
+// twin, src/passes/curved.rs; rows a, b, c of the record are those of U, V and W, and the trailing part of a is D.
+// Same interface as flat.wgsl. Twins: src/scene/cap.rs, src/passes/curved.rs.
+
+// The first of three words of a surfel's attributes: heights, world units.
+override CAP_WORD: u32;
+// Backs are left out, which a cap may show at some of its pixels.
+override CULLS: bool;
+
+struct Cap {
+    // uu, uv, vv, in units of the longer half-axis.
+    heights: vec3<f32>,
+    // The longer half-axis over the depth; 0 for an orthographic camera.
+    spread: f32,
+    // The longer half-axis, and the depth at which U, V and W are taken, device units.
+    radius: f32,
+    depth: f32,
+    // In front of all its fragments.
+    nearest: f32,
+}
+
+// Where on the surfel a fragment is.
+struct Spot {
+    uv: vec2<f32>,
+    // Its back is seen.
+    away: bool,
+}
+
+// What the normal gains for a unit of u and of v, where that of the centre is 1 long.
+struct Bend {
+    u: vec3<f32>,
+    v: vec3<f32>,
+}
+
+// No hit lies farther from the depth of U, V and W than so many longer half-axes: a cap is no higher than one.
+const FARTHEST_HIT: f32 = 8.0;
+
+fn world_heights(index: u32) -> vec3<f32> {
+    return vec3<f32>(
+        bitcast<f32>(attribute_word(index, CAP_WORD)),
+        bitcast<f32>(attribute_word(index, CAP_WORD + 1u)),
+        bitcast<f32>(attribute_word(index, CAP_WORD + 2u)),
+    );
+}
+
+// The least and largest height over the unit disk.
+fn extremes(heights: vec3<f32>) -> vec2<f32> {
+    let mean = 0.25 * (heights.x + heights.z);
+    let spread = length(vec2<f32>(0.25 * (heights.x - heights.z), 0.5 * heights.y));
+    return vec2<f32>(min(mean - spread, 0.0), max(mean + spread, 0.0));
+}
+
+// The inverse of [s t n] by rows, n the unit normal of s and t.
+fn inverse_of(s: vec3<f32>, t: vec3<f32>) -> mat3x3<f32> {
+    let across = cross(s, t);
+    let size = length(across);
+    let n = across / size;
+    return mat3x3<f32>(cross(t, n) / size, cross(n, s) / size, n);
+}
+
+// How the surfel curves whose disk has the homography h, in which rows and extent become those of the cap; and whether all of it shows
+// its back.
+fn curve(h: ptr<function, Homography>, index: u32, center: array<Double, 3>, s: vec3<f32>, t: vec3<f32>) -> Cap {
+    let p = vec3<f32>(center[0].high, center[1].high, center[2].high);
+    let r = max(length(s), length(t));
+    // In units of r, so that no product under- or overflows.
+    let unit_s = s / r;
+    let unit_t = t / r;
+    let m = inverse_of(unit_s, unit_t);
+    let heights = world_heights(index) * (held.unit / r);
+    let height = extremes(heights) * r;
+    let slope = length(vec2<f32>(s.z, t.z));
+    let low_shift = m[2] * height.x;
+    let high_shift = m[2] * height.y;
+    let depths = vec2<f32>(
+        p.z - slope + min(low_shift.z, high_shift.z),
+        p.z + slope + max(low_shift.z, high_shift.z),
+    );
+    (*h).turn = vec2<f32>(1.0, 0.0);
+    (*h).low = vec2<f32>(1.0);
+    (*h).high = vec2<f32>(0.0);
+    if (!(depths.y >= held.near)) {
+        return Cap(vec3<f32>(0.0), 0.0, 0.0, 0.0, 0.0);
+    }
+    let centered = holds_center(*h);
+    (*h).centered = centered;
+    let depth = select(max(held.near, depths.y), p.z, centered);
+    let scale = widening(depth) / r;
+    if (!centered) {
+        (*h).anchor = vec2<i32>(vec2<u32>(held.width, held.height) / 2u);
+    }
+    // A pixel's step on the plane at that depth, in r; and the point of the anchor's ray there, from the centre.
+    let per_pixel = scale / held.intrinsics.xy;
+    var start = -(*h).offset * per_pixel;
+    var start_z = 0.0;
+    if (!centered) {
+        let ray = (vec2<f32>((*h).anchor) + 0.5 - held.intrinsics.zw) / held.intrinsics.xy;
+        start = (ray * depth - p.xy) / r;
+        start_z = (depth - p.z) / r;
+    }
+    (*h).a = vec3<f32>(m[0].xy * per_pixel, dot(m[0].xy, start) + m[0].z * start_z);
+    (*h).b = vec3<f32>(m[1].xy * per_pixel, dot(m[1].xy, start) + m[1].z * start_z);
+    (*h).c = vec3<f32>(m[2].xy * per_pixel, dot(m[2].xy, start) + m[2].z * start_z);
+    // The vector times the matrix whose columns are the rows m.
+    (*h).a_low = toward(p, depth) * m;
+    // The sheared box about it: see the twin.
+    let ratio = shear(p);
+    let rest = p.xy - ratio * p.z;
+    let s_x = s.xy - ratio * s.z;
+    let t_x = t.xy - ratio * t.z;
+    let half = sqrt(s_x * s_x + t_x * t_x);
+    let low_x = low_shift.xy - ratio * low_shift.z;
+    let high_x = high_shift.xy - ratio * high_shift.z;
+    let first = select(rest, vec2<f32>(0.0), centered) - half + min(low_x, high_x);
+    let last = select(rest, vec2<f32>(0.0), centered) + half + max(low_x, high_x);
+    let before = max(depths, vec2<f32>(held.near));
+    let middle = select(
+        ratio * held.intrinsics.xy + held.intrinsics.zw,
+        vec2<f32>((*h).anchor) + 0.5 + (*h).offset,
+        centered,
+    );
+    (*h).low = middle + image_step(first, select(before.yy, before.xx, first < vec2<f32>(0.0)));
+    (*h).high = middle + image_step(last, select(before.yy, before.xx, last > vec2<f32>(0.0)));
+    (*h).depth_low = depths.x;
+    (*h).depth_high = depths.y;
+    return Cap(heights, spread_of(r, depth), r, depth, before.x * (1.0 - 1e-5));
+}
+
+// Whether all of the cap shows its back, or nothing of it is known: see the twin.
+fn is_back(h: Homography, cap: Cap) -> bool {
+    let p = vec3<f32>(h.a_low[0], h.a_low[1], h.a_low[2]);
+    let gradient = length(vec2<f32>(
+        cap.heights.x * p.x + cap.heights.y * p.y,
+        cap.heights.y * p.x + cap.heights.z * p.y,
+    ));
+    return p.z - extremes(cap.heights).y * cap.spread - gradient > 1e-6 * (1.0 + length(p.xy));
+}
+
+// Its rows in a splat's record, the last ones.
+const CAP_ROWS: u32 = 2u;
+
+fn with_cap(record: SplatRecord, cap: Cap) -> SplatRecord {
+    var curved_ = record;
+    let at = 4u + FILTER_ROWS + CLIP_ROWS;
+    curved_[at] = words(bitcast<vec4<u32>>(vec4<f32>(cap.spread, cap.radius, cap.depth, cap.nearest)));
+    curved_[at + 1u] = words(bitcast<vec4<u32>>(vec4<f32>(cap.heights, 0.0)));
+    return curved_;
+}
+
+fn cap_in(record: SplatRecord) -> Cap {
+    let at = 4u + FILTER_ROWS + CLIP_ROWS;
+    let sizes = bitcast<vec4<f32>>(each_word(record[at]));
+    let heights = bitcast<vec4<f32>>(each_word(record[at + 1u]));
+    return Cap(heights.xyz, sizes.x, sizes.y, sizes.z, sizes.w);
+}
+
+// The bilinear form of the heights.
+fn bent(heights: vec3<f32>, a: vec2<f32>, b: vec2<f32>) -> f32 {
+    return heights.x * a.x * b.x + heights.y * (a.x * b.y + a.y * b.x) + heights.z * a.y * b.y;
+}
+
+// The point of a pixel's ray that lies sigma behind the depth of `start`, as a fragment.
+fn on_cap(splat: Splat, start: vec3<f32>, step: vec3<f32>, sigma: f32, away: bool) -> Fragment {
+    let uv = start.xy + sigma * step.xy;
+    let rho2 = dot(uv, uv);
+    let depth = splat.cap.depth + splat.cap.radius * sigma;
+    let hit = rho2 <= 1.0 && abs(sigma) <= FARTHEST_HIT && depth >= held.near && !(CULLS && away)
+        && !cuts(splat.clip, vec3<f32>(uv, 1.0));
+    return Fragment(
+        hit,
+        select(held.farthest, depth, hit),
+        select(3e38, rho2, hit),
+        1.0,
+        Spot(select(vec2<f32>(0.0), uv, hit), away),
+    );
+}
+
+// The fragment of the pixel at d from the anchor, the nearer one of the ray's two.
+fn met(splat: Splat, filter_: Filter, d: vec2<f32>) -> Fragment {
+    let start = vec3<f32>(
+        splat.a[0] * d.x + (splat.a[1] * d.y + splat.a[2]),
+        splat.b[0] * d.x + (splat.b[1] * d.y + splat.b[2]),
+        splat.c[0] * d.x + (splat.c[1] * d.y + splat.c[2]),
+    );
+    let heights = splat.cap.heights;
+    let step = start * splat.cap.spread + vec3<f32>(splat.a_low[0], splat.a_low[1], splat.a_low[2]);
+    let a = 0.5 * bent(heights, step.xy, step.xy);
+    let b = bent(heights, start.xy, step.xy) - step.z;
+    let c = 0.5 * bent(heights, start.xy, start.xy) - start.z;
+    let discriminant = b * b - 4.0 * a * c;
+    let root = sqrt(max(discriminant, 0.0));
+    // Neither root cancels: q is the sum of two numbers of one sign.
+    let q = -0.5 * (b + select(-root, root, b >= 0.0));
+    // The slope at c / q is that of b, and at q / a the other one.
+    let one = on_cap(splat, start, step, c / q, b < 0.0);
+    let other = on_cap(splat, start, step, q / a, b >= 0.0);
+    let nearer = other.hit && (!one.hit || other.depth < one.depth);
+    var fragment = one;
+    if (nearer) {
+        fragment = other;
+    }
+    if (discriminant < 0.0) {
+        fragment.hit = false;
+        fragment.rho2 = 3e38;
+    }
+    return softened(fragment, splat, filter_, d, start, step);
+}
+
+// With the low-pass: its own fragments lie on the plane that touches the cap at its centre.
+fn softened(
+    fragment: Fragment,
+    splat: Splat,
+    filter_: Filter,
+    d: vec2<f32>,
+    start: vec3<f32>,
+    step: vec3<f32>,
+) -> Fragment {
+    if (!FILTERED) {
+        return fragment;
+    }
+    let sigma = -start.z / step.z;
+    let row = third_row(splat.cap.depth + splat.cap.radius * sigma);
+    var round = filtered(fragment, vec3<f32>(0.0, 0.0, row), filter_, d);
+    if (round.rho2 < fragment.rho2) {
+        round.hit = round.hit && !cuts(splat.clip, vec3<f32>(start.xy + sigma * step.xy, 1.0));
+        round.spot = Spot(vec2<f32>(0.0), (splat.bounds_last & AWAY) != 0u);
+    }
+    return round;
+}
+
+fn is_away(splat: Splat, fragment: Fragment) -> bool {
+    return fragment.spot.away;
+}
+
+// A depth in front of every fragment of the splat itself.
+fn nearest_on(splat: Splat, first: vec2<f32>, last: vec2<f32>) -> f32 {
+    return splat.cap.nearest;
+}

@@ -1,0 +1,24 @@
+// Caps in tiles: of a splat that another invocation fetched (tile.wgsl).
+
+fn handed_vector(own: vec3<f32>, from_: u32) -> vec3<f32> {
+    return vec3<f32>(handed_number(own.x, from_), handed_number(own.y, from_), handed_number(own.z, from_));
+}
+
+fn handed_cap(own: Cap, from_: u32) -> Cap {
+    return Cap(
+        handed_vector(own.heights, from_),
+        handed_number(own.spread, from_),
+        handed_number(own.radius, from_),
+        handed_number(own.depth, from_),
+        0.0,
+    );
+}
+
+fn handed_bend(own: Bend, from_: u32) -> Bend {
+    return Bend(handed_vector(own.u, from_), handed_vector(own.v, from_));
+}
+
+// Whether the splat has no fragment at `pixels`, which lie in its bounds: that is not looked at.
+fn misses(splat: Splat, filter_: Filter, pixels: Rectangle) -> bool {
+    return false;
+}

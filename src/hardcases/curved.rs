@@ -69,8 +69,9 @@ impl Precision {
         let sigma = [far / a, c / far].map(f64::abs).into_iter().fold(0.0, f64::max).min(FARTHEST_HIT);
         let terms = a.abs() * sigma * sigma + b.abs() * sigma + c.abs();
         let value = da * sigma * sigma + db * sigma + dc + 12.0 * E * terms;
+        let apart = slope * slope / (4.0 * (a.abs() + da));
         // NaN knows nothing.
-        if !(4.0 * (a.abs() + da) * value < slope * slope) {
+        if value.is_nan() || apart.is_nan() || value >= apart {
             return NOTHING;
         }
         let moved = 2.0 * value / slope;

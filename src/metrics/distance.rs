@@ -77,7 +77,9 @@ impl SurfaceDistances {
             let surfel = &scene.surfels[index];
             let (sin, cos) = (TAU * f64::from(k) / f64::from(RIM_POINTS)).sin_cos();
             let kept = scene.clips.get(index).map_or(1.0, |clip| clip.reach(cos, sin));
-            (kept > 0.0).then(|| center(index) + (world(surfel.s) * cos + world(surfel.t) * sin) * kept)
+            let height = scene.caps.get(index).map_or(0.0, |cap| cap.height(kept * cos, kept * sin));
+            let up = || world(surfel.s).cross(world(surfel.t)).normalize_or_zero() * height;
+            (kept > 0.0).then(|| center(index) + (world(surfel.s) * cos + world(surfel.t) * sin) * kept + up())
         };
         let surfels = (0..scene.surfels.len()).into_par_iter();
         let centers = surfels.clone().map(center).map(|point| triangles.distance(point));

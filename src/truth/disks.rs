@@ -1,4 +1,4 @@
-//! The disks of a scene as rays and points meet them: flat ellipses, neither blended nor filtered.
+//! The disks of a scene as rays and points meet them: ellipses, flat or curved, neither blended nor filtered.
 //!
 //! As for triangles, a tree of padded f32 boxes finds candidates, and each is decided in f64.
 
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use super::nearest::nearest;
 use super::triangles::PADDING;
-use crate::scene::{Bounds, Clip, Scene, Surfel};
+use crate::scene::{Bounds, Cap, Clip, Scene, Surfel};
 
 /// The shorter half-axis is taken for at least this part of the longer: a disk seen as a line has a distance all the same.
 const THINNEST: f64 = 1e-9;
@@ -42,6 +42,8 @@ struct Disk {
     half: [f64; 2],
     /// Where it ends before its rim, by the half-axes that came.
     clip: Clip,
+    /// The heights of its cap over the principal half-axes, uu, uv and vv; 0 of a flat one.
+    heights: [f64; 3],
     /// Cosine and sine of the angle from those to the principal ones.
     turn: DVec2,
 }
@@ -51,13 +53,14 @@ struct Placed<'a> {
     center: DVec3,
     surfel: &'a Surfel,
     clip: Clip,
+    cap: Cap,
 }
 
 impl Placed<'_> {
     /// What tells it from others.
-    fn bits(&self) -> ([u64; 3], [[u32; 3]; 4]) {
-        let Clip([first, second]) = self.clip;
-        let axes = [self.surfel.s, self.surfel.t, first, second].map(|axis| axis.map(f32::to_bits));
+    fn bits(&self) -> ([u64; 3], [[u32; 3]; 5]) {
+        let (Clip([first, second]), Cap(heights)) = (self.clip, self.cap);
+        let axes = [self.surfel.s, self.surfel.t, first, second, heights].map(|axis| axis.map(f32::to_bits));
         (self.center.to_array().map(f64::to_bits), axes)
     }
 }
@@ -72,8 +75,13 @@ impl DiskTree {
             numbers.as_flattened().iter().all(|c| c.is_finite()) && surfel.radius() > 0.0
         };
         let clip = |index: usize| scene.clips.get(index).copied().unwrap_or_default();
-        let placed =
-            |index: usize| Placed { center: scene.center(index), surfel: &scene.surfels[index], clip: clip(index) };
+        let cap = |index: usize| scene.caps.get(index).copied().unwrap_or_default();
+        let placed = |index: usize| Placed {
+            center: scene.center(index),
+            surfel: &scene.surfels[index],
+            clip: clip(index),
+            cap: cap(index),
+        };
         let all = (0..scene.surfels.len()).map(placed);
         let mut surfels: Vec<Placed<'_>> = all.filter(|placed| sized(&placed.surfel)).collect();
         // Boxes tell nothing apart that is in one place: of thousands that are, each would be looked at for each point.
@@ -81,8 +89,8 @@ impl DiskTree {
         surfels.dedup_by_key(|placed| placed.bits());
         let bounds = surfels.par_iter().fold(
             || Bounds::EMPTY,
-            |bounds, Placed { center, surfel, .. }| {
-                let (center, reach) = (*center, extent(surfel));
+            |bounds, Placed { center, surfel, cap, .. }| {
+                let (center, reach) = (*center, extent(surfel) + cap.highest());
                 bounds.with_point(center - reach).with_point(center + reach)
             },
         );
@@ -91,7 +99,8 @@ impl DiskTree {
         let radius = if extent > 0.0 { 0.5 * extent } else { 1.0 };
         let disk = |placed: &Placed<'_>| {
             let [s, t] = [placed.surfel.s, placed.surfel.t].map(world);
-            Disk { clip: placed.clip, ..Disk::new((placed.center - center) / radius, s / radius, t / radius) }
+            let flat = Disk::new((placed.center - center) / radius, s / radius, t / radius);
+            Disk { clip: placed.clip, ..flat }.curved(placed.cap.0.map(|height| f64::from(height) / radius))
         };
         let disks: Vec<Disk> = surfels.par_iter().map(disk).collect();
         let boxes: Vec<Aabb> = disks.iter().map(Disk::padded_box).collect();
@@ -169,26 +178,55 @@ impl Disk {
         let long = long.normalize_or(DVec3::X);
         let short = short.try_normalize().unwrap_or_else(|| long.any_orthonormal_vector());
         let turn = DVec2::new(cos, sin);
-        Self { center, axes: [long, short, long.cross(short)], half, clip: Clip::NONE, turn }
+        Self { center, axes: [long, short, long.cross(short)], half, clip: Clip::NONE, heights: [0.0; 3], turn }
+    }
+
+    /// With the cap of these heights over the half-axes that came: p = u' s' + v' t' with s' = s cos + t sin and t' = t cos - s sin.
+    fn curved(self, [uu, uv, vv]: [f64; 3]) -> Self {
+        let (c, s) = (self.turn.x, self.turn.y);
+        let heights = [
+            uu * c * c + 2.0 * uv * c * s + vv * s * s,
+            (vv - uu) * c * s + uv * (c * c - s * s),
+            uu * s * s - 2.0 * uv * c * s + vv * c * c,
+        ];
+        Self { heights, ..self }
     }
 
     fn padded_box(&self) -> Aabb {
         let [long, short] = [self.axes[0] * self.half[0], self.axes[1] * self.half[1]];
         let reach = (long * long + short * short).map(f64::sqrt) + f64::from(PADDING);
+        let [low, high] = Cap(self.heights.map(|height| height as f32)).extremes().map(|height| self.axes[2] * height);
         let corner = |at: DVec3| Vec3A::from(at.as_vec3());
-        Aabb::new(corner(self.center - reach), corner(self.center + reach))
+        Aabb::new(corner(self.center - reach + low.min(high)), corner(self.center + reach + low.max(high)))
     }
 
-    /// Where on the line `point + t * direction` the disk lies; None where it does not, or is seen edge-on.
+    /// Half the bilinear form of the heights: of one place on the unit disk twice, how high the cap is there.
+    fn bent(&self, a: DVec2, b: DVec2) -> f64 {
+        let [uu, uv, vv] = self.heights;
+        0.5 * (uu * a.x * b.x + uv * (a.x * b.y + a.y * b.x) + vv * a.y * b.y)
+    }
+
+    /// Where on the line `point + t * direction` the disk lies, the nearest to `point` of the line's two meetings with a cap; None where
+    /// it does not, or is flat and seen edge-on.
     fn met_at(&self, point: DVec3, direction: DVec3) -> Option<f64> {
         let [long, short, normal] = self.axes;
-        let t = (self.center - point).dot(normal) / direction.dot(normal);
-        let offset = point + direction * t - self.center;
-        let (u, v) = (offset.dot(long) / self.half[0], offset.dot(short) / self.half[1]);
-        // p = u' s' + v' t' with s' = s cos + t sin and t' = t cos - s sin.
+        let local = |v: DVec3| DVec2::new(v.dot(long) / self.half[0], v.dot(short) / self.half[1]);
+        let (start, step) = (local(point - self.center), local(direction));
+        let a = self.bent(step, step);
+        let b = 2.0 * self.bent(start, step) - direction.dot(normal);
+        let c = self.bent(start, start) - (point - self.center).dot(normal);
         let (cos, sin) = (self.turn.x, self.turn.y);
-        let inside = self.clip.inside(u * cos - v * sin, u * sin + v * cos) >= 0.0;
-        (inside && u * u + v * v <= 1.0).then_some(t)
+        let lies = |t: &f64| {
+            let at = start + step * *t;
+            let inside = self.clip.inside(at.x * cos - at.y * sin, at.x * sin + at.y * cos) >= 0.0;
+            inside && at.length_squared() <= 1.0
+        };
+        if self.heights == [0.0; 3] {
+            return Some(-c / b).filter(lies);
+        }
+        let root = (b * b - 4.0 * a * c).sqrt();
+        let far = -0.5 * (b + root.copysign(b));
+        [c / far, far / a].into_iter().filter(lies).min_by(|a, b| a.abs().total_cmp(&b.abs()))
     }
 
     /// Beyond the rim the nearest point (x', y') of the ellipse with half-axes a and b has the normal through (x, y):
@@ -199,7 +237,33 @@ impl Disk {
         let foot = DVec2::new(offset.dot(self.axes[0]), offset.dot(self.axes[1]));
         let height = offset.dot(self.axes[2]);
         let nearest = self.nearest_in_plane(foot);
-        foot.distance_squared(nearest) + height * height
+        if self.heights == [0.0; 3] || !nearest.is_finite() {
+            return foot.distance_squared(nearest) + height * height;
+        }
+        self.squared_distance_to_cap(foot.extend(height), nearest)
+    }
+
+    /// From a point in the disk's own axes to its cap, about the place `first` of the plane: from each place on to the nearest of the
+    /// plane that touches the cap there, as long as that is nearer. No distance is less than the true one.
+    fn squared_distance_to_cap(&self, point: DVec3, first: DVec2) -> f64 {
+        const STEPS: u32 = 8;
+        let half = DVec2::from_array(self.half);
+        let at = |place: DVec2| place.extend(self.bent(place / half, place / half));
+        let (mut place, mut least) = (first, point.distance_squared(at(first)));
+        for _ in 0..STEPS {
+            let [uu, uv, vv] = self.heights;
+            let unit = place / half;
+            let slope = DVec2::new(uu * unit.x + uv * unit.y, uv * unit.x + vv * unit.y) / half;
+            let normal = (-slope).extend(1.0).normalize();
+            let on_plane = point - normal * (point - at(place)).dot(normal);
+            let next = self.nearest_in_plane(on_plane.truncate());
+            let distance = point.distance_squared(at(next));
+            if distance.is_nan() || distance >= least {
+                break;
+            }
+            (place, least) = (next, distance);
+        }
+        least
     }
 
     /// The nearest point to `foot` of the ellipse, cut by its lines: that of the whole ellipse where the lines keep it, else one on a
@@ -386,6 +450,38 @@ mod tests {
             near += u32::from(reaches <= 1.0);
         }
         assert!(near > 20 && covered > 5 * near, "{near} {covered}");
+    }
+
+    #[test]
+    fn caps_are_met_and_near_where_they_are() {
+        let mut next = noise(3);
+        let mut scene = Scene { surfels: scene().surfels[9..].to_vec(), ..scene() };
+        let heights = |surfel: &Surfel| {
+            let mut height = || (0.5 * next()) as f32 * surfel.radius();
+            Cap([height(), height(), height()])
+        };
+        scene.caps = scene.surfels.iter().map(heights).collect();
+        let [caps, flat] = [DiskTree::new(&scene), DiskTree::new(&Scene { caps: Vec::new(), ..scene.clone() })];
+        let (mut met, mut flat_met) = (0, 0);
+        for (index, (surfel, cap)) in scene.surfels.iter().zip(&scene.caps).enumerate() {
+            let [center, s, t] = [surfel.center, surfel.s, surfel.t].map(|v| Vec3::from_array(v).as_dvec3());
+            let normal = s.cross(t).normalize_or_zero();
+            if surfel.shorter() < 0.05 * surfel.radius() {
+                continue;
+            }
+            let (sin, cos) = (index as f64).sin_cos();
+            let (u, v) = (0.8 * cos, 0.8 * sin);
+            let slope = cap.slope(u, v);
+            let on_cap = center + s * u + t * v + normal * cap.height(u, v);
+            let across = normal * s.cross(t).length() - t.cross(normal) * slope.x - normal.cross(s) * slope.y;
+            let point = on_cap + across.normalize() * (0.1 * f64::from(surfel.shorter()));
+            let distance = caps.distance(scene.origin + point);
+            assert!(distance <= 0.1 * f64::from(surfel.shorter()) + 1e-7, "{distance} {surfel:?} {cap:?}");
+            let near = |tree: &DiskTree| tree.covers(scene.origin + on_cap, across.normalize(), 1e-5);
+            met += u32::from(near(&caps));
+            flat_met += u32::from(near(&flat));
+        }
+        assert!(met > 150 && flat_met < 5, "{met} {flat_met}");
     }
 
     #[test]

@@ -49,6 +49,8 @@ enum ShapeName {
     Disk,
     /// Ellipses along the principal curvatures where they cover more: a fifth fewer
     Ellipse,
+    /// Circles that curve as the surface does, and so cover more
+    Cap,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
@@ -68,6 +70,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let shape = match arguments.shape {
         ShapeName::Disk => SplatShape::Disk,
         ShapeName::Ellipse => SplatShape::Ellipse,
+        ShapeName::Cap => SplatShape::Cap,
     };
     let options = Options { tolerance: arguments.tolerance, shape, relaxations: arguments.relax };
     let (simplified, report) = simplify(&scene, &options, &bars)?;
@@ -81,14 +84,15 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 fn points(scene: &Scene, shape: SplatShape) -> Points {
     let surfels = &scene.surfels;
     let normal = |surfel: &Surfel| surfel.normal().normalize_or_zero().to_array();
-    // Lines are by half-axes.
-    let half_axes = shape == SplatShape::Ellipse || !scene.clips.is_empty();
+    // Lines and caps are by half-axes.
+    let half_axes = shape != SplatShape::Disk || !scene.clips.is_empty();
     Points {
         positions: (0..surfels.len()).map(|index| (scene.origin + scene.center(index)).to_array()).collect(),
         normals: (!half_axes).then(|| surfels.iter().map(normal).collect()),
         radii: (!half_axes).then(|| surfels.iter().map(|surfel| surfel.radius()).collect()),
         axes: half_axes.then(|| surfels.iter().map(|surfel| [surfel.s, surfel.t]).collect()),
         clips: (!scene.clips.is_empty()).then(|| scene.clips.clone()),
+        caps: (!scene.caps.is_empty()).then(|| scene.caps.clone()),
         colors: match &scene.colors {
             Colors::Constant(color) => Some(Colors::Linear(vec![*color; surfels.len()])),
             colors => Some(colors.clone()),

@@ -12,6 +12,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::SplatShape;
 use super::cells::{Cells, piece_of, tangent_basis};
+use super::paraboloid::Paraboloid;
 use super::samples::Samples;
 
 /// Half-axes of an ellipse are at most so many times as long as each other, and a disk unless they are this much.
@@ -20,6 +21,12 @@ const SMALLEST_RATIO: f64 = 1.1;
 
 /// The cosine of the angle between ends up to which one line cuts a splat at both: 10 degrees.
 const ONE_LINE: f64 = 0.985;
+
+/// How often a cap is fitted to what it holds, and grown again.
+const FITS: usize = 3;
+
+/// The cosine of the angle up to which a cap bends: 45 degrees.
+const STEEPEST: f64 = 0.707;
 
 /// A line in a splat's plane at which it will be cut.
 struct Ended {
@@ -49,7 +56,9 @@ pub(super) struct Splat {
     pub shift: f64,
     /// Half-axes, perpendicular to each other and to the normal. All in scaled units.
     pub axes: [DVec3; 2],
-    /// The largest distance of a point inside from its plane. It exceeds the tolerance where the splat is
+    /// How it curves.
+    pub bend: Paraboloid,
+    /// The largest distance of a point inside from it. It exceeds the tolerance where the splat is
     /// [larger](Grower::grow_over_cell) than it grew.
     pub deviation: f64,
 }
@@ -101,6 +110,8 @@ pub(super) struct Grower<'a> {
     /// Scaled units.
     tolerance: f64,
     shape: SplatShape,
+    /// Of the splat that is growing.
+    bend: Paraboloid,
     confront: BinaryHeap<Reverse<(Distance, u32)>>,
     conquered: Vec<Conquered>,
     /// Which points the splat that is growing has seen: those with its number.
@@ -112,13 +123,26 @@ impl<'a> Grower<'a> {
     /// With the tolerance in scaled units.
     pub fn new(samples: &'a Samples, cells: &'a Cells, tolerance: f64, shape: SplatShape) -> Self {
         let seen = vec![0; samples.len()];
-        Self { samples, cells, tolerance, shape, confront: BinaryHeap::new(), conquered: Vec::new(), seen, number: 0 }
+        Self {
+            samples,
+            cells,
+            tolerance,
+            shape,
+            bend: Paraboloid::FLAT,
+            confront: BinaryHeap::new(),
+            conquered: Vec::new(),
+            seen,
+            number: 0,
+        }
     }
 
     /// Grows a splat from `point` and appends what it covers, in the order of cells.
     pub fn grow(&mut self, point: u32, covers: &mut Vec<Cover>) -> Splat {
         let first = covers.len();
         let disk = self.grow_shape(point, self.circle(point), false, covers);
+        if self.shape == SplatShape::Cap {
+            return self.grow_cap(disk, first, covers);
+        }
         let Some(axes) = (self.shape == SplatShape::Ellipse).then(|| self.principal_axes(point)).flatten() else {
             return disk;
         };
@@ -132,6 +156,55 @@ impl<'a> Grower<'a> {
             covers.truncate(middle);
             disk
         }
+    }
+
+    /// The cap around the point of `disk`, whose covers start at `first`, that covers the most of those that are grown in turns from what
+    /// the last one holds; or the disk.
+    fn grow_cap(&mut self, disk: Splat, mut first: usize, covers: &mut Vec<Cover>) -> Splat {
+        let area = |cells: &Cells, covers: &[Cover]| covers.iter().map(|c| cells.area(c.cell, c.pieces)).sum::<f64>();
+        let (start, mut best) = (first, disk);
+        for _ in 0..FITS {
+            let Some(bend) = self.bend_of(disk.point) else { break };
+            self.bend = bend;
+            let next = covers.len();
+            let cap = self.grow_shape(disk.point, self.circle(disk.point), false, covers);
+            if area(self.cells, &covers[next..]) <= area(self.cells, &covers[first..next]) {
+                covers.truncate(next);
+                break;
+            }
+            (best, first) = (cap, next);
+        }
+        self.bend = Paraboloid::FLAT;
+        covers.drain(start..first);
+        best
+    }
+
+    /// The paraboloid through the conquered set of the splat that grew last, around `point`, and what it would take next.
+    fn bend_of(&self, point: u32) -> Option<Paraboloid> {
+        let [s, t] = tangent_basis(self.samples.normals[point as usize]);
+        let (center, normal) = (self.samples.positions.position(point), self.samples.normals[point as usize]);
+        let around = self.confront.iter().map(|Reverse((_, point))| *point);
+        let faces = |other: &u32| self.samples.normals[*other as usize].dot(normal).abs() > STEEPEST;
+        let points = self.conquered.iter().map(|conquered| conquered.point).chain(around.filter(faces));
+        Paraboloid::through(points.map(|other| {
+            let offset = self.samples.positions.position(other) - center;
+            DVec3::new(offset.dot(s), offset.dot(t), offset.dot(normal))
+        }))
+    }
+
+    /// How far a point lies over the splat that grows around one of this normal, at `offset` from that.
+    fn over(&self, normal: DVec3, offset: DVec3) -> f64 {
+        if self.bend.is_flat() {
+            return offset.dot(normal);
+        }
+        let [s, t] = tangent_basis(normal);
+        self.bend.over(DVec2::new(offset.dot(s), offset.dot(t)), offset.dot(normal))
+    }
+
+    /// Whether the splat that grows from `point` may hold `other`.
+    fn holds(&self, point: u32, other: u32) -> bool {
+        let [normal, next] = [point, other].map(|index| self.samples.normals[index as usize]);
+        self.samples.same_side(point, other) && (self.bend.is_flat() || normal.dot(next).abs() > STEEPEST)
     }
 
     /// The same for a disk that is at least so large that it covers the point's own cell, though another point inside may then
@@ -204,7 +277,7 @@ impl<'a> Grower<'a> {
         let confront = self.confront.iter().map(|Reverse((Distance(distance), point))| (*distance, *point));
         let deviation = confront
             .filter(|(distance, _)| *distance < radius)
-            .map(|(_, point)| ((self.samples.positions.position(point) - center).dot(normal) - shift).abs())
+            .map(|(_, point)| (self.over(normal, self.samples.positions.position(point) - center) - shift).abs())
             .fold(0.5 * (high - low), f64::max);
         let first = covers.len();
         for conquered in &self.conquered {
@@ -214,7 +287,7 @@ impl<'a> Grower<'a> {
             }
         }
         covers[first..].sort_unstable_by_key(|cover| cover.cell);
-        Splat { point, shift, axes: shape.map(|axis| axis * radius), deviation }
+        Splat { point, shift, axes: shape.map(|axis| axis * radius), bend: self.bend, deviation }
     }
 
     /// The range of heights over the tangent plane of the points inside.
@@ -247,7 +320,7 @@ impl<'a> Grower<'a> {
                 return end;
             }
             let offset = self.samples.positions.position(next) - center;
-            let height = offset.dot(normal);
+            let height = self.over(normal, offset);
             (low, high) = (low.min(height), high.max(height));
             if high - low > 2.0 * self.tolerance {
                 // A way along the graph may lead back inward: what is farther out than this point is not inside.
@@ -268,7 +341,7 @@ impl<'a> Grower<'a> {
                 }
                 let offset = self.samples.positions.position(neighbour) - center;
                 let reached = DVec2::new(offset.dot(inverse[0]), offset.dot(inverse[1])).length();
-                if self.samples.same_side(point, neighbour) {
+                if self.holds(point, neighbour) {
                     self.seen[neighbour as usize] = self.number;
                     self.confront.push(Reverse((Distance(reached), neighbour)));
                 } else {

@@ -33,6 +33,7 @@ mod cells;
 mod cut;
 mod growing;
 mod outcome;
+mod paraboloid;
 mod relaxation;
 mod samples;
 mod selection;
@@ -92,6 +93,8 @@ pub enum SplatShape {
     Disk,
     /// Ellipses along the principal curvatures where these cover more, as in Wu and Kobbelt.
     Ellipse,
+    /// Round disks that curve as the points inside do ([`Cap`](crate::scene::Cap)), which lets them hold more of those.
+    Cap,
 }
 
 /// How to simplify.

@@ -1,16 +1,16 @@
 //! Selected splats as surfels, and how far from them the points lie.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::candidates::Candidates;
-use super::cells::Cells;
+use super::cells::{Cells, tangent_basis};
 use super::cut::clip;
 use super::samples::Samples;
 use crate::scene::color::linear_to_srgb;
 use crate::scene::scene::low_parts;
-use crate::scene::{Clip, Colors, Scene, Surfel};
+use crate::scene::{Cap, Clip, Colors, Scene, Surfel};
 
 /// A half-axis is written longer than it grew by at most this part of itself,
 const LARGEST_OVERLAP: f64 = 0.4;
@@ -74,6 +74,7 @@ struct Chosen {
     center: DVec3,
     surfel: Surfel,
     clip: Clip,
+    cap: Cap,
     color: [f32; 4],
     /// Area times deviation, and area.
     sums: [f64; 2],
@@ -87,10 +88,13 @@ impl Chosen {
         let splat = &candidates.splats[index as usize];
         let normal = samples.normals[splat.point as usize];
         let center = samples.positions.position(splat.point) + normal * splat.shift;
+        let basis = tangent_basis(normal);
         let (mut color, mut sums, mut largest) = ([0.0; 4], [0.0; 2], 0f64);
         for cover in candidates.covers(index) {
             let area = cells.area(cover.cell, cover.pieces);
-            let deviation = (samples.positions.position(cover.cell) - center).dot(normal).abs() / scale;
+            let offset = samples.positions.position(cover.cell) - center;
+            let at = DVec2::new(offset.dot(basis[0]), offset.dot(basis[1]));
+            let deviation = splat.bend.over(at, offset.dot(normal)).abs() / scale;
             largest = largest.max(deviation);
             sums = [sums[0] + area * deviation, sums[1] + area];
             for (sum, value) in color.iter_mut().zip(samples.colors[cover.cell as usize]) {
@@ -111,11 +115,13 @@ impl Chosen {
             (center, axes),
             (largest * scale, samples.radii[splat.point as usize]),
         );
+        let Cap(heights) = splat.bend.cap(axes.map(|axis| DVec2::new(axis.dot(basis[0]), axis.dot(basis[1]))));
+        let cap = Cap(heights.map(|height| (f64::from(height) / scale) as f32));
         let [s, t] = axes.map(world);
         let [r, g, b, alpha] = color;
         let opaque = if alpha > 0.0 { alpha } else { f64::INFINITY };
         let color = [r / opaque, g / opaque, b / opaque, alpha / sums[1]].map(|c| c as f32);
-        Self { center: center / scale, surfel: Surfel { center: world(center), s, t }, clip, color, sums, largest }
+        Self { center: center / scale, surfel: Surfel { center: world(center), s, t }, clip, cap, color, sums, largest }
     }
 }
 
@@ -141,12 +147,14 @@ pub(super) fn scene(
     let surfels: Vec<_> = chosen.iter().map(|chosen| chosen.surfel).collect();
     let low = low_parts(&surfels, |index| chosen[index].center);
     let clips: Vec<Clip> = chosen.iter().map(|chosen| chosen.clip).collect();
+    let caps: Vec<Cap> = chosen.iter().map(|chosen| chosen.cap).collect();
     (
         Scene {
             origin: scene.origin,
             surfels,
             low,
             clips: if clips.iter().all(Clip::is_none) { Vec::new() } else { clips },
+            caps: if caps.iter().all(Cap::is_flat) { Vec::new() } else { caps },
             colors,
             oriented: scene.oriented,
             closed: scene.closed,

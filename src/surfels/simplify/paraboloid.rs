@@ -1,0 +1,71 @@
+//! How a cap curves that grows: the paraboloid of the points that it holds.
+
+use glam::{DMat4, DVec2, DVec3, DVec4};
+
+use crate::scene::Cap;
+
+/// Heights over the tangent plane of a splat's point, `x u² + y u v + z v²` at (u, v) in the basis of that plane, scaled units. A disk's
+/// are zero.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Paraboloid(DVec3);
+
+impl Paraboloid {
+    pub const FLAT: Self = Self(DVec3::ZERO);
+
+    /// That of the least squares through points at (u, v) and a height, but for a height that all have. None where they do not say.
+    pub fn through(points: impl Iterator<Item = DVec3> + Clone) -> Option<Self> {
+        let reach = points.clone().map(|point| point.length()).fold(0.0, f64::max);
+        let (mut matrix, mut right) = (DMat4::ZERO, DVec4::ZERO);
+        for point in points {
+            let point = point / reach;
+            let row = DVec4::new(point.x * point.x, point.x * point.y, point.y * point.y, 1.0);
+            matrix += DMat4::from_cols(row * row.x, row * row.y, row * row.z, row);
+            right += row * point.z;
+        }
+        let found = (matrix.inverse() * right).truncate() / reach;
+        found.is_finite().then_some(Self(found))
+    }
+
+    pub fn is_flat(&self) -> bool {
+        self.0 == DVec3::ZERO
+    }
+
+    fn height(&self, at: DVec2) -> f64 {
+        self.0.dot(DVec3::new(at.x * at.x, at.x * at.y, at.y * at.y))
+    }
+
+    /// How far a point at (u, v) and a height lies over it along the normal, which is no less than how far it lies from it.
+    pub fn over(&self, at: DVec2, height: f64) -> f64 {
+        height - self.height(at)
+    }
+
+    /// The cap that it is over half-axes s and t in that basis, in their unit.
+    pub fn cap(&self, [s, t]: [DVec2; 2]) -> Cap {
+        let product = |a: DVec2, b: DVec2| {
+            2.0 * self.0.x * a.x * b.x + self.0.y * (a.x * b.y + a.y * b.x) + 2.0 * self.0.z * a.y * b.y
+        };
+        Cap([product(s, s), product(s, t), product(t, t)].map(|height| height as f32))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_of_a_paraboloid_lie_on_the_one_through_them() {
+        let height = |u: f64, v: f64| 0.25 - 0.3 * u * u + 0.2 * u * v + 0.1 * v * v;
+        let place = |k: i32| ((f64::from(k) * 1.7).sin(), (f64::from(k) * 2.3).cos());
+        let points = (0..20).map(place).map(|(u, v)| DVec3::new(u, v, height(u, v)));
+        let Some(found) = Paraboloid::through(points.clone()) else { unreachable!() };
+        for point in points {
+            let over = found.over(point.truncate(), point.z - 0.25);
+            assert!(over.abs() < 1e-12, "{over}");
+            assert!(Paraboloid::FLAT.over(point.truncate(), 0.5) == 0.5);
+        }
+        let axes = [DVec2::new(0.6, 0.8), DVec2::new(-0.4, 0.3)];
+        let at = axes[0] * 0.5 + axes[1] * 0.7;
+        assert!((found.cap(axes).height(0.5, 0.7) - (height(at.x, at.y) - 0.25)).abs() < 1e-7);
+        assert_eq!(Paraboloid::through([DVec3::ZERO; 3].into_iter()), None);
+    }
+}

@@ -20,7 +20,7 @@ use epsplat::surfels::build;
 use epsplat::surfels::sampling::voxels::Voxel;
 use epsplat::surfels::sampling::{MeshSurface, Method, Priority, sample};
 use epsplat::surfels::simplify::{Options, Report, SplatShape, Tolerance, grown, simplify, written};
-use epsplat::truth::TriangleTree;
+use epsplat::truth::{DiskTree, TriangleTree};
 use glam::{DVec3, Vec3};
 
 const DISKS: Options = Options { tolerance: Tolerance::Absolute(0.0), shape: SplatShape::Disk, relaxations: 0 };
@@ -164,6 +164,38 @@ fn ellipses_and_relaxation_leave_fewer_where_they_can() {
     let sphere = shape(Shape::Sphere, 30_000);
     let ratio = number(&sphere, SplatShape::Ellipse, 0) / number(&sphere, SplatShape::Disk, 0);
     assert!((0.98..1.02).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn caps_are_fewer_than_half_of_the_disks_and_leave_no_hole() {
+    // A sphere is nearly a paraboloid in each place, and a torus bends both ways.
+    for (surface, count, tolerance) in [(Shape::Sphere, 6_000, 0.004), (Shape::Torus, 12_000, 0.004)] {
+        let sampled = shape(surface, count);
+        let of = |shape: SplatShape| simplify(&sampled, &Options { shape, ..within(tolerance) }, &()).unwrap();
+        let ((disks, _), (caps, report)) = (of(SplatShape::Disk), of(SplatShape::Cap));
+        assert!(3 * caps.surfels.len() < disks.surfels.len(), "{} {}", caps.surfels.len(), disks.surfels.len());
+        assert!(report.max_deviation <= tolerance && report.beyond_tolerance == 0, "{report:?}");
+        assert_eq!(caps.caps.len(), caps.surfels.len());
+        // Points of the surface lie within the tolerance of a cap, as far as the points between them do not.
+        let tree = DiskTree::new(&caps);
+        let off = |scene: &DiskTree| {
+            let points = generate(surface, 20_000).map(|sample| scene.distance(DVec3::from_array(sample.position)));
+            points.fold(0.0, f64::max)
+        };
+        assert!(off(&tree) < 1.2 * tolerance, "{}", off(&tree));
+        // The controls: the same surfels flat, and one in ten left out.
+        let flat = DiskTree::new(&Scene { caps: Vec::new(), ..caps.clone() });
+        assert!(off(&flat) > 3.0 * tolerance, "{}", off(&flat));
+        let nine = |all: &[usize]| all.chunks(10).flat_map(|ten| ten[1..].to_vec()).collect::<Vec<_>>();
+        let kept = nine(&(0..caps.surfels.len()).collect::<Vec<_>>());
+        let fewer = Scene {
+            surfels: kept.iter().map(|&k| caps.surfels[k]).collect(),
+            caps: kept.iter().map(|&k| caps.caps[k]).collect(),
+            low: Vec::new(),
+            ..caps.clone()
+        };
+        assert!(off(&DiskTree::new(&fewer)) > 1.2 * tolerance);
+    }
 }
 
 /// Two sheets of a slab, one spacing apart or less, with normals outward or all upward.

@@ -25,8 +25,8 @@ const ONE_LINE: f64 = 0.985;
 /// How often a cap is fitted to what it holds, and grown again.
 const FITS: usize = 3;
 
-/// The cosine of the angle up to which a cap bends: 45 degrees.
-const STEEPEST: f64 = 0.707;
+/// The cosine of the angle up to which a cap bends: 37 degrees.
+const STEEPEST: f64 = 0.8;
 
 /// A line in a splat's plane at which it will be cut.
 struct Ended {
@@ -52,7 +52,9 @@ impl Ended {
 pub(super) struct Splat {
     /// The point it grew from.
     pub point: u32,
-    /// How far its centre lies from that point along the point's normal.
+    /// Unit: that of the point, but of a cap.
+    pub normal: DVec3,
+    /// How far its centre lies from that point along the normal.
     pub shift: f64,
     /// Half-axes, perpendicular to each other and to the normal. All in scaled units.
     pub axes: [DVec3; 2],
@@ -111,6 +113,7 @@ pub(super) struct Grower<'a> {
     tolerance: f64,
     shape: SplatShape,
     /// Of the splat that is growing.
+    normal: DVec3,
     bend: Paraboloid,
     confront: BinaryHeap<Reverse<(Distance, u32)>>,
     conquered: Vec<Conquered>,
@@ -128,6 +131,7 @@ impl<'a> Grower<'a> {
             cells,
             tolerance,
             shape,
+            normal: DVec3::Z,
             bend: Paraboloid::FLAT,
             confront: BinaryHeap::new(),
             conquered: Vec::new(),
@@ -139,7 +143,8 @@ impl<'a> Grower<'a> {
     /// Grows a splat from `point` and appends what it covers, in the order of cells.
     pub fn grow(&mut self, point: u32, covers: &mut Vec<Cover>) -> Splat {
         let first = covers.len();
-        let disk = self.grow_shape(point, self.circle(point), false, covers);
+        self.normal = self.samples.normals[point as usize];
+        let disk = self.grow_shape(point, self.circle(), false, covers);
         if self.shape == SplatShape::Cap {
             return self.grow_cap(disk, first, covers);
         }
@@ -148,8 +153,7 @@ impl<'a> Grower<'a> {
         };
         let middle = covers.len();
         let ellipse = self.grow_shape(point, axes, false, covers);
-        let area = |covers: &[Cover]| -> f64 { covers.iter().map(|c| self.cells.area(c.cell, c.pieces)).sum() };
-        if area(&covers[middle..]) > area(&covers[first..middle]) {
+        if self.area(&covers[middle..]) > self.area(&covers[first..middle]) {
             covers.drain(first..middle);
             ellipse
         } else {
@@ -159,37 +163,47 @@ impl<'a> Grower<'a> {
     }
 
     /// The cap around the point of `disk`, whose covers start at `first`, that covers the most of those that are grown in turns from what
-    /// the last one holds; or the disk.
-    fn grow_cap(&mut self, disk: Splat, mut first: usize, covers: &mut Vec<Cover>) -> Splat {
-        let area = |cells: &Cells, covers: &[Cover]| covers.iter().map(|c| cells.area(c.cell, c.pieces)).sum::<f64>();
-        let (start, mut best) = (first, disk);
-        for _ in 0..FITS {
-            let Some(bend) = self.bend_of(disk.point) else { break };
-            self.bend = bend;
+    /// the last one holds, of circles and then of ellipses along the principal curvatures; or the disk.
+    fn grow_cap(&mut self, disk: Splat, first: usize, covers: &mut Vec<Cover>) -> Splat {
+        let (point, mut best, mut kept) = (disk.point, disk, first);
+        for turn in 0..2 * FITS {
             let next = covers.len();
-            let cap = self.grow_shape(disk.point, self.circle(disk.point), false, covers);
-            if area(self.cells, &covers[next..]) <= area(self.cells, &covers[first..next]) {
+            let Some((_, normal)) = self.bend_of(point) else { break };
+            self.normal = normal;
+            let Some((bend, _)) = self.bend_of(point) else { break };
+            let shape = if turn < FITS { Some(self.circle()) } else { self.principal_axes(point) };
+            let Some(shape) = shape else { break };
+            self.bend = bend;
+            let cap = self.grow_shape(point, shape, false, covers);
+            if self.area(&covers[next..]) > self.area(&covers[kept..next]) {
+                (best, kept) = (cap, next);
+            } else {
                 covers.truncate(next);
-                break;
             }
-            (best, first) = (cap, next);
         }
         self.bend = Paraboloid::FLAT;
-        covers.drain(start..first);
+        covers.drain(first..kept);
         best
     }
 
+    fn area(&self, covers: &[Cover]) -> f64 {
+        covers.iter().map(|cover| self.cells.area(cover.cell, cover.pieces)).sum()
+    }
+
     /// The paraboloid through the conquered set of the splat that grew last, around `point`, and what it would take next.
-    fn bend_of(&self, point: u32) -> Option<Paraboloid> {
-        let [s, t] = tangent_basis(self.samples.normals[point as usize]);
-        let (center, normal) = (self.samples.positions.position(point), self.samples.normals[point as usize]);
+    fn bend_of(&self, point: u32) -> Option<(Paraboloid, DVec3)> {
+        let (center, normal) = (self.samples.positions.position(point), self.normal);
+        let [s, t] = tangent_basis(normal);
         let around = self.confront.iter().map(|Reverse((_, point))| *point);
         let faces = |other: &u32| self.samples.normals[*other as usize].dot(normal).abs() > STEEPEST;
         let points = self.conquered.iter().map(|conquered| conquered.point).chain(around.filter(faces));
-        Paraboloid::through(points.map(|other| {
+        let points = points.map(|other| {
             let offset = self.samples.positions.position(other) - center;
             DVec3::new(offset.dot(s), offset.dot(t), offset.dot(normal))
-        }))
+        });
+        let bend = Paraboloid::through(points.clone())?;
+        let tilt = bend.tilt(points)?;
+        Some((bend, (normal - s * tilt.x - t * tilt.y).normalize()))
     }
 
     /// How far a point lies over the splat that grows around one of this normal, at `offset` from that.
@@ -203,19 +217,20 @@ impl<'a> Grower<'a> {
 
     /// Whether the splat that grows from `point` may hold `other`.
     fn holds(&self, point: u32, other: u32) -> bool {
-        let [normal, next] = [point, other].map(|index| self.samples.normals[index as usize]);
-        self.samples.same_side(point, other) && (self.bend.is_flat() || normal.dot(next).abs() > STEEPEST)
+        let next = self.samples.normals[other as usize];
+        self.samples.same_side(point, other) && (self.bend.is_flat() || self.normal.dot(next).abs() > STEEPEST)
     }
 
     /// The same for a disk that is at least so large that it covers the point's own cell, though another point inside may then
     /// lie beyond the tolerance. It covers nothing of the cells of such points.
     pub fn grow_over_cell(&mut self, point: u32, covers: &mut Vec<Cover>) -> Splat {
-        self.grow_shape(point, self.circle(point), true, covers)
+        self.normal = self.samples.normals[point as usize];
+        self.grow_shape(point, self.circle(), true, covers)
     }
 
     /// Half-axes of unit length.
-    fn circle(&self, point: u32) -> [DVec3; 2] {
-        tangent_basis(self.samples.normals[point as usize])
+    fn circle(&self) -> [DVec3; 2] {
+        tangent_basis(self.normal)
     }
 
     /// Half-axes with the ratio and the directions in which the surface bends equally far from the tangent plane: along
@@ -223,9 +238,8 @@ impl<'a> Grower<'a> {
     /// conquered and the confront set of the splat that grew last, which must be a disk around `point`. None where it is
     /// nearly a circle.
     fn principal_axes(&self, point: u32) -> Option<[DVec3; 2]> {
-        let [s, t] = tangent_basis(self.samples.normals[point as usize]);
-        let center = self.samples.positions.position(point);
-        let normal = self.samples.normals[point as usize];
+        let (center, normal) = (self.samples.positions.position(point), self.normal);
+        let [s, t] = tangent_basis(normal);
         let inside = self.conquered.iter().map(|conquered| conquered.point);
         let around = self.confront.iter().map(|Reverse((_, point))| *point);
         let offsets =
@@ -262,7 +276,7 @@ impl<'a> Grower<'a> {
     /// The same for the shape of an ellipse with half-axes along `shape`: distances and radii are in units of them.
     fn grow_shape(&mut self, point: u32, shape: [DVec3; 2], over_cell: bool, covers: &mut Vec<Cover>) -> Splat {
         let mut radius = self.conquer(point, shape);
-        let normal = self.samples.normals[point as usize];
+        let normal = self.normal;
         let center = self.samples.positions.position(point);
         let inverse = shape.map(|axis| axis / axis.length_squared());
         let flat = |p: DVec3| DVec2::new(p.dot(inverse[0]), p.dot(inverse[1]));
@@ -287,7 +301,7 @@ impl<'a> Grower<'a> {
             }
         }
         covers[first..].sort_unstable_by_key(|cover| cover.cell);
-        Splat { point, shift, axes: shape.map(|axis| axis * radius), bend: self.bend, deviation }
+        Splat { point, normal, shift, axes: shape.map(|axis| axis * radius), bend: self.bend, deviation }
     }
 
     /// The range of heights over the tangent plane of the points inside.
@@ -304,7 +318,7 @@ impl<'a> Grower<'a> {
             self.number = 0;
         }
         self.number += 1;
-        let normal = self.samples.normals[point as usize];
+        let normal = self.normal;
         let center = self.samples.positions.position(point);
         let inverse = shape.map(|axis| axis / axis.length_squared());
         let shortest = shape[0].length().min(shape[1].length());

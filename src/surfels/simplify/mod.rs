@@ -19,6 +19,10 @@
 //! [`written`] closes it. Of 3.5 million rays at 13,152 disks for 57,000 samples of the Stanford bunny, at a tolerance of 0.00036
 //! diagonals, one finds a hole.
 //!
+//! **Caps.** A cap grows in turns: a disk, then the paraboloid through what the last one held, its own normal, and what that holds
+//! within the tolerance; at last ellipses of it. It holds points whose normals are within 37 degrees of its own, so that what it covers
+//! of them in its plane is what it covers of the surface.
+//!
 //! **Edges.** Where the surfels that came in end at lines, and at creases of more than 60 degrees, cells end and the graph has no
 //! edge; disks that stand for several surfels are cut there, as far as what they cover allows. As they are cut they may grow past two ends.
 //!
@@ -110,7 +114,7 @@ pub struct Options {
 
 /// Selects few large surfels that stand for all surfels of `scene`.
 ///
-/// Each comes from a surfel: it has its normal, and its centre lies on the line through it along the normal, halfway between the
+/// Each comes from a surfel: it has its normal, unless it is a cap, and its centre lies on the line through it along the normal, halfway between the
 /// highest and the lowest of the surfels inside, so that each is within the tolerance. Its colour is the mean of what
 /// it covers, by area (linear light, weighted by alpha).
 ///

@@ -86,7 +86,7 @@ impl Chosen {
     fn of(index: u32, samples: &Samples, cells: &Cells, candidates: &Candidates, tolerance: f64) -> Self {
         let scale = samples.positions.scale();
         let splat = &candidates.splats[index as usize];
-        let normal = samples.normals[splat.point as usize];
+        let normal = splat.normal;
         let center = samples.positions.position(splat.point) + normal * splat.shift;
         let basis = tangent_basis(normal);
         let (mut color, mut sums, mut largest) = ([0.0; 4], [0.0; 2], 0f64);

@@ -1,6 +1,6 @@
 //! How a cap curves that grows: the paraboloid of the points that it holds.
 
-use glam::{DMat4, DVec2, DVec3, DVec4};
+use glam::{DMat2, DMat4, DVec2, DVec3, DVec4};
 
 use crate::scene::Cap;
 
@@ -24,6 +24,21 @@ impl Paraboloid {
         }
         let found = (matrix.inverse() * right).truncate() / reach;
         found.is_finite().then_some(Self(found))
+    }
+
+    /// The slope of the plane of the least squares through what is left of points over it. None where they do not say.
+    pub fn tilt(&self, points: impl Iterator<Item = DVec3>) -> Option<DVec2> {
+        let outer = |a: DVec2| DMat2::from_cols(a * a.x, a * a.y);
+        let (mut matrix, mut right, mut sum, mut count) = (DMat2::ZERO, DVec2::ZERO, DVec3::ZERO, 0.0);
+        for point in points {
+            let (at, over) = (point.truncate(), self.over(point.truncate(), point.z));
+            matrix += outer(at);
+            right += at * over;
+            sum += at.extend(over);
+            count += 1.0;
+        }
+        let mean = sum.truncate() / count;
+        Some((matrix - outer(mean) * count).inverse() * (right - mean * sum.z)).filter(|tilt| tilt.is_finite())
     }
 
     pub fn is_flat(&self) -> bool {

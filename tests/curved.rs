@@ -76,6 +76,9 @@ fn kernels_and_twins_meet_the_same_caps() {
                 let (other, _) = render(&scene, &camera, &other, &backend, &()).unwrap();
                 assert!(common::bits(&other) == common::bits(&frame), "{organisation:?}");
             }
+            let shuffled = common::scenes::shuffled(&scene, 3);
+            let (shuffled, _) = render(&shuffled, &camera, &options, &backend, &()).unwrap();
+            assert!(common::bits(&shuffled) == common::bits(&frame), "another order");
             // The control: flat disks are another picture.
             let flat = Scene { caps: Vec::new(), ..scene.clone() };
             let (flat, report) = render(&flat, &camera, &options, &backend, &()).unwrap();
@@ -199,6 +202,25 @@ fn points_of_a_curved_surface_become_caps_of_it() {
         let made = from_points(vec![points.clone()], &FromPoints { limits: flat, ..FromPoints::default() }, &());
         assert!(made.unwrap().points.caps.is_none());
     }
+}
+
+#[test]
+fn caps_do_not_depend_on_the_order_of_points_at_one_position() {
+    let mut points = ellipsoid(400);
+    let normals = points.normals.as_mut().unwrap();
+    for k in 0..100 {
+        points.positions.push(points.positions[k]);
+        normals.push(if k % 2 == 0 { [0.0; 3] } else { normals[(k + 1) % 400] });
+    }
+    let count = points.positions.len();
+    let reversed = Points {
+        positions: points.positions.iter().rev().copied().collect(),
+        normals: Some(points.normals.as_ref().unwrap().iter().rev().copied().collect()),
+        ..Points::default()
+    };
+    let [one, mut other] = [points, reversed].map(|points| build(vec![points], &()).unwrap().0.caps);
+    other.reverse();
+    assert!(one == other && one.len() == count);
 }
 
 #[test]

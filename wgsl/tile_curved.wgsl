@@ -10,6 +10,7 @@ fn handed_cap(own: Cap, from_: u32) -> Cap {
         handed_number(own.spread, from_),
         handed_number(own.radius, from_),
         handed_number(own.depth, from_),
+        // Asked for by the one that fetched it alone.
         0.0,
     );
 }

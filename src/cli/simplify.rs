@@ -49,7 +49,7 @@ enum ShapeName {
     Disk,
     /// Ellipses along the principal curvatures where they cover more: a fifth fewer
     Ellipse,
-    /// Circles that curve as the surface does, and so cover more
+    /// Circles and ellipses that curve as the surface does: a third to three quarters as many
     Cap,
 }
 

@@ -5,7 +5,7 @@
 //! the centre: its (U, V, W) are affine in the pixel, and 0 where the centre is seen, so they are stored relative to the pixel that
 //! holds the centre, as the rows of a [homography](super::homography) are. From there the ray goes on, for each longer half-axis r
 //! that its depth grows by, by `(U, V, W) r/z + D` with D = N p r/z (pinhole), or by D = N e r (orthographic, e its direction). All of
-//! these numbers are near 1 whatever the scene's scale, if the surfel's image is not as wide as the image.
+//! these numbers are near 1 whatever the scene's scale, if the surfel is not much larger than its depth.
 //!
 //! **Intersection.** `a σ² + b σ + c = 0` for σ, the way along the ray in r of depth. Of its roots the nearest counts that lies on
 //! the cap, inside its lines and past the near depth; the sign of the slope there tells the side. Where the disk is flat the
@@ -120,7 +120,7 @@ pub(super) fn curve(camera: &Camera, seen: &Seen, projected: &Projected) -> Curv
     let radius = seen.s.length().max(seen.t.length());
     let rows = [m_s, m_t, n / radius];
     let depths = seen.depths();
-    // Past the near depth, and past the middle of a cap that crosses it, so that r / z is not large.
+    // Past the near depth: where a cap lies mostly behind the camera, r / z may be large.
     let depth = if projected.images.is_some() { seen.p.z } else { camera.near.max(depths[1]) };
     let focal = DVec2::new(camera.fx, camera.fy);
     let principal = DVec2::new(camera.cx, camera.cy);
@@ -164,7 +164,8 @@ pub(super) fn meet(curve: &Curve, splat: &Splat, camera: &Camera, d: DVec2) -> (
     let at = |row: DVec3| row.x * d.x + (row.y * d.y + row.z);
     let start = DVec3::new(at(curve.u), at(curve.v), at(curve.w));
     let step = start * curve.spread + curve.along;
-    let to_plane = -start.z / step.z;
+    // Seen edge-on it is met at its centre's depth.
+    let to_plane = if step.z == 0.0 { 0.0 } else { -start.z / step.z };
     let depth = curve.depth + curve.radius * to_plane;
     let inside = splat.clip.inside(start.x + to_plane * step.x, start.y + to_plane * step.y);
     let plane = match camera.projection {
@@ -201,7 +202,7 @@ impl Way {
         // How far it is from 0, of its terms: beside an outline nothing is known of it.
         let margin = discriminant / (b * b + (4.0 * a * c).abs());
         let root = discriminant.max(0.0).sqrt();
-        let far = -0.5 * (b + root.copysign(b));
+        let far = -0.5 * (b + if b >= 0.0 { root } else { -root });
         // Where the slope has the sign of b, and where it has the other one.
         let roots = [(c / far, b < 0.0), (far / a, b >= 0.0)];
         let [first, second] = roots.map(|(sigma, away)| {

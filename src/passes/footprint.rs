@@ -51,7 +51,10 @@ pub fn footprint(splat: &Splat, camera: &Camera, low_pass: LowPass, x: u32, y: u
     let (dx, dy) = ((i64::from(x) - splat.anchor[0]) as f64, (i64::from(y) - splat.anchor[1]) as f64);
     if let Some(curve) = &splat.curve {
         let (cap, plane) = curved::meet(curve, splat, camera, DVec2::new(dx, dy));
-        return filtered(splat, camera, low_pass, Some(cap), plane, (dx, dy));
+        // What a line cuts of the plane, and a back that is left out, the cap itself may show.
+        let shows = |(at, _): &(Intersection, f64)| at.inside >= 0.0 && !(curve.culls && at.away);
+        let soft = filtered(splat, camera, low_pass, Some(cap), plane, (dx, dy));
+        return soft.filter(|soft| soft.0.rho2 >= cap.rho2 || shows(soft)).or(Some((cap, 1.0)));
     }
     let at = |row: glam::DVec3| row.x * dx + (row.y * dy + row.z);
     let (a, b, c) = (at(splat.a), at(splat.b), at(splat.c));

@@ -47,8 +47,7 @@ pub(super) fn projected(
     let vector = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
     let (s_world, t_world) = (vector(surfel.s), vector(surfel.t));
     let (p, s, t) = (camera.rotation * relative, camera.rotation * s_world, camera.rotation * t_world);
-    // The ellipse of `ewa` is that of a flat disk.
-    let seen = cap.filter(|_| design.low_pass != LowPass::Ewa).map(|cap| Seen { p, s, t, cap });
+    let seen = cap.map(|cap| Seen { p, s, t, cap });
     let depths = seen.as_ref().map_or([p.z - slope(s, t), p.z + slope(s, t)], Seen::depths);
     if depths[1] < camera.near {
         return Err(Missed::Behind);
@@ -106,16 +105,10 @@ pub fn reference_all(scene: &Scene, camera: &Camera, options: &RenderOptions) ->
     let facts = Facts::of(scene);
     let (cull_back, sides) = (culls_back(&facts, camera, options), Sides::of(&facts, camera, options));
     let copies = (has_copies(scene) && options.draws_copies_once()).then(|| copies(scene));
+    let cap = |index: usize| scene.caps.get(index).copied().filter(|_| options.draws_caps());
     let project = |(index, surfel): (usize, &Surfel)| {
         let copies = copies.as_ref().map_or(1, |copies| copies[index]);
-        let splat = || {
-            reference(
-                (index as u32, surfel, scene.caps.get(index).copied()),
-                scene.center(index) - eye,
-                camera,
-                &design,
-            )
-        };
+        let splat = || reference((index as u32, surfel, cap(index)), scene.center(index) - eye, camera, &design);
         let splat = (copies > 0).then(splat).flatten().filter(|splat| !(cull_back && splat.faces_away()));
         let own = |splat: Splat| {
             let given = scene.normals.get(index).map(|normal| Vec3::from_array(*normal).as_dvec3());

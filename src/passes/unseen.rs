@@ -30,8 +30,12 @@ impl Unseen {
         let design = Design::of(options);
         let cull_back = culls_back(&Facts::of(scene), camera, options);
         let look = |(index, surfel): (usize, &Surfel)| {
-            let seen =
-                projected((0, surfel, scene.caps.get(index).copied()), scene.center(index) - eye, camera, &design);
+            let seen = projected(
+                (0, surfel, scene.caps.get(index).copied().filter(|_| options.draws_caps())),
+                scene.center(index) - eye,
+                camera,
+                &design,
+            );
             let reasons = [Some(Missed::Behind), Some(Missed::Outside), Some(Missed::Between), None];
             let [behind, outside, between, over] =
                 reasons.map(|reason| u64::from(seen.as_ref().err() == reason.as_ref()));

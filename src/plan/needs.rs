@@ -141,7 +141,7 @@ impl SceneNeeds {
             own_normals: facts.own_normals && (lit || options.maps.has(Map::Normal)),
             cull_back: culls_back(facts, camera, options),
             clips: facts.clips,
-            curved: facts.caps && options.low_pass != LowPass::Ewa && options.raster.is_none(),
+            curved: facts.caps && options.draws_caps(),
             samples: options.samples,
             shading: options.shading,
             maps: options.maps,

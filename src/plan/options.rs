@@ -101,6 +101,11 @@ impl RenderOptions {
         self.has(Optimisation::Copies) && self.organisation != Organisation::Tile
     }
 
+    /// Surfels that curve are drawn so: the rasteriser and the ellipse of `ewa` draw flat disks.
+    pub fn draws_caps(&self) -> bool {
+        self.low_pass != LowPass::Ewa && self.raster.is_none()
+    }
+
     /// Whether a pixel of the image differs from 0 where nothing is.
     pub fn shows_where_nothing_is(&self) -> bool {
         self.maps.has(Map::Depth) || self.background.iter().any(|value| value.to_bits() != 0)

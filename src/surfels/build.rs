@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::curvature::Around;
+use super::curvature::{Around, normals_at};
 use super::estimate::{self, Estimate, Estimates};
 use super::gather::{self, Gathered};
 use super::graph::NeighbourGraph;
@@ -86,7 +86,9 @@ pub fn build_within(
 /// Those of [`build`].
 pub fn build_at_vertices(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Preparation)> {
     let inputs = inputs.into_iter().map(|input| mesh::of_mesh(input, By::Vertices)).collect();
-    built(gather::gather(inputs)?, &Limits::default(), progress).map(|(made, _)| made)
+    // Samples are where the surfels are, however those curve.
+    let flat = Limits { curved: false, ..Limits::default() };
+    built(gather::gather(inputs)?, &flat, progress).map(|(made, _)| made)
 }
 
 /// The scene, and the texture coordinates of its surfels.
@@ -151,8 +153,8 @@ fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Progress) -> Re
         _ => Vec::new(),
     };
     drop(estimated);
-    let caps = usable_caps(caps, &surfels);
     preparation.limited_radii = limit_radii(&mut surfels, body.extent().max_element())?;
+    let caps = usable_caps(caps, &surfels);
     let relative = |index: usize| DVec3::from_array(gathered.points.positions[index]) - origin;
     let low = low_parts(&surfels, relative);
     preparation.rounding = rounding(&surfels, &low, relative);
@@ -247,10 +249,9 @@ impl Estimated {
     /// The caps of surfels of points whose sizes are estimated; normals tell sides if they are `sided`.
     fn caps(&self, given: &Given<'_>, surfels: &[Surfel], sided: bool) -> Vec<Cap> {
         let of_point = self.distinct.of_point();
-        // Points at one position may have several normals: the first tells.
-        let first = self.distinct.first_points();
+        let normals = normals_at(&self.distinct, |i| given.normal(i));
         let normal = |position: u32| {
-            let given = given.normal(first[position as usize] as usize);
+            let given = normals.get(position as usize).copied().flatten();
             given.unwrap_or_else(|| self.of_position[position as usize].normal()).as_dvec3()
         };
         let around = Around { distinct: &self.distinct, graph: &self.graph, normal, sided };

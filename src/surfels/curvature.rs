@@ -1,6 +1,7 @@
 //! How a surface curves at a point, by the points around it: the caps of surfels.
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Vec3};
+use rayon::prelude::*;
 
 use super::gaps::is_beside;
 use super::graph::NeighbourGraph;
@@ -11,8 +12,9 @@ use crate::scene::Cap;
 /// The cosine of the angle up to which another point is of one piece of surface with a point: 60 degrees.
 const ONE_PIECE: f64 = 0.5;
 
-/// A cap is made where it leaves at most this part of the squares of the heights and slopes that a disk leaves.
-const LEFT: f64 = 0.8;
+/// Neighbours on a line, or on one side, say nothing of how the surface curves across it: the determinant of their equations is at least
+/// this part of the cube of their trace. It is 1/27 where they lie evenly around.
+const LEAST_SPREAD: f64 = 1e-3;
 
 /// The surface around a position, by the positions around it and their normals.
 pub(crate) struct Around<'a, N: Fn(u32) -> DVec3> {
@@ -37,9 +39,29 @@ impl<N: Fn(u32) -> DVec3> Around<'_, N> {
     }
 }
 
+/// The normals of positions, of which points may have none or several: the least, so that no order of the points shows. Empty if no
+/// point has one.
+pub(crate) fn normals_at(
+    distinct: &DistinctPositions,
+    given: impl Fn(usize) -> Option<Vec3> + Sync,
+) -> Vec<Option<Vec3>> {
+    let of_point = distinct.of_point();
+    if !(0..of_point.len()).into_par_iter().any(|point| given(point).is_some()) {
+        return Vec::new();
+    }
+    let mut normals: Vec<Option<Vec3>> = vec![None; distinct.len()];
+    let bits = |normal: Vec3| normal.to_array().map(f32::to_bits);
+    for (point, position) in of_point.iter().enumerate() {
+        let at = &mut normals[*position as usize];
+        *at = [*at, given(point)].into_iter().flatten().min_by_key(|normal| bits(*normal));
+    }
+    normals
+}
+
 /// The cap of a surfel with these half-axes, which touches the surface with its plane, by the offsets of neighbours on the surface and
-/// their unit normals: the paraboloid of the least squares of heights and of slopes, both by the distance. Flat where it leaves too
-/// much of them, or would be higher than [`Cap::HIGHEST`]. All in one unit of length.
+/// their unit normals: the paraboloid of the least squares of heights and of slopes, both by the distance, times the share of their
+/// squares that it explains: one that explains little would stand out of the surface. Flat where it would be higher than
+/// [`Cap::HIGHEST`]. All in one unit of length.
 fn fitted(near: impl Iterator<Item = (DVec3, DVec3)> + Clone, [s, t]: [DVec3; 2]) -> Cap {
     let normal = s.cross(t).normalize_or_zero();
     let (a, b) = (s / s.length_squared(), t / t.length_squared());
@@ -64,13 +86,16 @@ fn fitted(near: impl Iterator<Item = (DVec3, DVec3)> + Clone, [s, t]: [DVec3; 2]
         right += row * value;
         squares += value * value;
     }
+    let trace = matrix.x_axis.x + matrix.y_axis.y + matrix.z_axis.z;
+    if matrix.determinant() < LEAST_SPREAD * trace.powi(3) {
+        return Cap::FLAT;
+    }
     let found = matrix.inverse() * right;
     let left = |(row, value): (DVec3, f64)| (row.dot(found) - value).powi(2);
-    let cap = Cap((found * unit).as_vec3().to_array());
-    let fits = found.is_finite()
-        && cap.highest() <= Cap::HIGHEST * unit
-        && near.flat_map(equations).map(left).sum::<f64>() <= LEFT * squares;
-    if fits { cap } else { Cap::FLAT }
+    let explained = 1.0 - near.flat_map(equations).map(left).sum::<f64>() / squares;
+    let heights = found * (unit * explained);
+    let cap = Cap(heights.as_vec3().to_array());
+    if heights.is_finite() && cap.highest() <= Cap::HIGHEST * unit { cap } else { Cap::FLAT }
 }
 
 #[cfg(test)]
@@ -106,11 +131,16 @@ mod tests {
         // Nothing around, and too little.
         assert_eq!(fitted([].into_iter(), axes), Cap::FLAT);
         assert_eq!(fitted([(DVec3::X, DVec3::new(-0.1, 0.0, 1.0).normalize())].into_iter(), axes), Cap::FLAT);
+        assert_eq!(fitted(near([0.2, 0.1, 0.3], 1).into_iter(), axes), Cap::FLAT);
+        // A line aslant, whose points hardly stray from it.
+        let line =
+            |k: i32| (DVec3::new(0.6, 0.8, 0.0) * f64::from(k - 4), DVec3::new(0.0, 1e-3 * f64::from(k % 2), 1.0));
+        assert_eq!(fitted((0..8).filter(|k| *k != 4).map(line).collect::<Vec<_>>().into_iter(), axes), Cap::FLAT);
         // A wave: slopes up and down in turn.
         let wave = near([0.0; 3], 8).into_iter().enumerate().map(|(k, (offset, _))| {
             (offset, (DVec3::Z + offset.normalize() * if k % 2 == 0 { 0.5 } else { -0.5 }).normalize())
         });
-        assert_eq!(fitted(wave.collect::<Vec<_>>().into_iter(), axes), Cap::FLAT);
+        assert!(fitted(wave.collect::<Vec<_>>().into_iter(), axes).highest() < 0.01);
         // More than half a sphere.
         assert_eq!(fitted(near([3.0, 0.0, 3.0], 4).into_iter(), axes), Cap::FLAT);
         // Another sheet, whose normals point away, says nothing.

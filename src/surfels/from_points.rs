@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::creases::clips;
-use super::curvature::Around;
+use super::curvature::{Around, normals_at};
 use super::estimate::{LONE_RADIUS, NORMAL_NEIGHBOURS, RADIUS_RANGE, fitted_normal};
 use super::gather::{Gathered, gather};
 use super::graph::NeighbourGraph;
@@ -127,7 +127,9 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
         false => (axes, None),
     };
     let radii = axes.as_ref().map_or(radii, longer);
-    let caps = axes.as_ref().filter(|_| options.limits.curved);
+    // Clusters of three say how large disks are, and not of what surface.
+    let curved = options.limits.curved && !matches!(options.size, Size::Bsp(_));
+    let caps = axes.as_ref().filter(|_| curved);
     let sided = !preparation.has_random_sides();
     let caps = caps.map(|axes| caps_of((&distinct, &graph), (&point_normals, sided), axes));
     let Points { positions, colors, texture, .. } = gathered.points;
@@ -218,11 +220,9 @@ fn caps_of(
     (normals, sided): (&[[f32; 3]], bool),
     axes: &HalfAxes,
 ) -> Vec<Cap> {
-    let first = distinct.first_points();
-    let normal = |position: u32| {
-        let normal = normals[first[position as usize] as usize];
-        DVec3::from_array(normal.map(f64::from)).normalize_or_zero()
-    };
+    let of_positions = normals_at(distinct, |point| Some(Vec3::from_array(normals[point])));
+    let normal =
+        |position: u32| of_positions[position as usize].map_or(DVec3::ZERO, |n| n.as_dvec3().normalize_or_zero());
     let around = Around { distinct, graph, normal, sided };
     axes.par_iter().zip(distinct.of_point()).map(|(axes, &position)| around.cap(position, *axes)).collect()
 }

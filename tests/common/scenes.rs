@@ -215,7 +215,11 @@ pub fn shuffled(scene: &Scene, seed: u64) -> Scene {
         Colors::Textured(textured) => Colors::Textured(textured.taken(&order)),
     };
     let low = order.iter().filter_map(|&k| scene.low.get(k).copied()).collect();
-    Scene { surfels: order.iter().map(|&k| scene.surfels[k]).collect(), low, colors, ..scene.clone() }
+    let clips = order.iter().filter_map(|&k| scene.clips.get(k).copied()).collect();
+    let caps = order.iter().filter_map(|&k| scene.caps.get(k).copied()).collect();
+    let normals = order.iter().filter_map(|&k| scene.normals.get(k).copied()).collect();
+    let surfels = order.iter().map(|&k| scene.surfels[k]).collect();
+    Scene { surfels, low, clips, caps, normals, colors, ..scene.clone() }
 }
 
 /// Scenes with many fragments on a pixel, in both kinds of colour.

@@ -169,6 +169,9 @@ impl<'a> Grower<'a> {
         for turn in 0..2 * FITS {
             let next = covers.len();
             let Some((_, normal)) = self.bend_of(point) else { break };
+            if normal.dot(self.samples.normals[point as usize]) < STEEPEST {
+                break;
+            }
             self.normal = normal;
             let Some((bend, _)) = self.bend_of(point) else { break };
             let shape = if turn < FITS { Some(self.circle()) } else { self.principal_axes(point) };

@@ -97,7 +97,7 @@ pub enum SplatShape {
     Disk,
     /// Ellipses along the principal curvatures where these cover more, as in Wu and Kobbelt.
     Ellipse,
-    /// Round disks that curve as the points inside do ([`Cap`](crate::scene::Cap)), which lets them hold more of those.
+    /// Disks and ellipses that curve as the points inside do ([`Cap`](crate::scene::Cap)), which lets them hold more of those.
     Cap,
 }
 
@@ -114,7 +114,7 @@ pub struct Options {
 
 /// Selects few large surfels that stand for all surfels of `scene`.
 ///
-/// Each comes from a surfel: it has its normal, unless it is a cap, and its centre lies on the line through it along the normal, halfway between the
+/// Each comes from a surfel: it has its normal, or as a cap one nearby, and its centre lies on the line through it along that normal, halfway between the
 /// highest and the lowest of the surfels inside, so that each is within the tolerance. Its colour is the mean of what
 /// it covers, by area (linear light, weighted by alpha).
 ///

@@ -51,10 +51,10 @@ pub struct Report {
     pub before_relaxation: u64,
     /// What was asked for.
     pub tolerance: f64,
-    /// The largest distance of a point from the plane of a selected surfel that covers its cell or a part of it: at most the
+    /// The largest distance of a point, along the normal, from the plane or the cap of a selected surfel that covers its cell or a part of it: at most the
     /// tolerance, rounding aside.
     pub max_deviation: f64,
-    /// The mean distance of a point from the planes of the selected surfels that cover its cell or a part of it, weighted by the
+    /// The mean distance of a point so from the selected surfels that cover its cell or a part of it, weighted by the
     /// area that they cover.
     pub mean_deviation: f64,
     /// Selected surfels at creases: the surface bends by more than the tolerance within the cell of their own point, which they
@@ -116,8 +116,10 @@ impl Chosen {
             (largest * scale, samples.radii[splat.point as usize]),
         );
         let Cap(heights) = splat.bend.cap(axes.map(|axis| DVec2::new(axis.dot(basis[0]), axis.dot(basis[1]))));
-        let cap = Cap(heights.map(|height| (f64::from(height) / scale) as f32));
         let [s, t] = axes.map(world);
+        // As it is read again, where a tiny patch is written as large as its sample was.
+        let longer = axes[0].length().max(axes[1].length()) / scale;
+        let cap = Cap(heights.map(|height| (f64::from(height) / scale) as f32)).usable(longer);
         let [r, g, b, alpha] = color;
         let opaque = if alpha > 0.0 { alpha } else { f64::INFINITY };
         let color = [r / opaque, g / opaque, b / opaque, alpha / sums[1]].map(|c| c as f32);

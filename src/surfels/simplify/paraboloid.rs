@@ -4,6 +4,10 @@ use glam::{DMat2, DMat4, DVec2, DVec3, DVec4};
 
 use crate::scene::Cap;
 
+/// Points on a strip say nothing of how the surface curves across it: the determinant of their equations is at least this part of the
+/// fourth power of their trace. It is 5e-5 of a disk, and falls with the sixth power of a strip's width.
+const LEAST_SPREAD: f64 = 1e-8;
+
 /// Heights over the tangent plane of a splat's point, `x u² + y u v + z v²` at (u, v) in the basis of that plane, scaled units. A disk's
 /// are zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -22,8 +26,9 @@ impl Paraboloid {
             matrix += DMat4::from_cols(row * row.x, row * row.y, row * row.z, row);
             right += row * point.z;
         }
+        let trace: f64 = (0..4).map(|k| matrix.col(k)[k]).sum();
         let found = (matrix.inverse() * right).truncate() / reach;
-        found.is_finite().then_some(Self(found))
+        (found.is_finite() && matrix.determinant() > LEAST_SPREAD * trace.powi(4)).then_some(Self(found))
     }
 
     /// The slope of the plane of the least squares through what is left of points over it. None where they do not say.

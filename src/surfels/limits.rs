@@ -2,7 +2,7 @@
 
 use crate::{Error, Result};
 
-/// Which points of a cloud become surfels, and how large those of them may be whose radius is estimated, and whether those curve.
+/// Which points of a cloud become surfels, and of those whose radius is estimated, how large they may be and whether they curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// Points are left out whose mean distance to 16 neighbours exceeds the mean of all by more than so many standard

@@ -4,8 +4,6 @@
 
 // The first of three words of a surfel's attributes: heights, world units.
 override CAP_WORD: u32;
-// Backs are left out, which a cap may show at some of its pixels.
-override CULLS: bool;
 
 struct Cap {
     // uu, uv, vv, in units of the longer half-axis.
@@ -106,28 +104,39 @@ fn curve(h: ptr<function, Homography>, index: u32, center: array<Double, 3>, s: 
     (*h).c = vec3<f32>(m[2].xy * per_pixel, dot(m[2].xy, start) + m[2].z * start_z);
     // The vector times the matrix whose columns are the rows m.
     (*h).a_low = toward(p, depth) * m;
-    // The sheared box about it: see the twin.
+    let extent = box_extent(*h, array<vec3<f32>, 5>(p, s, t, low_shift, high_shift), depths);
+    (*h).low = extent.xy;
+    (*h).high = extent.zw;
+    (*h).depth_low = depths.x;
+    (*h).depth_high = depths.y;
+    return Cap(heights, spread_of(r, depth), r, depth, max(depths.x, held.near) * (1.0 - 1e-5));
+}
+
+// The first and last point of the image (xy, zw) of the sheared box about a cap, for which see the twin: of the disk p, s, t whose
+// centre moves between two heights along the normal, at these depths.
+fn box_extent(h: Homography, disk: array<vec3<f32>, 5>, depths: vec2<f32>) -> vec4<f32> {
+    let p = disk[0];
     let ratio = shear(p);
-    let rest = p.xy - ratio * p.z;
-    let s_x = s.xy - ratio * s.z;
-    let t_x = t.xy - ratio * t.z;
-    let half = sqrt(s_x * s_x + t_x * t_x) * (1.0 + 1e-6) + 1e-6 * (r + max(abs(rest.x), abs(rest.y)));
-    let low_x = low_shift.xy - ratio * low_shift.z;
-    let high_x = high_shift.xy - ratio * high_shift.z;
-    let first = select(rest, vec2<f32>(0.0), centered) - half + min(low_x, high_x);
-    let last = select(rest, vec2<f32>(0.0), centered) + half + max(low_x, high_x);
+    let rest = select(p.xy - ratio * p.z, vec2<f32>(0.0), h.centered);
+    let s = disk[1].xy - ratio * disk[1].z;
+    let t = disk[2].xy - ratio * disk[2].z;
+    let low = disk[3].xy - ratio * disk[3].z;
+    let high = disk[4].xy - ratio * disk[4].z;
+    let longer = max(length(disk[1]), length(disk[2]));
+    let half = sqrt(s * s + t * t) * (1.0 + 1e-6) + 1e-6 * (longer + max(abs(rest.x), abs(rest.y)));
+    let first = rest - half + min(low, high);
+    let last = rest + half + max(low, high);
     let before = max(depths, vec2<f32>(held.near));
     let middle = select(
         ratio * held.intrinsics.xy + held.intrinsics.zw,
-        vec2<f32>((*h).anchor) + 0.5 + (*h).offset,
-        centered,
+        vec2<f32>(h.anchor) + 0.5 + h.offset,
+        h.centered,
     );
-    let margin = select(1.0, 0.0, centered);
-    (*h).low = middle + image_step(first, select(before.yy, before.xx, first < vec2<f32>(0.0))) - margin;
-    (*h).high = middle + image_step(last, select(before.yy, before.xx, last > vec2<f32>(0.0))) + margin;
-    (*h).depth_low = depths.x;
-    (*h).depth_high = depths.y;
-    return Cap(heights, spread_of(r, depth), r, depth, before.x * (1.0 - 1e-5));
+    let margin = select(1.0, 0.0, h.centered);
+    return vec4<f32>(
+        middle + image_step(first, select(before.yy, before.xx, first < vec2<f32>(0.0))) - margin,
+        middle + image_step(last, select(before.yy, before.xx, last > vec2<f32>(0.0))) + margin,
+    );
 }
 
 // Whether all of the cap shows its back, or nothing of it is known: see the twin.
@@ -168,7 +177,7 @@ fn on_cap(splat: Splat, start: vec3<f32>, step: vec3<f32>, sigma: f32, away: boo
     let uv = start.xy + sigma * step.xy;
     let rho2 = dot(uv, uv);
     let depth = splat.cap.depth + splat.cap.radius * sigma;
-    let hit = rho2 <= 1.0 && abs(sigma) <= FARTHEST_HIT && depth >= held.near && !(CULLS && away)
+    let hit = rho2 <= 1.0 && abs(sigma) <= FARTHEST_HIT && depth >= held.near && !(CULL_BACK && away)
         && !cuts(splat.clip, vec3<f32>(uv, 1.0));
     return Fragment(
         hit,
@@ -229,7 +238,7 @@ fn softened(
     if (round.rho2 < fragment.rho2) {
         let away = (splat.bounds_last & AWAY) != 0u;
         // What a line cuts of the plane, and a back that is left out, the cap itself may show.
-        if (cuts(splat.clip, vec3<f32>(start.xy + sigma * step.xy, 1.0)) || (CULLS && away)) {
+        if (cuts(splat.clip, vec3<f32>(start.xy + sigma * step.xy, 1.0)) || (CULL_BACK && away)) {
             return fragment;
         }
         round.spot = Spot(vec2<f32>(0.0), away);

@@ -3,7 +3,7 @@
 // eight rows are drawn apart, each by the splats that reach them. The footprint, and so every bit, is that of visibility.wgsl
 // and accumulate.wgsl.
 // Host side: src/passes/tiles.rs.
-// All loops end, by 1, 3 of src/gpu/loops.rs: 0xdcc9f17e3d75b9d7
+// All loops end, by 1, 3 of src/gpu/loops.rs: 0xe97c2aad9a0d189a
 
 // The lists of the large splats.
 @group(0) @binding(27) var<storage, read> large_lists: array<u32>;
@@ -72,6 +72,10 @@ fn handed_number(number: f32, from_: u32) -> f32 {
     return bitcast<f32>(handed(bitcast<u32>(number), from_));
 }
 
+fn handed_vector(own: vec3<f32>, from_: u32) -> vec3<f32> {
+    return vec3<f32>(handed_number(own.x, from_), handed_number(own.y, from_), handed_number(own.z, from_));
+}
+
 fn handed_row(row: array<f32, 3>, from_: u32) -> array<f32, 3> {
     return array<f32, 3>(
         handed_number(row[0], from_),
@@ -99,7 +103,6 @@ fn handed_splat(from_: u32) -> Splat {
 
 fn handed_attributes(own: Attributes, from_: u32) -> Attributes {
     let c = own.color;
-    let n = own.normal;
     return attributes_without_place(
         vec4<f32>(
             handed_number(c.x, from_),
@@ -107,7 +110,7 @@ fn handed_attributes(own: Attributes, from_: u32) -> Attributes {
             handed_number(c.z, from_),
             handed_number(c.w, from_),
         ),
-        vec3<f32>(handed_number(n.x, from_), handed_number(n.y, from_), handed_number(n.z, from_)),
+        handed_vector(own.normal, from_),
         handed_bend(own.bend, from_),
         handed_number(own.radius, from_),
     );

@@ -1,9 +1,5 @@
 // Caps in tiles: of a splat that another invocation fetched (tile.wgsl).
 
-fn handed_vector(own: vec3<f32>, from_: u32) -> vec3<f32> {
-    return vec3<f32>(handed_number(own.x, from_), handed_number(own.y, from_), handed_number(own.z, from_));
-}
-
 fn handed_cap(own: Cap, from_: u32) -> Cap {
     return Cap(
         handed_vector(own.heights, from_),

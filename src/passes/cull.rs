@@ -23,7 +23,8 @@ use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage};
 use crate::scene::{Camera, LowPass, Projection, Surfel};
 
-/// A ball around disks, each with its centre and the height of its cap: centre x, y, z and radius, world units relative to the scene's origin.
+/// A ball around disks, each with its centre and the height of its cap: centre x, y, z and radius, world units relative to the
+/// scene's origin.
 pub(crate) fn ball<'a>(surfels: impl Iterator<Item = (DVec3, &'a Surfel, f64)> + Clone) -> [f32; 4] {
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for (center, ..) in surfels.clone() {

@@ -34,8 +34,6 @@ pub struct Curve {
     pub radius: f64,
     /// The depth at which U, V and W are taken, world units.
     pub depth: f64,
-    /// Depths on the cap, world units.
-    pub depths: [f64; 2],
     /// The cap's heights in units of r.
     pub heights: [f64; 3],
     /// What the normal gains for a unit of u and of v, world space, where that of the centre is 1 long.
@@ -119,9 +117,8 @@ pub(super) fn curve(camera: &Camera, seen: &Seen, projected: &Projected) -> Curv
     let [m_s, m_t, n] = inverse(seen.s, seen.t);
     let radius = seen.s.length().max(seen.t.length());
     let rows = [m_s, m_t, n / radius];
-    let depths = seen.depths();
     // Past the near depth: where a cap lies mostly behind the camera, r / z may be large.
-    let depth = if projected.images.is_some() { seen.p.z } else { camera.near.max(depths[1]) };
+    let depth = if projected.images.is_some() { seen.p.z } else { camera.near.max(seen.depths()[1]) };
     let focal = DVec2::new(camera.fx, camera.fy);
     let principal = DVec2::new(camera.cx, camera.cy);
     let pixel = DVec2::new(projected.anchor[0] as f64, projected.anchor[1] as f64) + 0.5;
@@ -144,7 +141,6 @@ pub(super) fn curve(camera: &Camera, seen: &Seen, projected: &Projected) -> Curv
         spread,
         radius,
         depth,
-        depths: depths.map(|depth| depth.max(camera.near)),
         heights: seen.cap.0.map(|height| f64::from(height) / radius),
         slopes: [DVec3::ZERO; 2],
         culls: false,

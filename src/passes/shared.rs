@@ -20,5 +20,5 @@ pub const PASS: Pass = Pass {
         ]
     },
     kernels: |_| Vec::new(),
-    constants: |making| vec![("CULLS", u32::from(making.needs.cull_back).into())],
+    constants: |_| Vec::new(),
 };

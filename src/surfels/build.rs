@@ -126,33 +126,14 @@ fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Progress) -> Re
     } else {
         None
     };
-    let estimate_of = |i: usize| estimated.as_ref().map_or_else(Estimate::default, |all| all.of_point(i));
-    let surfel = |(i, position): (usize, &[f64; 3])| {
-        // Adding +0 makes -0 the same coordinate as 0.
-        let center = (DVec3::from_array(*position) - origin).as_vec3() + Vec3::ZERO;
-        if let Some([s, t]) = given.axes(i) {
-            return Surfel::ellipse(center, s, t);
-        }
-        match (given.normal(i), given.radius(i)) {
-            (Some(normal), Some(radius)) => Surfel::disk(center, normal, radius),
-            (None, Some(radius)) => Surfel::disk(center, estimate_of(i).normal(), radius),
-            (Some(normal), None) => laid(center, estimate_of(i).axes, normal),
-            (None, None) => {
-                let [s, t] = estimate_of(i).axes.map(Vec3::from_array);
-                Surfel::ellipse(center, s, t)
-            }
-        }
-    };
-    let mut surfels: Vec<Surfel> = gathered.points.positions.par_iter().enumerate().map(surfel).collect();
+    let mut surfels = given.surfels(estimated.as_ref(), origin);
     let oriented = preparation.estimated_normals == 0 && !preparation.has_random_sides();
-    let caps = match &estimated {
+    let caps = match estimated {
         Some(estimated) if limits.curved && preparation.estimated_radii > 0 => {
             estimated.caps(&given, &surfels, oriented)
         }
-        _ if gathered.points.caps.is_some() => (0..count).map(|i| given.cap(i).unwrap_or_default()).collect(),
-        _ => Vec::new(),
+        _ => given.caps(),
     };
-    drop(estimated);
     preparation.limited_radii = limit_radii(&mut surfels, body.extent().max_element())?;
     let caps = usable_caps(caps, &surfels);
     let relative = |index: usize| DVec3::from_array(gathered.points.positions[index]) - origin;
@@ -223,6 +204,34 @@ impl Given<'_> {
     /// How the disk of its half-axes curves.
     fn cap(&self, i: usize) -> Option<Cap> {
         self.axes(i).and(self.0.points.caps.as_ref()?.get(i).copied())
+    }
+
+    /// Those that are given; none where no input has any.
+    fn caps(&self) -> Vec<Cap> {
+        let count = self.0.points.caps.as_ref().map_or(0, Vec::len);
+        (0..count).map(|i| self.cap(i).unwrap_or_default()).collect()
+    }
+
+    /// The points' surfels, of which what is lacking was `estimated`, about `origin`.
+    fn surfels(&self, estimated: Option<&Estimated>, origin: DVec3) -> Vec<Surfel> {
+        let estimate_of = |i: usize| estimated.map_or_else(Estimate::default, |all| all.of_point(i));
+        let surfel = |(i, position): (usize, &[f64; 3])| {
+            // Adding +0 makes -0 the same coordinate as 0.
+            let center = (DVec3::from_array(*position) - origin).as_vec3() + Vec3::ZERO;
+            if let Some([s, t]) = self.axes(i) {
+                return Surfel::ellipse(center, s, t);
+            }
+            match (self.normal(i), self.radius(i)) {
+                (Some(normal), Some(radius)) => Surfel::disk(center, normal, radius),
+                (None, Some(radius)) => Surfel::disk(center, estimate_of(i).normal(), radius),
+                (Some(normal), None) => laid(center, estimate_of(i).axes, normal),
+                (None, None) => {
+                    let [s, t] = estimate_of(i).axes.map(Vec3::from_array);
+                    Surfel::ellipse(center, s, t)
+                }
+            }
+        };
+        self.0.points.positions.par_iter().enumerate().map(surfel).collect()
     }
 
     fn lacks_normal(&self, i: usize) -> bool {

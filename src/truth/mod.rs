@@ -4,6 +4,7 @@
 //! boxes ([`triangles`]); the disks that stand for a surface are found in the same way ([`disks`]). Only the first surface
 //! on a ray is shaded: there are no layers of transparency, as in a render.
 
+mod disk;
 pub mod disks;
 pub(crate) mod nearest;
 mod shading;

@@ -114,9 +114,9 @@ pub struct Options {
 
 /// Selects few large surfels that stand for all surfels of `scene`.
 ///
-/// Each comes from a surfel: it has its normal, or as a cap one nearby, and its centre lies on the line through it along that normal, halfway between the
-/// highest and the lowest of the surfels inside, so that each is within the tolerance. Its colour is the mean of what
-/// it covers, by area (linear light, weighted by alpha).
+/// Each comes from a surfel: it has its normal, or as a cap one nearby, and its centre lies on the line through it along that
+/// normal, halfway between the highest and the lowest of the surfels inside, so that each is within the tolerance. Its colour is
+/// the mean of what it covers, by area (linear light, weighted by alpha).
 ///
 /// The surface is where a scene's surfels are, and between them where they surround a gap that is no more than a few
 /// spacings wide; where it ends, it goes on as far as its surfels do. Normals that face apart by a right angle or more belong

@@ -51,8 +51,8 @@ pub struct Report {
     pub before_relaxation: u64,
     /// What was asked for.
     pub tolerance: f64,
-    /// The largest distance of a point, along the normal, from the plane or the cap of a selected surfel that covers its cell or a part of it: at most the
-    /// tolerance, rounding aside.
+    /// The largest distance of a point, along the normal, from the plane or the cap of a selected surfel that covers its cell or
+    /// a part of it: at most the tolerance, rounding aside.
     pub max_deviation: f64,
     /// The mean distance of a point so from the selected surfels that cover its cell or a part of it, weighted by the
     /// area that they cover.

@@ -87,7 +87,7 @@ pub(super) fn clips(
             let (toward, distance) = crease([normal, other], offset, radius, ROUGH * rough)?;
             let inward = DVec2::new(-toward.dot(s), -toward.dot(t));
             let line = Line { inward: inward.try_normalize()?, offset: -distance / inward.length() };
-            let line = line.keeping(cell.iter().copied(), MARGIN);
+            let line = line.keeping(&cell, MARGIN);
             ((1.0 + line.offset) * radius > ROUGH * rough).then_some(line)
         };
         lines::clip(others.filter(|(other, _)| other.dot(normal) < SHARP).filter_map(line).collect())

@@ -31,8 +31,8 @@ impl Line {
     ///
     /// A disk must cover its cell: where an end bends around that, the line along one of its sides would cut off what lies past the
     /// next.
-    pub fn keeping(self, points: impl Iterator<Item = DVec2>, margin: f64) -> Self {
-        let of_points = points.map(|point| point.dot(self.inward)).fold(0.0, f64::min);
+    pub fn keeping(self, points: &[DVec2], margin: f64) -> Self {
+        let of_points = points.iter().map(|point| point.dot(self.inward)).fold(0.0, f64::min);
         Self { offset: self.offset.min(of_points) - margin, ..self }
     }
 }
@@ -130,8 +130,8 @@ mod tests {
         let end = Line::through(DVec2::new(0.5, -1.0), DVec2::new(0.5, 1.0)).map(|line| (line.inward, line.offset));
         assert_eq!(end, Some((DVec2::NEG_X, -0.5)));
         let end = Line { inward: DVec2::NEG_X, offset: -0.5 };
-        assert_eq!(end.keeping([DVec2::new(0.7, 0.2)].into_iter(), 0.1).offset, -0.7 - 0.1);
-        assert_eq!(end.keeping([DVec2::new(-0.7, 0.2)].into_iter(), 0.0), end);
+        assert_eq!(end.keeping(&[DVec2::new(0.7, 0.2)], 0.1).offset, -0.7 - 0.1);
+        assert_eq!(end.keeping(&[DVec2::new(-0.7, 0.2)], 0.0), end);
         assert_eq!(Line::through(DVec2::X, DVec2::X), None);
         assert_eq!(nearest_share(DVec2::new(1.0, -1.0), DVec2::new(1.0, 3.0)), 0.25);
     }

@@ -166,7 +166,7 @@ impl Ends {
             // Moved out it leaves out less.
             let line = Line::through(p, q).filter(|line| past(line, end.leaves) > least)?;
             let margin = (MARGIN * least_radius + rough) / across(&line);
-            let line = line.keeping(cell.iter().copied(), margin);
+            let line = line.keeping(&cell, margin);
             (past(&line, end.leaves) > least).then_some((line, end.leaves))
         };
         let mut lines = lines::apart(self.near(disk.center, radius).into_iter().filter_map(line).collect());

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::cells::{piece_of, tangent_basis};
+use super::cells::tangent_basis;
 use super::samples::{End, Samples};
 use crate::surfels::creases::{NARROWEST, SHARP, crease};
 use crate::surfels::neighbours::Neighbour;
@@ -42,7 +42,49 @@ pub(super) enum Beyond {
     Outline,
 }
 
+/// What an edge of a cell is to a splat that comes to it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Edge {
+    /// The surface goes on.
+    Joined,
+    /// The surface goes on past the line at which the surfel ends.
+    Bend,
+    /// The surfel ends there: the line is as exact as the surfel is.
+    Line,
+    /// The surface ends sharply, about there: where the tangent planes of two points meet.
+    Crease,
+    /// Nothing is known past it.
+    Outline,
+}
+
+impl Edge {
+    /// Whether nothing that a splat could hold is past it.
+    pub fn is_end(self) -> bool {
+        matches!(self, Self::Line | Self::Crease | Self::Outline)
+    }
+
+    /// Whether a splat may be cut there.
+    pub fn is_sharp(self) -> bool {
+        matches!(self, Self::Line | Self::Crease | Self::Bend)
+    }
+
+    /// Whether a surfel's own line says where it is.
+    pub fn is_exact(self) -> bool {
+        matches!(self, Self::Line | Self::Bend)
+    }
+}
+
 impl Beyond {
+    fn edge(self) -> Edge {
+        match self {
+            Self::Neighbour(..) => Edge::Joined,
+            Self::Crease => Edge::Crease,
+            Self::Line => Edge::Line,
+            Self::Bend(..) => Edge::Bend,
+            Self::Outline => Edge::Outline,
+        }
+    }
+
     pub fn neighbour(self) -> Option<(u32, f64)> {
         match self {
             Self::Neighbour(index, distance) | Self::Bend(index, distance) => Some((index, distance)),
@@ -164,30 +206,15 @@ impl Polygon {
         !self.corners.is_empty() && !self.cut_by.contains(&Beyond::Outline)
     }
 
-    /// Whether the edge has no neighbour.
-    fn is_end(&self, edge: usize) -> bool {
-        self.cut_by[edge].neighbour().is_none()
-    }
-
-    /// The edges without a neighbour as bits.
-    pub fn ends(&self) -> u16 {
-        self.edges(|k| self.is_end(k))
-    }
-
-    /// The edges at which the surface ends sharply, as bits.
-    pub fn cut_sharply(&self) -> u16 {
-        self.edges(|k| matches!(self.cut_by[k], Beyond::Line | Beyond::Crease | Beyond::Bend(..)))
-    }
-
-    fn edges(&self, are: impl Fn(usize) -> bool) -> u16 {
-        let count = self.corners.len();
-        (0..count).filter(|&k| are(k)).fold(0, |edges, k| edges | 1 << piece_of(k, count))
+    /// Of each corner the edge to the next.
+    pub fn edges(&self) -> Vec<Edge> {
+        self.cut_by.iter().map(|beyond| beyond.edge()).collect()
     }
 
     /// How far the corners are at edges without a neighbour; zero without such edges.
     pub fn farthest_at_end(&self) -> f64 {
         let count = self.corners.len();
-        let ends = (0..count).filter(|&k| self.is_end(k)).flat_map(|k| [k, (k + 1) % count]);
+        let ends = (0..count).filter(|&k| self.cut_by[k].edge().is_end()).flat_map(|k| [k, (k + 1) % count]);
         ends.map(|k| self.corners[k].length()).fold(0.0, f64::max)
     }
 

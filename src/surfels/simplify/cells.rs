@@ -8,7 +8,7 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::borders::{Border, Polygon};
+use super::borders::{Border, Edge, Polygon};
 use super::samples::Samples;
 use crate::Progress;
 use crate::surfels::neighbours::{Neighbour, NeighbourSearch};
@@ -37,14 +37,11 @@ pub(super) struct Cells {
     first_corner: Vec<usize>,
     /// Relative to the cell's point, in the basis of its tangent plane; counter-clockwise. Scaled units.
     corners: Vec<DVec2>,
+    /// Of each corner the edge to the next.
+    edges: Vec<Edge>,
     /// The distance of the farthest corner from the point.
     pub radii: Vec<f64>,
-    /// The edges of each cell beyond which there is no neighbour, as bits like those of [`Cells::pieces`]: the surface ends
-    /// there, or has a crease that the graph has no edge across.
-    ends: Vec<u16>,
-    /// The edges of each cell that lie on a sharp edge of the surface, or a line at which its surfel ends, as such bits.
-    cut: Vec<u16>,
-    /// How far such a cell goes on there from its point; zero for other cells.
+    /// How far a cell with [ends](Edge::is_end) goes on there from its point; zero for other cells.
     pub overhangs: Vec<f64>,
     first_neighbour: Vec<usize>,
     neighbours: Vec<u32>,
@@ -70,9 +67,8 @@ impl Cells {
         let mut cells = Self {
             first_corner: Vec::with_capacity(samples.len() + 1),
             corners: Vec::new(),
+            edges: Vec::new(),
             radii: Vec::with_capacity(samples.len()),
-            ends: Vec::with_capacity(samples.len()),
-            cut: Vec::with_capacity(samples.len()),
             overhangs: Vec::with_capacity(samples.len()),
             first_neighbour: Vec::new(),
             neighbours: Vec::new(),
@@ -82,9 +78,8 @@ impl Cells {
         for cell in chunks.iter().flatten() {
             cells.first_corner.push(cells.corners.len());
             cells.corners.extend(&cell.corners);
+            cells.edges.extend(&cell.edges);
             cells.radii.push(cell.corners.iter().map(|corner| corner.length()).fold(0.0, f64::max));
-            cells.ends.push(cell.ends);
-            cells.cut.push(cell.cut);
             cells.overhangs.push(cell.overhang);
             spacings.push(cell.spacing);
         }
@@ -130,23 +125,11 @@ impl Cells {
         ((1u32 << pieces) - 1) as u16
     }
 
-    /// The unit directions, in the basis of the cell's tangent plane, in which it ends: across the edges that have no neighbour. And
-    /// whether a splat is cut there.
-    pub fn ends(&self, index: u32) -> impl Iterator<Item = (DVec2, bool)> {
-        let (corners, ends, cut) = (self.corners(index), self.ends[index as usize], self.cut[index as usize]);
-        let bit = |bits: u16, k: usize, count: usize| bits >> piece_of(k, count) & 1 == 1;
-        let open = (0..corners.len()).filter(move |&k| bit(ends, k, corners.len()));
-        open.filter_map(move |k| {
-            let across = (corners[k] - corners[(k + 1) % corners.len()]).perp().try_normalize()?;
-            Some((across, bit(cut, k, corners.len())))
-        })
-    }
-
-    /// The edges of a cell that lie on a sharp edge of the surface, or a line at which its surfel ends, from corner to corner.
-    pub fn cut_edges(&self, index: u32) -> impl Iterator<Item = [DVec2; 2]> {
-        let (corners, cut) = (self.corners(index), self.cut[index as usize]);
-        let edges = (0..corners.len()).map(|k| (k, [corners[k], corners[(k + 1) % corners.len()]]));
-        edges.filter(move |(k, _)| cut >> piece_of(*k, corners.len()) & 1 == 1).map(|(_, edge)| edge)
+    /// The edges of a cell, each from corner to corner, counter-clockwise.
+    pub fn edges(&self, index: u32) -> impl Iterator<Item = ([DVec2; 2], Edge)> {
+        let (corners, first) = (self.corners(index), self.first_corner[index as usize]);
+        let ends = move |k: usize| [corners[k], corners[(k + 1) % corners.len()]];
+        (0..corners.len()).map(move |k| (ends(k), self.edges[first + k]))
     }
 
     /// The corners of some of its pieces, its point aside.
@@ -191,8 +174,7 @@ struct Cell {
     corners: Vec<DVec2>,
     /// And how far they are.
     neighbours: Vec<(u32, f64)>,
-    ends: u16,
-    cut: u16,
+    edges: Vec<Edge>,
     overhang: f64,
     spacing: f64,
 }
@@ -222,15 +204,13 @@ fn cell(
         neighbours = polygon.neighbours();
         if polygon.is_closed() {
             let overhang = polygon.farthest_at_end();
-            let cut = polygon.cut_sharply();
-            return Cell { ends: polygon.ends(), cut, corners: polygon.corners, neighbours, overhang, spacing };
+            return Cell { edges: polygon.edges(), corners: polygon.corners, neighbours, overhang, spacing };
         }
     }
     // Where the surface ends, it goes on as far as the surfel does.
     let overhang = samples.radii[index as usize];
     let polygon = Polygon::cut(overhang, &borders);
-    let cut = polygon.cut_sharply();
-    Cell { ends: polygon.ends(), cut, corners: polygon.corners, neighbours, overhang, spacing }
+    Cell { edges: polygon.edges(), corners: polygon.corners, neighbours, overhang, spacing }
 }
 
 /// The local spacing; zero without neighbours.

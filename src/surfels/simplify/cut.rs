@@ -2,20 +2,69 @@
 
 use glam::{DVec2, DVec3};
 
+use super::borders::Edge;
 use super::cells::{Cells, tangent_basis};
 use super::growing::Cover;
 use super::samples::Samples;
 use crate::scene::Clip;
 use crate::surfels::lines::{self, Line, hull, nearest_share};
 
-/// How far past an end a splat goes: twice its deviation, as disks that end at one line may lie so far apart there; and a part of the
-/// radius of the surfel that it grew from, as cells only nearly tile a rough surface. Of 3.5 million rays at 7,248 disks for
-/// `data/bunny.obj`, five find a hole with a tenth, and none with a fifth.
-const MARGIN: [f64; 2] = [2.0, 0.2];
+/// How far past what it covers a splat goes, by its deviation: splats that end at one edge may lie so far apart there.
+const MARGIN: f64 = 2.0;
+
+/// And how far more, in radii of the surfel that it grew from, where the surface goes on past a line, or an edge is only about there: cells
+/// only nearly tile a rough surface. Of 3.5 million rays at 7,263 disks for `data/bunny.obj`, one finds a hole with 0.2, none with 0.3.
+const ROUGH_MARGIN: f64 = 0.3;
 
 /// A splat is cut where it stands out past an end by more than so many deviations: less may be the roughness of the surface, whose holes
 /// disks close by their overlap.
 const ROUGH: f64 = 4.0;
+
+/// The unit disk of a splat.
+struct Disk<'a> {
+    samples: &'a Samples,
+    cells: &'a Cells,
+    center: DVec3,
+    /// Half-axes over their squares.
+    inverse: [DVec3; 2],
+}
+
+impl Disk<'_> {
+    /// Where a corner of a cell lies on it.
+    fn place(&self, cell: u32, corner: DVec2) -> DVec2 {
+        let [s, t] = tangent_basis(self.samples.normals[cell as usize]);
+        let offset = self.samples.positions.position(cell) + s * corner.x + t * corner.y - self.center;
+        DVec2::new(offset.dot(self.inverse[0]), offset.dot(self.inverse[1]))
+    }
+
+    /// The edges of a cell.
+    fn edges(&self, cell: u32) -> impl Iterator<Item = ([DVec2; 2], Edge)> {
+        self.cells.edges(cell).map(move |(ends, edge)| (ends.map(|corner| self.place(cell, corner)), edge))
+    }
+
+    /// Of a unit of length, across a line.
+    fn unit(&self, line: &Line) -> f64 {
+        (self.inverse[0] * line.inward.x + self.inverse[1] * line.inward.y).length()
+    }
+
+    /// The corners of what it covers.
+    fn covered(&self, covers: &[Cover]) -> Vec<DVec2> {
+        let corners = |&Cover { cell, pieces }: &Cover| {
+            self.cells.corners_of(cell, pieces).map(move |corner| self.place(cell, corner))
+        };
+        hull(covers.iter().flat_map(corners).collect())
+    }
+
+    /// The corners of what it lies over of these cells and those that the surface goes on to, to whose splats it closes slits.
+    fn beside(&self, covers: &[Cover]) -> Vec<DVec2> {
+        let goes_on = |cell: u32| {
+            self.cells.neighbours(cell).iter().copied().filter(move |next| self.samples.are_smooth(cell, *next))
+        };
+        let cells = sorted(covers.iter().flat_map(|cover| goes_on(cover.cell)).collect());
+        let parts = cells.into_iter().flat_map(|cell| self.edges(cell)).filter_map(|(ends, _)| on_unit_disk(ends));
+        hull(parts.flatten().collect())
+    }
+}
 
 /// The lines at which a splat of these half-axes ends: those at which the surfels end that it stands for, and what lies around them. It
 /// keeps what it covers, of which the points lie up to `deviation` from its plane; the surfel that it grew from has this `radius`.
@@ -26,43 +75,40 @@ pub(super) fn clip(
     (center, axes): (DVec3, [DVec3; 2]),
     (deviation, radius): (f64, f64),
 ) -> Clip {
-    let inverse = axes.map(|axis| axis / axis.length_squared());
-    let on_disk = |at: DVec3| DVec2::new((at - center).dot(inverse[0]), (at - center).dot(inverse[1]));
-    let place = |cell: u32, corner: DVec2| {
-        let [s, t] = tangent_basis(samples.normals[cell as usize]);
-        on_disk(samples.positions.position(cell) + s * corner.x + t * corner.y)
-    };
-    if let [only] = covers {
-        // What stands for one surfel ends where that did.
-        let own = samples.lines[only.cell as usize].iter().map(|end| {
-            let inward = DVec2::new(-end.toward.dot(axes[0]), -end.toward.dot(axes[1]));
-            let offset = -(end.distance + (samples.positions.position(only.cell) - center).dot(end.toward));
-            Line { inward: inward.normalize_or(DVec2::X), offset: offset / inward.length() }
-        });
-        return lines::clip(own.collect());
-    }
+    let disk = Disk { samples, cells, center, inverse: axes.map(|axis| axis / axis.length_squared()) };
     let normal = axes[0].cross(axes[1]);
-    let faces = |cell: u32| samples.normals[cell as usize].dot(normal) > 0.5 * normal.length();
-    let mut around: Vec<u32> =
-        covers.iter().flat_map(|cover| [&[cover.cell], cells.neighbours(cover.cell)].concat()).collect();
-    around.sort_unstable();
-    around.dedup();
-    let edges = around
-        .iter()
-        .filter(|cell| faces(**cell))
-        .flat_map(|&cell| cells.cut_edges(cell).map(move |edge| (cell, edge)));
-    let mut edges = edges.map(|(cell, edge)| edge.map(|corner| place(cell, corner))).peekable();
+    let faces = |cell: &u32| samples.normals[*cell as usize].dot(normal) > 0.5 * normal.length();
+    let around = covers.iter().flat_map(|cover| [&[cover.cell], cells.neighbours(cover.cell)].concat()).collect();
+    let edges = sorted(around).into_iter().filter(faces).flat_map(|cell| disk.edges(cell));
+    let mut edges = edges.filter(|(_, edge)| edge.is_sharp()).peekable();
     if edges.peek().is_none() {
         return Clip::NONE;
     }
-    let kept = covers.iter().flat_map(|c| cells.corners_of(c.cell, c.pieces).map(|corner| place(c.cell, corner)));
-    let kept = hull(kept.collect());
-    let shortest = axes[0].length().min(axes[1].length());
-    let margin = (MARGIN[0] * deviation + MARGIN[1] * radius) / shortest;
-    let line = |[from, to]: [DVec2; 2]| {
+    let [covered, beside] = [disk.covered(covers), disk.beside(covers)];
+    let line = |([from, to], edge): ([DVec2; 2], Edge)| {
         let is_near = from.lerp(to, nearest_share(from, to)).length() < 1.0;
-        let line = Line::through(from, to).filter(|_| is_near)?.keeping(kept.iter().copied(), margin);
-        ((1.0 + line.offset) * shortest > ROUGH * deviation).then_some(line)
+        let line = Line::through(from, to).filter(|_| is_near)?;
+        let unit = disk.unit(&line);
+        let line = line.keeping(&covered, 0.0);
+        let going_on = if edge.is_exact() { line.keeping(&beside, 0.0).offset } else { f64::NEG_INFINITY };
+        let offset = going_on.max(line.offset - ROUGH_MARGIN * radius * unit) - MARGIN * deviation * unit;
+        (1.0 + offset > ROUGH * deviation * unit).then_some(Line { offset, ..line })
     };
     lines::clip(edges.filter_map(line).collect())
+}
+
+/// Each once.
+fn sorted(mut cells: Vec<u32>) -> Vec<u32> {
+    cells.sort_unstable();
+    cells.dedup();
+    cells
+}
+
+/// The ends of the part of a segment that lies on the unit disk.
+fn on_unit_disk([from, to]: [DVec2; 2]) -> Option<[DVec2; 2]> {
+    let along = to - from;
+    let (a, b, c) = (along.length_squared(), from.dot(along), from.length_squared() - 1.0);
+    let root = (b * b - a * c).sqrt();
+    let [low, high] = [((-b - root) / a).max(0.0), ((-b + root) / a).min(1.0)];
+    (low <= high).then(|| [low, high].map(|share| from + along * share))
 }

@@ -34,6 +34,8 @@ struct Ended {
     toward: DVec3,
     /// From the splat's point; the surface ends there, or before.
     distance: f64,
+    /// How far from it an end may lie for which it stands.
+    reach: f64,
 }
 
 impl Ended {
@@ -41,9 +43,10 @@ impl Ended {
         offset.dot(self.toward) > self.distance
     }
 
-    /// Whether the two are one, but for so much in distance.
-    fn is_near(&self, other: &Self, distance: f64) -> bool {
-        self.toward.dot(other.toward) > ONE_LINE && (self.distance - other.distance).abs() <= distance
+    /// Whether it stands for an end in about this unit direction, from corner to corner.
+    fn stands_for(&self, toward: DVec3, corners: [DVec3; 2]) -> bool {
+        let is_near = |corner: DVec3| (corner.dot(self.toward) - self.distance).abs() <= self.reach;
+        self.toward.dot(toward) > ONE_LINE && corners.into_iter().all(is_near)
     }
 }
 
@@ -379,13 +382,17 @@ impl<'a> Grower<'a> {
         let overhang = self.cells.overhangs[next as usize];
         let [s, t] = tangent_basis(self.samples.normals[next as usize]);
         let mut least = f64::INFINITY;
-        for (end, is_cut) in self.cells.ends(next) {
-            let Some((toward, extent)) = along(s * end.x + t * end.y, shape) else { continue };
-            let ended = Ended { toward, distance: offset.dot(toward) + overhang };
-            if is_cut && offset.dot(toward) >= 0.0 {
-                if lines.iter().any(|line| line.is_near(&ended, overhang)) {
+        for ([from, to], edge) in self.cells.edges(next).filter(|(_, edge)| edge.is_end()) {
+            let Some(across) = (from - to).perp().try_normalize() else { continue };
+            let Some((toward, extent)) = along(s * across.x + t * across.y, shape) else { continue };
+            if edge.is_sharp() && offset.dot(toward) >= 0.0 {
+                let corners = [from, to].map(|corner| offset + s * corner.x + t * corner.y);
+                if lines.iter().any(|line| line.stands_for(toward, corners)) {
                     continue;
                 }
+                let distance = corners[0].dot(toward).max(corners[1].dot(toward));
+                let reach = if edge.is_exact() { self.tolerance } else { overhang };
+                let ended = Ended { toward, distance, reach };
                 if lines.len() < 2 && !self.is_any_past(next, offset, &ended) {
                     lines.push(ended);
                     continue;

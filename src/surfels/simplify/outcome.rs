@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::candidates::Candidates;
 use super::cells::{Cells, tangent_basis};
 use super::cut::clip;
+use super::growing::Cover;
 use super::samples::Samples;
 use crate::scene::color::linear_to_srgb;
 use crate::scene::scene::low_parts;
@@ -83,7 +84,51 @@ struct Chosen {
 }
 
 impl Chosen {
-    fn of(index: u32, samples: &Samples, cells: &Cells, candidates: &Candidates, tolerance: f64) -> Self {
+    fn of(
+        index: u32,
+        scene: &Scene,
+        (samples, cells): (&Samples, &Cells),
+        candidates: &Candidates,
+        tolerance: f64,
+    ) -> Self {
+        match *candidates.covers(index) {
+            [cover] => Self::alone(cover, scene, samples, cells),
+            _ => None,
+        }
+        .unwrap_or_else(|| Self::grown(index, samples, cells, candidates, tolerance))
+    }
+
+    /// What stands for one surfel is that as it came, but for a factor that lets it hold its cell. None where several share a position, as
+    /// of a file that was read twice.
+    fn alone(Cover { cell, pieces }: Cover, scene: &Scene, samples: &Samples, cells: &Cells) -> Option<Self> {
+        let index = samples.only[cell as usize]? as usize;
+        let surfel = scene.surfels[index];
+        let scale = samples.positions.scale();
+        let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
+        let inverse = [s, t].map(|axis| axis / (axis.length_squared() * scale));
+        let basis = tangent_basis(samples.normals[cell as usize]);
+        let on_disk = |corner: &DVec2| {
+            let corner = basis[0] * corner.x + basis[1] * corner.y;
+            DVec2::new(corner.dot(inverse[0]), corner.dot(inverse[1])).length()
+        };
+        let held = cells.corners(cell).iter().map(on_disk).fold(0.0, f64::max);
+        let factor = (held * (1.0 + SMALLEST_OVERLAP)).max(1.0);
+        let [s, t] = [s, t].map(|axis| (axis * factor).as_vec3().to_array());
+        let clip = scene.clips.get(index).copied().unwrap_or_default();
+        let cap = scene.caps.get(index).copied().unwrap_or_default();
+        Some(Self {
+            center: samples.positions.position(cell) / scale,
+            surfel: Surfel { s, t, ..surfel },
+            clip: Clip(clip.0.map(|[x, y, z]| [x, y, (f64::from(z) / factor) as f32])).usable(),
+            cap: Cap(cap.0.map(|height| (f64::from(height) * factor * factor) as f32))
+                .usable(f64::from(surfel.radius()) * factor),
+            color: mean_color(samples.colors[cell as usize], 1.0),
+            sums: [0.0, cells.area(cell, pieces)],
+            largest: 0.0,
+        })
+    }
+
+    fn grown(index: u32, samples: &Samples, cells: &Cells, candidates: &Candidates, tolerance: f64) -> Self {
         let scale = samples.positions.scale();
         let splat = &candidates.splats[index as usize];
         let normal = splat.normal;
@@ -120,11 +165,15 @@ impl Chosen {
         // As it is read again, where a tiny patch is written as large as its sample was.
         let longer = axes[0].length().max(axes[1].length()) / scale;
         let cap = Cap(heights.map(|height| (f64::from(height) / scale) as f32)).usable(longer);
-        let [r, g, b, alpha] = color;
-        let opaque = if alpha > 0.0 { alpha } else { f64::INFINITY };
-        let color = [r / opaque, g / opaque, b / opaque, alpha / sums[1]].map(|c| c as f32);
+        let color = mean_color(color, sums[1]);
         Self { center: center / scale, surfel: Surfel { center: world(center), s, t }, clip, cap, color, sums, largest }
     }
+}
+
+/// Linear and not premultiplied, of a sum of premultiplied colours over this area.
+fn mean_color([r, g, b, alpha]: [f64; 4], area: f64) -> [f32; 4] {
+    let opaque = if alpha > 0.0 { alpha } else { f64::INFINITY };
+    [r / opaque, g / opaque, b / opaque, alpha / area].map(|c| c as f32)
 }
 
 /// The selected splats as a scene like `scene`; the tolerance in scaled units.
@@ -137,7 +186,7 @@ pub(super) fn scene(
     tolerance: f64,
 ) -> (Scene, Deviations) {
     let chosen: Vec<Chosen> =
-        selected.par_iter().map(|&index| Chosen::of(index, samples, cells, candidates, tolerance)).collect();
+        selected.par_iter().map(|&index| Chosen::of(index, scene, (samples, cells), candidates, tolerance)).collect();
     let colors = match scene.colors {
         Colors::Constant(color) => Colors::Constant(color),
         Colors::Srgb8(_) => Colors::Srgb8(chosen.iter().map(|chosen| srgb8(chosen.color)).collect()),

@@ -14,6 +14,8 @@ pub(super) struct Samples {
     pub positions: DistinctPositions,
     /// Unit normals: the mean over the surfels at a position, or, where they cancel, the first of them by coordinates.
     pub normals: Vec<DVec3>,
+    /// The surfel at a position, if it is the only one there.
+    pub only: Vec<Option<u32>>,
     /// The largest half-axis of the surfels at a position.
     pub radii: Vec<f64>,
     /// The lines at which the one surfel at a position ends, if it does.
@@ -49,6 +51,7 @@ impl Samples {
         let mut normals = Vec::with_capacity(count);
         let mut radii = Vec::with_capacity(count);
         let mut colors = Vec::with_capacity(count);
+        let mut only = Vec::with_capacity(count);
         let mut lines = Vec::with_capacity(count);
         for group in of_position.chunk_by(|a, b| a.0 == b.0) {
             let (mut normal, mut color, mut radius) = (DVec3::ZERO, [0.0; 4], 0f64);
@@ -66,6 +69,7 @@ impl Samples {
             normals.push(if cancelled { first } else { normal.normalize() });
             radii.push(radius * positions.scale());
             colors.push(color);
+            only.push(if let &[(_, surfel)] = group { Some(surfel) } else { None });
             lines.push(match (group, scene.clips.as_slice()) {
                 (&[(_, surfel)], clips @ [_, ..]) => {
                     ends(&scene.surfels[surfel as usize], &clips[surfel as usize], positions.scale())
@@ -73,7 +77,7 @@ impl Samples {
                 _ => Vec::new(),
             });
         }
-        Ok(Self { positions, normals, radii, lines, colors, oriented: scene.oriented })
+        Ok(Self { positions, normals, only, radii, lines, colors, oriented: scene.oriented })
     }
 
     pub fn len(&self) -> usize {

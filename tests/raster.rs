@@ -196,7 +196,7 @@ fn lit_pictures_are_computes() {
 #[test]
 fn tight_shapes_leave_out_nothing() {
     let tight = Sources::default();
-    let boxes = tight.clone().replace("raster.wgsl", "if (FILTERED || thin", "if (true || thin").unwrap();
+    let boxes = tight.clone().replace("raster.wgsl", "if (FACES || FILTERED", "if (true || FILTERED").unwrap();
     let small = tight.clone().replace("raster.wgsl", "SHAPE_MARGIN: f32 = 0.05", "SHAPE_MARGIN: f32 = -0.5").unwrap();
     let draw = |sources: &Sources, case: &HardCase, size, depth| {
         let Some(gpu) = common::gpu() else { return vec![] };

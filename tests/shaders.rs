@@ -16,7 +16,7 @@ use epsplat::plan::pass::Making;
 use epsplat::plan::{
     Accumulator, COLOR_CHANNEL, ColorNeed, Features, PixelLayout, RenderOptions, SceneNeeds, color_channels,
 };
-use epsplat::scene::{Kernel, KernelShape, MAPS, Map};
+use epsplat::scene::{Facing, Kernel, KernelShape, MAPS, Map};
 use naga::AddressSpace;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use rayon::prelude::*;
@@ -100,11 +100,16 @@ const ALTERNATIVES: [&[&str]; 6] = [
 ];
 
 /// Needs that no render has together (`src/plan/check.rs`, `src/plan/needs.rs`).
-const EXCLUSIVE: [(&str, &[&str]); 6] = [
+const EXCLUSIVE: [(&str, &[&str]); 8] = [
     ("samples", &["count", "depth", "index", "normal-map", "weight-map"]),
     ("color-textured", &["tiles", "gather", "copies", "raster-exact", "raster-offset", "raster-ray"]),
     ("copies", &["tiles", "gather", "cull", "atomics-u64"]),
     ("color-constant", &["alpha"]),
+    (
+        "facing",
+        &["clips", "color-textured", "cull", "cull-back", "curved", "lambert", "phong", "lowpass-ewa", "lowpass-max"],
+    ),
+    ("facing", &["normal", "normal-map", "own-normals", "sides"]),
     ("sides", &["cull-back", "raster-offset", "raster-ray"]),
     ("raster", &["wide-sums", "atomics-u64", "copies", "cull", "tiles", "gather", "index"]),
 ];
@@ -169,7 +174,8 @@ fn host_and_kernels_agree_about_overrides() {
             KernelShape::Constant => Kernel::Constant,
         };
         assert_eq!(kernel.shape(), needs.kernel);
-        let options = RenderOptions { kernel, ..RenderOptions::default() };
+        let facing = needs.facing.map(|shape| Facing { shape, pixels: Facing::LIMITS });
+        let options = RenderOptions { kernel, facing, ..RenderOptions::default() };
         let constants = passes::constants(&Making { needs, options: &options, surfels: 1000 });
         assert!(constants.iter().all(|(_, value)| value.is_finite()));
         let set: BTreeSet<String> = constants.into_iter().map(|(name, _)| name.to_owned()).collect();

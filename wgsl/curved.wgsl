@@ -150,6 +150,8 @@ fn is_back(h: Homography, cap: Cap) -> bool {
 }
 
 // Its rows in a splat's record, the last ones.
+const FACES: bool = false;
+
 const CAP_ROWS: u32 = 2u;
 
 fn with_cap(record: SplatRecord, cap: Cap) -> SplatRecord {

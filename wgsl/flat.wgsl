@@ -20,6 +20,8 @@ fn is_back(h: Homography, cap: Cap) -> bool {
     return h.away > 0.0;
 }
 
+const FACES: bool = false;
+
 const CAP_ROWS: u32 = 0u;
 
 fn with_cap(record: SplatRecord, cap: Cap) -> SplatRecord {

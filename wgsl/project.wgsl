@@ -1,7 +1,7 @@
 // Stage 1: every surfel becomes a splat, once. One invocation a surfel; the rare ones that take longer (thin splats, disks
 // that reach the near depth, large splats) are listed and done together, so that the others of a subgroup need not wait.
 // Twin: src/passes/project.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x59063df4bc45a100
+// All loops end, by 1 of src/gpu/loops.rs: 0xcbac92c4010e0c02
 
 @group(0) @binding(3) var<storage, read_write> splats: array<SplatRecord>;
 // Word 0 counts the large splats, word 1 all that are out of view; three words from QUEUE_GRID on are a grid with a workgroup
@@ -55,17 +55,13 @@ const RARE: u32 = 2u;
 fn project_into(slot: u32, every: bool) -> u32 {
     let index = surfel_for(slot);
     let surfel = surfel_at(index);
-    // f32 serves for the half-axes of most splats; thin ones come back for more (rows.wgsl).
-    let s_world = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * held.unit;
-    let t_world = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]) * held.unit;
     let center = rotate(relative_center(index, surfel));
-    let s = rotate_plain(s_world);
-    let t = rotate_plain(t_world);
-    var h = homography(center, s, t, s_world, t_world, every);
+    let axes = half_axes(surfel, center[2].high);
+    var h = homography(center, axes.s, axes.t, axes.s_world, axes.t_world, every);
     if (h.rare) {
         return RARE;
     }
-    let cap = curve(&h, index, center, s, t);
+    let cap = curve(&h, index, center, axes.s, axes.t);
     let filter_ = low_pass(&h);
 
     // Bounds are conservative: the margin covers the rounding of the extent, and `intersect` decides.

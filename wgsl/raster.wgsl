@@ -58,7 +58,7 @@ fn corner_image(splat: Splat, number: u32) -> vec2<f32> {
     let thin = any(vec3<f32>(splat.a_low[0], splat.a_low[1], splat.a_low[2]) != vec3<f32>(0.0));
     // Corners are within 2 of the centre: there the homogeneous coordinate stays within half of the centre's.
     let level = 4.0 * (abs(u.z) + abs(v.z)) < abs(center.z);
-    if (FILTERED || thin || !level || any(size > vec2<f32>(4096.0))) {
+    if (FACES || FILTERED || thin || !level || any(size > vec2<f32>(4096.0))) {
         return boxed;
     }
     // A step of a pixel changes u and v by less than this, anywhere on such a disk.

@@ -29,6 +29,14 @@ fn parse_numbers(text: &str) -> Result<Vec<f64>, String> {
     text.split(',').map(number).collect()
 }
 
+/// `MIN,MAX`, pixels.
+pub(super) fn parse_pixels(text: &str) -> Result<[f64; 2], String> {
+    match parse_numbers(text)?[..] {
+        [least, most] if 0.0 <= least && least <= most && most > 0.0 => Ok([least, most]),
+        _ => Err("two numbers are needed, the lesser first: MIN,MAX".into()),
+    }
+}
+
 /// `X,Y,Z`.
 pub(super) fn parse_vector(text: &str) -> Result<DVec3, String> {
     match parse_numbers(text)?[..] {

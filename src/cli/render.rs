@@ -13,7 +13,10 @@ use epsplat::io::Texture;
 use epsplat::passes::unseen::{Unseen, is_empty};
 use epsplat::plan::{Accumulator, BackendName, BlendFormat, Organisation, Raster, RasterDepth, RenderOptions, check};
 use epsplat::render::{Backend, Report, render};
-use epsplat::scene::{Camera, Cull, Epsilon, Kernel, Light, LowPass, MAPS, Map, Maps, Samples, Scene, Shading};
+use epsplat::scene::{
+    Camera, Cull, Epsilon, Facing, Kernel, Light, LowPass, MAPS, Map, Maps, PointShape, PointSize, Samples, Scene,
+    Shading,
+};
 use epsplat::surfels::Preparation;
 use epsplat::{Error, Result, surfels};
 use glam::DVec3;
@@ -21,7 +24,7 @@ use serde::Serialize;
 
 use self::output::{Format, note_overflows, summary};
 use self::view::{ChosenView, View};
-use super::parse::{parse_color, parse_intrinsics, parse_scale, parse_size, parse_up, parse_vector};
+use super::parse::{parse_color, parse_intrinsics, parse_pixels, parse_scale, parse_size, parse_up, parse_vector};
 use super::progress::Bars;
 use super::reading::{LimitArguments, Reading, help_of, named};
 use super::{note, outputs, write_json};
@@ -104,6 +107,16 @@ pub struct Arguments {
     /// half-axis), or radius:K,rel:E (the lesser of the two)
     #[arg(long, default_value = "radius:1,rel:0.01")]
     epsilon: Epsilon,
+    /// Draw points as shapes that face the camera, without a look at normals or neighbours: square, circle, sphere, cone or paraboloid
+    #[arg(long, value_name = "SHAPE", help_heading = "Points")]
+    facing: Option<PointShape>,
+    /// Their size: radius:F (times a point's own radius, or, where points have none, one for all by their spacing), abs:R (the radius
+    /// in world units) or pixels:D (the diameter)
+    #[arg(long, value_name = "SIZE", default_value = "radius:1", requires = "facing", help_heading = "Points")]
+    point_size: PointSize,
+    /// Their smallest and largest diameter in the image
+    #[arg(long, value_name = "MIN,MAX", default_value = "1,50", value_parser = parse_pixels, requires = "facing", help_heading = "Points")]
+    pixels: [f64; 2],
     /// Blending kernel over the disk: gaussian[:SIGMA], ellipse:A,N[,smooth] (exp(-A rho^N)), hat or constant
     #[arg(long, default_value = "ellipse:6,3")]
     kernel: Kernel,
@@ -132,9 +145,9 @@ pub struct Arguments {
     /// camera's axis) or ray (along the view ray) [default: exact]
     #[arg(long, value_name = "HOW")]
     raster_depth: Option<RasterDepth>,
-    /// Shading of the blended colour
-    #[arg(long, value_enum, default_value_t = ShadingName::Lambert)]
-    shading: ShadingName,
+    /// Shading of the blended colour [default: lambert; unlit with --facing]
+    #[arg(long, value_enum)]
+    shading: Option<ShadingName>,
     /// Exponent of the highlights of --shading phong, 1 to 1000: the higher, the smaller they are [default: 32]
     #[arg(long, value_name = "EXPONENT")]
     shininess: Option<f32>,
@@ -197,6 +210,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 }
 
 impl Arguments {
+    /// Points that face the camera have no normals.
+    fn shading(&self) -> ShadingName {
+        let unless_chosen = if self.facing.is_some() { ShadingName::Unlit } else { ShadingName::Lambert };
+        self.shading.unwrap_or(unless_chosen)
+    }
+
     /// The files that are read, but those of `--cameras`.
     fn files(&self) -> impl Iterator<Item = &PathBuf> {
         self.inputs.iter().chain(&self.camera).chain(&self.texture)
@@ -252,7 +271,11 @@ fn scene(arguments: &Arguments, bars: &Bars) -> Result<(Scene, Preparation)> {
         let what = "its points have no texture coordinates, so they cannot be textured; `epsplat sample` gives surfels of a mesh some";
         return Err(Error::malformed(path, what));
     }
-    let built = surfels::build_within(inputs, texture, &arguments.limits.limits(), bars);
+    let limits = arguments.limits.limits();
+    let built = match arguments.facing {
+        Some(_) => surfels::build_facing(inputs, arguments.point_size, &limits, bars),
+        None => surfels::build_within(inputs, texture, &limits, bars),
+    };
     let (scene, preparation) = built.map_err(|error| named(error, &arguments.inputs))?;
     for line in preparation.notes() {
         note(&line);
@@ -272,6 +295,7 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
         kernel: arguments.kernel,
         cull: arguments.cull,
         samples: arguments.samples,
+        facing: facing(arguments),
         low_pass: match arguments.lowpass {
             LowPassName::None => LowPass::None,
             LowPassName::Max => LowPass::Max,
@@ -280,7 +304,7 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
         accumulator: arguments.accumulator.unwrap_or_default(),
         organisation: arguments.organisation.unwrap_or_default(),
         raster: raster(arguments),
-        shading: match arguments.shading {
+        shading: match arguments.shading() {
             ShadingName::Unlit => Shading::Unlit,
             ShadingName::Lambert => Shading::Lambert,
             ShadingName::Phong => Shading::Phong,
@@ -292,16 +316,25 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
         without: default.without,
     };
     check::options(&options, arguments.backend.0 == Some(BackendName::Reference))?;
+    if arguments.texture.is_some() && arguments.facing.is_some() {
+        return Err(Error::Usage("points that face the camera have no plane to paint: leave --texture out".into()));
+    }
     if arguments.texture.is_some() {
         check::textured(&options, arguments.backend.0 == Some(BackendName::Reference))?;
     }
     Ok(options)
 }
 
+/// How points face the camera, if they do.
+fn facing(arguments: &Arguments) -> Option<Facing> {
+    let pixels = if let PointSize::Pixels(diameter) = arguments.point_size { [diameter; 2] } else { arguments.pixels };
+    arguments.facing.map(|shape| Facing { shape, pixels })
+}
+
 /// The exponent of highlights, if there are any.
 fn shininess(arguments: &Arguments) -> Result<Option<f32>> {
     match arguments.shininess {
-        Some(_) if arguments.shading != ShadingName::Phong => {
+        Some(_) if arguments.shading() != ShadingName::Phong => {
             Err(Error::Usage("--shininess is of highlights: give it with --shading phong".into()))
         }
         chosen => Ok(chosen),

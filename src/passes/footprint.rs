@@ -2,9 +2,9 @@
 
 use glam::DVec2;
 
-use super::curved;
 use super::lowpass::filtered;
 use super::splat::{Intersection, Splat};
+use super::{curved, facing};
 use crate::plan::Sides;
 use crate::plan::pass::Pass;
 use crate::scene::{Camera, Kernel, KernelShape, LowPass, Projection};
@@ -55,6 +55,9 @@ pub fn footprint(splat: &Splat, camera: &Camera, low_pass: LowPass, x: u32, y: u
         let shows = |(at, _): &(Intersection, f64)| at.inside >= 0.0 && !(curve.culls && at.away);
         let soft = filtered(splat, camera, low_pass, Some(cap), plane, (dx, dy));
         return soft.filter(|soft| soft.0.rho2 >= cap.rho2 || shows(soft)).or(Some((cap, 1.0)));
+    }
+    if let Some(point) = &splat.point {
+        return Some((facing::meet(point, splat, camera, DVec2::new(dx, dy)), 1.0));
     }
     let at = |row: glam::DVec3| row.x * dx + (row.y * dy + row.z);
     let (a, b, c) = (at(splat.a), at(splat.b), at(splat.c));

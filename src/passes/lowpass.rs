@@ -14,6 +14,7 @@
 
 use glam::DVec2;
 
+use super::facing::Faced;
 use super::splat::{Filter, Intersection, Splat};
 use crate::plan::RenderOptions;
 use crate::plan::pass::Pass;
@@ -60,20 +61,26 @@ pub const PASS: Pass = Pass {
     },
 };
 
-/// A low-pass with its number, computed once a render.
+/// What a projection needs of the options, computed once a render: a low-pass with its number, and how points face the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Design {
     /// Which.
     pub low_pass: LowPass,
     /// What `ewa` adds to J J^T, pixels squared.
     pub blur: f64,
+    /// Surfels are points that face the camera.
+    pub facing: Option<Faced>,
 }
 
 impl Design {
-    /// The low-pass of `options`.
+    /// That of `options`.
     pub fn of(options: &RenderOptions) -> Self {
         let blur = if options.low_pass == LowPass::Ewa { blur(options.kernel) } else { 0.0 };
-        Self { low_pass: options.low_pass, blur }
+        Self {
+            low_pass: options.low_pass,
+            blur,
+            facing: options.facing.map(|facing| Faced::new(facing, options.samples)),
+        }
     }
 }
 

@@ -23,6 +23,7 @@ pub mod attributes;
 pub mod covered;
 pub mod cull;
 pub mod curved;
+pub mod facing;
 pub mod footprint;
 pub mod homography;
 pub mod index;
@@ -107,9 +108,10 @@ pub fn finish(frame: &mut Frame, needs: &SceneNeeds, provenance: &Provenance, or
 }
 
 /// The passes whose files every module has.
-const PASSES: [&Pass; 11] = [
+const PASSES: [&Pass; 12] = [
     &shared::PASS,
     &project::PASS,
+    &facing::PASS,
     &cull::PASS,
     &lowpass::PASS,
     &footprint::PASS,

@@ -46,7 +46,9 @@ pub(super) fn projected(
 ) -> Result<Splat, Missed> {
     let vector = |v: [f32; 3]| Vec3::from_array(v).as_dvec3();
     let (s_world, t_world) = (vector(surfel.s), vector(surfel.t));
-    let (p, s, t) = (camera.rotation * relative, camera.rotation * s_world, camera.rotation * t_world);
+    let p = camera.rotation * relative;
+    let point = design.facing.map(|faced| faced.point(surfel, p.z, camera));
+    let [s, t] = point.map_or_else(|| [s_world, t_world].map(|axis| camera.rotation * axis), |point| point.axes());
     let seen = cap.map(|cap| Seen { p, s, t, cap });
     let depths = seen.as_ref().map_or([p.z - slope(s, t), p.z + slope(s, t)], Seen::depths);
     if depths[1] < camera.near {
@@ -86,12 +88,14 @@ pub(super) fn projected(
         a: projected.a,
         b: projected.b,
         c: projected.c,
-        away: projected.away,
+        // Of a point nothing does.
+        away: projected.away && point.is_none(),
         sides: Sides::None,
         normal,
         filter,
         clip: Clip::NONE,
         curve,
+        point,
         copies: 1,
     })
 }
@@ -115,7 +119,7 @@ pub fn reference_all(scene: &Scene, camera: &Camera, options: &RenderOptions) ->
             let normal = given.unwrap_or(splat.normal);
             Splat {
                 copies,
-                clip: scene.clips.get(index).copied().unwrap_or_default(),
+                clip: scene.clips.get(index).copied().filter(|_| splat.point.is_none()).unwrap_or_default(),
                 sides,
                 normal: if splat.away && sides != Sides::Both && splat.curve.is_none() { -normal } else { normal },
                 curve: splat.curve.map(|curve| Curve { culls: cull_back, ..curve }),

@@ -12,7 +12,7 @@ pub const PASS: Pass = Pass {
             pick(needs.long_words, "words_long.wgsl", "words.wgsl"),
             "records.wgsl",
             pick(needs.clips, "clip.wgsl", "clip_absent.wgsl"),
-            pick(needs.curved, "curved.wgsl", "flat.wgsl"),
+            pick(needs.facing.is_some(), "facing.wgsl", pick(needs.curved, "curved.wgsl", "flat.wgsl")),
             "double.wgsl",
             "rows.wgsl",
             pick(needs.doubled, "center_doubled.wgsl", "center.wgsl"),

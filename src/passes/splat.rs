@@ -3,6 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::curved::Curve;
+use super::facing::Point;
 use crate::plan::Sides;
 use crate::scene::{Camera, Clip};
 
@@ -36,6 +37,8 @@ pub struct Splat {
     pub clip: Clip,
     /// How it curves, in a scene in which some surfel does.
     pub curve: Option<Curve>,
+    /// It is a point that faces the camera.
+    pub point: Option<Point>,
     /// Surfels that it stands for.
     pub copies: u32,
 }

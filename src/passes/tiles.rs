@@ -32,7 +32,7 @@ pub const PASS: Pass = Pass {
             "tile_reach.wgsl",
             pick(needs.low_pass == LowPass::None, "tile_filter_absent.wgsl", "tile_filter.wgsl"),
             pick(needs.clips, "tile_clip.wgsl", "tile_clip_absent.wgsl"),
-            pick(needs.curved, "tile_curved.wgsl", "tile_flat.wgsl"),
+            pick(needs.facing.is_some(), "tile_facing.wgsl", pick(needs.curved, "tile_curved.wgsl", "tile_flat.wgsl")),
             pick(needs.gather, "tile_small.wgsl", "tile_small_absent.wgsl"),
             pick(needs.samples == Samples::ONE, "tile_pixels.wgsl", "tile_samples.wgsl"),
             pick(needs.subgroups, "splat_shared.wgsl", "splat_plain.wgsl"),

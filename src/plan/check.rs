@@ -7,7 +7,7 @@ use super::{RenderOptions, SceneNeeds};
 use crate::error::{Error, Result};
 use crate::gpu::adapter::AdapterDescription;
 use crate::scene::light::MAX_LIGHTS;
-use crate::scene::{Camera, Cull, Map, Shading, options::SHININESS_RANGE};
+use crate::scene::{Camera, Cull, LowPass, Map, Shading, options::SHININESS_RANGE};
 
 fn usage(what: impl Into<String>) -> Result<()> {
     Err(Error::Usage(what.into()))
@@ -24,6 +24,9 @@ pub fn options(options: &RenderOptions, reference: bool) -> Result<()> {
     }
     if options.shading == Shading::Phong && !(least..=most).contains(&options.shininess) {
         return usage(format!("the shininess is {least} to {most}, not {}", options.shininess));
+    }
+    if options.facing.is_some() {
+        facing(options)?;
     }
     if reference {
         return Ok(());
@@ -43,6 +46,24 @@ pub fn options(options: &RenderOptions, reference: bool) -> Result<()> {
         None if options.organisation == Organisation::Tile && options.accumulator != Accumulator::Fixed => {
             usage("the organisation tile needs the accumulator fixed: leave one of them out")
         }
+        _ => Ok(()),
+    }
+}
+
+/// Points that face the camera have no normals, and no plane.
+fn facing(options: &RenderOptions) -> Result<()> {
+    let normal = options.shading != Shading::Unlit || options.maps.has(Map::Normal);
+    match options {
+        _ if normal => usage("points that face the camera have no normals: take --shading unlit and no normal map"),
+        _ if options.low_pass != LowPass::None => {
+            usage("points that face the camera have no low-pass: each shows at its own pixel anyway")
+        }
+        RenderOptions { raster: Some(raster), facing: Some(facing), .. }
+            if facing.shape.rises() && raster.depth != RasterDepth::Exact =>
+        {
+            usage("the rasteriser tests the depths of flat points by itself, of others with raster-depth exact alone")
+        }
+        _ if options.cull == Cull::Back => usage("points that face the camera have no backs: leave --cull back out"),
         _ => Ok(()),
     }
 }
@@ -105,6 +126,9 @@ pub fn scene(facts: &Facts, options: &RenderOptions, reference: bool) -> Result<
             "only surfels whose normals have a side face away, and not all of these do: leave --cull back out, or give \
              normals a side with epsplat surfels",
         );
+    }
+    if options.facing.is_some() && facts.colors == ColorNeed::Textured {
+        return usage("points that face the camera have no plane to paint: leave the texture out");
     }
     if facts.colors == ColorNeed::Textured { textured(options, reference) } else { Ok(()) }
 }

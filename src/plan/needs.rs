@@ -2,7 +2,7 @@
 
 use super::{Accumulator, ColorNeed, Facts, Optimisation, Organisation, Raster, RasterDepth, RenderOptions, tuning};
 use crate::gpu::adapter::AdapterDescription;
-use crate::scene::{Camera, Cull, Epsilon, KernelShape, LowPass, Map, Maps, Projection, Samples, Shading};
+use crate::scene::{Camera, Cull, Epsilon, KernelShape, LowPass, Map, Maps, PointShape, Projection, Samples, Shading};
 
 /// What exists in this render: it chooses the WGSL files that are joined, and so the bindings, buffers and sums.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -58,6 +58,8 @@ pub struct SceneNeeds {
     pub clips: bool,
     /// Disks curve: neither the rasteriser nor the ellipse of `ewa` does that.
     pub curved: bool,
+    /// Surfels are points of this shape that face the camera.
+    pub facing: Option<PointShape>,
     /// Samples of a pixel. The kernels' pixels are samples, but for those that they are resolved to.
     pub samples: Samples,
     /// How pixels are lit.
@@ -77,6 +79,7 @@ fn may_be_small(options: &RenderOptions) -> bool {
 /// Whether surfels that face away are left out.
 pub fn culls_back(facts: &Facts, camera: &Camera, options: &RenderOptions) -> bool {
     match options.cull {
+        _ if options.facing.is_some() => false,
         Cull::None => false,
         Cull::Back => facts.oriented,
         Cull::Auto => {
@@ -103,7 +106,7 @@ impl Sides {
     /// Those in a picture.
     pub fn of(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Self {
         let tells_nearest = options.raster.is_none_or(|raster| raster.depth == RasterDepth::Exact);
-        match facts.oriented && !culls_back(facts, camera, options) {
+        match facts.oriented && options.facing.is_none() && !culls_back(facts, camera, options) {
             true if tells_nearest => Self::Nearest,
             true => Self::Both,
             false => Self::None,
@@ -140,8 +143,9 @@ impl SceneNeeds {
             sides: Sides::of(facts, camera, options),
             own_normals: facts.own_normals && (lit || options.maps.has(Map::Normal)),
             cull_back: culls_back(facts, camera, options),
-            clips: facts.clips,
+            clips: facts.clips && options.facing.is_none(),
             curved: facts.caps && options.draws_caps(),
+            facing: options.facing.map(|facing| facing.shape),
             samples: options.samples,
             shading: options.shading,
             maps: options.maps,
@@ -207,6 +211,7 @@ impl SceneNeeds {
             (self.cull_back, "cull-back"),
             (self.clips, "clips"),
             (self.curved, "curved"),
+            (self.facing.is_some(), "facing"),
             (self.samples != Samples::ONE, "samples"),
             (self.shading == Shading::Lambert, "lambert"),
             (self.shading == Shading::Phong, "phong"),

@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use super::{Accumulator, Optimisation, Raster};
 use crate::error::Error;
-use crate::scene::{Cull, Epsilon, Kernel, Light, LowPass, Map, Maps, Samples, Shading};
+use crate::scene::{Cull, Epsilon, Facing, Kernel, Light, LowPass, Map, Maps, Samples, Shading};
 
 /// Who renders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,6 +71,8 @@ pub struct RenderOptions {
     pub cull: Cull,
     /// Samples of a pixel's colour. Maps are of its centre, however many there are: a depth between two surfaces is of none.
     pub samples: Samples,
+    /// Surfels are points that face the camera; else each lies in its own plane.
+    pub facing: Option<Facing>,
     /// Blending kernel.
     pub kernel: Kernel,
     /// Low-pass filter.
@@ -101,9 +103,9 @@ impl RenderOptions {
         self.has(Optimisation::Copies) && self.organisation != Organisation::Tile
     }
 
-    /// Surfels that curve are drawn so: the rasteriser and the ellipse of `ewa` draw flat disks.
+    /// Surfels that curve are drawn so: the rasteriser and the ellipse of `ewa` draw flat disks, and points have no plane.
     pub fn draws_caps(&self) -> bool {
-        self.low_pass != LowPass::Ewa && self.raster.is_none()
+        self.low_pass != LowPass::Ewa && self.raster.is_none() && self.facing.is_none()
     }
 
     /// Whether a pixel of the image differs from 0 where nothing is.
@@ -123,6 +125,7 @@ impl Default for RenderOptions {
             epsilon: Epsilon::Bounded { radius: 1.0, relative: 0.01 },
             cull: Cull::Auto,
             samples: Samples::ONE,
+            facing: None,
             kernel: Kernel::Ellipse { a: 6.0, n: 3.0, smooth: false },
             low_pass: LowPass::None,
             accumulator: Accumulator::Fixed,

@@ -92,9 +92,9 @@ pub fn build_at_vertices(inputs: Vec<Points>, progress: &dyn Progress) -> Result
 }
 
 /// The scene, and the texture coordinates of its surfels.
-type Built = ((Scene, Preparation), Option<Vec<[f32; 2]>>);
+pub(super) type Built = ((Scene, Preparation), Option<Vec<[f32; 2]>>);
 
-fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Progress) -> Result<Built> {
+pub(super) fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Progress) -> Result<Built> {
     let bounds = Bounds::of(gathered.points.positions.par_iter().map(|position| DVec3::from_array(*position)));
     let (body, _) = body(gathered.points.positions.len(), |index| DVec3::from_array(gathered.points.positions[index]));
     let origin = origin_for(&body);

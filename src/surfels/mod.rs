@@ -9,6 +9,7 @@ mod curvature;
 mod eigen;
 mod ellipse;
 mod estimate;
+mod facing;
 mod forest;
 mod from_points;
 mod gaps;
@@ -26,6 +27,7 @@ pub mod sampling;
 mod sheets;
 pub mod simplify;
 mod sizes;
+mod spacing;
 #[cfg(test)]
 mod tests;
 mod texture;
@@ -35,6 +37,7 @@ use rayon::prelude::*;
 
 pub use self::build::{build, build_at_vertices, build_textured, build_within};
 pub use self::coverage::{Coverage, coverage};
+pub use self::facing::build_facing;
 pub use self::from_points::{FromPoints, Surfels, from_points};
 pub use self::limits::Limits;
 pub use self::orient::Orientation;

@@ -27,6 +27,8 @@ pub struct Preparation {
     pub opposed_normals: u64,
     /// Surfels whose radius was missing, not positive or not finite, and was estimated from neighbours.
     pub estimated_radii: u64,
+    /// Points without a radius that are drawn facing the camera, and the one that all of them took, world units.
+    pub common_radius: Option<(u64, f64)>,
     /// Surfels whose colour was not finite and was replaced by [`DEFAULT_COLOR`](crate::scene::color::DEFAULT_COLOR).
     pub replaced_colors: u64,
     /// Points whose texture coordinates were not finite or too large and became 0; counted where a texture paints them.
@@ -69,6 +71,9 @@ impl Preparation {
             counted(self.replaced_colors, "had a colour that is not finite and became grey"),
             counted(self.replaced_places, "had texture coordinates that are not finite or too large and became 0"),
         ];
+        let common = self.common_radius.map(|(points, radius)| {
+            format!("{points} points have no radius and took one for all, by the mean spacing: {radius:.3e} world units (--point-size)")
+        });
         let strays = counted(self.strays, "stray: they lie far away from all others, outside of the default view");
         let by_neighbours =
             counted(self.limited_by_neighbours, "would have had larger surfels than their neighbours allow");
@@ -81,6 +86,6 @@ impl Preparation {
         let rounding = self.rounding.map(|error| {
             format!("the smallest surfels lie so far from others that their coordinates err by up to {error:.2e} world units")
         });
-        notes.into_iter().chain([strays, by_neighbours, random, limited, rounding]).flatten().collect()
+        notes.into_iter().chain([common, strays, by_neighbours, random, limited, rounding]).flatten().collect()
     }
 }

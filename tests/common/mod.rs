@@ -19,6 +19,7 @@ use epsplat::plan::{
     ACCUMULATORS, Accumulator, AccumulatorRow, BlendFormat, ColorNeed, Facts, Raster, RasterDepth, RenderOptions,
     SceneNeeds, Sides, check,
 };
+use epsplat::scene::facing::POINT_SHAPES;
 use epsplat::scene::{KernelShape, LowPass, Map, Maps, Projection, Samples, Shading};
 
 /// What one unit in a sum of the accumulator `fixed` is of a full weight.
@@ -127,6 +128,24 @@ pub fn all_needs() -> Vec<SceneNeeds> {
             gather: false,
             maps: base.maps.but(&[Map::Index]),
             ..*base
+        });
+    }
+    let planes: Vec<_> =
+        all.iter().copied().filter(|needs| !needs.normal && needs.color != ColorNeed::Textured).collect();
+    for (step, needs) in planes.iter().step_by(3).enumerate() {
+        let shape = POINT_SHAPES[step % POINT_SHAPES.len()].1;
+        if needs.raster.is_some_and(|raster| raster.depth != RasterDepth::Exact && shape.rises()) {
+            continue;
+        }
+        all.push(SceneNeeds {
+            facing: Some(shape),
+            low_pass: LowPass::None,
+            sides: Sides::None,
+            cull: false,
+            cull_back: false,
+            clips: false,
+            curved: false,
+            ..*needs
         });
     }
     all

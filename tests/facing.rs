@@ -1,0 +1,320 @@
+//! Points that face the camera: kernels and twins agree, and shapes divide the image as Schuetz and Wimmer 2015 say.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use common::Random;
+use common::scenes::{sphere, sphere_camera};
+use epsplat::frame::Frame;
+use epsplat::gpu::Sources;
+use epsplat::io::Points;
+use epsplat::plan::{BlendFormat, Organisation, Raster, RasterDepth, RenderOptions, check};
+use epsplat::render::{Backend, render};
+use epsplat::scene::facing::POINT_SHAPES;
+use epsplat::scene::{
+    Camera, Colors, Cull, Epsilon, Facing, Kernel, Lens, LowPass, Map, Maps, PointShape, PointSize, Projection,
+    Samples, Scene, Shading, Surfel, Up,
+};
+use epsplat::surfels::{Limits, build_facing};
+use glam::{DVec2, DVec3, Vec3};
+
+mod common;
+
+/// Points of all sizes on a sphere, thin surfels among them.
+fn points() -> Scene {
+    let mut random = Random(5);
+    let mut scene = sphere(1500, 1.0);
+    for surfel in &mut scene.surfels {
+        let factor = 10f64.powf(random.between(-2.0, 0.6)) as f32;
+        surfel.s = surfel.s.map(|c| c * factor);
+        surfel.t = surfel.t.map(|c| c * factor * 0.3);
+    }
+    scene
+}
+
+fn options(shape: PointShape) -> RenderOptions {
+    RenderOptions {
+        facing: Some(Facing { shape, pixels: [1.0, 12.0] }),
+        shading: Shading::Unlit,
+        maps: Maps::of(&[Map::Depth, Map::Weight, Map::Count]),
+        ..RenderOptions::default()
+    }
+}
+
+/// The first of equal ones wins, or their mean.
+fn nearest(shape: PointShape) -> RenderOptions {
+    RenderOptions { epsilon: Epsilon::Absolute(0.0), kernel: Kernel::Constant, ..options(shape) }
+}
+
+/// Pixels that differ by more than `tolerance` of the larger of the value and a half, of those that are decided.
+fn differing(frame: &Frame, reference: &Frame, tolerance: f32) -> usize {
+    let decision = reference.map(Map::Decision).unwrap();
+    let maps = [Map::Weight, Map::Depth, Map::Count].map(|map| (frame.map(map).unwrap(), reference.map(map).unwrap()));
+    let far = |a: f32, b: f32| a != b && ((a - b).abs() > tolerance * b.abs().max(0.5) || a.is_nan() || b.is_nan());
+    let differs = |pixel: usize| {
+        let colors = frame.color[pixel].into_iter().zip(reference.color[pixel]);
+        let values = maps.iter().map(|(ours, theirs)| (ours[pixel], theirs[pixel]));
+        decision[pixel] >= 1e-4 && colors.chain(values).any(|(a, b)| far(a, b))
+    };
+    (0..decision.len()).filter(|&pixel| differs(pixel)).count()
+}
+
+#[test]
+fn kernels_and_twins_draw_the_same_points() {
+    let Some(gpu) = common::gpu() else { return };
+    let (scene, backend) = (points(), Backend::gpu(gpu));
+    for (projection, (name, shape)) in
+        [Projection::Pinhole, Projection::Orthographic].into_iter().flat_map(|p| POINT_SHAPES.map(|shape| (p, shape)))
+    {
+        let camera = sphere_camera(160, projection);
+        let options = options(shape);
+        let decided = RenderOptions { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
+        let (reference, _) = render(&scene, &camera, &decided, &Backend::Reference, &()).unwrap();
+        let decision = reference.map(Map::Decision).unwrap();
+        let undecided = decision.iter().filter(|decision| **decision < 1e-4).count();
+        let (frame, report) = render(&scene, &camera, &options, &backend, &()).unwrap();
+        assert!(report.needs.contains(&"facing") && !report.needs.contains(&"cull-back"));
+        let wrong = differing(&frame, &reference, 1e-5);
+        assert!(wrong == 0 && undecided < 800, "{wrong} wrong, {undecided} undecided, {projection:?} {name}");
+        for organisation in [Organisation::Scatter, Organisation::Tile] {
+            let other = RenderOptions { organisation, ..options.clone() };
+            let (other, _) = render(&scene, &camera, &other, &backend, &()).unwrap();
+            assert!(common::bits(&other) == common::bits(&frame), "{organisation:?} {name}");
+        }
+        let (shuffled, _) = render(&common::scenes::shuffled(&scene, 3), &camera, &options, &backend, &()).unwrap();
+        assert!(common::bits(&shuffled) == common::bits(&frame), "another order, {name}");
+        // The control: disks in planes of their own are another picture.
+        let (own, _) = render(&scene, &camera, &RenderOptions { facing: None, ..options }, &backend, &()).unwrap();
+        assert!(differing(&own, &reference, 1e-5) > 1000);
+    }
+}
+
+#[test]
+fn broken_points_are_noticed() {
+    let (scene, camera) = (points(), sphere_camera(160, Projection::Pinhole));
+    for (shape, file, from, to) in [
+        (PointShape::Circle, "facing.wgsl", "min(length(beside), max(own.x, own.y))", "length(beside)"),
+        (PointShape::Square, "facing.wgsl", "max(beside.x, beside.y), SQUARE", "length(beside), SQUARE"),
+        (PointShape::Sphere, "facing.wgsl", "rise(rho2) * radius_across", "0.99 * rise(rho2) * radius_across"),
+        (PointShape::Cone, "shape_cone.wgsl", "1.0 - sqrt(rho2)", "1.0 - rho2"),
+        (PointShape::Circle, "axes_facing.wgsl", "LEAST_RADIUS * row", "0.9 * LEAST_RADIUS * row"),
+        (PointShape::Circle, "axes_facing.wgsl", "MOST_RADIUS * row", "1.1 * MOST_RADIUS * row"),
+    ] {
+        let Some(gpu) = common::gpu() else { return };
+        // A point of less than a pixel is that pixel, however much smaller.
+        let least = if from.starts_with("LEAST") { 3.0 } else { 1.0 };
+        let facing = Some(Facing { shape, pixels: [least, 12.0] });
+        let options = RenderOptions { facing, ..options(shape) };
+        let decided = RenderOptions { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
+        let (reference, _) = render(&scene, &camera, &decided, &Backend::Reference, &()).unwrap();
+        let sources = Sources::default().replace(file, from, to).unwrap();
+        let backend = Backend::Gpu { gpu: Box::new(gpu), sources };
+        let (frame, _) = render(&scene, &camera, &options, &backend, &()).unwrap();
+        assert!(differing(&frame, &reference, 1e-5) > 10, "{from}");
+    }
+}
+
+/// Points of one radius and a colour each.
+fn sites(count: usize, radius: f32, depth: impl Fn(&mut Random) -> f64) -> Scene {
+    let mut random = Random(11);
+    let mut colors = Vec::new();
+    let surfels = (0..count).map(|k| {
+        let center = DVec3::new(random.between(-1.0, 1.0), random.between(-1.0, 1.0), depth(&mut random));
+        colors.push([k as f32 / count as f32, 1.0 - k as f32 / count as f32, (k % 7) as f32 / 7.0, 1.0]);
+        Surfel::disk(center.as_vec3(), Vec3::new(0.3, -0.4, 0.5), radius)
+    });
+    let surfels: Vec<Surfel> = surfels.collect();
+    Scene { surfels, colors: Colors::Linear(colors), ..Scene::default() }
+}
+
+/// From the side of z, which is up to the viewer.
+fn frontal(size: u32) -> Camera {
+    let lens = Lens::OrthographicHeight(2.0);
+    Camera::look_at((size, size), lens, DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, None, Up::Y, 1e-3).unwrap()
+}
+
+/// Pixels whose colour is not that of the site of least `cost`, a function of its squared distance and its height, of those that a
+/// footprint holds and where the second is dearer by 1e-5; and how many those are.
+fn wrong_sites(frame: &Frame, scene: &Scene, size: u32, cost: impl Fn(f64, f64) -> f64) -> (usize, usize) {
+    let Colors::Linear(colors) = &scene.colors else { panic!("colours") };
+    let (mut wrong, mut decided) = (0, 0);
+    for (pixel, color) in frame.color.iter().enumerate() {
+        let [x, y] =
+            [pixel as u32 % size, pixel as u32 / size].map(|k| (f64::from(k) + 0.5) / f64::from(size) * 2.0 - 1.0);
+        let at = DVec2::new(x, -y);
+        let of = |(k, surfel): (usize, &Surfel)| {
+            let [x, y, z] = surfel.center.map(f64::from);
+            let (squared, radius) = (at.distance_squared(DVec2::new(x, y)), f64::from(surfel.radius()));
+            (squared <= radius * radius).then(|| (cost(squared, z), k, (squared.sqrt() - radius).abs()))
+        };
+        let mut costs: Vec<_> = scene.surfels.iter().enumerate().filter_map(of).collect();
+        costs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (Some(first), second) = (costs.first(), costs.get(1)) else { continue };
+        if second.is_some_and(|second| second.0 - first.0 < 1e-5) || costs.iter().any(|cost| cost.2 < 1e-5) {
+            continue;
+        }
+        decided += 1;
+        wrong += usize::from(colors[first.1].iter().zip(color).any(|(a, b)| (a - b).abs() > 1e-4));
+    }
+    (wrong, decided)
+}
+
+#[test]
+fn paraboloids_give_the_power_diagram_and_points_of_a_plane_the_voronoi_diagram() {
+    let Some(gpu) = common::gpu() else { return };
+    let (backend, size, radius) = (Backend::gpu(gpu), 192, 0.3f32);
+    let r = f64::from(radius);
+    let wide = |options: RenderOptions| {
+        let facing = options.facing.map(|facing| Facing { pixels: [1.0, 500.0], ..facing });
+        RenderOptions { facing, ..options }
+    };
+    // z_i + d_i^2 / R: the paper's straight borders.
+    let scene = sites(300, radius, |random| random.between(-0.2, 0.2));
+    for backend in [&backend, &Backend::Reference] {
+        let (frame, _) = render(&scene, &frontal(size), &wide(nearest(PointShape::Paraboloid)), backend, &()).unwrap();
+        let (wrong, decided) = wrong_sites(&frame, &scene, size, |squared, z| -z + squared / r);
+        assert!(wrong == 0 && decided > 30_000, "{wrong} of {decided}");
+        // The control: no power diagram is that of the nearest axis.
+        assert!(wrong_sites(&frame, &scene, size, |squared, _| squared).0 > 5000);
+        let plane = sites(300, radius, |_| 0.125);
+        for shape in [PointShape::Sphere, PointShape::Cone, PointShape::Paraboloid] {
+            let (frame, _) = render(&plane, &frontal(size), &wide(nearest(shape)), backend, &()).unwrap();
+            let (wrong, decided) = wrong_sites(&frame, &plane, size, |squared, _| squared);
+            assert!(wrong == 0 && decided > 30_000, "{wrong} of {decided} {shape:?}");
+        }
+        // The control: flat circles of a plane are one surface, which is blended.
+        let (frame, _) = render(&plane, &frontal(size), &wide(nearest(PointShape::Circle)), backend, &()).unwrap();
+        assert!(wrong_sites(&frame, &plane, size, |squared, _| squared).0 > 5000);
+    }
+}
+
+#[test]
+fn a_point_shows_at_its_own_pixel_and_is_no_larger_than_its_limit() {
+    let Some(gpu) = common::gpu() else { return };
+    let (scene, backend) = (points(), Backend::gpu(gpu));
+    for projection in [Projection::Pinhole, Projection::Orthographic] {
+        let camera = sphere_camera(160, projection);
+        let at = |surfel: &Surfel| {
+            let p = camera.rotation * (Vec3::from_array(surfel.center).as_dvec3() - camera.eye);
+            let scale = if projection == Projection::Pinhole { p.z } else { 1.0 };
+            [p.x / scale * camera.fx + camera.cx, p.y / scale * camera.fy + camera.cy]
+        };
+        for (name, shape) in POINT_SHAPES {
+            let facing = |least: f64, most: f64| Some(Facing { shape, pixels: [least, most] });
+            let of = |facing| RenderOptions {
+                epsilon: Epsilon::Absolute(1e3),
+                ..RenderOptions { facing, ..options(shape) }
+            };
+            let count = |facing| {
+                let (frame, _) = render(&scene, &camera, &of(facing), &backend, &()).unwrap();
+                frame.map(Map::Count).unwrap().to_vec()
+            };
+            // Of one pixel: each that does not lie between two.
+            let counts = count(facing(0.0, 1.0));
+            let mut expected = vec![0f32; counts.len()];
+            let mut near = vec![false; counts.len()];
+            for image in scene.surfels.iter().map(at) {
+                let [x, y] = image.map(|x| x.floor() as usize);
+                expected[y * 160 + x] += 1.0;
+                let edge = image.iter().any(|x| (x - x.round()).abs() < 1e-3);
+                for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)].into_iter().filter(|_| edge) {
+                    near[(y + dy) * 160 + x + dx] = true;
+                    near[(y - dy) * 160 + x - dx] = true;
+                }
+            }
+            let wrong = (0..counts.len()).filter(|&k| !near[k] && counts[k] != expected[k]).count();
+            assert!(wrong == 0 && near.iter().filter(|near| **near).count() < 200, "{wrong} {name} {projection:?}");
+            // Of fifty pixels all: an area each.
+            let area = if shape == PointShape::Square { 50.0 * 50.0 } else { std::f32::consts::PI * 25.0 * 25.0 };
+            let alone = sites(1, 1.0, |_| 0.0);
+            let alone = Scene { surfels: vec![Surfel { center: [0.0; 3], ..alone.surfels[0] }], ..alone };
+            let (frame, _) = render(&alone, &camera, &of(facing(50.0, 50.0)), &backend, &()).unwrap();
+            let held = frame.map(Map::Count).unwrap().iter().sum::<f32>();
+            assert!((held - area).abs() < 60.0, "{held} {area} {name}");
+        }
+    }
+}
+
+#[test]
+fn a_shape_that_crosses_the_near_depth_ends_there() {
+    let Some(gpu) = common::gpu() else { return };
+    let backend = Backend::gpu(gpu);
+    let scene = sites(40, 0.5, |random| random.between(-0.3, 0.3));
+    for shape in [PointShape::Sphere, PointShape::Cone, PointShape::Paraboloid] {
+        let facing = Some(Facing { shape, pixels: [1.0, 500.0] });
+        let options = RenderOptions { facing, ..options(shape) };
+        let decided = RenderOptions { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
+        for near in [3.5, 3.9, 4.1] {
+            let camera = Camera { near, ..frontal(128) };
+            let (reference, _) = render(&scene, &camera, &decided, &Backend::Reference, &()).unwrap();
+            let (frame, _) = render(&scene, &camera, &options, &backend, &()).unwrap();
+            assert_eq!(differing(&frame, &reference, 1e-5), 0, "{shape:?} {near}");
+            let least = frame.map(Map::Depth).unwrap().iter().copied().fold(f32::INFINITY, f32::min);
+            assert!(f64::from(least) >= near, "{least} {near}");
+        }
+    }
+}
+
+#[test]
+fn the_rasteriser_draws_the_same_points() {
+    let Some(gpu) = common::gpu() else { return };
+    let (scene, backend) = (points(), Backend::gpu(gpu));
+    let camera = sphere_camera(160, Projection::Pinhole);
+    for (name, shape) in POINT_SHAPES {
+        let options = options(shape);
+        let raster = Some(Raster { format: BlendFormat::Rgba16Float, depth: RasterDepth::Exact });
+        let (frame, _) = render(&scene, &camera, &options, &backend, &()).unwrap();
+        let (rastered, _) = render(&scene, &camera, &RenderOptions { raster, ..options }, &backend, &()).unwrap();
+        let [ours, theirs] = [&frame, &rastered].map(|frame| frame.map(Map::Count).unwrap());
+        assert!(ours == theirs && ours.iter().sum::<f32>() > 1e4, "{name}");
+    }
+}
+
+#[test]
+fn samples_of_a_pixel_see_points_as_large_as_one_does() {
+    let (scene, camera) = (points(), sphere_camera(120, Projection::Pinhole));
+    for text in ["4", "8"] {
+        let samples: Samples = text.parse().unwrap();
+        let options = RenderOptions { maps: Maps::default(), ..options(PointShape::Circle) };
+        let (one, _) = render(&scene, &camera, &options, &Backend::Reference, &()).unwrap();
+        let several = RenderOptions { samples, ..options };
+        let (several, _) = render(&scene, &camera, &several, &Backend::Reference, &()).unwrap();
+        let [one, several] = [one, several].map(|frame| frame.color.iter().map(|color| color[3]).sum::<f32>());
+        assert!((one / several - 1.0).abs() < 0.02, "{one} {several}");
+    }
+}
+
+#[test]
+fn clouds_without_radii_take_one_for_all_whatever_the_order() {
+    let positions: Vec<[f64; 3]> =
+        sphere(20_000, 1.0).surfels.iter().map(|surfel| surfel.center.map(f64::from)).collect();
+    let cloud = |positions: &[[f64; 3]]| Points { positions: positions.to_vec(), ..Points::default() };
+    let built =
+        |positions: &[[f64; 3]], size| build_facing(vec![cloud(positions)], size, &Limits::default(), &()).unwrap();
+    let (scene, preparation) = built(&positions, PointSize::Radius(2.0));
+    let spacing = (4.0 * std::f64::consts::PI / 20_000f64).sqrt();
+    let (lacking, radius) = preparation.common_radius.unwrap();
+    assert!(lacking == 20_000 && (0.8..1.25).contains(&(radius / (2.4 * spacing))), "{radius} {spacing}");
+    assert!(scene.surfels.iter().all(|surfel| (f64::from(surfel.radius()) / radius - 1.0).abs() < 1e-6));
+    assert!(!scene.oriented && preparation.estimated_normals == 0);
+    let reversed: Vec<_> = positions.iter().rev().copied().collect();
+    assert_eq!(built(&reversed, PointSize::Radius(2.0)).1.common_radius, preparation.common_radius);
+    let (scene, preparation) = built(&positions, PointSize::Absolute(0.25));
+    assert!(scene.surfels[7].radius() == 0.25 && preparation.common_radius.is_none());
+    // Radii that are given stay.
+    let given = Points { radii: Some(vec![0.5, f32::NAN, 0.0]), ..cloud(&positions[..3]) };
+    let (scene, preparation) = build_facing(vec![given], PointSize::Radius(1.0), &Limits::default(), &()).unwrap();
+    assert_eq!((scene.surfels[0].radius(), preparation.common_radius.unwrap().0), (0.5, 2));
+}
+
+#[test]
+fn what_points_do_not_have_is_refused() {
+    let facing = options(PointShape::Sphere);
+    let refused = |options: RenderOptions| check::options(&options, false).unwrap_err().to_string();
+    assert!(refused(RenderOptions { shading: Shading::Lambert, ..facing.clone() }).contains("no normals"));
+    assert!(refused(RenderOptions { maps: Maps::of(&[Map::Normal]), ..facing.clone() }).contains("no normals"));
+    assert!(refused(RenderOptions { low_pass: LowPass::Max, ..facing.clone() }).contains("no low-pass"));
+    assert!(refused(RenderOptions { cull: Cull::Back, ..facing.clone() }).contains("no backs"));
+    let raster = Some(Raster { format: BlendFormat::Rgba16Float, depth: RasterDepth::Offset });
+    assert!(refused(RenderOptions { raster, ..facing.clone() }).contains("exact"));
+    assert!(check::options(&facing, false).is_ok());
+}

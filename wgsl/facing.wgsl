@@ -1,0 +1,68 @@
+// Points that face the camera: shapes in a plane parallel to the image, around an axis along the view (Schuetz and Wimmer 2015, section
+// III). Same interface as flat.wgsl.
+// Twin: src/passes/facing.rs.
+
+struct Cap {
+    nothing: u32,
+}
+
+struct Spot {
+    nothing: u32,
+}
+
+struct Bend {
+    nothing: u32,
+}
+
+override SQUARE: bool;
+
+const FACES: bool = true;
+
+fn curve(h: ptr<function, Homography>, index: u32, center: array<Double, 3>, s: vec3<f32>, t: vec3<f32>) -> Cap {
+    return Cap(0u);
+}
+
+fn is_back(h: Homography, cap: Cap) -> bool {
+    return false;
+}
+
+const CAP_ROWS: u32 = 0u;
+
+fn with_cap(record: SplatRecord, cap: Cap) -> SplatRecord {
+    return record;
+}
+
+fn cap_in(record: SplatRecord) -> Cap {
+    return Cap(0u);
+}
+
+// The radius, device units: of a disk parallel to the image, u changes by 1 / (r fx) a pixel, over its depth for a pinhole.
+fn radius_across(splat: Splat) -> f32 {
+    return 1.0 / (splat.a[0] * held.intrinsics.x);
+}
+
+fn met(splat: Splat, filter_: Filter, d: vec2<f32>) -> Fragment {
+    let change = vec2<f32>(splat.a[0], splat.b[1]);
+    let abc = vec3<f32>(change * d + vec2<f32>(splat.a[2], splat.b[2]), splat.c[2]);
+    let flat_ = intersect(abc);
+    let uv = homogeneous(abc);
+    // A point always shows at the pixel that it lies in, as if it were a square of that size.
+    let own = 2.0 * abs(uv.xy / change);
+    let beside = abs(uv.xy) / uv.z;
+    let rho = select(min(length(beside), max(own.x, own.y)), max(beside.x, beside.y), SQUARE);
+    let rho2 = rho * rho;
+    let depth = flat_.depth - rise(rho2) * radius_across(splat);
+    var spot: Spot;
+    return Fragment(rho <= 1.0 && depth >= held.near, depth, rho2, 1.0, spot);
+}
+
+fn is_away(splat: Splat, fragment: Fragment) -> bool {
+    return false;
+}
+
+// A depth in front of every fragment of the splat.
+fn nearest_on(splat: Splat, first: vec2<f32>, last: vec2<f32>) -> f32 {
+    let slack = 4e-6 * abs(splat.c[2]);
+    let ahead = rise(0.0) * radius_across(splat);
+    return nearest_between(splat.c[2] - slack, splat.c[2] + slack) - ahead * (1.0 + 1e-5);
+}

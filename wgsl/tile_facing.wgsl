@@ -1,0 +1,14 @@
+// Points that face the camera in tiles. Same interface as tile_flat.wgsl.
+
+fn handed_cap(own: Cap, from_: u32) -> Cap {
+    return own;
+}
+
+fn handed_bend(own: Bend, from_: u32) -> Bend {
+    return own;
+}
+
+// Whether the splat has no fragment at `pixels`, which lie in its bounds: of a few pixels that is not looked at.
+fn misses(splat: Splat, filter_: Filter, pixels: Rectangle) -> bool {
+    return false;
+}

@@ -105,10 +105,7 @@ const EXCLUSIVE: [(&str, &[&str]); 8] = [
     ("color-textured", &["tiles", "gather", "copies", "raster-exact", "raster-offset", "raster-ray"]),
     ("copies", &["tiles", "gather", "cull", "atomics-u64"]),
     ("color-constant", &["alpha"]),
-    (
-        "facing",
-        &["clips", "color-textured", "cull", "cull-back", "curved", "lambert", "phong", "lowpass-ewa", "lowpass-max"],
-    ),
+    ("facing", &["clips", "color-textured", "cull-back", "curved", "lambert", "phong", "lowpass-ewa", "lowpass-max"]),
     ("facing", &["normal", "normal-map", "own-normals", "sides"]),
     ("sides", &["cull-back", "raster-offset", "raster-ray"]),
     ("raster", &["wide-sums", "atomics-u64", "copies", "cull", "tiles", "gather", "index"]),

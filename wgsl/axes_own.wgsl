@@ -7,6 +7,11 @@ struct Axes {
     t_world: vec3<f32>,
 }
 
+// By how much the surfel is drawn larger than it is, at most, up to this depth.
+fn growth(depth: f32) -> f32 {
+    return 0.0;
+}
+
 fn half_axes(surfel: Surfel, depth: f32) -> Axes {
     // f32 serves for the half-axes of most splats; thin ones come back for more (rows.wgsl).
     let s_world = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * held.unit;

@@ -3,7 +3,7 @@
 // its fragments could be nearest or within epsilon of the nearest, so no image depends on it. The splats of the others are
 // stored one batch after the other, in slots: those that are left out take no room.
 // Host side and twin: src/passes/cull.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xa6d193549f2d2b17
+// All loops end, by 1 of src/gpu/loops.rs: 0x6b1af0861d8b20c6
 
 // A batch's bounding ball: centre and radius, world units relative to the scene's origin.
 @group(0) @binding(23) var<storage, read> balls: array<vec4<f32>>;
@@ -70,6 +70,7 @@ fn ball_of(batch: u32) -> Ball {
     b.center = rotate_plain(relative);
     // Ten roundings of f32 in these lengths.
     b.radius = ball.w * held.unit + 1e-6 * (length(relative) + length(held.eye.xyz));
+    b.radius += growth(b.center.z + b.radius);
     b.nearest = b.center.z - b.radius;
     b.farthest = b.center.z + b.radius;
     return b;

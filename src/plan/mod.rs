@@ -96,8 +96,6 @@ impl Plan {
             && tuning::PIXELS_A_CULLED_SURFEL * facts.surfels > camera.pixels() as u64
             && page >= BATCH.into()
             && !needs.copies
-            // Points may be larger than the balls of their batches.
-            && needs.facing.is_none()
             && needs.raster.is_none();
         let needs = SceneNeeds { gather, cull, ..needs };
         // Tiles that gather store no sums.

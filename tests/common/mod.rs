@@ -141,7 +141,6 @@ pub fn all_needs() -> Vec<SceneNeeds> {
             facing: Some(shape),
             low_pass: LowPass::None,
             sides: Sides::None,
-            cull: false,
             cull_back: false,
             clips: false,
             curved: false,

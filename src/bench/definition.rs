@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::plan::{
     Accumulator, BackendName, BlendFormat, Optimisation, Organisation, Raster, RasterDepth, RenderOptions,
 };
-use crate::scene::{Cull, Epsilon, Kernel, LowPass, Map, Maps, Samples, Shading};
+use crate::scene::{Cull, Epsilon, Facing, Kernel, LowPass, Map, Maps, PointShape, Samples, Shading};
 use crate::surfels::analytic::Shape;
 use crate::truth::DEFAULT_GRID;
 
@@ -183,6 +183,12 @@ pub struct Config {
     /// Samples of a pixel: 1, 4, 8 or 16.
     #[serde(default, deserialize_with = "parsed")]
     pub samples: Option<Samples>,
+    /// Surfels are points of this shape that face the camera: square, circle, sphere, cone or paraboloid; unlit unless the configuration says
+    /// otherwise.
+    #[serde(default, deserialize_with = "parsed")]
+    pub facing: Option<PointShape>,
+    /// Their least and largest diameter, pixels; else the paper's.
+    pub pixels: Option<[f64; 2]>,
     /// The rasteriser's targets.
     #[serde(default, deserialize_with = "parsed")]
     pub blend_format: Option<BlendFormat>,
@@ -263,6 +269,7 @@ impl Config {
             epsilon: self.epsilon.unwrap_or(default.epsilon),
             cull: self.cull.unwrap_or(default.cull),
             samples: self.samples.unwrap_or(default.samples),
+            facing: self.facing.map(|shape| Facing { shape, pixels: self.pixels.unwrap_or(Facing::LIMITS) }),
             kernel: self.kernel.unwrap_or(default.kernel),
             low_pass: self.lowpass.unwrap_or(default.low_pass),
             accumulator: self.accumulator().unwrap_or_default(),
@@ -272,7 +279,7 @@ impl Config {
                 format: self.blend_format.unwrap_or(raster.format),
                 depth: self.raster_depth.unwrap_or(raster.depth),
             }),
-            shading: self.shading.or(shading).unwrap_or(default.shading),
+            shading: self.shading.or(self.facing.map(|_| Shading::Unlit)).or(shading).unwrap_or(default.shading),
             maps: Maps::of(&self.maps),
             ..default
         }

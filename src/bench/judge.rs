@@ -99,7 +99,10 @@ pub(super) fn against_truth(
         let truths: Vec<Truth> = case.staged.cameras.iter().map(cast).collect::<Result<_>>()?;
         for member in members {
             let timed = &timed[member];
-            let maps = timed.options.maps.and(&[Map::Depth, Map::Normal]);
+            // Points that face the camera have no normals.
+            let wanted: &[Map] =
+                if timed.options.facing.is_some() { &[Map::Depth] } else { &[Map::Depth, Map::Normal] };
+            let maps = timed.options.maps.and(wanted);
             let with_maps = RenderOptions { maps, ..timed.options.clone() };
             let mut renderer = Renderer::new(&case.staged.scene, &with_maps, case.backend(timed.config))?;
             for (camera, truth) in case.staged.cameras.iter().zip(&truths) {

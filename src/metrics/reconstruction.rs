@@ -69,19 +69,18 @@ pub struct NormalError {
     pub percentile_99: f64,
 }
 
-/// Measures `frame`, which must have the maps depth and normal.
+/// Measures `frame`, which must have the map of depth; of one without normals these are not measured.
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] if it lacks one, or the truth does, or the two differ in size.
+/// [`Error::Usage`] if it lacks that, or the truth one of both, or the two differ in size.
 pub fn reconstruction(frame: &Frame, truth: &Truth) -> Result<Reconstruction> {
     same_size(frame, &truth.frame)?;
-    let maps = |frame: &Frame, whose: &str| match (frame.map(Map::Depth), frame.normals()) {
-        (Some(depth), Some(normal)) => Ok((depth.to_vec(), normal.to_vec())),
-        _ => Err(Error::Usage(format!("{whose} lacks the maps of depth and normal that its error is measured by"))),
+    let lacks = |what: &str| Error::Usage(format!("{what} that its error is measured by"));
+    let depth = frame.map(Map::Depth).ok_or_else(|| lacks("the render lacks the map of depth"))?;
+    let (Some(true_depth), Some(true_normal)) = (truth.frame.map(Map::Depth), truth.frame.normals()) else {
+        return Err(lacks("the truth lacks the maps of depth and normal"));
     };
-    let (depth, normal) = maps(frame, "the render")?;
-    let (true_depth, true_normal) = maps(&truth.frame, "the truth")?;
 
     let colors = frame.color.par_iter().zip(&truth.frame.color);
     let color = ColorError::of(colors.map(|(a, b)| (premultiplied(a), premultiplied(b))));
@@ -100,7 +99,6 @@ pub fn reconstruction(frame: &Frame, truth: &Truth) -> Result<Reconstruction> {
         let truth = f64::from(true_depth[pixel]);
         (f64::from(depth[pixel]) - truth).abs() / truth
     };
-    let of_normal = |&pixel: &usize| angle(normal[pixel], true_normal[pixel]);
     let either = all.clone().filter(|pixel| covered(pixel) || truly_covered(pixel)).count();
     let common = all.filter(|pixel| covered(pixel) && truly_covered(pixel)).count();
     Ok(Reconstruction {
@@ -109,7 +107,9 @@ pub fn reconstruction(frame: &Frame, truth: &Truth) -> Result<Reconstruction> {
         percentile_99_9: color.percentile_99_9,
         ssim: mean_ssim(&luma(frame), &luma(&truth.frame), frame.width as usize),
         depth_relative: DepthError::of(both.par_iter().map(of_depth).collect()),
-        normal_degrees: NormalError::of(both.par_iter().map(of_normal).collect()),
+        normal_degrees: frame.normals().and_then(|normal| {
+            NormalError::of(both.par_iter().map(|&pixel| angle(normal[pixel], true_normal[pixel])).collect())
+        }),
         hole_rate: share(inside.len() - both.len(), inside.len()),
         leak_rate: share(both.iter().filter(leaks).count(), both.len()),
         silhouette_iou: share(common, either),

@@ -14,7 +14,7 @@ use epsplat::gpu::sources::FILES;
 use epsplat::passes;
 use epsplat::plan::pass::Making;
 use epsplat::plan::{
-    Accumulator, COLOR_CHANNEL, ColorNeed, Features, PixelLayout, RenderOptions, SceneNeeds, color_channels,
+    Accumulator, COLOR_CHANNEL, ColorNeed, Features, PixelLayout, RenderOptions, SceneNeeds, Winner, color_channels,
 };
 use epsplat::scene::{Facing, Kernel, KernelShape, MAPS, Map};
 use naga::AddressSpace;
@@ -46,7 +46,7 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
         let Made { needs, files, kernels, .. } = made;
         let module = &made.reflected().module;
         let features = match needs.raster {
-            None if needs.atomics_u64 => Features::AtomicsU64,
+            None if needs.atomics_u64 || needs.winner == Some(Winner::Once) => Features::AtomicsU64,
             None => needs.accumulator.row().features,
             Some(_) => Features::None,
         };
@@ -62,7 +62,10 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
         }
         let entries: BTreeSet<&str> = module.entry_points.iter().map(|entry| entry.name.as_str()).collect();
         let drawn: &[&str] = if needs.raster.is_some() {
-            &["shape", "shape_with_attributes", "raster_visibility", "raster_attributes"]
+            match needs.winner {
+                None => &["shape", "shape_with_attributes", "raster_visibility", "raster_attributes"],
+                Some(_) => &["shape", "shape_with_attributes", "raster_nearest"],
+            }
         } else {
             &[]
         };
@@ -100,7 +103,7 @@ const ALTERNATIVES: [&[&str]; 6] = [
 ];
 
 /// Needs that no render has together (`src/plan/check.rs`, `src/plan/needs.rs`).
-const EXCLUSIVE: [(&str, &[&str]); 8] = [
+const EXCLUSIVE: [(&str, &[&str]); 10] = [
     ("samples", &["count", "depth", "index", "normal-map", "weight-map"]),
     ("color-textured", &["tiles", "gather", "copies", "raster-exact", "raster-offset", "raster-ray"]),
     ("copies", &["tiles", "gather", "cull", "atomics-u64"]),
@@ -108,6 +111,38 @@ const EXCLUSIVE: [(&str, &[&str]); 8] = [
     ("facing", &["clips", "color-textured", "cull-back", "curved", "lambert", "phong", "lowpass-ewa", "lowpass-max"]),
     ("facing", &["normal", "normal-map", "own-normals", "sides"]),
     ("sides", &["cull-back", "raster-offset", "raster-ray"]),
+    (
+        "nearest",
+        &[
+            "atomics-u64",
+            "color-linear",
+            "color-textured",
+            "copies",
+            "gather",
+            "index",
+            "kernel-ellipse",
+            "kernel-gaussian",
+        ],
+    ),
+    (
+        "nearest",
+        &[
+            "kernel-hat",
+            "lambert",
+            "lowpass-ewa",
+            "lowpass-max",
+            "normal",
+            "normal-map",
+            "own-normals",
+            "phong",
+            "sides",
+            "tiles",
+            "wide-sums",
+            "epsilon-radius",
+            "count",
+            "weight-map",
+        ],
+    ),
     ("raster", &["wide-sums", "atomics-u64", "copies", "cull", "tiles", "gather", "index"]),
 ];
 
@@ -311,6 +346,9 @@ fn absent_parts_have_their_partners_signatures() {
     alike("tile_filter", &["handed_filter", "filter_misses"]);
     alike("tile_small", &["small_list", "small_entry"]);
     alike("kernel_", &["kernel_weight"]);
+    alike("nearest_", &["keep_nearest", "nearest_at"]);
+    alike_in("winner_", vec!["winner_constant.wgsl", "winner_color.wgsl"], &["resolve_color"]);
+    alike_in("winners", vec!["winner_second.wgsl", "nearest_color.wgsl"], &["winning_word"]);
     alike("epsilon", &["radius_of", "deepest_accepted", "farthest_accepted"]);
     let shared = ["homography", "intersect", "ray", "seen_at"];
     let (pinhole, orthographic) =

@@ -2,13 +2,7 @@
 // splat, one workgroup a large splat. Each fragment's terms are quantised before they are added, so the sums do not
 // depend on the order.
 // Twin: src/passes/accumulate.rs.
-// All loops end, by 2, 4 of src/gpu/loops.rs: 0x9ef926c3f0fe2460
-
-@group(0) @binding(7) var<storage, read> visible: array<u32>;
-
-fn front_at(pixel: u32) -> f32 {
-    return bitcast<f32>(kept_depth(visible[pixel]));
-}
+// All loops end, by 2, 4 of src/gpu/loops.rs: 0xf3b64b01bef73c61
 
 // The fragments of one invocation: the splat's pixels from `offset` on in steps of `step`. Each round of the outer loop
 // finds the invocation's next fragment and then adds it if it is accepted, so that the invocations of a subgroup, whose

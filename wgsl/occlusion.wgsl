@@ -1,7 +1,7 @@
 // Stage 2, its end: the farthest of the nearest depths in each tile of pixels, by which stage 3 tells splats that are
 // hidden altogether without a look at their pixels. No image depends on it.
 // Host side: src/passes/visibility.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xaf7294a9f0816c46
+// All loops end, by 1 of src/gpu/loops.rs: 0xc48f03445918a49c
 
 const OCCLUSION_TILE: u32 = 8u;
 
@@ -20,7 +20,7 @@ fn farthest_in(tile: u32, nothing: u32) {
     var farthest = 0u;
     for (var y = first.y; y < end.y; y++) {
         for (var x = first.x; x < end.x; x++) {
-            let front = kept_depth(atomicLoad(&nearest[y * held.width + x]));
+            let front = nearest_at(y * held.width + x);
             farthest = max(farthest, select(front, nothing, front == NOTHING));
         }
     }

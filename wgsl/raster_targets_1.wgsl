@@ -13,3 +13,13 @@ fn targets() -> Targets {
 fn target_at(place: vec2<u32>, index: u32) -> vec4<f32> {
     return textureLoad(sums_0, place, 0);
 }
+
+// With the fragment's own depth.
+struct Seen {
+    @location(0) sums_0: vec4<f32>,
+    @builtin(frag_depth) depth: f32,
+}
+
+fn seen(depth: f32) -> Seen {
+    return Seen(four_terms(0u), depth);
+}

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::plan::{
     Accumulator, BackendName, BlendFormat, Optimisation, Organisation, Raster, RasterDepth, RenderOptions,
 };
-use crate::scene::{Cull, Epsilon, Facing, Kernel, LowPass, Map, Maps, PointShape, Samples, Shading};
+use crate::scene::{Blend, Cull, Epsilon, Facing, Kernel, LowPass, Map, Maps, PointShape, Samples, Shading};
 use crate::surfels::analytic::Shape;
 use crate::truth::DEFAULT_GRID;
 
@@ -189,6 +189,9 @@ pub struct Config {
     pub facing: Option<PointShape>,
     /// Their least and largest diameter, pixels; else the paper's.
     pub pixels: Option<[f64; 2]>,
+    /// Whether fragments are blended; unlit if they are not, unless the configuration says otherwise.
+    #[serde(default, deserialize_with = "parsed")]
+    pub blend: Option<Blend>,
     /// The rasteriser's targets.
     #[serde(default, deserialize_with = "parsed")]
     pub blend_format: Option<BlendFormat>,
@@ -270,6 +273,7 @@ impl Config {
             cull: self.cull.unwrap_or(default.cull),
             samples: self.samples.unwrap_or(default.samples),
             facing: self.facing.map(|shape| Facing { shape, pixels: self.pixels.unwrap_or(Facing::LIMITS) }),
+            blend: self.blend.unwrap_or_default(),
             kernel: self.kernel.unwrap_or(default.kernel),
             low_pass: self.lowpass.unwrap_or(default.low_pass),
             accumulator: self.accumulator().unwrap_or_default(),
@@ -279,10 +283,15 @@ impl Config {
                 format: self.blend_format.unwrap_or(raster.format),
                 depth: self.raster_depth.unwrap_or(raster.depth),
             }),
-            shading: self.shading.or(self.facing.map(|_| Shading::Unlit)).or(shading).unwrap_or(default.shading),
+            shading: self.shading.or(self.unlit().then_some(Shading::Unlit)).or(shading).unwrap_or(default.shading),
             maps: Maps::of(&self.maps),
             ..default
         }
+    }
+
+    /// Whether normals are of no use: of points that face the camera there are none, and of what is not blended none is kept.
+    fn unlit(&self) -> bool {
+        self.facing.is_some() || self.blend == Some(Blend::Nearest)
     }
 
     /// How the compute kernels keep sums; none if others render.

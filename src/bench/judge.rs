@@ -10,7 +10,7 @@ use crate::plan::RenderOptions;
 use crate::progress::Progress;
 use crate::render::{Backend, Renderer, render};
 use crate::report::{ImageSet, Measurement, Numeric};
-use crate::scene::{Map, Maps};
+use crate::scene::{Blend, Map, Maps};
 use crate::truth::Truth;
 
 /// The side that pictures for the page are kept at, pixels.
@@ -99,9 +99,9 @@ pub(super) fn against_truth(
         let truths: Vec<Truth> = case.staged.cameras.iter().map(cast).collect::<Result<_>>()?;
         for member in members {
             let timed = &timed[member];
-            // Points that face the camera have no normals.
-            let wanted: &[Map] =
-                if timed.options.facing.is_some() { &[Map::Depth] } else { &[Map::Depth, Map::Normal] };
+            // Points that face the camera have no normals, and of what is not blended none is kept.
+            let normals = timed.options.facing.is_none() && timed.options.blend == Blend::Weighted;
+            let wanted: &[Map] = if normals { &[Map::Depth, Map::Normal] } else { &[Map::Depth] };
             let maps = timed.options.maps.and(wanted);
             let with_maps = RenderOptions { maps, ..timed.options.clone() };
             let mut renderer = Renderer::new(&case.staged.scene, &with_maps, case.backend(timed.config))?;

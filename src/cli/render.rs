@@ -14,8 +14,8 @@ use epsplat::passes::unseen::{Unseen, is_empty};
 use epsplat::plan::{Accumulator, BackendName, BlendFormat, Organisation, Raster, RasterDepth, RenderOptions, check};
 use epsplat::render::{Backend, Report, render};
 use epsplat::scene::{
-    Camera, Cull, Epsilon, Facing, Kernel, Light, LowPass, MAPS, Map, Maps, PointShape, PointSize, Samples, Scene,
-    Shading,
+    Blend, Camera, Cull, Epsilon, Facing, Kernel, Light, LowPass, MAPS, Map, Maps, PointShape, PointSize, Samples,
+    Scene, Shading,
 };
 use epsplat::surfels::Preparation;
 use epsplat::{Error, Result, surfels};
@@ -105,8 +105,9 @@ pub struct Arguments {
     near: Option<f64>,
     /// Depth tolerance: rel:E (fraction of the depth), abs:E (world units), radius:K (times the surfel's own shorter
     /// half-axis), or radius:K,rel:E (the lesser of the two)
-    #[arg(long, default_value = "radius:1,rel:0.01")]
-    epsilon: Epsilon,
+    /// [default: radius:1,rel:0.01]
+    #[arg(long)]
+    epsilon: Option<Epsilon>,
     /// Draw points as shapes that face the camera, without a look at normals or neighbours: square, circle, sphere, cone or paraboloid
     #[arg(long, value_name = "SHAPE", help_heading = "Points")]
     facing: Option<PointShape>,
@@ -118,8 +119,13 @@ pub struct Arguments {
     #[arg(long, value_name = "MIN,MAX", default_value = "1,50", value_parser = parse_pixels, requires = "facing", help_heading = "Points")]
     pixels: [f64; 2],
     /// Blending kernel over the disk: gaussian[:SIGMA], ellipse:A,N[,smooth] (exp(-A rho^N)), hat or constant
-    #[arg(long, default_value = "ellipse:6,3")]
-    kernel: Kernel,
+    /// [default: ellipse:6,3]
+    #[arg(long)]
+    kernel: Option<Kernel>,
+    /// What a pixel shows: weighted (the mean of the fragments within epsilon of the nearest) or nearest (the colour of the nearest
+    /// alone, as with a depth test: faster, unlit) [default: weighted]
+    #[arg(long, value_name = "HOW")]
+    blend: Option<Blend>,
     /// Filter for splats near a pixel in size or below
     #[arg(long, value_enum, default_value_t = LowPassName::None)]
     lowpass: LowPassName,
@@ -145,7 +151,7 @@ pub struct Arguments {
     /// camera's axis) or ray (along the view ray) [default: exact]
     #[arg(long, value_name = "HOW")]
     raster_depth: Option<RasterDepth>,
-    /// Shading of the blended colour [default: lambert; unlit with --facing]
+    /// Shading of the blended colour [default: lambert; unlit with --facing and --blend nearest]
     #[arg(long, value_enum)]
     shading: Option<ShadingName>,
     /// Exponent of the highlights of --shading phong, 1 to 1000: the higher, the smaller they are [default: 32]
@@ -210,9 +216,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 }
 
 impl Arguments {
-    /// Points that face the camera have no normals.
+    /// Points that face the camera have no normals, and of what is not blended none is kept.
     fn shading(&self) -> ShadingName {
-        let unless_chosen = if self.facing.is_some() { ShadingName::Unlit } else { ShadingName::Lambert };
+        let unlit = self.facing.is_some() || self.blend == Some(Blend::Nearest);
+        let unless_chosen = if unlit { ShadingName::Unlit } else { ShadingName::Lambert };
         self.shading.unwrap_or(unless_chosen)
     }
 
@@ -289,10 +296,15 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
         return Err(Error::Usage("a PNG holds no maps: give --aov with an .exr output".into()));
     }
     check_chosen(arguments)?;
+    if arguments.blend == Some(Blend::Nearest) && (arguments.epsilon.is_some() || arguments.kernel.is_some()) {
+        let what = "--blend nearest has no tolerance and no weights: leave --epsilon and --kernel out";
+        return Err(Error::Usage(what.into()));
+    }
     let default = RenderOptions::default();
     let options = RenderOptions {
-        epsilon: arguments.epsilon,
-        kernel: arguments.kernel,
+        epsilon: arguments.epsilon.unwrap_or(default.epsilon),
+        kernel: arguments.kernel.unwrap_or(default.kernel),
+        blend: arguments.blend.unwrap_or_default(),
         cull: arguments.cull,
         samples: arguments.samples,
         facing: facing(arguments),

@@ -36,7 +36,7 @@ use super::visibility::Nearest;
 use crate::gpu::layout::TILE;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
-use crate::plan::{Accumulator, Plan, RenderOptions, SceneNeeds};
+use crate::plan::{Accumulator, Plan, RenderOptions, SceneNeeds, Winner};
 use crate::scene::options::LEAST_FILTERED_WEIGHT;
 use crate::scene::{Camera, Colors, Map, Scene};
 
@@ -207,7 +207,7 @@ pub fn reference<'a>(
 
 /// The relative distance to the nearest decision that could turn the fragment's fate: it is in or out by rim, near
 /// depth and epsilon together, so a fragment that fails one of them clearly is not undecided by the others.
-fn decision(at: Intersection, behind: f64, near: f64) -> f64 {
+pub(super) fn decision(at: Intersection, behind: f64, near: f64) -> f64 {
     let before = if behind.is_finite() { behind / at.depth - 1.0 } else { f64::INFINITY };
     let margins = [1.0 - at.rho2.sqrt(), at.inside, at.depth / near - 1.0, before];
     if margins.iter().any(|m| *m < -NEARBY) {
@@ -220,8 +220,14 @@ fn decision(at: Intersection, behind: f64, near: f64) -> f64 {
 /// The pass's kernels, files and constants.
 pub const PASS: Pass = Pass {
     name: "accumulate",
-    files: |needs| if needs.raster.is_none() { vec!["accumulate.wgsl"] } else { Vec::new() },
-    kernels: |needs| match needs.raster.is_none() && !needs.gather {
+    files: |needs| {
+        if needs.sums_in_storage() || needs.winner == Some(Winner::Second) {
+            vec!["accumulate.wgsl"]
+        } else {
+            Vec::new()
+        }
+    },
+    kernels: |needs| match (needs.sums_in_storage() && !needs.gather) || needs.winner == Some(Winner::Second) {
         true => vec![ACCUMULATE, ACCUMULATE_LARGE],
         false => Vec::new(),
     },
@@ -231,7 +237,7 @@ pub const PASS: Pass = Pass {
 /// The files that keep the sums of a render's first module.
 pub const SUMS: Pass = Pass {
     name: "sums",
-    files: |needs| if needs.raster.is_none() { files(needs) } else { Vec::new() },
+    files: |needs| if needs.sums_in_storage() { files(needs) } else { Vec::new() },
     kernels: |_| Vec::new(),
     constants: |_| Vec::new(),
 };

@@ -2,7 +2,7 @@
 //! terms to a pixel's sums and one that resolves them, or an absent one.
 
 use crate::plan::pass::Pass;
-use crate::plan::{ColorNeed, PixelLayout, RasterDepth, Sides, SurfelLayout, color_channels};
+use crate::plan::{ColorNeed, PixelLayout, RasterDepth, Sides, SurfelLayout, Winner, color_channels};
 use crate::scene::Map;
 
 /// The files and constants.
@@ -15,13 +15,19 @@ pub const PASS: Pass = Pass {
             pick(needs.normal, pick(needs.curved, "normal_curved.wgsl", "normal_flat.wgsl"), "normal_absent.wgsl"),
             pick(needs.own_normals, "normal_own.wgsl", "normal_plane.wgsl"),
             pick(needs.maps.has(Map::Count), "count.wgsl", "count_absent.wgsl"),
-            pick(needs.maps.has(Map::Depth), pick(whole, "depth_whole.wgsl", "depth.wgsl"), "depth_absent.wgsl"),
+            match needs.maps.has(Map::Depth) {
+                false => "depth_absent.wgsl",
+                true if needs.winner.is_some() => "depth_nearest.wgsl",
+                true => pick(whole, "depth_whole.wgsl", "depth.wgsl"),
+            },
             pick(needs.color == ColorNeed::Textured, "texture.wgsl", "texture_absent.wgsl"),
         ];
         files.extend(needs.normal.then_some("normal.wgsl"));
         files.push("attributes.wgsl");
         files.extend(match needs.color {
-            ColorNeed::Constant => &["color_constant.wgsl"][..],
+            // Of one fragment nothing is summed.
+            _ if needs.winner.is_some_and(|winner| winner != Winner::Rasterised) => &[][..],
+            ColorNeed::Constant => &["color_constant.wgsl"],
             ColorNeed::Srgb8 => &["color_srgb8.wgsl", "srgb.wgsl", "color_sums.wgsl"],
             ColorNeed::Linear => &["color_linear.wgsl", "color_sums.wgsl"],
             ColorNeed::Textured => &["color_textured.wgsl", "srgb.wgsl", "color_sums.wgsl"],

@@ -5,30 +5,37 @@ use glam::DVec2;
 use super::lowpass::filtered;
 use super::splat::{Intersection, Splat};
 use super::{curved, facing};
-use crate::plan::Sides;
 use crate::plan::pass::Pass;
+use crate::plan::{Sides, Winner};
 use crate::scene::{Camera, Kernel, KernelShape, LowPass, Projection};
 
 /// The files of the footprint and its weight; kernels of other passes evaluate them.
 pub const PASS: Pass = Pass {
     name: "footprint",
     files: |needs| {
-        vec![
+        let mut files = vec![
             match needs.projection {
                 Projection::Pinhole => "camera_pinhole.wgsl",
                 Projection::Orthographic => "camera_orthographic.wgsl",
             },
             "footprint.wgsl",
             "side.wgsl",
-            "blend.wgsl",
-            if needs.epsilon_radius { "epsilon_radius.wgsl" } else { "epsilon.wgsl" },
-            match needs.kernel {
+            match needs.winner {
+                Some(_) => "epsilon_none.wgsl",
+                None if needs.epsilon_radius => "epsilon_radius.wgsl",
+                None => "epsilon.wgsl",
+            },
+        ];
+        if matches!(needs.winner, None | Some(Winner::Rasterised)) {
+            files.push("blend.wgsl");
+            files.push(match needs.kernel {
                 KernelShape::Gaussian => "kernel_gaussian.wgsl",
                 KernelShape::Ellipse => "kernel_ellipse.wgsl",
                 KernelShape::Hat => "kernel_hat.wgsl",
                 KernelShape::Constant => "kernel_constant.wgsl",
-            },
-        ]
+            });
+        }
+        files
     },
     kernels: |_| Vec::new(),
     constants: |making| {

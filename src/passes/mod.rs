@@ -9,6 +9,7 @@
 //! | [`project`] | surfels | [`splat::Splat`] each |
 //! | [`visibility`] | splats | the nearest depth of each pixel |
 //! | [`accumulate`] | splats, nearest depths | [`accumulate::PixelSums`] |
+//! | [`winner`] | splats | the same of the nearest fragment alone |
 //! | [`tiles`] | large splats, or all | the same two, or the next |
 //! | [`covered`] | nearest depths | the tiles that have anything |
 //! | [`resolve`] | sums | [`Frame`] |
@@ -39,6 +40,7 @@ pub mod tiles;
 pub mod unseen;
 pub mod upload;
 pub mod visibility;
+pub mod winner;
 
 use crate::frame::Frame;
 use crate::plan::pass::{Making, Module, Pass};
@@ -108,7 +110,7 @@ pub fn finish(frame: &mut Frame, needs: &SceneNeeds, provenance: &Provenance, or
 }
 
 /// The passes whose files every module has.
-const PASSES: [&Pass; 12] = [
+const PASSES: [&Pass; 13] = [
     &shared::PASS,
     &project::PASS,
     &facing::PASS,
@@ -116,6 +118,7 @@ const PASSES: [&Pass; 12] = [
     &lowpass::PASS,
     &footprint::PASS,
     &visibility::PASS,
+    &winner::PASS,
     &accumulate::PASS,
     &attributes::PASS,
     &covered::PASS,

@@ -31,9 +31,11 @@ pub const PASS: Pass = Pass {
             "raster.wgsl",
             "accumulator_raster.wgsl",
             targets_file(needs),
-            match raster.depth {
-                RasterDepth::Exact => "raster_exact.wgsl",
-                RasterDepth::Offset | RasterDepth::Ray => "raster_offset.wgsl",
+            match (raster.depth, needs.winner) {
+                (RasterDepth::Exact, None) => "raster_exact.wgsl",
+                (RasterDepth::Exact, Some(_)) => "raster_nearest_exact.wgsl",
+                (RasterDepth::Offset | RasterDepth::Ray, None) => "raster_offset.wgsl",
+                (RasterDepth::Offset | RasterDepth::Ray, Some(_)) => "raster_nearest_offset.wgsl",
             },
         ],
     },
@@ -42,7 +44,7 @@ pub const PASS: Pass = Pass {
         None => Vec::new(),
         Some(raster) => vec![
             ("VERTICES", vertices(making.needs).into()),
-            ("BLEND_SCALE", blend_scale(raster.format)),
+            ("BLEND_SCALE", if making.needs.winner.is_some() { 1.0 } else { blend_scale(raster.format) }),
             // The visibility pass's pipeline says otherwise.
             ("MOVED", 0.0),
             ("ALONG_RAY", u32::from(raster.depth == RasterDepth::Ray).into()),
@@ -85,8 +87,9 @@ pub fn texture_format(format: BlendFormat) -> wgpu::TextureFormat {
 /// The format of nearest depths.
 pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-/// The pipelines of the two passes.
-pub fn draws(raster: Raster, pixel: PixelLayout) -> Vec<Draw> {
+/// The pipelines of the two passes, or of the one in which the nearest fragment's terms replace those of others.
+pub fn draws(raster: Raster, needs: &SceneNeeds) -> Vec<Draw> {
+    let pixel = PixelLayout::of(needs);
     let depth = |compare, write| {
         Some(wgpu::DepthStencilState {
             format: DEPTH_FORMAT,
@@ -121,6 +124,17 @@ pub fn draws(raster: Raster, pixel: PixelLayout) -> Vec<Draw> {
         depth,
         constant: Some(("MOVED", u32::from(moved).into())),
     };
+    if needs.winner.is_some() {
+        let replaced = wgpu::ColorTargetState { blend: None, ..target };
+        let entries = ("shape_with_attributes", "raster_nearest");
+        return vec![draw(
+            "nearest",
+            entries,
+            vec![replaced; pixel.targets() as usize],
+            depth(near_first, true),
+            false,
+        )];
+    }
     vec![
         draw("visibility", ("shape", "raster_visibility"), vec![], depth(near_first, true), true),
         draw(

@@ -6,9 +6,9 @@
 //! pixels lets the next pass leave out splats that are hidden altogether. Where surfels have sides and both may be seen, the last bit of
 //! a depth says on which it is (side.wgsl).
 
-use super::covered;
 use super::footprint::footprint;
 use super::splat::Splat;
+use super::{covered, winner};
 use crate::gpu::layout::TILE;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
@@ -67,7 +67,9 @@ pub fn reference<'a>(
 /// The pass's kernels, files and constants.
 pub const PASS: Pass = Pass {
     name: "visibility",
-    files: |needs| if needs.raster.is_none() { vec!["visibility.wgsl", "occlusion.wgsl"] } else { Vec::new() },
+    files: |needs| {
+        if needs.raster.is_none() { vec!["visibility.wgsl", "occlusion.wgsl", "front.wgsl"] } else { Vec::new() }
+    },
     kernels: |needs| match (needs.raster, needs.cull) {
         (None, false) => vec![VISIBILITY, VISIBILITY_LARGE, OCCLUDE],
         (None, true) => vec![VISIBILITY, VISIBILITY_LARGE, OCCLUDE, OCCLUDE_OPEN],
@@ -92,7 +94,9 @@ pub fn steps(plan: &Plan, band: usize, part: Part) -> Stage {
     match part {
         Part::Far => stage,
         Part::All | Part::Near => {
-            stage.after(vec![Clear::of("nearest", 0, plan.bands[band].pixels)]).as_twin(Twin::Visibility)
+            let nearest = Clear::of("nearest", 0, plan.bands[band].pixels);
+            let clears = [nearest].into_iter().chain(winner::clears(plan, band));
+            stage.after(clears.collect()).as_twin(Twin::Visibility)
         }
     }
 }

@@ -7,7 +7,7 @@ use super::{RenderOptions, SceneNeeds};
 use crate::error::{Error, Result};
 use crate::gpu::adapter::AdapterDescription;
 use crate::scene::light::MAX_LIGHTS;
-use crate::scene::{Camera, Cull, LowPass, Map, Shading, options::SHININESS_RANGE};
+use crate::scene::{Blend, Camera, Cull, LowPass, Map, Shading, options::SHININESS_RANGE};
 
 fn usage(what: impl Into<String>) -> Result<()> {
     Err(Error::Usage(what.into()))
@@ -27,6 +27,9 @@ pub fn options(options: &RenderOptions, reference: bool) -> Result<()> {
     }
     if options.facing.is_some() {
         facing(options)?;
+    }
+    if options.blend == Blend::Nearest {
+        nearest(options, reference)?;
     }
     if reference {
         return Ok(());
@@ -64,6 +67,32 @@ fn facing(options: &RenderOptions) -> Result<()> {
             usage("the rasteriser tests the depths of flat points by itself, of others with raster-depth exact alone")
         }
         _ if options.cull == Cull::Back => usage("points that face the camera have no backs: leave --cull back out"),
+        _ => Ok(()),
+    }
+}
+
+/// Of the nearest fragment alone there is a colour and a depth.
+fn nearest(options: &RenderOptions, reference: bool) -> Result<()> {
+    // Of the reference a fragment weighs 1 and counts as one.
+    let others = if reference { &[Map::Normal][..] } else { &[Map::Normal, Map::Weight, Map::Count, Map::Index] };
+    let map = others.iter().map(|map| map.row()).find(|row| options.maps.has(row.map));
+    let exact = options.raster.is_none_or(|raster| raster.depth == RasterDepth::Exact);
+    match (options.shading, map) {
+        (Shading::Lambert | Shading::Phong, _) => usage(
+            "of the nearest fragment alone the colour is kept and no normal: take --shading unlit with --blend nearest",
+        ),
+        (_, Some(row)) => usage(format!("--blend nearest keeps colour and depth: leave the {} map out", row.name)),
+        _ if options.low_pass != LowPass::None => usage("a low-pass blends: leave it out with --blend nearest"),
+        _ if reference => Ok(()),
+        _ if options.accumulator != Accumulator::Fixed => {
+            usage("--blend nearest sums nothing: leave the accumulator out")
+        }
+        _ if options.organisation == Organisation::Tile => {
+            usage("the organisation tile sums: leave it out with --blend nearest")
+        }
+        _ if options.maps.has(Map::Depth) && !exact => {
+            usage("the rasteriser tells depths with raster-depth exact alone: take that, or leave the depth map out")
+        }
         _ => Ok(()),
     }
 }
@@ -129,6 +158,15 @@ pub fn scene(facts: &Facts, options: &RenderOptions, reference: bool) -> Result<
     }
     if options.facing.is_some() && facts.colors == ColorNeed::Textured {
         return usage("points that face the camera have no plane to paint: leave the texture out");
+    }
+    match facts.colors {
+        ColorNeed::Linear | ColorNeed::Textured if options.blend == Blend::Nearest => {
+            return usage(
+                "--blend nearest keeps colours of 8 bits, and these are finer: take --epsilon abs:0 --kernel constant, which \
+                 averages what lies at one depth",
+            );
+        }
+        _ => {}
     }
     if facts.colors == ColorNeed::Textured { textured(options, reference) } else { Ok(()) }
 }

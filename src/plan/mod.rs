@@ -21,7 +21,7 @@ pub use accumulator::{ACCUMULATORS, Accumulator, AccumulatorRow, Features};
 pub use cuts::{Band, bands, page_surfels};
 pub use facts::{ColorNeed, Facts};
 pub use known::Known;
-pub use needs::{SMALL_WEIGHT, SceneNeeds, Sides, culls_back};
+pub use needs::{SMALL_WEIGHT, SceneNeeds, Sides, Winner, culls_back};
 pub use optimisation::Optimisation;
 pub use options::{BackendName, Organisation, RenderOptions};
 pub use pixel::{COLOR_CHANNEL, PixelLayout, color_channels};

@@ -2,7 +2,9 @@
 
 use super::{Accumulator, ColorNeed, Facts, Optimisation, Organisation, Raster, RasterDepth, RenderOptions, tuning};
 use crate::gpu::adapter::AdapterDescription;
-use crate::scene::{Camera, Cull, Epsilon, KernelShape, LowPass, Map, Maps, PointShape, Projection, Samples, Shading};
+use crate::scene::{
+    Blend, Camera, Cull, Epsilon, KernelShape, LowPass, Map, Maps, PointShape, Projection, Samples, Shading,
+};
 
 /// What exists in this render: it chooses the WGSL files that are joined, and so the bindings, buffers and sums.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -34,6 +36,8 @@ pub struct SceneNeeds {
     pub subgroups: bool,
     /// Sums are the rasteriser's.
     pub raster: Option<Raster>,
+    /// The nearest fragment alone shows, and how it is found.
+    pub winner: Option<Winner>,
     /// It draws a triangle a splat instead of a quad ([`tuning::PIXELS_A_TRIANGLE`]).
     pub triangles: bool,
     /// The kernel's formula.
@@ -66,6 +70,19 @@ pub struct SceneNeeds {
     pub shading: Shading,
     /// Maps that are written; depths are accumulated for theirs, and fragments counted.
     pub maps: Maps,
+}
+
+/// How the fragment is found that alone shows at a pixel ([`winner`](crate::passes::winner)).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Winner {
+    /// All surfels have one colour: the nearest depth says all.
+    Depth,
+    /// Depth and colour in one number, by 64-bit atomics.
+    Once,
+    /// The nearest depth first, and its colour in a second pass.
+    Second,
+    /// By the rasteriser's depth test.
+    Rasterised,
 }
 
 /// Terms of at least this weight keep 23 of the 32 bits that `fixed` has, as f32 would.
@@ -106,7 +123,8 @@ impl Sides {
     /// Those in a picture.
     pub fn of(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Self {
         let tells_nearest = options.raster.is_none_or(|raster| raster.depth == RasterDepth::Exact);
-        match facts.oriented && options.facing.is_none() && !culls_back(facts, camera, options) {
+        let both = options.facing.is_none() && !culls_back(facts, camera, options);
+        match facts.oriented && both && options.blend == Blend::Weighted {
             true if tells_nearest => Self::Nearest,
             true => Self::Both,
             false => Self::None,
@@ -119,7 +137,9 @@ impl SceneNeeds {
     pub fn of_picture(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Self {
         let (low, high) = facts.color;
         let lit = options.shading != Shading::Unlit;
-        let fixed = options.accumulator == Accumulator::Fixed && options.raster.is_none();
+        let blends = options.blend == Blend::Weighted;
+        let fixed = options.accumulator == Accumulator::Fixed && options.raster.is_none() && blends;
+        let unblended = if options.raster.is_some() { Winner::Rasterised } else { Winner::Second };
         Self {
             projection: camera.projection,
             accumulator: options.accumulator,
@@ -133,10 +153,11 @@ impl SceneNeeds {
             gather: false,
             subgroups: false,
             raster: options.raster,
+            winner: (!blends).then_some(unblended),
             triangles: options.raster.is_some() && tuning::PIXELS_A_TRIANGLE * facts.surfels > camera.pixels() as u64,
-            kernel: options.kernel.shape(),
+            kernel: if blends { options.kernel.shape() } else { KernelShape::Constant },
             low_pass: options.low_pass,
-            epsilon_radius: matches!(options.epsilon, Epsilon::Radius(_) | Epsilon::Bounded { .. }),
+            epsilon_radius: blends && matches!(options.epsilon, Epsilon::Radius(_) | Epsilon::Bounded { .. }),
             color: facts.colors,
             alpha: low[3] != high[3],
             normal: lit || options.maps.has(Map::Normal),
@@ -155,18 +176,31 @@ impl SceneNeeds {
     /// What a render on `adapter` needs, before the image is cut into bands.
     pub fn of(facts: &Facts, adapter: &AdapterDescription, camera: &Camera, options: &RenderOptions) -> Self {
         let picture = Self::of_picture(facts, camera, options);
-        let fixed = picture.accumulator == Accumulator::Fixed && picture.raster.is_none();
+        let blends = picture.winner.is_none();
+        let fixed = picture.accumulator == Accumulator::Fixed && picture.raster.is_none() && blends;
+        let long_atomics = adapter.atomics_u64 && options.has(Optimisation::Pairs);
+        let winner = picture.winner.map(|winner| match winner {
+            Winner::Second if picture.color == ColorNeed::Constant => Winner::Depth,
+            Winner::Second if long_atomics => Winner::Once,
+            other => other,
+        });
         let copies = facts.copies && options.draws_copies_once() && fixed && picture.color != ColorNeed::Textured;
         // Of copies tiles would make long lists.
         let tiles = picture.tiles && !copies;
         Self {
             copies,
             tiles,
-            atomics_u64: adapter.atomics_u64 && options.has(Optimisation::Pairs) && fixed && !copies,
+            winner,
+            atomics_u64: long_atomics && fixed && !copies,
             long_words: adapter.integers_u64 && options.has(Optimisation::LongWords),
             subgroups: tiles && tuning::shares(adapter) && options.has(Optimisation::Sharing),
             ..picture
         }
+    }
+
+    /// Weighted sums are kept, in storage or in a tile's registers.
+    pub fn sums_in_storage(&self) -> bool {
+        self.raster.is_none() && self.winner.is_none()
     }
 
     /// The needs by name, for people and JSON.
@@ -212,6 +246,7 @@ impl SceneNeeds {
             (self.clips, "clips"),
             (self.curved, "curved"),
             (self.facing.is_some(), "facing"),
+            (self.winner.is_some(), "nearest"),
             (self.samples != Samples::ONE, "samples"),
             (self.shading == Shading::Lambert, "lambert"),
             (self.shading == Shading::Phong, "phong"),

@@ -15,7 +15,8 @@ pub enum Optimisation {
     Hiding,
     /// Surfels that are the same are drawn once (`scene/copies.rs`).
     Copies,
-    /// Two sums share a 64-bit word, which one atomic addition serves (`wgsl/accumulator_fixed_pairs.wgsl`).
+    /// Two sums share a 64-bit word, which one atomic addition serves (`wgsl/accumulator_fixed_pairs.wgsl`), or the nearest depth and its
+    /// colour do (`wgsl/nearest_color.wgsl`).
     Pairs,
     /// Records are read and written 64 bits at a time (`wgsl/words_long.wgsl`).
     LongWords,

@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use super::{Accumulator, Optimisation, Raster};
 use crate::error::Error;
-use crate::scene::{Cull, Epsilon, Facing, Kernel, Light, LowPass, Map, Maps, Samples, Shading};
+use crate::scene::{Blend, Cull, Epsilon, Facing, Kernel, Light, LowPass, Map, Maps, Samples, Shading};
 
 /// Who renders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,6 +73,8 @@ pub struct RenderOptions {
     pub samples: Samples,
     /// Surfels are points that face the camera; else each lies in its own plane.
     pub facing: Option<Facing>,
+    /// Whether fragments are blended.
+    pub blend: Blend,
     /// Blending kernel.
     pub kernel: Kernel,
     /// Low-pass filter.
@@ -126,6 +128,7 @@ impl Default for RenderOptions {
             cull: Cull::Auto,
             samples: Samples::ONE,
             facing: None,
+            blend: Blend::Weighted,
             kernel: Kernel::Ellipse { a: 6.0, n: 3.0, smooth: false },
             low_pass: LowPass::None,
             accumulator: Accumulator::Fixed,

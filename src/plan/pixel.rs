@@ -1,6 +1,6 @@
 //! The room that a pixel takes.
 
-use super::{ColorNeed, SceneNeeds};
+use super::{ColorNeed, SceneNeeds, Winner};
 use crate::scene::{MAPS, Map};
 
 /// Where a pixel's values lie, in the sums (by channel) and in the image (by word). What is not needed takes no room.
@@ -54,9 +54,15 @@ impl PixelLayout {
         }
     }
 
-    /// u32 words of a pixel's sums in storage; the rasteriser's are in textures.
+    /// u32 words of a pixel's sums in storage, or of its nearest colour; the rasteriser's are in textures.
     pub fn sum_words(&self, needs: &SceneNeeds) -> u32 {
-        if needs.raster.is_some() { 0 } else { self.channels * needs.accumulator.row().words }
+        match needs.winner {
+            _ if needs.raster.is_some() => 0,
+            None => self.channels * needs.accumulator.row().words,
+            Some(Winner::Once) => 2,
+            Some(Winner::Second) => 1,
+            Some(Winner::Depth | Winner::Rasterised) => 0,
+        }
     }
 
     /// Blended targets of four channels that a pixel's sums need.

@@ -54,7 +54,7 @@ impl Kernels {
             return Ok(program);
         }
         let draws = match self.made.0.raster {
-            Some(raster) if index == 0 => raster::draws(raster, crate::plan::PixelLayout::of(&self.made.0)),
+            Some(raster) if index == 0 => raster::draws(raster, &self.made.0),
             _ => Vec::new(),
         };
         let stages: Vec<_> = module.kernels.iter().map(|kernel| kernel.name).collect();

@@ -12,11 +12,11 @@ use super::sequence;
 use crate::frame::Frame;
 use crate::passes::order::order;
 use crate::passes::splat::Splat;
-use crate::passes::{MAP_PASSES, Strip, accumulate, project, resolve, visibility};
+use crate::passes::{MAP_PASSES, Strip, accumulate, project, resolve, visibility, winner};
 use crate::plan::steps::{Step, Twin};
 use crate::plan::{Facts, Plan, RenderOptions, SceneNeeds};
 use crate::progress::Progress;
-use crate::scene::{Camera, Samples, Scene};
+use crate::scene::{Blend, Camera, Samples, Scene};
 
 /// Renders `scene` by `camera`, whose pixels are the samples.
 pub(super) fn frame(
@@ -86,6 +86,9 @@ fn strip_by(strip: &Strip<'_>, twins: &[Twin], spent: &Spent) -> Frame {
         spent.timed(twin.pass(), rayon::current_num_threads(), || match twin {
             Twin::Project => {}
             Twin::Visibility => nearest = visibility::reference(splats(), camera, options.low_pass, first_row, rows),
+            Twin::Accumulate if options.blend == Blend::Nearest => {
+                sums = winner::reference(splats(), scene, camera, options, (first_row, rows));
+            }
             Twin::Accumulate => {
                 sums = accumulate::reference(splats(), scene, camera, options, first_row, &nearest);
             }

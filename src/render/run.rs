@@ -205,11 +205,15 @@ impl<'a> Run<'a> {
         let exact = raster.depth == RasterDepth::Exact;
         let nothing = if exact { 1.0 } else { 0.0 };
         let clear = wgpu::Operations { load: wgpu::LoadOp::Clear(nothing), store: wgpu::StoreOp::Store };
-        self.timing.draw(gpu, "visibility", &[], Some(attachment(Some(clear))), |pass| draw(pass, "visibility"))?;
         let ops = wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: wgpu::StoreOp::Store };
         let attach =
             |view| Some(wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops });
         let sums: Vec<_> = targets.sums.iter().map(attach).collect();
+        let cleared = Some(attachment(Some(clear)));
+        if plan.needs.winner.is_some() {
+            return self.timing.draw(gpu, "visibility", &sums, cleared, |pass| draw(pass, "nearest"));
+        }
+        self.timing.draw(gpu, "visibility", &[], cleared, |pass| draw(pass, "visibility"))?;
         // Without operations the depth buffer is read only, and the shader may not see it either way.
         let depth = (!exact).then(|| attachment(None));
         self.timing.draw(gpu, "accumulate", &sums, depth, |pass| draw(pass, "accumulate"))

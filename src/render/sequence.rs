@@ -1,9 +1,9 @@
 //! A frame as a list of steps: the papers' passes in their order.
 
 use crate::passes::{accumulate, cull, of_maps, project, raster, resolve, tiles, visibility};
-use crate::plan::Plan;
 use crate::plan::known::Listed;
 use crate::plan::steps::{Look, Part, Stage, Step};
+use crate::plan::{Plan, Winner};
 
 /// The steps of a frame by `plan`.
 pub fn steps(plan: &Plan) -> Vec<Step> {
@@ -50,6 +50,10 @@ fn nearest(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
 
 /// The sums of each pixel of a band; by tiles that gather, its image too.
 fn sums(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
+    // The visibility pass has told all.
+    if matches!(plan.needs.winner, Some(Winner::Depth | Winner::Once)) {
+        return;
+    }
     if plan.needs.gather {
         steps.extend(plan.looks_for_lists[Listed::Small as usize].then(|| tiles::look(plan, Listed::Small, band)));
         steps.extend(tiles::resolve(plan, band).into_iter().map(Step::Stage));

@@ -15,13 +15,14 @@ use crate::plan::{Band, Known, Plan, Raster, SceneNeeds, splat_words};
 use crate::scene::Samples;
 
 /// Names in WGSL of buffers that have another one where kernels write them.
-const ALIASES: [(&str, &str); 7] = [
+const ALIASES: [(&str, &str); 8] = [
     ("projected", "splats"),
     ("queued", "queue"),
     ("listed", "rare"),
     ("surviving", "drawn"),
     ("visible", "nearest"),
     ("added", "sums"),
+    ("winners", "sums"),
     ("indexed", "image"),
 ];
 

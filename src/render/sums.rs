@@ -15,7 +15,7 @@ use crate::passes::{MAP_PASSES, accumulate, resolve as resolve_pass, visibility}
 use crate::plan::known::MOST_TRIES;
 use crate::plan::steps::{Part, Stage, Step, Twin};
 use crate::plan::{Accumulator, Known, Optimisation, PixelLayout, Plan, RenderOptions, check};
-use crate::scene::Camera;
+use crate::scene::{Blend, Camera};
 
 /// What the attribute pass leaves of an image, by the accumulator `fixed`.
 #[derive(Clone, Debug, PartialEq)]
@@ -100,6 +100,9 @@ fn stored(options: &RenderOptions) -> Result<RenderOptions> {
     check::options(options, false)?;
     if options.accumulator != Accumulator::Fixed || options.raster.is_some() {
         return Err(Error::Usage("sums leave the device in the form of the accumulator fixed: take it".into()));
+    }
+    if options.blend == Blend::Nearest {
+        return Err(Error::Usage("--blend nearest sums nothing: leave it out, or render".into()));
     }
     if let Some(own) = MAP_PASSES.iter().find(|own| options.maps.has(own.map)) {
         let map = own.map.row().name;

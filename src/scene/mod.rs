@@ -28,7 +28,7 @@ pub(crate) use copies::{copies, has_copies};
 pub use facing::{Facing, PointShape, PointSize};
 pub use light::Light;
 pub use maps::{MAPS, Map, Maps};
-pub use options::{Cull, Epsilon, Kernel, KernelShape, LowPass, Samples, Shading};
+pub use options::{Blend, Cull, Epsilon, Kernel, KernelShape, LowPass, Samples, Shading};
 pub use provenance::Provenance;
 pub use scene::{Bounds, Scene, Up};
 pub use surfel::Surfel;

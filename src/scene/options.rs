@@ -85,6 +85,28 @@ impl FromStr for Epsilon {
     }
 }
 
+/// What a pixel shows of its fragments.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Blend {
+    /// The weighted mean of those within epsilon of the nearest depth (paper 000, Eq. 7).
+    #[default]
+    Weighted,
+    /// The colour of the nearest one alone, as with a depth test; of several at one depth that of the greatest colour.
+    Nearest,
+}
+
+impl FromStr for Blend {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        match text {
+            "weighted" => Ok(Self::Weighted),
+            "nearest" => Ok(Self::Nearest),
+            _ => Err(Error::Usage(format!("fragments are blended weighted or nearest, not {text:?}"))),
+        }
+    }
+}
+
 /// Which surfels are left out by the side that they show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Cull {

@@ -17,7 +17,7 @@ use epsplat::gpu::Gpu;
 use epsplat::gpu::layout::{ONE, View};
 use epsplat::plan::{
     ACCUMULATORS, Accumulator, AccumulatorRow, BlendFormat, ColorNeed, Facts, Raster, RasterDepth, RenderOptions,
-    SceneNeeds, Sides, check,
+    SceneNeeds, Sides, Winner, check,
 };
 use epsplat::scene::facing::POINT_SHAPES;
 use epsplat::scene::{KernelShape, LowPass, Map, Maps, Projection, Samples, Shading};
@@ -147,7 +147,38 @@ pub fn all_needs() -> Vec<SceneNeeds> {
             ..*needs
         });
     }
+    let unblended: Vec<_> = all.iter().copied().filter(shows_nearest).collect();
+    for (step, needs) in unblended.iter().enumerate() {
+        let winners: &[Winner] = match (needs.raster, needs.color) {
+            (Some(_), _) => &[Winner::Rasterised],
+            (None, ColorNeed::Constant) => &[Winner::Depth],
+            (None, _) => &[Winner::Once, Winner::Second],
+        };
+        all.push(SceneNeeds {
+            winner: Some(winners[step % winners.len()]),
+            tiles: false,
+            gather: false,
+            copies: false,
+            atomics_u64: false,
+            subgroups: false,
+            wide_sums: false,
+            epsilon_radius: false,
+            kernel: KernelShape::Constant,
+            low_pass: LowPass::None,
+            accumulator: Accumulator::Fixed,
+            sides: Sides::None,
+            ..*needs
+        });
+    }
     all
+}
+
+/// Whether a render with `needs` could show the nearest fragments alone.
+fn shows_nearest(needs: &SceneNeeds) -> bool {
+    let kept = needs.maps.is_empty() || needs.maps == Maps::of(&[Map::Depth]);
+    let colors = matches!(needs.color, ColorNeed::Constant | ColorNeed::Srgb8);
+    let exact = needs.raster.is_none_or(|raster| raster.depth == RasterDepth::Exact);
+    kept && colors && !needs.normal && (exact || needs.maps.is_empty())
 }
 
 /// Several samples, not as many across as down.

@@ -18,7 +18,7 @@ use epsplat::gpu::layout::{
 };
 use epsplat::gpu::sources::FILES;
 use epsplat::passes;
-use epsplat::plan::{Accumulator, COLOR_CHANNEL, PixelLayout, SceneNeeds, color_channels};
+use epsplat::plan::{Accumulator, COLOR_CHANNEL, PixelLayout, SceneNeeds, Winner, color_channels};
 use epsplat::scene::camera::MAX_SIDE;
 use epsplat::scene::options::{LEAST_FILTERED_WEIGHT, LEAST_WEIGHT};
 use mirrors::{differences, elements, kept_as, mirrors, sums_of};
@@ -153,12 +153,13 @@ fn constants_agree() {
                 assert_eq!(constant(name), exists.then_some(f64::from(value)), "{name}");
             }
         }
-        assert_eq!(constant("LEAST_WEIGHT"), Some(LEAST_WEIGHT));
-        assert_eq!(constant("LEAST_FILTERED_WEIGHT"), Some(LEAST_FILTERED_WEIGHT));
-        let colors = color_channels(&needs) > 0;
+        let blends = matches!(needs.winner, None | Some(Winner::Rasterised));
+        assert_eq!(constant("LEAST_WEIGHT"), blends.then_some(LEAST_WEIGHT));
+        assert_eq!(constant("LEAST_FILTERED_WEIGHT"), blends.then_some(LEAST_FILTERED_WEIGHT));
+        let colors = blends && color_channels(&needs) > 0;
         assert_eq!(constant("COLOR_CHANNEL"), colors.then_some(f64::from(COLOR_CHANNEL)));
         let one = match needs.accumulator {
-            _ if needs.raster.is_some() => None,
+            _ if !needs.sums_in_storage() => None,
             Accumulator::Fixed if !needs.wide_sums => Some(f64::from(ONE)),
             Accumulator::Fixed | Accumulator::Fixed64 => Some(ONE_WIDE as f64),
             _ => None,

@@ -152,6 +152,8 @@ pub fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         ("nearest", Element::Plain(WORD)),
         ("visible", Element::Plain(WORD)),
         ("sums", Element::Plain(sums_of(accumulator).0)),
+        // A colour, or a depth and a colour in one number.
+        ("winners", Element::Plain(&[u32::SHAPE, u64::SHAPE])),
         ("added", Element::Plain(&[<[u64; 2]>::SHAPE])),
         ("image", Element::Plain(&[f32::SHAPE, <[f32; 4]>::SHAPE])),
         ("texels", Element::Plain(WORD)),

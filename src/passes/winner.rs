@@ -1,0 +1,98 @@
+//! Stages 2 and 3 where the nearest fragment alone shows, as with a depth test (Schuetz and Wimmer 2015, section III): nothing is blended,
+//! so there is no epsilon, no weight and nothing to sum.
+//!
+//! A pixel shows the least (depth, colour): of fragments at one depth that of the greatest colour, as a word of four bytes, so the order
+//! of the surfels shows nowhere. With 64-bit atomics both are one number and the visibility pass is the only one over the fragments; else
+//! a second pass keeps the colours of those at the nearest depth, which makes the same bits. Where all surfels have one colour, the
+//! nearest depth is all there is.
+
+use super::accumulate::{PixelSums, decision};
+use super::footprint::footprint;
+use super::splat::Splat;
+use crate::plan::pass::Pass;
+use crate::plan::steps::Clear;
+use crate::plan::{Plan, RenderOptions, Winner};
+use crate::scene::{Camera, Colors, Scene};
+
+/// The files.
+pub const PASS: Pass = Pass {
+    name: "winner",
+    files: |needs| match needs.winner {
+        None if needs.raster.is_none() => vec!["nearest_depth.wgsl"],
+        None => Vec::new(),
+        Some(Winner::Rasterised) => Vec::new(),
+        Some(Winner::Depth) => vec!["winner.wgsl", "nearest_depth.wgsl", "winner_constant.wgsl"],
+        Some(Winner::Once) => vec!["winner.wgsl", "nearest_color.wgsl", "winner_color.wgsl", "srgb.wgsl"],
+        Some(Winner::Second) => {
+            vec!["winner.wgsl", "nearest_depth.wgsl", "winner_second.wgsl", "winner_color.wgsl", "srgb.wgsl"]
+        }
+    },
+    kernels: |_| Vec::new(),
+    constants: |_| Vec::new(),
+};
+
+/// What is cleared before the visibility pass, where it keeps colours.
+pub fn clears(plan: &Plan, band: usize) -> Option<Clear> {
+    let words = plan.bands[band].pixels * u64::from(plan.sum_words);
+    (plan.needs.winner == Some(Winner::Once)).then(|| Clear::of("sums", 0, words))
+}
+
+/// What wins a pixel.
+#[derive(Clone, Copy)]
+struct Best {
+    depth: f64,
+    /// The bytes of the colour.
+    word: u32,
+    surfel: usize,
+}
+
+/// The twin, over `rows` rows from `first_row` on: sums of the one fragment that each pixel shows.
+pub fn reference<'a>(
+    splats: impl Iterator<Item = &'a Splat> + Clone,
+    scene: &Scene,
+    camera: &Camera,
+    options: &RenderOptions,
+    (first_row, rows): (u32, u32),
+) -> Vec<PixelSums> {
+    let word = |surfel: usize| match &scene.colors {
+        Colors::Srgb8(codes) => u32::from_le_bytes(codes[surfel]),
+        // One for all (src/plan/check.rs).
+        _ => 0,
+    };
+    let mut best: Vec<Option<Best>> = vec![None; camera.width as usize * rows as usize];
+    let fragments = |visit: &mut dyn FnMut(usize, &Splat, super::splat::Intersection)| {
+        for splat in splats.clone() {
+            for y in splat.first[1].max(first_row)..=splat.last[1].min(first_row + rows - 1) {
+                for x in splat.first[0]..=splat.last[0] {
+                    let pixel = (y - first_row) as usize * camera.width as usize + x as usize;
+                    footprint(splat, camera, options.low_pass, x, y)
+                        .into_iter()
+                        .for_each(|(at, _)| visit(pixel, splat, at));
+                }
+            }
+        }
+    };
+    fragments(&mut |pixel, splat, at| {
+        let own = Best { depth: at.depth, word: word(splat.surfel as usize), surfel: splat.surfel as usize };
+        let wins = |other: Best| own.depth < other.depth || (own.depth == other.depth && own.word > other.word);
+        if at.hit(camera) && best[pixel].is_none_or(wins) {
+            best[pixel] = Some(own);
+        }
+    });
+    let mut sums = vec![PixelSums::ZERO; best.len()];
+    fragments(&mut |pixel, splat, at| {
+        let behind = match best[pixel] {
+            // The winner itself is decided by its rim alone.
+            Some(best) if best.surfel != splat.surfel as usize => best.depth,
+            _ => f64::INFINITY,
+        };
+        sums[pixel].decision = sums[pixel].decision.min(decision(at, behind, camera.near));
+    });
+    for (sum, best) in sums.iter_mut().zip(best) {
+        let Some(best) = best else { continue };
+        let [r, g, b, alpha] = scene.colors.linear(best.surfel).map(f64::from);
+        let color = [r * alpha, g * alpha, b * alpha, alpha];
+        *sum = PixelSums { weight: 1.0, color, depth: best.depth, count: 1, ..*sum };
+    }
+    sums
+}

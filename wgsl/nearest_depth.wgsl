@@ -1,0 +1,10 @@
+// What the visibility pass keeps of the fragments of a pixel: the nearest depth. Same interface as nearest_color.wgsl.
+
+fn keep_nearest(pixel: u32, depth: f32, surfel: u32) {
+    atomicMax(&nearest[pixel], kept_depth(bitcast<u32>(depth)));
+}
+
+// The bits of the nearest depth, where `visible` has it from now on.
+fn nearest_at(pixel: u32) -> u32 {
+    return kept_depth(atomicLoad(&nearest[pixel]));
+}

@@ -1,0 +1,21 @@
+// The rasteriser's depth test alone, one pass, of depths that it interpolates itself: what it is fastest at. Same interface as
+// raster_nearest_exact.wgsl.
+
+fn corner_depth(splat: Splat, image: vec2<f32>, index: u32) -> f32 {
+    let d = vec3<f32>(image - 0.5 - vec2<f32>(f32(splat.anchor_x), f32(splat.anchor_y)), 1.0);
+    return depth_order(depth_of(dot(vec3<f32>(splat.c[0], splat.c[1], splat.c[2]), d)));
+}
+
+fn front_at(pixel: u32) -> f32 {
+    return 0.0;
+}
+
+@fragment
+fn raster_nearest(corner: Corner) -> Targets {
+    let fragment = fragment_of(corner);
+    if (!fragment.hit) {
+        discard;
+    }
+    blend(0u, fragment, 0.0, carried(corner));
+    return targets();
+}

@@ -1,0 +1,13 @@
+// Without 64-bit atomics: a second pass over the fragments keeps the colour of those at the nearest depth, of several the greatest word.
+// Both passes evaluate the same footprint, so a nearest fragment has the very bits of the depth that it left.
+
+// Cleared.
+@group(0) @binding(43) var<storage, read_write> winners: array<atomic<u32>>;
+
+fn blend(pixel: u32, fragment: Fragment, front: f32, attributes: Attributes) {
+    atomicMax(&winners[pixel], attributes.word);
+}
+
+fn winning_word(pixel: u32) -> u32 {
+    return atomicLoad(&winners[pixel]);
+}

@@ -111,7 +111,7 @@ fn a_broken_kernel_fails_a_hard_case() {
         ("camera_pinhole.wgsl", "chord_1) + blur)", "chord_1) - 0.5)", "across the near depth"),
         ("center.wgsl", "d.low - held.eye_low[i]", "d.low", "UTM, a kilometre off"),
         ("center.wgsl", "surfel.center[i] * held.unit", "surfel.center[i]", "coordinates of 1e12"),
-        ("visibility.wgsl", "kept_depth(", "NOTHING - kept_depth(", "intersecting sheets"),
+        ("nearest_depth.wgsl", "kept_depth(bitcast", "NOTHING - kept_depth(bitcast", "intersecting sheets"),
         (
             "side.wgsl",
             "fragment.depth <= farthest",

@@ -305,7 +305,7 @@ fn a_broken_footprint_or_sum_is_noticed() {
         |file, from, to| compare_nearest(case, &enclosure, &run(case, &options, &gpu, &broken(file, from, to)));
     let file = "flat.wgsl";
     depths(file, "splat.c[1] * d.y + splat.c[2]", "splat.c[1] * d.y + splat.c[2] * 1.00001").expect_noticed("depth");
-    depths("visibility.wgsl", "kept_depth(", "NOTHING - kept_depth(").expect_noticed("farthest");
+    depths("nearest_depth.wgsl", "kept_depth(bitcast", "NOTHING - kept_depth(bitcast").expect_noticed("farthest");
     sums(file, "d.y + splat.a[2]))\n", "d.y + splat.a[2] * 1.001))\n").expect_noticed("row a");
     sums(file, "splat.b[1] * d.y", "splat.b[1] * d.y * 1.001").expect_noticed("row b");
     sums("kernel_ellipse.wgsl", "-KERNEL_A", "-1.0001 * KERNEL_A").expect_noticed("kernel");

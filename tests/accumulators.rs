@@ -19,8 +19,10 @@ use epsplat::render::{Backend, Renderer, render};
 use epsplat::scene::{Camera, Colors, Epsilon, Kernel, Map, Maps, Projection, Scene, Shading, Surfel};
 use glam::{DVec3, Vec3};
 
-const KERNELS: [&str; 5] = ["gaussian", "ellipse:6,3", "ellipse:6,3,smooth", "hat", "constant"];
-const EPSILONS: [Epsilon; 3] = [Epsilon::Relative(0.02), Epsilon::Absolute(0.05), Epsilon::Radius(0.4)];
+const KERNELS: [&str; 7] =
+    ["gaussian", "ellipse:6,3", "ellipse:6,3,smooth", "hat", "constant", "ellipse:20,3", "cone:1.5"];
+const EPSILONS: [Epsilon; 4] =
+    [Epsilon::Relative(0.02), Epsilon::Absolute(0.05), Epsilon::Radius(0.4), Epsilon::Ray(0.05)];
 
 /// What a device's frame is compared with.
 struct Case {
@@ -189,8 +191,10 @@ fn a_broken_accumulator_kernel_or_epsilon_is_noticed() {
     for (kernel, file, from, to) in [
         ("gaussian", "kernel_gaussian.wgsl", "-KERNEL_FALL", "-1.0005 * KERNEL_FALL"),
         ("ellipse:6,3,smooth", "kernel_ellipse.wgsl", "power) - KERNEL_STEP", "power)"),
-        ("ellipse:6,3,smooth", "blend.wgsl", ", LEAST_WEIGHT, 1.0)", ", 0.0, 1.0)"),
-        ("hat", "kernel_hat.wgsl", "sqrt(rho2)", "1.0005 * sqrt(rho2)"),
+        ("ellipse:6,3,smooth", "blend.wgsl", ", KERNEL_FLOOR, 1.0)", ", 0.0, 1.0)"),
+        ("hat", "kernel_cone.wgsl", "sqrt(rho2)", "1.0005 * sqrt(rho2)"),
+        ("cone:1.5", "kernel_cone.wgsl", "height * sqrt(height)", "height * height"),
+        ("ellipse:20,3", "kernel_ellipse.wgsl", "rho2 * sqrt(rho2)", "rho2 * rho2"),
         ("constant", "kernel_constant.wgsl", "return 1.0", "return 0.9995"),
     ] {
         noticed(&case(kernel, EPSILONS[0], Projection::Pinhole), row, file, from, to);
@@ -199,6 +203,8 @@ fn a_broken_accumulator_kernel_or_epsilon_is_noticed() {
     let file = "epsilon_radius.wgsl";
     noticed(&radius, row, file, "min(length(s), length(t))", "1.05 * max(length(s), length(t))");
     noticed(&radius, row, file, "held.epsilon_radius * radius", "held.epsilon_deepest");
+    let ray = case("hat", EPSILONS[3], Projection::Pinhole);
+    noticed(&ray, row, "epsilon_ray.wgsl", " * along_axis(image)", "");
     let absolute = case("hat", EPSILONS[1], Projection::Pinhole);
     noticed(&absolute, row, "epsilon.wgsl", "held.epsilon_absolute", "1.05 * held.epsilon_absolute");
 }

@@ -167,7 +167,7 @@ fn unusable_arguments_exit_with_2() {
     render(&["--epsilon", "0.01"], &["rel:E"]);
     render(&["--epsilon", "radius:-1"], &["rel:E"]);
     for bad in
-        ["box", "gaussian:0", "gaussian:wide", "ellipse:17,3", "ellipse:6,3,rough", "ellipse:0,3,smooth", "hat:1"]
+        ["box", "gaussian:0", "gaussian:wide", "ellipse:1001,3", "ellipse:6,3,rough", "ellipse:0,3,smooth", "hat:1"]
     {
         render(&["--kernel", bad], &["gaussian", "ellipse:A,N", "hat", "constant"]);
     }

@@ -8,7 +8,7 @@ use epsplat::frame::Frame;
 use epsplat::gpu::Sources;
 use epsplat::io::{self, Points};
 use epsplat::metrics::reconstruction;
-use epsplat::plan::{Organisation, RenderOptions};
+use epsplat::plan::{BlendFormat, Organisation, Raster, RasterDepth, RenderOptions};
 use epsplat::render::{Backend, render};
 use epsplat::scene::{Camera, Clip, Colors, Cull, Lens, LowPass, Map, Maps, Projection, Samples, Scene, Surfel};
 use epsplat::surfels::build;
@@ -67,6 +67,15 @@ fn kernels_and_twins_end_disks_at_the_same_lines() {
                 let (other, _) = render(&scene, &camera, &other, &backend, &()).unwrap();
                 assert!(common::bits(&other) == common::bits(&frame), "{organisation:?}");
             }
+            // The rasteriser draws the very same fragments.
+            let raster = Some(Raster { format: BlendFormat::Rgba16Float, depth: RasterDepth::Exact });
+            let by_raster = RenderOptions { raster, ..options.clone() };
+            let (by_raster, _) = render(&scene, &camera, &by_raster, &backend, &()).unwrap();
+            let [counted, expected] = [&by_raster, &frame].map(|frame| frame.map(Map::Count).unwrap());
+            let decided = reference.map(Map::Decision).unwrap().iter().map(|decision| *decision >= 1e-4);
+            let differ =
+                decided.zip(counted.iter().zip(expected)).filter(|(decided, (a, b))| *decided && a != b).count();
+            assert_eq!(differ, 0, "{projection:?} {low_pass:?}");
             // The control: whole disks are another picture.
             let whole = Scene { clips: Vec::new(), ..scene.clone() };
             let (whole, report) = render(&whole, &camera, &options, &backend, &()).unwrap();

@@ -235,7 +235,14 @@ fn normals_whose_sides_are_random_have_none() {
     assert!(of((positions, normals), 0.0).0);
 }
 
-const SIZES: [Size; 4] = [Size::Knn, Size::Ellipse, Size::Bsp(Triangle::MeanEdge), Size::Bsp(Triangle::Circumsphere)];
+const SIZES: [Size; 6] = [
+    Size::Knn,
+    Size::Ellipse,
+    Size::Bsp(Triangle::MeanEdge),
+    Size::Bsp(Triangle::Circumsphere),
+    Size::BspGlobal(Triangle::MeanEdge),
+    Size::BspGlobal(Triangle::Circumsphere),
+];
 
 /// Checks that all is finite, and gives the surfels.
 fn sound(positions: Vec<[f64; 3]>, size: Size) -> Surfels {
@@ -405,8 +412,9 @@ fn clusters_of_three_give_the_sizes_of_their_triangles() {
     // Triangles with edges 3, 4, 5, far from each other: every cluster is one, its circumcircle on the longest edge.
     let triangle = [[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
     let positions: Vec<_> = (0..300).map(|i| triangle[i % 3].map(|c| c + 100.0 * (i / 3) as f64)).collect();
-    for (measure, expected) in [(Triangle::MeanEdge, 4.0), (Triangle::Circumsphere, 5.0)] {
-        let options = FromPoints { size: Size::Bsp(measure), ..FromPoints::default() };
+    let of = |size: fn(Triangle) -> Size| [(size(Triangle::MeanEdge), 4.0), (size(Triangle::Circumsphere), 5.0)];
+    for (measure, expected) in of(Size::Bsp).into_iter().chain(of(Size::BspGlobal)) {
+        let options = FromPoints { size: measure, ..FromPoints::default() };
         let made = surfels(cloud(positions.clone()), &options);
         assert!(made.points.radii.as_ref().unwrap().iter().all(|r| (r - expected).abs() < 1e-5), "{measure:?}");
         assert_eq!(made.collinear, 0);

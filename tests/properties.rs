@@ -68,8 +68,12 @@ fn options() -> impl Strategy<Value = RenderOptions> {
     let ellipse =
         prop_oneof![Just(3.0), Just(2.0), Just(1.7)].prop_map(|n| Kernel::Ellipse { a: 6.0, n, smooth: false });
     let smooth = Kernel::Ellipse { a: 6.0, n: 3.0, smooth: true };
-    let others =
-        prop_oneof![Just(Kernel::Gaussian { sigma: 0.4 }), Just(smooth), Just(Kernel::Hat), Just(Kernel::Constant)];
+    let others = prop_oneof![
+        Just(Kernel::Gaussian { sigma: 0.4 }),
+        Just(smooth),
+        Just(Kernel::Cone { power: 1.0 }),
+        Just(Kernel::Constant)
+    ];
     let kernel = prop_oneof![ellipse, others];
     (0usize..4, kernel, 0..ACCUMULATORS.len()).prop_map(|(epsilon, kernel, accumulator)| {
         let epsilons = [Epsilon::Relative(0.01), Epsilon::Absolute(0.05), Epsilon::Relative(0.0), Epsilon::Radius(0.5)];

@@ -93,24 +93,26 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
 }
 
 /// Names of needs of which a render has one at most.
-const ALTERNATIVES: [&[&str]; 6] = [
+const ALTERNATIVES: [&[&str]; 7] = [
     &["pinhole", "orthographic"],
-    &["kernel-gaussian", "kernel-ellipse", "kernel-hat", "kernel-constant"],
+    &["kernel-gaussian", "kernel-ellipse", "kernel-cone", "kernel-constant"],
     &["color-constant", "color-srgb8", "color-linear", "color-textured"],
-    &["raster-exact", "raster-offset", "raster-ray"],
+    &["raster-exact", "raster-offset"],
+    &["epsilon-radius", "epsilon-ray"],
     &["lowpass-max", "lowpass-ewa"],
     &["lambert", "phong"],
 ];
 
 /// Needs that no render has together (`src/plan/check.rs`, `src/plan/needs.rs`).
-const EXCLUSIVE: [(&str, &[&str]); 10] = [
+const EXCLUSIVE: [(&str, &[&str]); 11] = [
     ("samples", &["count", "depth", "index", "normal-map", "weight-map"]),
-    ("color-textured", &["tiles", "gather", "copies", "raster-exact", "raster-offset", "raster-ray"]),
+    ("color-textured", &["tiles", "gather", "copies", "raster-exact", "raster-offset"]),
     ("copies", &["tiles", "gather", "cull", "atomics-u64"]),
     ("color-constant", &["alpha"]),
+    ("lit-splats", &["color-constant", "color-textured", "facing", "nearest"]),
     ("facing", &["clips", "color-textured", "cull-back", "curved", "lambert", "phong", "lowpass-ewa", "lowpass-max"]),
     ("facing", &["normal", "normal-map", "own-normals", "sides"]),
-    ("sides", &["cull-back", "raster-offset", "raster-ray"]),
+    ("sides", &["cull-back", "raster-offset"]),
     (
         "nearest",
         &[
@@ -127,7 +129,7 @@ const EXCLUSIVE: [(&str, &[&str]); 10] = [
     (
         "nearest",
         &[
-            "kernel-hat",
+            "kernel-cone",
             "lambert",
             "lowpass-ewa",
             "lowpass-max",
@@ -139,6 +141,7 @@ const EXCLUSIVE: [(&str, &[&str]); 10] = [
             "tiles",
             "wide-sums",
             "epsilon-radius",
+            "epsilon-ray",
             "count",
             "weight-map",
         ],
@@ -202,7 +205,7 @@ fn host_and_kernels_agree_about_overrides() {
         let kernel = match needs.kernel {
             KernelShape::Gaussian => Kernel::Gaussian { sigma: 0.4 },
             KernelShape::Ellipse => Kernel::Ellipse { a: 6.0, n: 3.0, smooth: true },
-            KernelShape::Hat => Kernel::Hat,
+            KernelShape::Cone => Kernel::Cone { power: 1.5 },
             KernelShape::Constant => Kernel::Constant,
         };
         assert_eq!(kernel.shape(), needs.kernel);

@@ -253,8 +253,8 @@ fn what_has_no_area_is_not_there() {
     // Over no pixels, no measure says that all is well.
     let error = reconstruction(&empty.frame, &empty).unwrap();
     assert_eq!(
-        (error.depth_relative, error.hole_rate, error.leak_rate, error.silhouette_iou),
-        (None, None, None, None)
+        (error.depth_relative, error.hole_rate, error.leak_rate, error.silhouette_iou, error.outline_px),
+        (None, None, None, None, None)
     );
     let outside = Mesh { triangles: vec![[0, 1, 9]], ..mixed.clone() };
     let colorless = Mesh { colors: Some(Colors::Linear(vec![[1.0; 4]])), ..mixed };

@@ -19,7 +19,8 @@ use epsplat::passes::{accumulate, visibility};
 use epsplat::plan::{Accumulator, COLOR_CHANNEL, RenderOptions};
 use epsplat::render::{Backend, render};
 use epsplat::scene::options::HIGHLIGHT;
-use epsplat::scene::{Epsilon, Kernel, LowPass, Map, Maps, Projection, Shading};
+use epsplat::scene::{Epsilon, Kernel, Light, LowPass, Map, Maps, Projection, Shading, ShadingAt};
+use glam::Vec3;
 
 fn options(kernel: Kernel) -> RenderOptions {
     RenderOptions { kernel, epsilon: Epsilon::Relative(0.02), maps: Maps::ON_DEVICE, ..Default::default() }
@@ -324,10 +325,18 @@ fn a_broken_footprint_or_sum_is_noticed() {
 fn the_frame_of_the_device_is_the_frame_of_the_twins() {
     let Some(gpu) = common::gpu() else { return };
     let backend = Backend::gpu(gpu);
+    let aside = Light::Directional { toward: Vec3::new(0.6, 0.0, 0.8), intensity: 0.5 };
+    let lights = vec![Light::Headlight { intensity: 0.5 }, aside];
     for projection in [Projection::Pinhole, Projection::Orthographic] {
-        for shading in [Shading::Lambert, Shading::Unlit, Shading::Phong] {
+        for (shading, shading_at) in [
+            (Shading::Lambert, ShadingAt::Pixel),
+            (Shading::Unlit, ShadingAt::Pixel),
+            (Shading::Phong, ShadingAt::Pixel),
+            (Shading::Lambert, ShadingAt::Splat),
+            (Shading::Phong, ShadingAt::Splat),
+        ] {
             let (scene, camera) = (sphere(3000, 1.5), sphere_camera(256, projection));
-            let mut options = RenderOptions { shading, ..options(DEFAULT_KERNEL) };
+            let mut options = RenderOptions { shading, shading_at, lights: lights.clone(), ..options(DEFAULT_KERNEL) };
             let (device, _) = render(&scene, &camera, &options, &backend, &()).unwrap();
             options.maps = options.maps.and(&[Map::Decision]);
             let (twin, _) = render(&scene, &camera, &options, &Backend::Reference, &()).unwrap();
@@ -351,7 +360,7 @@ fn the_frame_of_the_device_is_the_frame_of_the_twins() {
                 let of_color = limit * (1.0 + HIGHLIGHT as f32 * highlight);
                 assert!(
                     difference < of_color,
-                    "colour {difference:e} over {of_color:e} at {pixel}, {shading:?} {projection:?}"
+                    "colour {difference:e} over {of_color:e} at {pixel}, {shading:?} {shading_at:?} {projection:?}"
                 );
                 let (near, far) = (device.map(Map::Depth).unwrap()[pixel], twin.map(Map::Depth).unwrap()[pixel]);
                 assert!(near == far || (near - far).abs() < 2e-6 * far, "depth {near} {far} at {pixel}");

@@ -2,7 +2,7 @@
 // splat, one workgroup a large splat. Each fragment's terms are quantised before they are added, so the sums do not
 // depend on the order.
 // Twin: src/passes/accumulate.rs.
-// All loops end, by 2, 4 of src/gpu/loops.rs: 0xf3b64b01bef73c61
+// All loops end, by 2, 4 of src/gpu/loops.rs: 0x1c18d5be7c903b06
 
 // The fragments of one invocation: the splat's pixels from `offset` on in steps of `step`. Each round of the outer loop
 // finds the invocation's next fragment and then adds it if it is accepted, so that the invocations of a subgroup, whose
@@ -28,7 +28,7 @@ fn accumulate_splat(surfel: u32, splat: Splat, filter_: Filter, pixels: Rectangl
         }
         let pixel = pixel_index(place.x, place.y);
         let front = front_at(pixel);
-        if (is_shown(fragment, front, attributes.radius)) {
+        if (is_shown(fragment, front, attributes.radius, place)) {
             blend(pixel, fragment, front, attributes);
         }
     }

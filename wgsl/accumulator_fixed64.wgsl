@@ -1,4 +1,4 @@
-// Sums of terms_wide.wgsl in fixed point of one u64: room for 2^24 full weights. Needs 64-bit atomics.
+// Sums of terms_wide.wgsl in fixed point of one u64: room for 2^24 full weights, or for all surfels. Needs 64-bit atomics.
 // Error bound: src/passes/accumulate.rs.
 
 override CHANNELS: u32;

@@ -1,10 +1,10 @@
 // What an accepted fragment adds to its pixel's sums, whoever keeps them: the attribute pass of compute (accumulate.wgsl)
 // or of the rasteriser (raster.wgsl). Twin: src/passes/accumulate.rs.
 
-// 2^-10: see LEAST_WEIGHT in src/scene/options.rs.
-const LEAST_WEIGHT: f32 = 0.0009765625;
-// 2^-24: see LEAST_FILTERED_WEIGHT there.
-const LEAST_FILTERED_WEIGHT: f32 = 5.9604644775390625e-8;
+// 2^-24: see LEAST_WEIGHT in src/scene/kernel.rs.
+const LEAST_WEIGHT: f32 = 5.9604644775390625e-8;
+// Kernel::floor there.
+override KERNEL_FLOOR: f32;
 
 struct Attributes {
     color: vec4<f32>,
@@ -18,7 +18,7 @@ struct Attributes {
 
 fn attributes_of(index: u32, splat: Splat) -> Attributes {
     hold_copies(index);
-    return Attributes(color_of(index), normal_of(index, splat), bend_of(index), radius_of(index), place_of(index));
+    return Attributes(color_of(index, splat), normal_of(index, splat), bend_of(index), radius_of(index), place_of(index));
 }
 
 // Those that a tile's list or the rasteriser hands on, neither of which draws textures.
@@ -28,8 +28,8 @@ fn attributes_without_place(color: vec4<f32>, normal: vec3<f32>, bend: Bend, rad
 }
 
 fn fragment_weight(fragment: Fragment) -> f32 {
-    let unfiltered = clamp(kernel_weight(fragment.rho2), LEAST_WEIGHT, 1.0);
-    return max(fragment.gain * unfiltered, LEAST_FILTERED_WEIGHT);
+    let unfiltered = clamp(kernel_weight(fragment.rho2), KERNEL_FLOOR, 1.0);
+    return max(fragment.gain * unfiltered, LEAST_WEIGHT);
 }
 
 fn weight_of(fragment: Fragment) -> Term {

@@ -125,6 +125,10 @@ fn ray(x: u32, y: u32) -> vec3<f32> {
     return held.rotation[2].xyz;
 }
 
+fn ray_to(relative: vec3<f32>) -> vec3<f32> {
+    return held.rotation[2].xyz;
+}
+
 fn seen_at(x: u32, y: u32, depth: f32) -> vec3<f32> {
     let image = (vec2<f32>(f32(x), f32(y)) + 0.5 - held.intrinsics.zw) / held.intrinsics.xy;
     return image.x * held.rotation[0].xyz + image.y * held.rotation[1].xyz + depth * held.rotation[2].xyz;

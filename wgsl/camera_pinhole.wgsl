@@ -1,6 +1,6 @@
 // The pinhole camera x = fx X/Z + cx: homography and bounds of a disk, and the evaluation at a pixel.
 // Twin: src/passes/homography.rs and src/passes/footprint.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x578ed3a388fe5d71
+// All loops end, by 1 of src/gpu/loops.rs: 0x0a9118a74b35410c
 
 fn image_of(position: Double, depth: Double, axis: u32) -> Double {
     let focal = Double(held.intrinsics[axis], held.intrinsics_low[axis]);
@@ -266,6 +266,11 @@ fn plane_depth(abc: vec3<f32>, low: f32, high: f32) -> f32 {
 fn ray(x: u32, y: u32) -> vec3<f32> {
     let image = (vec2<f32>(f32(x), f32(y)) + 0.5 - held.intrinsics.zw) / held.intrinsics.xy;
     return normalize(image.x * held.rotation[0].xyz + image.y * held.rotation[1].xyz + held.rotation[2].xyz);
+}
+
+// The direction in which the point `relative` to the eye is seen, unit; none at the eye.
+fn ray_to(relative: vec3<f32>) -> vec3<f32> {
+    return relative * inverseSqrt(max(dot(relative, relative), 1e-36));
 }
 
 // The point at a depth on that ray, relative to the eye, device units.

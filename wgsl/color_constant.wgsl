@@ -1,6 +1,6 @@
 // Every surfel has one colour: nothing is stored, nothing is summed, and it comes out exactly.
 
-fn color_of(index: u32) -> vec4<f32> {
+fn color_of(index: u32, splat: Splat) -> vec4<f32> {
     return vec4<f32>(0.0);
 }
 

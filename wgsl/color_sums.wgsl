@@ -1,6 +1,6 @@
 // Premultiplied linear colour, each channel mapped from the scene's range to [0, 1] before it is summed. Channels: weight
 // and red, green and blue, alpha where it varies. Twin: src/passes/accumulate.rs, src/passes/resolve.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x02c0f2e90c770e8a
+// All loops end, by 1 of src/gpu/loops.rs: 0x6f35f0f1d6ce788c
 
 const COLOR_CHANNEL: u32 = 1u;
 // 3, or 4 where alpha varies.
@@ -8,6 +8,10 @@ override COLOR_CHANNELS: u32;
 
 fn in_range(premultiplied: vec4<f32>) -> vec4<f32> {
     return (premultiplied - held.color_low) * held.color_scale;
+}
+
+fn color_of(index: u32, splat: Splat) -> vec4<f32> {
+    return in_range(lit(premultiplied_color(index), index, splat));
 }
 
 fn accumulate_color(pixel: u32, weight: Term, color: vec4<f32>) {

@@ -5,7 +5,7 @@ fn color_part(index: u32, part: u32) -> vec4<f32> {
     return attribute_vector(index, 4u * part);
 }
 
-fn color_of(index: u32) -> vec4<f32> {
+fn premultiplied_color(index: u32) -> vec4<f32> {
     let color = color_part(index, 0u);
-    return in_range(vec4<f32>(color.rgb * color.a, color.a));
+    return vec4<f32>(color.rgb * color.a, color.a);
 }

@@ -9,6 +9,12 @@ fn deepest_accepted(front: f32) -> f32 {
     return min(front + (front * held.epsilon_relative + held.epsilon_absolute), held.farthest);
 }
 
+// At some pixel; what a bound is made of.
 fn farthest_accepted(front: f32, radius: f32) -> f32 {
     return deepest_accepted(front);
+}
+
+// At a point of the image.
+fn farthest_shown(front: f32, radius: f32, image: vec2<f32>) -> f32 {
+    return farthest_accepted(front, radius);
 }

@@ -11,3 +11,7 @@ fn deepest_accepted(front: f32) -> f32 {
 fn farthest_accepted(front: f32, radius: f32) -> f32 {
     return front;
 }
+
+fn farthest_shown(front: f32, radius: f32, image: vec2<f32>) -> f32 {
+    return farthest_accepted(front, radius);
+}

@@ -18,3 +18,7 @@ fn farthest_accepted(front: f32, radius: f32) -> f32 {
     let epsilon = min(held.epsilon_radius * radius, front * held.epsilon_most);
     return min(front + (front * held.epsilon_relative + epsilon), held.farthest);
 }
+
+fn farthest_shown(front: f32, radius: f32, image: vec2<f32>) -> f32 {
+    return farthest_accepted(front, radius);
+}

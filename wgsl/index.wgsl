@@ -1,6 +1,6 @@
 // The map of the strongest surfels, by the words of the image: of the fragments within epsilon of a pixel's nearest depth the greatest
 // weight, and then the place of the surfel that has it. Twin: src/passes/index.rs.
-// All loops end, by 1, 2 of src/gpu/loops.rs: 0x2b8a45b7d8e8f85e
+// All loops end, by 1, 2 of src/gpu/loops.rs: 0xd93bd99b9f961a1c
 
 // The image, of which these words are no one else's.
 @group(0) @binding(41) var<storage, read_write> indexed: array<atomic<u32>>;
@@ -17,7 +17,7 @@ const AS_GREAT: u32 = 4u;
 fn take(splat: Splat, filter_: Filter, surfel: u32, x: u32, y: u32, names: bool) {
     let fragment = footprint(splat, filter_, x, y);
     let pixel = pixel_index(x, y);
-    if (!is_shown(fragment, front_at(pixel), radius_of(surfel))) {
+    if (!is_shown(fragment, front_at(pixel), radius_of(surfel), vec2<u32>(x, y))) {
         return;
     }
     let weight = bitcast<u32>(fragment_weight(fragment));

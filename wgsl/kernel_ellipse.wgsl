@@ -1,5 +1,5 @@
 // psi_E(rho) = exp(-a rho^n), paper 000, Eq. 12; KERNEL_STEP is 0, or exp(-a) to end at 0.
-// Twin: Kernel::weight in src/scene/options.rs.
+// Twin: Kernel::weight in src/scene/kernel.rs.
 
 override KERNEL_A: f32;
 override KERNEL_N: f32;

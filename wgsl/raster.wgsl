@@ -119,6 +119,8 @@ fn fragment_of(corner: Corner) -> Fragment {
     splat.b = array<f32, 3>(corner.b.x, corner.b.y, corner.b.z);
     splat.c = array<f32, 3>(corner.c.x, corner.c.y, corner.c.z);
     splat.a_low = array<f32, 3>(corner.a_low.x, corner.a_low.y, corner.a_low.z);
+    // Read only where there are any.
+    splat.clip = clip_in(projected[corner.index]);
     let pixel = vec2<u32>(corner.position.xy);
     return footprint(splat, filter_in(projected[corner.index]), pixel.x, pixel.y);
 }

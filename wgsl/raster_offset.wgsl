@@ -3,8 +3,6 @@
 // exact. `depth_order` is linear over the image of a plane,
 // and largest in front.
 
-// Epsilon is along the view ray (paper 000), not along the camera's axis.
-override ALONG_RAY: bool;
 // The visibility pass, whose depths are moved.
 override MOVED: bool;
 
@@ -14,10 +12,7 @@ fn corner_depth(splat: Splat, image: vec2<f32>, index: u32) -> f32 {
     if (!MOVED) {
         return depth_order(z);
     }
-    // A fraction of the depth is the same fraction of the distance; a length along the ray is less of a depth.
-    let fraction = z * held.epsilon_relative;
-    let length = farthest_accepted(z, radius_of(index)) - z - fraction;
-    return depth_order(z + fraction + select(length, length * along_axis(image), ALONG_RAY));
+    return depth_order(farthest_shown(z, radius_of(index), image));
 }
 
 @fragment

@@ -24,5 +24,5 @@ fn shown_color(sums_of: u32, weight: f32, normal: vec3<f32>, x: u32, y: u32) -> 
     let premultiplied = textured(sums_of, weight, resolve_color(sums_of, weight));
     let alpha = premultiplied.a;
     let color = select(vec3<f32>(0.0), premultiplied.rgb / alpha, alpha > 0.0);
-    return over(vec4<f32>(shade(color, normal, x, y), alpha), held.background);
+    return over(vec4<f32>(shade_pixel(color, normal, x, y), alpha), held.background);
 }

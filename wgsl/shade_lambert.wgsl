@@ -1,12 +1,11 @@
 // color * sum of intensity * cosine over the lights. The headlight lights both sides of a surface, n . toward_eye in
 // absolute value; a directional light the side its normal is on. Twin: src/passes/resolve.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xba5d86d8f582c54d
+// All loops end, by 1 of src/gpu/loops.rs: 0xd1b562527e52f89a
 
 // A constant, as some drivers compile a kernel whose loops end by a uniform again for every frame (Mesa's lavapipe).
 override LIGHTS: u32;
 
-fn shade(color: vec3<f32>, normal: vec3<f32>, x: u32, y: u32) -> vec3<f32> {
-    let toward_eye = -ray(x, y);
+fn shade(color: vec3<f32>, normal: vec3<f32>, toward_eye: vec3<f32>) -> vec3<f32> {
     var irradiance = 0.0;
     for (var i = 0u; i < LIGHTS; i++) {
         let light = held.lights[i];

@@ -1,6 +1,6 @@
 // Lambert's term as in shade_lambert.wgsl, and beside it white highlights where the eye is near a light's mirrored
 // direction r = 2 (n . l) n - l: sum of intensity * (n . l) * max(0, r . v)^SHININESS. Twin: src/passes/resolve.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x042b711b629bafdc
+// All loops end, by 1 of src/gpu/loops.rs: 0x6e9dcf4baea10395
 
 override SHININESS: f32;
 // As in shade_lambert.wgsl.
@@ -9,8 +9,7 @@ override LIGHTS: u32;
 // HIGHLIGHT of src/scene/options.rs.
 const HIGHLIGHT: f32 = 0.3;
 
-fn shade(color: vec3<f32>, normal: vec3<f32>, x: u32, y: u32) -> vec3<f32> {
-    let toward_eye = -ray(x, y);
+fn shade(color: vec3<f32>, normal: vec3<f32>, toward_eye: vec3<f32>) -> vec3<f32> {
     let facing_eye = dot(normal, toward_eye);
     var irradiance = 0.0;
     var highlight = 0.0;

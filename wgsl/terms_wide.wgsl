@@ -1,12 +1,13 @@
-// The terms of the accumulator `fixed` for scenes in which they may be small (SceneNeeds::wide_sums): 40 fractional bits.
+// The terms of the accumulator `fixed` for scenes in which they may be small (SceneNeeds::wide_sums): 40 to 56
+// fractional bits (wide_bits in src/plan/accumulator.rs).
 // Error bound: src/passes/accumulate.rs.
 
-// Units of 2^-40 as f32: a product is rounded once, as f32 sums would, and no more.
+// Their units as f32: a product is rounded once, as f32 sums would, and no more.
 alias Term = f32;
 const COUNT_ONE: Term = 1.0;
 
-// The units of a weight of 1: 2^40.
-const ONE: f32 = 1099511627776.0;
+// The units of a weight of 1, a power of two.
+override ONE: f32;
 
 const WORD: f32 = 4294967296.0;
 

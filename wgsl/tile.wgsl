@@ -3,7 +3,7 @@
 // eight rows are drawn apart, each by the splats that reach them. The footprint, and so every bit, is that of visibility.wgsl
 // and accumulate.wgsl.
 // Host side: src/passes/tiles.rs.
-// All loops end, by 1, 3 of src/gpu/loops.rs: 0xe97c2aad9a0d189a
+// All loops end, by 1, 3 of src/gpu/loops.rs: 0x82fd9beaaba5b075
 
 // The lists of the large splats.
 @group(0) @binding(27) var<storage, read> large_lists: array<u32>;
@@ -208,7 +208,7 @@ fn fronts_of(column: Column, k: u32) -> vec4<f32> {
 fn gather(slot: u32, splat: Splat, filter_: Filter, attributes: Attributes, front: f32, column: Column) {
     let fragment = footprint(splat, filter_, column.x, column.y + slot);
     // Selected, as a branch would select what is stored of each sum.
-    let accepted = is_shown(fragment, front, attributes.radius);
+    let accepted = is_shown(fragment, front, attributes.radius, vec2<u32>(column.x, column.y + slot));
     let weight = select(Term(0), weight_of(fragment), accepted);
     let normal = normal_at(attributes, fragment.spot);
     blend_weighted(slot, weight, select(front, fragment.depth, accepted), front, normal, attributes);

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::plan::{
     Accumulator, BackendName, BlendFormat, Optimisation, Organisation, Raster, RasterDepth, RenderOptions,
 };
-use crate::scene::{Blend, Cull, Epsilon, Facing, Kernel, LowPass, Map, Maps, PointShape, Samples, Shading};
+use crate::scene::{Blend, Cull, Epsilon, Facing, Kernel, LowPass, Map, Maps, PointShape, Samples, Shading, ShadingAt};
 use crate::surfels::analytic::Shape;
 use crate::truth::DEFAULT_GRID;
 
@@ -72,18 +72,23 @@ pub struct SceneEntry {
     /// How surfels are made of the file; as `epsplat render` reads it by default.
     #[serde(default)]
     pub surfels: Making,
+    /// What is kept of how they end; all by default.
+    #[serde(default)]
+    pub rims: Rims,
     /// An image for the mesh of the file, relative to the definition's folder.
     pub texture: Option<PathBuf>,
     /// The image is looked up once a pixel; else surfels have its colours.
     #[serde(default)]
     pub lookup: bool,
-    /// A generated surface: sphere, torus, plane or checkerboard.
+    /// A generated surface: sphere, torus, plane, checkerboard or text.
     #[serde(default, deserialize_with = "parsed")]
     pub shape: Option<Shape>,
     /// Surfels of the shape, or to be made of the mesh.
     pub count: Option<OneOrMany<u64>>,
     /// Disk radius of a shape's surfels in units of their mean spacing; the generator's by default.
     pub radius: Option<f64>,
+    /// How far a shape's points lie off it, along its normals: the standard deviation in units of their mean spacing.
+    pub noise: Option<f64>,
     /// The mean radius of the splats, pixels, as if seen face-on: disks are enlarged or shrunk to it.
     pub footprint_px: Option<OneOrMany<f64>>,
     /// Leaves out what of a sweep would cover more pixels than this, counting `surfels * pi * footprint_px^2`.
@@ -138,16 +143,36 @@ pub enum Making {
     Ellipse,
     /// The same with disks from clusters of three.
     Bsp,
+    /// The same with one radius for all.
+    #[serde(rename = "bsp:global")]
+    BspGlobal,
+    /// The same with disks as large as the triangles at a mesh's vertices.
+    Qsplat,
     /// As `epsplat sample` does: `count` of a mesh, with ellipses that cover it.
     Sample,
+    /// Samples of a mesh, or of a shape, `count` of them, with its normals alone, as `epsplat render` draws them.
+    Scanned,
     /// Independent random points of a mesh, `count` of them, with its normals, and ellipses that hold their cells.
     Uniform,
+}
+
+/// How surfels end and curve.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Rims {
+    /// They curve, and end at lines.
+    #[default]
+    Curved,
+    /// They end at lines.
+    Clipped,
+    /// Whole ellipses.
+    Flat,
 }
 
 impl Making {
     /// Whether the mesh is sampled at a number of points.
     pub fn samples(self) -> bool {
-        matches!(self, Self::Sample | Self::Uniform)
+        matches!(self, Self::Sample | Self::Scanned | Self::Uniform)
     }
 }
 
@@ -200,6 +225,9 @@ pub struct Config {
     pub raster_depth: Option<RasterDepth>,
     /// Shading; else the scene's, else Lambert.
     pub shading: Option<Shading>,
+    /// What is lit: pixel or splat.
+    #[serde(default)]
+    pub shading_at: ShadingAt,
     /// Maps that are rendered too.
     #[serde(default, deserialize_with = "all_parsed")]
     pub maps: Vec<Map>,
@@ -284,6 +312,7 @@ impl Config {
                 depth: self.raster_depth.unwrap_or(raster.depth),
             }),
             shading: self.shading.or(self.unlit().then_some(Shading::Unlit)).or(shading).unwrap_or(default.shading),
+            shading_at: self.shading_at,
             maps: Maps::of(&self.maps),
             ..default
         }

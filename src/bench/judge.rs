@@ -131,6 +131,7 @@ fn join_worst(worst: &mut BTreeMap<String, f64>, error: &Reconstruction) {
         ("hole_rate", error.hole_rate),
         ("leak_rate", error.leak_rate),
         ("silhouette_iou", error.silhouette_iou),
+        ("outline_px", error.outline_px),
     ];
     for (name, value) in measures {
         let Some(value) = value else { continue };
@@ -233,6 +234,7 @@ mod tests {
             hole_rate: Some(0.0),
             leak_rate: None,
             silhouette_iou: Some(1.0),
+            outline_px: None,
         };
         let mut worst = BTreeMap::new();
         for error in [of(None, 0.0), of(Some(30.0), 0.2), of(Some(40.0), 0.5)] {

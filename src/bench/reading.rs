@@ -95,14 +95,18 @@ impl SceneEntry {
                 }
                 not_beside("count", counts && !self.surfels.samples(), "file, unless surfels are sampled")?;
                 not_beside("radius", self.radius.is_some(), "file (footprint_px serves)")?;
+                not_beside("noise", self.noise.is_some(), "file")?;
                 let is_mesh =
                     file.extension().is_some_and(|e| ["obj", "ply"].iter().any(|m| e.eq_ignore_ascii_case(m)));
                 if self.truth && !is_mesh {
                     return Err("truth: only OBJ and PLY files have triangles that rays can meet".into());
                 }
             }
-            (None, Some(_)) if self.texture.is_some() || self.source.is_some() || self.surfels != Making::File => {
-                return Err("surfels, texture, source: they are of a file".into());
+            (None, Some(_)) if self.texture.is_some() || self.source.is_some() => {
+                return Err("texture, source: they are of a file".into());
+            }
+            (None, Some(_)) if !matches!(self.surfels, Making::File | Making::Scanned) => {
+                return Err("surfels: of a shape they are scanned, or as generated".into());
             }
             (None, Some(_)) if self.count.is_none() => return Err("count: a shape needs its number of surfels".into()),
             (None, Some(_)) => {}
@@ -136,6 +140,7 @@ impl SceneEntry {
         }
         sized("size", self.size)?;
         positive("radius", self.radius)?;
+        positive("noise", self.noise)?;
         positive("fill", self.fill)?;
         positive("fov", self.fov)?;
         positive("ortho", self.ortho)?;
@@ -249,7 +254,7 @@ mod tests {
             ("[[scene]]\nname = \"t\"\nfile = \"a.ply\"\nsurfels = \"mesh\"\n", &["surfels:", "mesh", "uniform"]),
             ("[[scene]]\nname = \"t\"\nfile = \"a.ply\"\nlookup = true\n", &["lookup:", "texture"]),
             ("[[scene]]\nname = \"t\"\nfile = \"a.ply\"\ntexture = \"a.png\"\n", &["texture:", "sampled"]),
-            ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 1\nsurfels = \"knn\"\n", &["surfels", "file"]),
+            ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 1\nsurfels = \"knn\"\n", &["surfels", "shape"]),
             ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = [1, \"x\"]\n", &["count:", "list of numbers"]),
             ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 0\n", &["count:"]),
             ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 1\nfill = -1\n", &["fill:", "-1"]),

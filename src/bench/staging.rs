@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3};
 
-use super::definition::{Definition, Making, OneOrMany, SceneEntry};
+use super::definition::{Definition, Making, OneOrMany, Rims, SceneEntry};
 use crate::error::{Error, Result};
 use crate::io::{self, Points, Texture};
 use crate::progress::Progress;
+use crate::random::Random;
 use crate::scene::camera::DEFAULT_FOV;
 use crate::scene::{Camera, Colors, Lens, Projection, Scene, Surfel};
 use crate::surfels::analytic::{RADIUS_IN_SPACINGS, Shape, generate};
@@ -76,7 +77,12 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
         }
         (None, Some(shape)) => {
             let surface = entry.truth.then_some(Surface::Analytic(shape));
-            (of_shape(shape, point.count.unwrap_or(1), entry.radius), surface)
+            let mut points = of_shape(shape, point.count.unwrap_or(1), entry.radius);
+            if let Some(noise) = entry.noise {
+                scatter(&mut points, noise * (shape.area() / point.count.unwrap_or(1) as f64).sqrt());
+            }
+            let radii = points.radii.clone().filter(|_| entry.surfels != Making::Scanned);
+            (Points { radii, ..points }, surface)
         }
         // Reading a definition makes sure that there is one of them; no points are told as an empty scene.
         (None, None) => (Points::default(), None),
@@ -85,6 +91,12 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
         Some(texture) => build_textured(vec![points], texture, progress)?,
         None => build(vec![points], progress)?,
     };
+    if entry.rims != Rims::Curved {
+        scene.caps.clear();
+    }
+    if entry.rims == Rims::Flat {
+        scene.clips.clear();
+    }
     let cameras = cameras(entry.size.unwrap_or(definition.size), entry, &scene)?;
     let mut footprint_px = footprint(&scene, &cameras);
     if let Some(wanted) = point.footprint_px.filter(|_| footprint_px > 0.0) {
@@ -140,6 +152,7 @@ fn of_file(
         Some(mesh) => Ok::<_, Error>(sample(mesh, count, &method, 0, progress)?.0),
         None => Ok(Points::default()),
     };
+    let stratified = Method::Stratified { priority: &priority, depth: None };
     let points = match entry.surfels {
         Making::File => io::read(file, progress)?,
         Making::Points => bare()?,
@@ -147,7 +160,17 @@ fn of_file(
         Making::Knn => sized(Size::Knn)?,
         Making::Ellipse => sized(Size::Ellipse)?,
         Making::Bsp => sized(Size::Bsp(Triangle::default()))?,
-        Making::Sample => sampled(Method::Stratified { priority: &priority, depth: None })?,
+        Making::BspGlobal => sized(Size::BspGlobal(Triangle::default()))?,
+        Making::Qsplat => {
+            let bare = Points { faces: io::read(file, progress)?.faces, ..bare()? };
+            let options = FromPoints { size: Size::Qsplat, ..FromPoints::default() };
+            from_points(vec![bare], &options, progress)?.points
+        }
+        Making::Sample => sampled(stratified)?,
+        Making::Scanned => {
+            let Points { positions, up, normals, .. } = sampled(stratified)?;
+            Points { positions, up, normals, ..Points::default() }
+        }
         Making::Uniform => sampled(Method::Uniform)?,
     };
     let surface = mesh.filter(|_| entry.truth).map(|mesh| Surface::mesh(&mesh)).transpose()?;
@@ -167,6 +190,21 @@ fn of_shape(shape: Shape, count: u64, radius: Option<f64>) -> Points {
         ..Points::default()
     }
 }
+
+/// Moves each point along its normal by a Gaussian of standard deviation `sigma`, world units: always by the same.
+fn scatter(points: &mut Points, sigma: f64) {
+    let normals = points.normals.iter().flatten();
+    for (index, (position, normal)) in points.positions.iter_mut().zip(normals).enumerate() {
+        let mut random = Random::stream(NOISE_SEED, index as u64);
+        // Box and Muller 1958; the logarithm is of no 0.
+        let (radius, turn) = ((-2.0 * (1.0 - random.number()).ln()).sqrt(), TAU * random.number());
+        let offset = sigma * radius * turn.cos();
+        *position = (DVec3::from(*position) + offset * DVec3::from(normal.map(f64::from))).to_array();
+    }
+}
+
+/// Of the numbers that points are scattered by.
+const NOISE_SEED: u64 = 4;
 
 /// The first camera as the scene's entry says, and the others around the scene's centre.
 fn cameras([width, height]: [u32; 2], entry: &SceneEntry, scene: &Scene) -> Result<Vec<Camera>> {
@@ -253,6 +291,19 @@ mod tests {
         assert!((ratio(&far) - 0.1).abs() < 0.02, "{}", ratio(&far));
         let (_, flat) = staged("shape = \"plane\"\ncount = 100\northo = 4\nfill = 0.5");
         assert!((flat[0].footprint_px - 0.3 * 100.0 / 4.0 * 0.5).abs() < 1e-6);
+    }
+
+    #[test]
+    fn noise_scatters_points_along_their_normals() {
+        let heights = |entry: &str| -> Vec<f64> {
+            let (_, all) = staged(&format!("shape = \"plane\"\ncount = 4000\n{entry}"));
+            (0..4000).map(|index| (all[0].scene.origin + all[0].scene.center(index)).z).collect()
+        };
+        let spacing = (4.0f64 / 4000.0).sqrt();
+        let found = heights("noise = 0.5");
+        let sigma = (found.iter().map(|z| z * z).sum::<f64>() / 4000.0).sqrt();
+        assert!((sigma / (0.5 * spacing) - 1.0).abs() < 0.05, "{sigma}");
+        assert!(heights("").iter().all(|z| *z == 0.0) && found == heights("noise = 0.5"));
     }
 
     #[test]

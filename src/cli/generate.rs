@@ -12,16 +12,21 @@ use super::{note, outputs};
 
 /// Write an analytic scene as PLY: surfels with exact normals, radii and colours.
 ///
-/// SHAPE is sphere (unit radius), torus (radii 1 and 0.4), plane (a square of side 2, one colour) or checkerboard
-/// (the same with 32x32 squares). Radii are 1.5 times the spacing.
+/// SHAPE is sphere (unit radius), torus (radii 1 and 0.4), plane (a square of side 2, one colour), checkerboard
+/// (the same with 32x32 squares) or text (the same with lines of text, each half as high as the one above). Radii are 1.5 times the spacing.
 #[derive(Args)]
-#[command(after_help = "Example:\n  epsplat generate sphere --count 1000000 -o sphere.ply")]
+#[command(after_help = "Example:\n  epsplat generate sphere --count 1000000 -o sphere.ply\n  \
+    epsplat generate torus --count 20000 --texture -o torus.ply")]
 pub struct Arguments {
-    /// sphere, torus, plane or checkerboard
+    /// sphere, torus, plane, checkerboard or text
     shape: Shape,
     /// Surfels
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..=4_000_000_000))]
     count: u64,
+    /// Write texture coordinates too, for render --texture: turns around the upward axis and, upward, latitudes or turns around the
+    /// tube; across and up a square
+    #[arg(long)]
+    texture: bool,
     /// The file: .ply
     #[arg(short, long)]
     output: PathBuf,
@@ -43,6 +48,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             normal: sample.normal,
             radius: sample.radius,
             color: Some(ply::Color::Srgb8([r, g, b, 255])),
+            texture: arguments.shape.texture_at(sample.position.into()),
             ..ply::Vertex::default()
         }
     });
@@ -50,6 +56,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         normals: true,
         radii: true,
         colors: ply::ColorProperties::Srgb8,
+        texture: arguments.texture,
         up: Some(arguments.shape.up()),
         ..ply::Properties::default()
     };

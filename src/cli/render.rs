@@ -15,7 +15,7 @@ use epsplat::plan::{Accumulator, BackendName, BlendFormat, Organisation, Raster,
 use epsplat::render::{Backend, Report, render};
 use epsplat::scene::{
     Blend, Camera, Cull, Epsilon, Facing, Kernel, Light, LowPass, MAPS, Map, Maps, PointShape, PointSize, Samples,
-    Scene, Shading,
+    Scene, Shading, ShadingAt,
 };
 use epsplat::surfels::Preparation;
 use epsplat::{Error, Result, surfels};
@@ -103,8 +103,8 @@ pub struct Arguments {
     /// Smallest depth drawn, world units [default: a millionth of the scene]
     #[arg(long)]
     near: Option<f64>,
-    /// Depth tolerance: rel:E (fraction of the depth), abs:E (world units), radius:K (times the surfel's own shorter
-    /// half-axis), or radius:K,rel:E (the lesser of the two)
+    /// Depth tolerance: rel:E (fraction of the depth), abs:E (world units along the camera's axis), ray:E (along the view ray), radius:K (times the
+    /// surfel's own shorter half-axis), or radius:K,rel:E (the lesser of the two)
     /// [default: radius:1,rel:0.01]
     #[arg(long)]
     epsilon: Option<Epsilon>,
@@ -123,7 +123,7 @@ pub struct Arguments {
     #[arg(long)]
     kernel: Option<Kernel>,
     /// What a pixel shows: weighted (the mean of the fragments within epsilon of the nearest) or nearest (the colour of the nearest
-    /// alone, as with a depth test: faster, unlit) [default: weighted]
+    /// alone, as with a depth test: unlit, and faster for points of a few pixels) [default: weighted]
     #[arg(long, value_name = "HOW")]
     blend: Option<Blend>,
     /// Filter for splats near a pixel in size or below
@@ -147,13 +147,15 @@ pub struct Arguments {
     /// What --backend raster blends into: rgba8unorm, rgba16float or rgba32float [default: rgba16float]
     #[arg(long, value_name = "FORMAT")]
     blend_format: Option<BlendFormat>,
-    /// How --backend raster tests depth: exact (in the shader, as compute does), offset (by the rasteriser, along the
-    /// camera's axis) or ray (along the view ray) [default: exact]
+    /// How --backend raster tests depth: exact (in the shader, as compute does) or offset (by the rasteriser) [default: exact]
     #[arg(long, value_name = "HOW")]
     raster_depth: Option<RasterDepth>,
     /// Shading of the blended colour [default: lambert; unlit with --facing and --blend nearest]
     #[arg(long, value_enum)]
     shading: Option<ShadingName>,
+    /// What is lit: each pixel, at its blended normal, or each splat, at its centre, whose lit colours are blended
+    #[arg(long, value_enum, value_name = "WHAT", default_value_t = ShadingAtName::Pixel)]
+    shading_at: ShadingAtName,
     /// Exponent of the highlights of --shading phong, 1 to 1000: the higher, the smaller they are [default: 32]
     #[arg(long, value_name = "EXPONENT")]
     shininess: Option<f32>,
@@ -206,6 +208,12 @@ enum ShadingName {
     Lambert,
     /// Colour times the lights' cosines, and white highlights
     Phong,
+}
+
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum ShadingAtName {
+    Pixel,
+    Splat,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
@@ -300,6 +308,9 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
         let what = "--blend nearest has no tolerance and no weights: leave --epsilon and --kernel out";
         return Err(Error::Usage(what.into()));
     }
+    if arguments.shading_at == ShadingAtName::Splat && arguments.shading() == ShadingName::Unlit {
+        return Err(Error::Usage("nothing is lit: give --shading-at with --shading lambert or phong".into()));
+    }
     let default = RenderOptions::default();
     let options = RenderOptions {
         epsilon: arguments.epsilon.unwrap_or(default.epsilon),
@@ -320,6 +331,10 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
             ShadingName::Unlit => Shading::Unlit,
             ShadingName::Lambert => Shading::Lambert,
             ShadingName::Phong => Shading::Phong,
+        },
+        shading_at: match arguments.shading_at {
+            ShadingAtName::Pixel => ShadingAt::Pixel,
+            ShadingAtName::Splat => ShadingAt::Splat,
         },
         shininess: shininess(arguments)?.unwrap_or(default.shininess),
         lights: if arguments.lights.is_empty() { default.lights } else { arguments.lights.clone() },

@@ -27,7 +27,8 @@ pub struct Arguments {
     #[arg(short, long)]
     output: PathBuf,
     /// knn: the ellipse that holds what is nearer to a point than to its neighbours; ellipse: the one that bounds 8 neighbours in the tangent
-    /// plane; bsp, bsp:circumsphere: disks from clusters of three points, by their mean edge or circumsphere
+    /// plane; bsp, bsp:circumsphere: disks from clusters of three points, by their mean edge or circumsphere; bsp:global,
+    /// bsp:global-circumsphere: one disk for all, of such clusters' mean; qsplat: as large as the largest triangle at a mesh's vertex
     #[arg(long, default_value = "knn")]
     size: Size,
     /// Which side estimated normals point to: propagate from neighbour to neighbour, outward; X,Y,Z, toward the nearest

@@ -68,9 +68,6 @@ pub const OCCLUSION_TILE: u32 = 8;
 /// weight keep every digit.
 pub const ONE: u32 = u32::MAX - 1023;
 
-/// Units of a weight of 1 in the sums of `fixed` where terms may be small, and of `fixed64`: 2^40.
-pub const ONE_WIDE: u64 = 1 << 40;
-
 /// Bit of [`Splat::bounds_last`] that says that s x t points away from the viewer.
 pub const AWAY: u32 = 1 << 31;
 

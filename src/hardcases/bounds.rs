@@ -25,7 +25,7 @@ use crate::passes::project::reference_all;
 use crate::passes::splat::Splat;
 use crate::passes::visibility::Nearest;
 use crate::plan::{AccumulatorRow, Facts, RenderOptions, Sides};
-use crate::scene::{Camera, Clip, Kernel, LowPass, Scene};
+use crate::scene::{Camera, Clip, Epsilon, Kernel, LowPass, Scene};
 
 /// What a division may err by, relative: WGSL grants 2.5 units in the last place.
 const DIVISION: f64 = 5.0 * U;
@@ -379,8 +379,11 @@ pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Pi
     let farthest = (farthest + f64::from(scene.largest_radius())) * 1.001;
     let mut pixels = vec![NOTHING; camera.pixels()];
     fragments(&splats, scene, view, |pixel, splat, surface, f| {
-        let behind = |front: f64| options.epsilon.farthest(front, surface.radius);
-        let rounding = 4.0 * U * f.depth.abs();
+        let along = camera.along_axis(pixel as u32 % camera.width, pixel as u32 / camera.width);
+        let behind = |front: f64| options.epsilon.farthest(front, surface.radius, along);
+        // The slope of a ray takes an inverse root and three roundings of its argument.
+        let of_ray = if let Epsilon::Ray(length) = options.epsilon { 10.0 * U * length } else { 0.0 };
+        let rounding = 4.0 * U * f.depth.abs() + of_ray;
         let (near, front) = (&depths[pixel], depths[pixel].found);
         let may = f.may_hit(camera) && f.depth - f.depth_error - rounding <= behind(near.high());
         let must = f.surely_hits(camera) && f.depth + f.depth_error + rounding <= behind(near.beside(splat.surfel));
@@ -417,13 +420,26 @@ fn weight_error(kernel: Kernel, f: &Fragment) -> f64 {
     let moved = (psi((f.rho - f.rho_error).max(0.0)) - weight).max(weight - psi((f.rho + f.rho_error).min(1.0)));
     let exponential = |x: f64, power: f64| 2.0 * U * (3.0 + 2.0 * x) + x * power;
     let root = 9.0 * U;
+    // WGSL's pow is exp2(y log2 x), whose logarithm errs by 2^-21, or by 3 units in its last place where x < 1/2.
+    let logarithm = |x: f64| (8.0 * U).max(6.0 * U * x.log2().abs());
     let evaluated = match kernel {
         Kernel::Constant => 0.0,
-        Kernel::Hat => root + U,
+        Kernel::Cone { power } => {
+            let (height, error) = (1.0 - f.rho, root + U);
+            let below = height.powf(power) - (height - error).max(0.0).powf(power);
+            let raised = if power == 1.0 {
+                0.0
+            } else if [1.5, 2.0].contains(&power) {
+                root
+            } else {
+                power * logarithm(height.max(error)) + 2.0 * U * (3.0 + 2.0 * power * height.max(error).log2().abs())
+            };
+            below.max((height + error).powf(power) - height.powf(power)) + (height + error).powf(power) * raised
+        }
         Kernel::Gaussian { sigma } => weight * exponential(0.5 * f.rho * f.rho / (sigma * sigma), 3.0 * U),
         Kernel::Ellipse { a, n, smooth } => {
-            // WGSL's pow is exp2(y log2 x), whose logarithm errs by 2^-21; the kernel has a root for 3, products for 2, 4.
-            let power = if [2.0, 4.0].contains(&n) { 3.0 * U } else { root.max(n * 8.0 * U) + 3.0 * U };
+            // The kernel has a root for 3, products for 2, 4.
+            let power = if [2.0, 4.0].contains(&n) { 3.0 * U } else { root.max(n * logarithm(f.rho)) + 3.0 * U };
             let step = if smooth { (-a).exp() } else { 0.0 };
             let plain = weight * (1.0 - step) + step;
             (plain * exponential(a * f.rho.powf(n), power) + 2.0 * U * step) / (1.0 - step) + DIVISION * weight

@@ -132,6 +132,14 @@ const LIST: &[Entry] = &[
         unbounded
     ),
     entry!(
+        "epsilon along the ray",
+        "Two sheets through which rays pass 0.01 units apart in the middle: toward the corners an epsilon of 0.0105 along the ray ends between them.",
+        FRAGMENTS,
+        (64, 48),
+        Stage::askew,
+        along_rays
+    ),
+    entry!(
         "only the kernel's tail, smooth",
         "Every pixel is reached by four disks' rims alone, where the weight is at its floor of 1/1024.",
         "2^-32 over weights of 1/1024: 2^-22 a fragment",
@@ -145,7 +153,31 @@ const LIST: &[Entry] = &[
         "the rounding of rho over a weight of 1/200",
         (32, 32),
         Stage::askew,
-        |stage| tail(stage, Kernel::Hat)
+        |stage| tail(stage, Kernel::Cone { power: 1.0 })
+    ),
+    entry!(
+        "only the kernel's tail, steep",
+        "Every pixel is reached by four disks' rims alone, of a kernel that is exp(-50) there: the weight is at its floor of 2^-24.",
+        "2^-51 over weights of 2^-24: 2^-27 a fragment, and the rounding of rho",
+        (32, 32),
+        Stage::askew,
+        |stage| tail(stage, Kernel::Ellipse { a: 50.0, n: 5.0, smooth: false })
+    ),
+    entry!(
+        "a kernel of exp(-50)",
+        "A wavy sheet drawn by the steepest kernel of paper 000's Figure 10: weights of 1 and of 2^-24 meet in a pixel.",
+        FRAGMENTS,
+        (48, 48),
+        Stage::askew,
+        |stage| rough(stage).kernel(Kernel::Ellipse { a: 50.0, n: 5.0, smooth: false })
+    ),
+    entry!(
+        "a cone's rim",
+        "A wavy sheet drawn by (1 - rho)^1.5, which is as flat at the rim as rho's rounding is steep.",
+        FRAGMENTS,
+        (48, 48),
+        Stage::askew,
+        |stage| rough(stage).kernel(Kernel::Cone { power: 1.5 })
     ),
     entry!(
         "colours of 1e5 beside 1e-5",
@@ -224,6 +256,12 @@ fn sheets(stage: &Stage, behind: impl Fn(f64) -> f64, excused: f64) -> Filling {
     surfels.extend(stage.sheet(4.0, 0.0, |x, _| behind(x)));
     let mut filling = Filling { excused, ..Filling::of(surfels, (1.0, 1.0)) };
     filling.options.epsilon = Epsilon::Absolute(0.01);
+    filling
+}
+
+fn along_rays(stage: &Stage) -> Filling {
+    let mut filling = sheets(stage, |_| 2.01, 0.03);
+    filling.options.epsilon = Epsilon::Ray(0.0105);
     filling
 }
 

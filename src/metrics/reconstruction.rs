@@ -1,5 +1,7 @@
 //! The error of a render against the surface itself, which knows no splats.
 
+use std::f64::consts::PI;
+
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -46,6 +48,9 @@ pub struct Reconstruction {
     pub leak_rate: Option<f64>,
     /// Pixels that both cover over pixels that either covers.
     pub silhouette_iou: Option<f64>,
+    /// Mean distance between the two outlines against the background, pixels: the area that one covers and not the other over the
+    /// length of the true outline, that by the steps between covered pixels and others along rows and columns (Crofton).
+    pub outline_px: Option<f64>,
 }
 
 /// The error of depths as a fraction of the true depth.
@@ -113,7 +118,20 @@ pub fn reconstruction(frame: &Frame, truth: &Truth) -> Result<Reconstruction> {
         hole_rate: share(inside.len() - both.len(), inside.len()),
         leak_rate: share(both.iter().filter(leaks).count(), both.len()),
         silhouette_iou: share(common, either),
+        outline_px: outline(true_depth, frame.width as usize).map(|length| (either - common) as f64 / length),
     })
+}
+
+/// The length of the outline of what has a depth, pixels; none if nothing has one. A line crosses rows and columns of pixels in
+/// `|sin| + |cos|` steps a pixel of its length, `4 / pi` over all directions.
+fn outline(depth: &[f32], width: usize) -> Option<f64> {
+    let covered = |pixel: usize| depth[pixel].is_finite();
+    let steps = (0..depth.len()).map(|pixel| {
+        let beside = (pixel % width > 0 && covered(pixel) != covered(pixel - 1)) as u64;
+        let above = (pixel >= width && covered(pixel) != covered(pixel - width)) as u64;
+        beside + above
+    });
+    Some(steps.sum::<u64>() as f64 * PI / 4.0).filter(|length| *length > 0.0)
 }
 
 impl DepthError {
@@ -193,6 +211,27 @@ mod tests {
 
     fn normals(frame: &mut Frame) -> &mut [[f32; 3]] {
         bytemuck::cast_slice_mut(frame.map_mut(Map::Normal).unwrap())
+    }
+
+    /// An outline that lies two pixels outside the true circle, all around.
+    #[test]
+    fn outlines_are_as_far_apart_as_they_were_moved() {
+        let covered = truth().frame.map(Map::Depth).unwrap().iter().filter(|depth| depth.is_finite()).count();
+        let wider = (covered as f64 / PI).sqrt() + 2.0;
+        let away = |pixel: usize| {
+            let [x, y] = [pixel % SIDE, pixel / SIDE].map(|k| k as f64 + 0.5 - SIDE as f64 / 2.0);
+            x.hypot(y)
+        };
+        let widen = |frame: &mut Frame, _: &Truth| {
+            for (pixel, depth) in depths(frame).iter_mut().enumerate() {
+                *depth = if away(pixel) < wider { depth.min(5.0) } else { f32::INFINITY };
+            }
+        };
+        let found = with(widen).0.outline_px.unwrap();
+        // A ring is longer outside.
+        let expected = 2.0 * (1.0 + 1.0 / (wider - 2.0));
+        assert!((found / expected - 1.0).abs() < 0.05, "{found} for {expected}");
+        assert_eq!(with(|_, _| ()).0.outline_px, Some(0.0));
     }
 
     const NO_DEPTH_ERROR: Option<DepthError> = Some(DepthError { mean: 0.0, rmse: 0.0, percentile_99: 0.0 });

@@ -20,7 +20,7 @@
 //!   weight, which is rarer than fragments (on a software adapter carries are a fifth of the pass); and the rim of the
 //!   paper's kernel, exp(-6), keeps 23 bits. Where weights may be smaller still, or alphas differ
 //!   ([`SceneNeeds::wide_sums`](crate::plan::SceneNeeds::wide_sums)), terms are those of `fixed64` in two words, which
-//!   takes two additions for most. An adapter with 64-bit atomics makes the same sums in half the additions.
+//!   takes two additions for most, of 40 bits or, where the kernel's tails need them, up to 56 ([`wide_bits`]). An adapter with 64-bit atomics makes the same sums in half the additions.
 //! - **fixed32**: the same in one word. B fraction bits, `32 - bits(min(surfels, 255))`, are at least 24 and let 255 full
 //!   weights (or all surfels there are) meet in a pixel; a sum that wraps is noticed and the frame rendered again with
 //!   `fixed`. A sum is read with one rounding: `n 2^-B / w + 5 u`.
@@ -31,13 +31,14 @@
 //!   `(n - 1) u` of itself, and so does the weight's: `2 n u + 4 u`. The order shows.
 
 use super::footprint::footprint;
+use super::lit;
 use super::splat::{Intersection, Splat};
 use super::visibility::Nearest;
 use crate::gpu::layout::TILE;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
-use crate::plan::{Accumulator, Plan, RenderOptions, SceneNeeds, Winner};
-use crate::scene::options::LEAST_FILTERED_WEIGHT;
+use crate::plan::{Accumulator, Plan, RenderOptions, SceneNeeds, Winner, wide_bits};
+use crate::scene::kernel::LEAST_WEIGHT;
 use crate::scene::{Camera, Colors, Map, Scene};
 
 /// The file that keeps the sums of `fixed`, by whether terms may reach past a word, because weights may be small
@@ -159,9 +160,9 @@ pub fn reference<'a>(
     let mut sums = vec![PixelSums::ZERO; nearest.len()];
     for splat in splats {
         let [r, g, b, alpha] = scene.colors.linear(splat.surfel as usize).map(f64::from);
-        let color = [r * alpha, g * alpha, b * alpha, alpha];
         let surfel = &scene.surfels[splat.surfel as usize];
         let center = scene.origin + scene.center(splat.surfel as usize);
+        let color = lit::reference([r * alpha, g * alpha, b * alpha, alpha], splat, center, camera, options);
         let radius = f64::from(surfel.shorter());
         let times = f64::from(splat.copies);
         for y in splat.first[1].max(first_row)..=splat.last[1].min(first_row + rows - 1) {
@@ -170,7 +171,7 @@ pub fn reference<'a>(
                 let Some((at, gain)) = footprint(splat, camera, options.low_pass, x, y) else { continue };
                 let (pixel, back) = (row + x as usize, splat.shows_back(&at));
                 let front = nearest[pixel];
-                let behind = options.epsilon.farthest(front.depth, radius);
+                let behind = options.epsilon.farthest(front.depth, radius, camera.along_axis(x, y));
                 let sum = &mut sums[pixel];
                 if options.maps.has(Map::Decision) {
                     // What shows the other side is out unless it is nearest.
@@ -181,7 +182,7 @@ pub fn reference<'a>(
                     continue;
                 }
                 sum.back = front.back;
-                let weight = times * (gain * options.kernel.weight(at.rho2)).max(LEAST_FILTERED_WEIGHT);
+                let weight = times * (gain * options.kernel.weight(at.rho2)).max(LEAST_WEIGHT);
                 sum.weight += weight;
                 for (total, value) in sum.color.iter_mut().zip(color) {
                     *total += weight * value;
@@ -221,23 +222,29 @@ pub(super) fn decision(at: Intersection, behind: f64, near: f64) -> f64 {
 pub const PASS: Pass = Pass {
     name: "accumulate",
     files: |needs| {
-        if needs.sums_in_storage() || needs.winner == Some(Winner::Second) {
+        if needs.sums_by_compute() || needs.winner == Some(Winner::Second) {
             vec!["accumulate.wgsl"]
         } else {
             Vec::new()
         }
     },
-    kernels: |needs| match (needs.sums_in_storage() && !needs.gather) || needs.winner == Some(Winner::Second) {
+    kernels: |needs| match (needs.sums_by_compute() && !needs.gather) || needs.winner == Some(Winner::Second) {
         true => vec![ACCUMULATE, ACCUMULATE_LARGE],
         false => Vec::new(),
     },
-    constants: |making| vec![("FRACTION_BITS", making.needs.accumulator.row().fraction_bits(making.surfels).into())],
+    constants: |making| {
+        let wide = wide_bits(making.options.kernel, making.surfels);
+        vec![
+            ("FRACTION_BITS", making.needs.accumulator.row().fraction_bits(making.surfels).into()),
+            ("ONE", f64::from(wide).exp2()),
+        ]
+    },
 };
 
 /// The files that keep the sums of a render's first module.
 pub const SUMS: Pass = Pass {
     name: "sums",
-    files: |needs| if needs.sums_in_storage() { files(needs) } else { Vec::new() },
+    files: |needs| if needs.sums_by_compute() { files(needs) } else { Vec::new() },
     kernels: |_| Vec::new(),
     constants: |_| Vec::new(),
 };

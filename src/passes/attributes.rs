@@ -2,7 +2,7 @@
 //! terms to a pixel's sums and one that resolves them, or an absent one.
 
 use crate::plan::pass::Pass;
-use crate::plan::{ColorNeed, PixelLayout, RasterDepth, Sides, SurfelLayout, Winner, color_channels};
+use crate::plan::{ColorNeed, PixelLayout, RasterDepth, Sides, SurfelLayout, color_channels};
 use crate::scene::Map;
 
 /// The files and constants.
@@ -26,7 +26,7 @@ pub const PASS: Pass = Pass {
         files.push("attributes.wgsl");
         files.extend(match needs.color {
             // Of one fragment nothing is summed.
-            _ if needs.winner.is_some_and(|winner| winner != Winner::Rasterised) => &[][..],
+            _ if !needs.weighs() => &[][..],
             ColorNeed::Constant => &["color_constant.wgsl"],
             ColorNeed::Srgb8 => &["color_srgb8.wgsl", "srgb.wgsl", "color_sums.wgsl"],
             ColorNeed::Linear => &["color_linear.wgsl", "color_sums.wgsl"],

@@ -6,7 +6,7 @@ use super::lowpass::filtered;
 use super::splat::{Intersection, Splat};
 use super::{curved, facing};
 use crate::plan::pass::Pass;
-use crate::plan::{Sides, Winner};
+use crate::plan::{EpsilonForm, Sides};
 use crate::scene::{Camera, Kernel, KernelShape, LowPass, Projection};
 
 /// The files of the footprint and its weight; kernels of other passes evaluate them.
@@ -22,16 +22,19 @@ pub const PASS: Pass = Pass {
             "side.wgsl",
             match needs.winner {
                 Some(_) => "epsilon_none.wgsl",
-                None if needs.epsilon_radius => "epsilon_radius.wgsl",
-                None => "epsilon.wgsl",
+                None => match needs.epsilon {
+                    EpsilonForm::Depth => "epsilon.wgsl",
+                    EpsilonForm::Radius => "epsilon_radius.wgsl",
+                    EpsilonForm::Ray => "epsilon_ray.wgsl",
+                },
             },
         ];
-        if matches!(needs.winner, None | Some(Winner::Rasterised)) {
+        if needs.weighs() {
             files.push("blend.wgsl");
             files.push(match needs.kernel {
                 KernelShape::Gaussian => "kernel_gaussian.wgsl",
                 KernelShape::Ellipse => "kernel_ellipse.wgsl",
-                KernelShape::Hat => "kernel_hat.wgsl",
+                KernelShape::Cone => "kernel_cone.wgsl",
                 KernelShape::Constant => "kernel_constant.wgsl",
             });
         }
@@ -39,14 +42,17 @@ pub const PASS: Pass = Pass {
     },
     kernels: |_| Vec::new(),
     constants: |making| {
-        let mut constants = vec![("SIDES", u32::from(making.needs.sides == Sides::Nearest).into())];
-        constants.extend(match making.options.kernel {
+        let kernel = making.options.kernel;
+        let mut constants =
+            vec![("SIDES", u32::from(making.needs.sides == Sides::Nearest).into()), ("KERNEL_FLOOR", kernel.floor())];
+        constants.extend(match kernel {
             Kernel::Gaussian { sigma } => vec![("KERNEL_FALL", 0.5 / (sigma * sigma))],
             Kernel::Ellipse { a, n, smooth } => {
                 let step = if smooth { (-a).exp() } else { 0.0 };
                 vec![("KERNEL_A", a), ("KERNEL_N", n), ("KERNEL_STEP", step)]
             }
-            Kernel::Hat | Kernel::Constant => Vec::new(),
+            Kernel::Cone { power } => vec![("KERNEL_POWER", power)],
+            Kernel::Constant => Vec::new(),
         });
         constants
     },

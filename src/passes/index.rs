@@ -12,7 +12,7 @@ use crate::gpu::layout::TILE;
 use crate::plan::Plan;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Kernel, Over, Part, Run, Stage};
-use crate::scene::options::LEAST_FILTERED_WEIGHT;
+use crate::scene::kernel::LEAST_WEIGHT;
 use crate::scene::{Map, Provenance};
 
 /// The map's row.
@@ -72,12 +72,11 @@ fn reference(strip: &Strip<'_>, nearest: &[Nearest], frame: &mut Frame) {
                 let pixel = ((y - first_row) * camera.width + x) as usize;
                 let Some((at, gain)) = footprint(splat, camera, options.low_pass, x, y) else { continue };
                 let front = nearest[pixel];
-                if !at.hit(camera)
-                    || !front.shows(at.depth, splat.shows_back(&at), options.epsilon.farthest(front.depth, radius))
-                {
+                let behind = options.epsilon.farthest(front.depth, radius, camera.along_axis(x, y));
+                if !at.hit(camera) || !front.shows(at.depth, splat.shows_back(&at), behind) {
                     continue;
                 }
-                let weight = (gain * options.kernel.weight(at.rho2)).max(LEAST_FILTERED_WEIGHT);
+                let weight = (gain * options.kernel.weight(at.rho2)).max(LEAST_WEIGHT);
                 let (most, rank, _) = strongest[pixel];
                 if weight > most || (weight == most && ranks[surfel] < rank) {
                     strongest[pixel] = (weight, ranks[surfel], splat.surfel);

@@ -144,7 +144,7 @@ mod tests {
     fn the_blur_is_the_ratio_of_variances() {
         assert!((blur(Kernel::Gaussian { sigma: 0.25 }) - 4.0 / 3.0).abs() < 1e-12);
         // A cone has variance 3/20 along each axis.
-        assert!((blur(Kernel::Hat) - 1.0 / (12.0 * 0.15)).abs() < 5e-3);
+        assert!((blur(Kernel::Cone { power: 1.0 }) - 1.0 / (12.0 * 0.15)).abs() < 5e-3);
         // A disk of constant weight has 1/4, for which the filter would not reach the next pixel's centre.
         assert_eq!(blur(Kernel::Constant), RADIUS * RADIUS);
     }

@@ -28,6 +28,7 @@ pub mod facing;
 pub mod footprint;
 pub mod homography;
 pub mod index;
+pub mod lit;
 pub mod lowpass;
 pub mod order;
 pub mod project;
@@ -110,7 +111,7 @@ pub fn finish(frame: &mut Frame, needs: &SceneNeeds, provenance: &Provenance, or
 }
 
 /// The passes whose files every module has.
-const PASSES: [&Pass; 13] = [
+const PASSES: [&Pass; 14] = [
     &shared::PASS,
     &project::PASS,
     &facing::PASS,
@@ -121,6 +122,7 @@ const PASSES: [&Pass; 13] = [
     &winner::PASS,
     &accumulate::PASS,
     &attributes::PASS,
+    &lit::PASS,
     &covered::PASS,
     &resolve::PASS,
     &raster::PASS,

@@ -7,7 +7,7 @@
 //!
 //! - **exact**: fragments write their own depth, scaled by a power of two, and the attribute pass compares in the shader.
 //!   It accepts the very fragments that compute accepts.
-//! - **offset**, **ray**: both sides of a surface are blended, and normals as they are given, as in the papers. The quads lie in the disks' planes, the rasteriser interpolates and compares. Depths err by its
+//! - **offset**: both sides of a surface are blended, and normals as they are given, as in the papers. The quads lie in the disks' planes, the rasteriser interpolates and compares. Depths err by its
 //!   interpolation (a fragment within about 2^-20 of epsilon may be decided otherwise), absolute tolerances are applied at
 //!   the quads' corners, and a plane that passes the eye within its quad is bent. OpenGL has no such depths: it takes them
 //!   from -1 to 1, of which those far from the eye, all near the end that is 0 elsewhere, keep no digits.
@@ -27,17 +27,16 @@ pub const PASS: Pass = Pass {
     name: "raster",
     files: |needs| match needs.raster {
         None => Vec::new(),
-        Some(raster) => vec![
-            "raster.wgsl",
-            "accumulator_raster.wgsl",
-            targets_file(needs),
-            match (raster.depth, needs.winner) {
-                (RasterDepth::Exact, None) => "raster_exact.wgsl",
-                (RasterDepth::Exact, Some(_)) => "raster_nearest_exact.wgsl",
-                (RasterDepth::Offset | RasterDepth::Ray, None) => "raster_offset.wgsl",
-                (RasterDepth::Offset | RasterDepth::Ray, Some(_)) => "raster_nearest_offset.wgsl",
-            },
-        ],
+        Some(raster) => {
+            let mut files = vec!["raster.wgsl", "accumulator_raster.wgsl", targets_file(needs)];
+            files.extend(match (raster.depth, needs.winner) {
+                (RasterDepth::Exact, None) => &["raster_own_depths.wgsl", "raster_exact.wgsl"][..],
+                (RasterDepth::Exact, Some(_)) => &["raster_own_depths.wgsl", "raster_nearest_exact.wgsl"],
+                (RasterDepth::Offset, None) => &["raster_offset.wgsl"],
+                (RasterDepth::Offset, Some(_)) => &["raster_nearest_offset.wgsl"],
+            });
+            files
+        }
     },
     kernels: |_| Vec::new(),
     constants: |making| match making.needs.raster {
@@ -47,7 +46,6 @@ pub const PASS: Pass = Pass {
             ("BLEND_SCALE", if making.needs.winner.is_some() { 1.0 } else { blend_scale(raster.format) }),
             // The visibility pass's pipeline says otherwise.
             ("MOVED", 0.0),
-            ("ALONG_RAY", u32::from(raster.depth == RasterDepth::Ray).into()),
         ],
     },
 };
@@ -102,9 +100,7 @@ pub fn draws(raster: Raster, needs: &SceneNeeds) -> Vec<Draw> {
     let (near_first, test) = match raster.depth {
         RasterDepth::Exact => (wgpu::CompareFunction::Less, None),
         // Their depths are largest in front.
-        RasterDepth::Offset | RasterDepth::Ray => {
-            (wgpu::CompareFunction::Greater, depth(wgpu::CompareFunction::GreaterEqual, false))
-        }
+        RasterDepth::Offset => (wgpu::CompareFunction::Greater, depth(wgpu::CompareFunction::GreaterEqual, false)),
     };
     let add = wgpu::BlendComponent {
         src_factor: wgpu::BlendFactor::One,

@@ -1,6 +1,6 @@
 //! Stage 4: sums become the image: divide by the weight (paper 000, section 5.4), shade, put over the background.
 
-use glam::{DVec2, DVec3, DVec4};
+use glam::{DVec3, DVec4};
 use rayon::prelude::*;
 
 use super::accumulate::PixelSums;
@@ -38,7 +38,9 @@ pub fn reference(
             if sum.back {
                 normal = -normal;
             }
-            let shaded = shade(straight, normal, camera, options, DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5));
+            let toward_eye = -camera.ray(f64::from(x) + 0.5, f64::from(y) + 0.5).normalize();
+            let lit = options.lights_splats();
+            let shaded = if lit { straight } else { shade(straight, normal, toward_eye, options) };
             color = over([shaded.x, shaded.y, shaded.z, alpha], background);
             depth = sum.depth / sum.weight;
         }
@@ -86,16 +88,16 @@ pub fn mean_of_samples(fine: &Frame, samples: Samples) -> Frame {
     mean.with(Map::Decision, (0..width * height).map(least).collect())
 }
 
-/// The linear colour that a surface of colour `straight` and unit `normal` has at the image point `at`, pixels.
-fn shade(straight: DVec3, normal: DVec3, camera: &Camera, options: &RenderOptions, at: DVec2) -> DVec3 {
+/// The linear colour that a surface of colour `straight` and unit `normal` sends in the direction `toward_eye`, unit.
+pub(super) fn shade(straight: DVec3, normal: DVec3, toward_eye: DVec3, options: &RenderOptions) -> DVec3 {
     match options.shading {
         Shading::Unlit => straight,
         Shading::Lambert => {
-            straight * irradiances(normal, camera, &options.lights, at).map(|(light, _)| light).sum::<f64>()
+            straight * irradiances(normal, toward_eye, &options.lights).map(|(light, _)| light).sum::<f64>()
         }
         Shading::Phong => {
             let exponent = f64::from(options.shininess);
-            let lights = irradiances(normal, camera, &options.lights, at);
+            let lights = irradiances(normal, toward_eye, &options.lights);
             let (diffuse, highlight) = lights.fold((0.0, 0.0), |(diffuse, highlight), (light, mirrored)| {
                 (diffuse + light, highlight + light * mirrored.max(0.0).powf(exponent))
             });
@@ -104,10 +106,9 @@ fn shade(straight: DVec3, normal: DVec3, camera: &Camera, options: &RenderOption
     }
 }
 
-/// For each light at an image point its intensity times its cosine (the headlight lights both sides, a directional light the
+/// For each light its intensity times its cosine (the headlight lights both sides, a directional light the
 /// side the normal is on), and the cosine between its mirrored direction and the one toward the eye.
-fn irradiances(normal: DVec3, camera: &Camera, lights: &[Light], at: DVec2) -> impl Iterator<Item = (f64, f64)> {
-    let toward_eye = -camera.ray(at.x, at.y).normalize();
+fn irradiances(normal: DVec3, toward_eye: DVec3, lights: &[Light]) -> impl Iterator<Item = (f64, f64)> {
     lights.iter().map(move |light| {
         let (toward, intensity) = match *light {
             Light::Headlight { intensity } => (toward_eye, intensity),

@@ -135,7 +135,7 @@ impl ScenePage<'_> {
         let low = self.scene.low.get(index);
         match (self.needs.color, &self.scene.colors) {
             (ColorNeed::Srgb8, Colors::Srgb8(codes)) => into[0] = u32::from_le_bytes(codes[index]),
-            (ColorNeed::Linear, Colors::Linear(colors)) => bits(&[colors[index]], into),
+            (ColorNeed::Linear, colors) => bits(&[colors.linear(index)], into),
             (ColorNeed::Textured, Colors::Textured(textured)) => {
                 let [center, u_slope, v_slope] = textured.mapped(index, low);
                 bits(&[textured.colors()[index], center, u_slope, v_slope], into);

@@ -84,6 +84,14 @@ impl Splat {
         self.curve.as_ref().map_or(self.away, Curve::faces_away)
     }
 
+    /// The normal that light sees where splats are lit, that of the centre: of a surfel that has a side as it is given.
+    pub fn lit_normal(&self) -> DVec3 {
+        // That of a disk was turned toward the viewer, that of a cap is turned at each fragment.
+        let turned = self.away && self.sides != Sides::Both && self.curve.is_none();
+        let turns = self.away && self.sides == Sides::None;
+        if turned == turns { self.normal } else { -self.normal }
+    }
+
     /// The normal that light sees at `at`, world space, unit.
     pub fn normal_at(&self, at: &Intersection) -> DVec3 {
         let Some(curve) = &self.curve else { return self.normal };

@@ -7,6 +7,8 @@ use serde::{Serialize, Serializer};
 
 use crate::error::Error;
 use crate::gpu::layout::ONE;
+use crate::scene::Kernel;
+use crate::scene::kernel::LEAST_AT_RIM;
 
 /// How sums are kept on the device.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -167,6 +169,13 @@ impl AccumulatorRow {
     }
 }
 
+/// Fraction bits that `fixed64`, and `fixed` where terms may be small, keep of a term in a scene of `surfels` drawn by `kernel`: 40, and of
+/// kernels that fall below [`LEAST_AT_RIM`] as many as the sums of all surfels leave free of 64, up to 56, so that a pixel of which their
+/// tails alone tell keeps its digits.
+pub fn wide_bits(kernel: Kernel, surfels: u64) -> u32 {
+    if kernel.floor() < LEAST_AT_RIM { surfels.leading_zeros().clamp(40, 56) } else { 40 }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -179,6 +188,16 @@ mod tests {
             assert_eq!(row.name.parse::<Accumulator>().ok(), Some(row.of));
         }
         assert!("double".parse::<Accumulator>().is_err());
+    }
+
+    #[test]
+    fn wide_bits_leave_room_for_every_surfel_and_24_digits_to_the_least_weight_of_few() {
+        let steep = Kernel::Ellipse { a: 20.0, n: 3.0, smooth: false };
+        for (surfels, bits) in [(0, 56), (255, 56), (256, 55), (65_535, 48), (1_000_000, 44), (1 << 24, 40)] {
+            assert_eq!(wide_bits(steep, surfels), bits, "{surfels}");
+            assert!(u128::from(surfels) << bits < 1 << 64 || bits == 40);
+            assert_eq!(wide_bits(Kernel::Ellipse { a: 6.0, n: 3.0, smooth: true }, surfels), 40);
+        }
     }
 
     #[test]

@@ -133,6 +133,11 @@ pub fn chosen(backend: Option<BackendName>, chosen: Chosen) -> Result<()> {
 /// # Errors
 /// [`Error::Usage`].
 pub fn textured(options: &RenderOptions, reference: bool) -> Result<()> {
+    if options.lights_splats() {
+        return usage(
+            "a texture has many colours in a splat, which are lit pixel by pixel: leave --shading-at splat out",
+        );
+    }
     if options.raster.is_some() && !reference {
         return usage("the rasteriser blends no texture coordinates: leave the texture out, or render by compute");
     }

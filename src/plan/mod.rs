@@ -17,11 +17,11 @@ mod surfel;
 pub mod tuning;
 mod view;
 
-pub use accumulator::{ACCUMULATORS, Accumulator, AccumulatorRow, Features};
+pub use accumulator::{ACCUMULATORS, Accumulator, AccumulatorRow, Features, wide_bits};
 pub use cuts::{Band, bands, page_surfels};
 pub use facts::{ColorNeed, Facts};
 pub use known::Known;
-pub use needs::{SMALL_WEIGHT, SceneNeeds, Sides, Winner, culls_back};
+pub use needs::{EpsilonForm, SMALL_WEIGHT, SceneNeeds, Sides, Winner, culls_back};
 pub use optimisation::Optimisation;
 pub use options::{BackendName, Organisation, RenderOptions};
 pub use pixel::{COLOR_CHANNEL, PixelLayout, color_channels};
@@ -31,7 +31,7 @@ pub use view::device_unit;
 
 use crate::error::Result;
 use crate::gpu::adapter::AdapterDescription;
-use crate::gpu::layout::BATCH;
+use crate::gpu::layout::{BATCH, ONE};
 use crate::scene::Camera;
 use known::Listed;
 use steps::Part;
@@ -45,6 +45,8 @@ pub struct Plan {
     pub pixel: PixelLayout,
     /// u32 words of a pixel's sums in storage; the rasteriser's are in textures, those of tiles that gather in registers.
     pub sum_words: u32,
+    /// Units of a weight of 1 in the sums of `fixed`.
+    pub one: u64,
     /// Columns of samples.
     pub width: u32,
     /// The rows of samples that buffers hold at a time.
@@ -114,6 +116,7 @@ impl Plan {
             needs,
             pixel,
             sum_words,
+            one: if needs.wide_sums { 1 << wide_bits(options.kernel, facts.surfels) } else { ONE.into() },
             width: camera.width,
             bands,
             pages: facts.surfels.div_ceil(page) as usize,
@@ -133,6 +136,7 @@ impl Plan {
             needs: SceneNeeds { raster: None, tiles: false, ..needs },
             pixel: PixelLayout::of(&needs),
             sum_words: 0,
+            one: 1,
             width: camera.width,
             bands: cuts::strips(camera, tuning::REFERENCE_ROWS),
             pages: 1,

@@ -44,8 +44,8 @@ pub struct SceneNeeds {
     pub kernel: KernelShape,
     /// The filter for small splats.
     pub low_pass: LowPass,
-    /// Epsilon depends on the surfel's radius.
-    pub epsilon_radius: bool,
+    /// What epsilon depends on.
+    pub epsilon: EpsilonForm,
     /// The colour source.
     pub color: ColorNeed,
     /// Surfels differ in alpha.
@@ -66,10 +66,33 @@ pub struct SceneNeeds {
     pub facing: Option<PointShape>,
     /// Samples of a pixel. The kernels' pixels are samples, but for those that they are resolved to.
     pub samples: Samples,
-    /// How pixels are lit.
+    /// How pixels, or splats, are lit.
     pub shading: Shading,
+    /// It is splats that are lit.
+    pub lit_splats: bool,
     /// Maps that are written; depths are accumulated for theirs, and fragments counted.
     pub maps: Maps,
+}
+
+/// What epsilon depends on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum EpsilonForm {
+    /// The nearest depth, if anything.
+    Depth,
+    /// The surfel's radius.
+    Radius,
+    /// The slope of the pixel's ray.
+    Ray,
+}
+
+impl EpsilonForm {
+    fn of(epsilon: Epsilon, camera: &Camera) -> Self {
+        match epsilon {
+            Epsilon::Radius(_) | Epsilon::Bounded { .. } => Self::Radius,
+            Epsilon::Ray(_) if camera.projection == Projection::Pinhole => Self::Ray,
+            Epsilon::Ray(_) | Epsilon::Relative(_) | Epsilon::Absolute(_) => Self::Depth,
+        }
+    }
 }
 
 /// How the fragment is found that alone shows at a pixel ([`winner`](crate::passes::winner)).
@@ -89,8 +112,10 @@ pub enum Winner {
 pub const SMALL_WEIGHT: f64 = 1.0 / 512.0;
 
 fn may_be_small(options: &RenderOptions) -> bool {
-    // The convolution with the pixel lowers the weight of splats below it.
-    options.kernel.weight(1.0) < SMALL_WEIGHT || options.low_pass == LowPass::Ewa
+    // Squares have corners at sqrt(2) radii. The convolution with the pixel lowers the weight of splats below it.
+    let square = options.facing.is_some_and(|facing| facing.shape == PointShape::Square);
+    let farthest = if square { 2.0 } else { 1.0 };
+    options.kernel.weight(farthest) < SMALL_WEIGHT || options.low_pass == LowPass::Ewa
 }
 
 /// Whether surfels that face away are left out.
@@ -157,10 +182,14 @@ impl SceneNeeds {
             triangles: options.raster.is_some() && tuning::PIXELS_A_TRIANGLE * facts.surfels > camera.pixels() as u64,
             kernel: if blends { options.kernel.shape() } else { KernelShape::Constant },
             low_pass: options.low_pass,
-            epsilon_radius: blends && matches!(options.epsilon, Epsilon::Radius(_) | Epsilon::Bounded { .. }),
-            color: facts.colors,
+            epsilon: if blends { EpsilonForm::of(options.epsilon, camera) } else { EpsilonForm::Depth },
+            // Surfels of one colour differ once they are lit.
+            color: match facts.colors {
+                ColorNeed::Constant if options.lights_splats() => ColorNeed::Linear,
+                colors => colors,
+            },
             alpha: low[3] != high[3],
-            normal: lit || options.maps.has(Map::Normal),
+            normal: (lit && !options.lights_splats()) || options.maps.has(Map::Normal),
             sides: Sides::of(facts, camera, options),
             own_normals: facts.own_normals && (lit || options.maps.has(Map::Normal)),
             cull_back: culls_back(facts, camera, options),
@@ -169,6 +198,7 @@ impl SceneNeeds {
             facing: options.facing.map(|facing| facing.shape),
             samples: options.samples,
             shading: options.shading,
+            lit_splats: options.lights_splats(),
             maps: options.maps,
         }
     }
@@ -198,9 +228,14 @@ impl SceneNeeds {
         }
     }
 
-    /// Weighted sums are kept, in storage or in a tile's registers.
-    pub fn sums_in_storage(&self) -> bool {
+    /// Weighted sums are kept by compute kernels, in storage or in a tile's registers.
+    pub fn sums_by_compute(&self) -> bool {
         self.raster.is_none() && self.winner.is_none()
+    }
+
+    /// Fragments have weights: they are summed, or they are the rasteriser's, whose targets hold terms even of one fragment.
+    pub fn weighs(&self) -> bool {
+        matches!(self.winner, None | Some(Winner::Rasterised))
     }
 
     /// The needs by name, for people and JSON.
@@ -218,13 +253,12 @@ impl SceneNeeds {
         let kernel = match self.kernel {
             KernelShape::Gaussian => "kernel-gaussian",
             KernelShape::Ellipse => "kernel-ellipse",
-            KernelShape::Hat => "kernel-hat",
+            KernelShape::Cone => "kernel-cone",
             KernelShape::Constant => "kernel-constant",
         };
         let raster = self.raster.map(|raster| match raster.depth {
             RasterDepth::Exact => "raster-exact",
             RasterDepth::Offset => "raster-offset",
-            RasterDepth::Ray => "raster-ray",
         });
         let flags = [
             (self.low_pass == LowPass::Max, "lowpass-max"),
@@ -237,7 +271,8 @@ impl SceneNeeds {
             (self.cull, "cull"),
             (self.tiles, "tiles"),
             (self.gather, "gather"),
-            (self.epsilon_radius, "epsilon-radius"),
+            (self.epsilon == EpsilonForm::Radius, "epsilon-radius"),
+            (self.epsilon == EpsilonForm::Ray, "epsilon-ray"),
             (self.alpha, "alpha"),
             (self.normal, "normal"),
             (self.sides == Sides::Nearest, "sides"),
@@ -250,6 +285,7 @@ impl SceneNeeds {
             (self.samples != Samples::ONE, "samples"),
             (self.shading == Shading::Lambert, "lambert"),
             (self.shading == Shading::Phong, "phong"),
+            (self.lit_splats, "lit-splats"),
         ];
         [projection, kernel, color]
             .into_iter()

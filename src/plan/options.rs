@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use super::{Accumulator, Optimisation, Raster};
 use crate::error::Error;
-use crate::scene::{Blend, Cull, Epsilon, Facing, Kernel, Light, LowPass, Map, Maps, Samples, Shading};
+use crate::scene::{Blend, Cull, Epsilon, Facing, Kernel, Light, LowPass, Map, Maps, Samples, Shading, ShadingAt};
 
 /// Who renders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,6 +87,8 @@ pub struct RenderOptions {
     pub raster: Option<Raster>,
     /// Shading model.
     pub shading: Shading,
+    /// What it lights.
+    pub shading_at: ShadingAt,
     /// Exponent of [`Shading::Phong`], in [`SHININESS_RANGE`](crate::scene::options::SHININESS_RANGE): the higher, the smaller a highlight is.
     pub shininess: f32,
     /// Lights of the shading models; unlit pixels have none.
@@ -108,6 +110,11 @@ impl RenderOptions {
     /// Surfels that curve are drawn so: the rasteriser and the ellipse of `ewa` draw flat disks, and points have no plane.
     pub fn draws_caps(&self) -> bool {
         self.low_pass != LowPass::Ewa && self.raster.is_none() && self.facing.is_none()
+    }
+
+    /// Light falls on splats, whose lit colours are blended, and not on pixels.
+    pub fn lights_splats(&self) -> bool {
+        self.shading != Shading::Unlit && self.shading_at == ShadingAt::Splat
     }
 
     /// Whether a pixel of the image differs from 0 where nothing is.
@@ -135,6 +142,7 @@ impl Default for RenderOptions {
             organisation: Organisation::Auto,
             raster: None,
             shading: Shading::Lambert,
+            shading_at: ShadingAt::Pixel,
             shininess: 32.0,
             lights: vec![Light::Headlight { intensity: 1.0 }],
             background: [0.0; 4],

@@ -52,16 +52,14 @@ impl BlendFormat {
 pub enum RasterDepth {
     /// Each fragment writes its own depth, and compares it with the nearest in the shader: what compute does.
     Exact,
-    /// The rasteriser interpolates and compares depths, which the visibility pass moves away by epsilon along the
-    /// camera's axis (Botsch et al. 2005).
+    /// The rasteriser interpolates and compares depths, which the visibility pass moves away by epsilon: along the camera's axis (Botsch et
+    /// al. 2005), or along the view ray where epsilon lies along it (paper 000, section 5.3).
     Offset,
-    /// The classic depth test against depths that are moved along the view ray (paper 000, section 5.3).
-    Ray,
 }
 
 impl RasterDepth {
     /// Every way by name.
-    pub const ALL: [(Self, &'static str); 3] = [(Self::Exact, "exact"), (Self::Offset, "offset"), (Self::Ray, "ray")];
+    pub const ALL: [(Self, &'static str); 2] = [(Self::Exact, "exact"), (Self::Offset, "offset")];
 
     /// Its name.
     pub fn name(self) -> &'static str {

@@ -5,8 +5,9 @@ use glam::DVec3;
 use super::{Facts, RenderOptions};
 use crate::gpu::layout::View;
 use crate::scene::light::MAX_LIGHTS;
+use crate::scene::options::HIGHLIGHT;
 use crate::scene::texture::PlaceRange;
-use crate::scene::{Bounds, Camera, Light, Projection};
+use crate::scene::{Bounds, Camera, Light, Projection, Shading};
 
 /// x as the nearest f32 and the nearest f32 to what that leaves.
 fn split(x: f64) -> (f32, f32) {
@@ -42,7 +43,8 @@ const LARGEST_FRACTION: f64 = 1e9;
 impl View {
     /// The view by `camera` of the scene that `facts` are of.
     pub fn new(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Self {
-        let Facts { bounds, body, core, color: (low, high), largest_radius, .. } = facts;
+        let Facts { bounds, body, core, color, largest_radius, .. } = facts;
+        let [low, high] = lit_range([color.0, color.1], options);
         let largest_radius = f64::from(*largest_radius);
         let eye_relative = camera.eye - facts.origin;
         let unit = device_unit(body, bounds, eye_relative);
@@ -74,7 +76,7 @@ impl View {
             eye_low,
             intrinsics,
             intrinsics_low,
-            color_low: *low,
+            color_low: low,
             color_span: span,
             color_scale: span.map(|s| if s > 0.0 { 1.0 / s } else { 0.0 }),
             background: options.background,
@@ -108,6 +110,22 @@ fn farthest_of(bounds: &Bounds, eye: DVec3, camera: &Camera) -> f64 {
         camera.rotation.row(2).dot(DVec3::new(pick(0), pick(1), pick(2)) - eye)
     };
     (0..8).map(corner).fold(0.0, f64::max)
+}
+
+/// The range of premultiplied colours in `range` once they are lit, if splats are.
+fn lit_range([low, high]: [[f32; 4]; 2], options: &RenderOptions) -> [[f32; 4]; 2] {
+    if !options.lights_splats() {
+        return [low, high];
+    }
+    let light: f32 = options.lights.iter().map(Light::intensity).sum();
+    let highlight = if options.shading == Shading::Phong { HIGHLIGHT as f32 * light } else { 0.0 };
+    let mut lit = [low, high];
+    for k in 0..3 {
+        lit[0][k] = (low[k] * light).min(0.0);
+        // A hair for roundings.
+        lit[1][k] = ((high[k] * light).max(0.0) + highlight) * 1.000_01;
+    }
+    lit
 }
 
 /// The lights as the kernels see them: a direction, zero for a headlight, and an intensity.

@@ -7,7 +7,7 @@ use super::sequence;
 use super::store::Store;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
-use crate::gpu::layout::{ONE, ONE_WIDE, View};
+use crate::gpu::layout::View;
 use crate::gpu::{Gpu, Sources};
 use crate::passes::source::Source;
 use crate::passes::upload::{Uploaded, shared, upload};
@@ -37,14 +37,13 @@ pub struct Sums {
 impl Sums {
     /// Room for an image by `plan`.
     pub(super) fn new(camera: &Camera, plan: &Plan, view: &View) -> Self {
-        let one = if plan.needs.wide_sums { ONE_WIDE } else { ONE.into() };
         let view = View { lights: Default::default(), background: [0.0; 4], ..*view };
         Self {
             size: [camera.width, camera.height],
             nearest: Vec::new(),
             sums: Vec::new(),
             pixel: plan.pixel,
-            one,
+            one: plan.one,
             view,
         }
     }

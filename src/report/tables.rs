@@ -25,7 +25,7 @@ impl<'a> Column<'a> {
 const PASSES: [&str; 4] = ["project", "visibility", "accumulate", "resolve"];
 
 /// Measures against ground truth as a reader knows them; others have their own name.
-const TRUTHS: [(&str, &str); 13] = [
+const TRUTHS: [(&str, &str); 14] = [
     ("psnr_db", "PSNR, dB"),
     ("ssim", "SSIM"),
     ("max_abs", "largest"),
@@ -38,6 +38,7 @@ const TRUTHS: [(&str, &str); 13] = [
     ("hole_rate", "holes"),
     ("leak_rate", "leaks"),
     ("silhouette_iou", "silhouette IoU"),
+    ("outline_px", "outline, px"),
     ("rmse", "RMSE"),
 ];
 

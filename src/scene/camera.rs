@@ -252,6 +252,11 @@ impl Camera {
         }
     }
 
+    /// The depth that the view ray of the pixel (x, y), through its centre, gains over a unit of its length: 1 in orthographic images.
+    pub fn along_axis(&self, x: u32, y: u32) -> f64 {
+        1.0 / self.ray(f64::from(x) + 0.5, f64::from(y) + 0.5).length()
+    }
+
     /// Pixels of the image.
     pub fn pixels(&self) -> usize {
         self.width as usize * self.height as usize

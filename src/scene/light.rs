@@ -26,6 +26,15 @@ pub enum Light {
 /// Lights one render can have: they travel in a uniform.
 pub const MAX_LIGHTS: usize = 8;
 
+impl Light {
+    /// Factor on the surface's colour at normal incidence.
+    pub fn intensity(&self) -> f32 {
+        match *self {
+            Self::Headlight { intensity } | Self::Directional { intensity, .. } => intensity,
+        }
+    }
+}
+
 impl FromStr for Light {
     type Err = Error;
 

@@ -9,8 +9,10 @@ use crate::error::Error;
 pub enum Epsilon {
     /// A fraction of the nearest depth at the pixel.
     Relative(f64),
-    /// World units.
+    /// World units, along the camera's axis.
     Absolute(f64),
+    /// World units along the pixel's view ray, as paper 000 moves its splats "along the perspective projector" (section 5.3).
+    Ray(f64),
     /// A multiple of the fragment's own surfel's shorter half-axis.
     Radius(f64),
     /// The lesser of a multiple of that half-axis and a fraction of the nearest depth: disks that are coarse for their scene do not
@@ -28,12 +30,12 @@ pub enum Epsilon {
 pub const LEAST_EPSILON: f64 = 4.0 / 16_777_216.0;
 
 impl Epsilon {
-    /// The parts (relative, absolute, of the radius): the farthest accepted depth of a surfel of radius r is
+    /// The parts (relative, absolute, of the radius): the farthest accepted depth of a surfel of radius r is at most
     /// `nearest * (1 + relative) + absolute + of_radius * r`.
     pub fn parts(self) -> (f64, f64, f64) {
         match self {
             Self::Relative(e) => (e.max(LEAST_EPSILON), 0.0, 0.0),
-            Self::Absolute(e) => (LEAST_EPSILON, e, 0.0),
+            Self::Absolute(e) | Self::Ray(e) => (LEAST_EPSILON, e, 0.0),
             Self::Radius(k) | Self::Bounded { radius: k, .. } => (LEAST_EPSILON, 0.0, k),
         }
     }
@@ -46,9 +48,11 @@ impl Epsilon {
         }
     }
 
-    /// The farthest depth that is accepted of a surfel whose shorter half-axis is `radius`, where the `nearest` is known; world units.
-    pub fn farthest(self, nearest: f64, radius: f64) -> f64 {
+    /// The farthest depth that is accepted of a surfel whose shorter half-axis is `radius`, where the `nearest` is known, at a pixel whose
+    /// ray gains the depth `along` a unit of its length ([`Camera::along_axis`](super::Camera::along_axis)); world units.
+    pub fn farthest(self, nearest: f64, radius: f64, along: f64) -> f64 {
         let (relative, absolute, of_radius) = self.parts();
+        let absolute = if matches!(self, Self::Ray(_)) { absolute * along } else { absolute };
         nearest * (1.0 + relative) + (absolute + of_radius * radius).min(nearest * self.most())
     }
 }
@@ -66,7 +70,7 @@ impl FromStr for Epsilon {
     fn from_str(text: &str) -> Result<Self, Error> {
         let bad = || {
             Error::Usage(format!(
-                "an epsilon is rel:E (fraction of depth), abs:E (world units), radius:K (times the surfel's) or the lesser of two, \
+                "an epsilon is rel:E (fraction of depth), abs:E (world units along the camera's axis), ray:E (along the ray), radius:K (times the surfel's) or the lesser of two, \
                  radius:K,rel:E, not {text:?}"
             ))
         };
@@ -79,6 +83,7 @@ impl FromStr for Epsilon {
         match kind_and_amount(text).ok_or_else(bad)? {
             ("rel", value) => Ok(Self::Relative(value)),
             ("abs", value) => Ok(Self::Absolute(value)),
+            ("ray", value) => Ok(Self::Ray(value)),
             ("radius", value) => Ok(Self::Radius(value)),
             _ => Err(bad()),
         }
@@ -173,111 +178,6 @@ impl FromStr for Samples {
     }
 }
 
-/// The weight of a fragment over the unit disk of its surfel, rho in [0, 1].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Kernel {
-    /// `exp(-rho^2 / (2 sigma^2))` (paper 000, Eq. 11), cut off at the rim.
-    Gaussian {
-        /// Standard deviation, in radii.
-        sigma: f64,
-    },
-    /// `psi_E(rho) = exp(-a rho^n)` (paper 000, Eq. 12, where b cancels).
-    Ellipse {
-        /// Drop-off: the weight at the rim is `exp(-a)`.
-        a: f64,
-        /// Steepness: higher values have a wider plateau.
-        n: f64,
-        /// `(psi_E - exp(-a)) / (1 - exp(-a))` instead, which ends at 0: no step at the rim.
-        smooth: bool,
-    },
-    /// `1 - rho`.
-    Hat,
-    /// 1.
-    Constant,
-}
-
-/// The least weight of a fragment. It keeps "depth written implies weight > 0" true for kernels that end at 0, and is
-/// large enough that a pixel reached by a kernel's tail alone keeps 14 bits of its attributes in 24-bit sums.
-pub const LEAST_WEIGHT: f64 = 1.0 / 1024.0;
-
-/// The least weight of a fragment that a low-pass has spread over its pixel: the weight of a splat of a millionth of a
-/// pixel is as small a share of that of a large one. It is a whole unit of every accumulator, and a floor as high as
-/// [`LEAST_WEIGHT`] would flatten the filter itself.
-pub const LEAST_FILTERED_WEIGHT: f64 = 1.0 / 16_777_216.0;
-
-/// A kernel without its numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[allow(missing_docs)]
-pub enum KernelShape {
-    Gaussian,
-    Ellipse,
-    Hat,
-    Constant,
-}
-
-impl Kernel {
-    /// The weight at squared radius `rho2` in [0, 1], at least [`LEAST_WEIGHT`].
-    pub fn weight(self, rho2: f64) -> f64 {
-        let weight = match self {
-            Self::Gaussian { sigma } => (-0.5 * rho2 / (sigma * sigma)).exp(),
-            Self::Ellipse { a, n, smooth } => {
-                let step = if smooth { (-a).exp() } else { 0.0 };
-                ((-a * rho2.powf(0.5 * n)).exp() - step) / (1.0 - step)
-            }
-            Self::Hat => 1.0 - rho2.sqrt(),
-            Self::Constant => 1.0,
-        };
-        weight.max(LEAST_WEIGHT)
-    }
-
-    /// Which it is.
-    pub fn shape(self) -> KernelShape {
-        match self {
-            Self::Gaussian { .. } => KernelShape::Gaussian,
-            Self::Ellipse { .. } => KernelShape::Ellipse,
-            Self::Hat => KernelShape::Hat,
-            Self::Constant => KernelShape::Constant,
-        }
-    }
-}
-
-impl FromStr for Kernel {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self, Error> {
-        let bad = || {
-            Error::Usage(format!(
-                "a kernel is gaussian[:SIGMA] (0.05 to 10), ellipse:A,N[,smooth] (A from 0 to 16, N from 0.1 to 100), \
-                 hat or constant, not {text:?}"
-            ))
-        };
-        let number = |text: &str| text.trim().parse::<f64>().map_err(|_| bad());
-        let kernel = match text.split_once(':') {
-            None => match text {
-                "gaussian" => Self::Gaussian { sigma: 1.0 / 3.0 },
-                "hat" => Self::Hat,
-                "constant" => Self::Constant,
-                _ => return Err(bad()),
-            },
-            Some(("gaussian", sigma)) => Self::Gaussian { sigma: number(sigma)? },
-            Some(("ellipse", numbers)) => match numbers.split(',').collect::<Vec<_>>()[..] {
-                [a, n] => Self::Ellipse { a: number(a)?, n: number(n)?, smooth: false },
-                [a, n, "smooth"] => Self::Ellipse { a: number(a)?, n: number(n)?, smooth: true },
-                _ => return Err(bad()),
-            },
-            Some(_) => return Err(bad()),
-        };
-        let usable = match kernel {
-            Self::Gaussian { sigma } => (0.05..=10.0).contains(&sigma),
-            Self::Ellipse { a, n, smooth } => {
-                (if smooth { 0.01 } else { 0.0 }..=16.0).contains(&a) && (0.1..=100.0).contains(&n)
-            }
-            Self::Hat | Self::Constant => true,
-        };
-        if usable { Ok(kernel) } else { Err(bad()) }
-    }
-}
-
 /// What is done about splats that are near a pixel in size or below.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -306,6 +206,17 @@ pub enum Shading {
     Phong,
 }
 
+/// What is lit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ShadingAt {
+    /// Each pixel, at its blended normal.
+    #[default]
+    Pixel,
+    /// Each splat, at its centre: lit colours are blended (paper 000, section 5.3).
+    Splat,
+}
+
 /// What a highlight of [`Shading::Phong`] adds, of a light's irradiance, where the light is mirrored into the eye.
 /// With one light of 1 it does not clip the colour of surfels that have none (`DEFAULT_COLOR`).
 pub const HIGHLIGHT: f64 = 0.3;
@@ -322,46 +233,9 @@ mod tests {
     fn options_are_read_and_refused() {
         assert_eq!("rel:0.01".parse::<Epsilon>().unwrap(), Epsilon::Relative(0.01));
         assert_eq!("abs:2".parse::<Epsilon>().unwrap(), Epsilon::Absolute(2.0));
-        for bad in ["", "rel", "rel:", "rel:-1", "abs:nan", "abs:inf", "radii:1"] {
+        assert_eq!("ray:2".parse::<Epsilon>().unwrap(), Epsilon::Ray(2.0));
+        for bad in ["", "rel", "rel:", "rel:-1", "abs:nan", "abs:inf", "ray:-1", "radii:1"] {
             assert!(bad.parse::<Epsilon>().is_err(), "{bad}");
         }
-        assert_eq!("ellipse:6,3".parse::<Kernel>().unwrap(), Kernel::Ellipse { a: 6.0, n: 3.0, smooth: false });
-        for bad in [
-            "",
-            "ellipse",
-            "ellipse:6",
-            "ellipse:17,3",
-            "ellipse:6,0",
-            "gaussian:0",
-            "ellipse:6,3,1",
-            "hat:1",
-            "ellipse:0,3,smooth",
-        ] {
-            assert!(bad.parse::<Kernel>().is_err(), "{bad}");
-        }
-    }
-
-    #[test]
-    fn the_ellipse_kernel_is_the_papers() {
-        let kernel = Kernel::Ellipse { a: 6.0, n: 3.0, smooth: false };
-        assert_eq!(kernel.weight(0.0), 1.0);
-        assert!((kernel.weight(0.25) - (-6.0f64 / 8.0).exp()).abs() < 1e-15);
-        assert!((kernel.weight(1.0) - (-6.0f64).exp()).abs() < 1e-15);
-    }
-
-    #[test]
-    fn every_kernel_falls_from_one_and_never_below_the_floor() {
-        for text in
-            ["gaussian", "gaussian:0.2", "ellipse:6,3", "ellipse:6,3,smooth", "ellipse:16,0.5", "hat", "constant"]
-        {
-            let kernel: Kernel = text.parse().unwrap();
-            assert_eq!(kernel.weight(0.0), 1.0, "{text}");
-            let weights: Vec<_> = (0..=100).map(|i| kernel.weight(f64::from(i) / 100.0)).collect();
-            assert!(weights.windows(2).all(|w| w[0] >= w[1]) && weights[100] >= LEAST_WEIGHT, "{text}");
-        }
-        assert_eq!("ellipse:6,3,smooth".parse::<Kernel>().unwrap().weight(1.0), LEAST_WEIGHT);
-        assert_eq!(Kernel::Hat.weight(0.25), 0.5);
-        let sigma = 0.4;
-        assert!((Kernel::Gaussian { sigma }.weight(sigma * sigma) - (-0.5f64).exp()).abs() < 1e-15);
     }
 }

@@ -12,7 +12,10 @@ use super::orient::{self, Orientation};
 use super::outliers::drop_outliers;
 use super::positions::DistinctPositions;
 use super::sheets;
-use super::sizes::{RADIUS_NEIGHBOURS, Size, bsp_radii, half_axes_at, local_limits, offsets, open_radius};
+use super::sizes::{
+    RADIUS_NEIGHBOURS, Size, bsp_radii, common_radius, half_axes_at, local_limits, measure_triangles, offsets,
+    open_radius,
+};
 use super::{Limits, Preparation, guess_up, origin_for, unit, usable_axes};
 use crate::io::Points;
 use crate::scene::{Bounds, Cap, Clip, Surfel, body, framed};
@@ -84,6 +87,10 @@ impl Surfels {
 /// 2^32 - 1 points.
 pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Progress) -> Result<Surfels> {
     check(options)?;
+    let mut inputs = inputs;
+    if options.size == Size::Qsplat {
+        inputs.iter_mut().try_for_each(measure_triangles)?;
+    }
     let mut gathered = gather(inputs)?;
     if options.estimate_normals {
         (gathered.points.normals, gathered.points.axes) = (None, None);
@@ -114,7 +121,7 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
     };
 
     progress.begin("measuring surfels", 0);
-    let sizes = Sizes::of(&distinct, &graph, &normals, options, progress);
+    let sizes = Sizes::of((&distinct, &graph), &normals, gathered.points.radii.as_deref(), options, progress);
     let normal_of = |(point, position): (usize, &u32)| {
         given.as_ref().and_then(|all| *all.get(point)?).unwrap_or(normals[*position as usize])
     };
@@ -127,8 +134,7 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
         false => (axes, None),
     };
     let radii = axes.as_ref().map_or(radii, longer);
-    // Clusters of three say how large disks are, and not of what surface.
-    let curved = options.limits.curved && !matches!(options.size, Size::Bsp(_));
+    let curved = options.limits.curved && !options.size.is_of_disks();
     let caps = axes.as_ref().filter(|_| curved);
     let sided = !preparation.has_random_sides();
     let caps = caps.map(|axes| caps_of((&distinct, &graph), (&point_normals, sided), axes));
@@ -271,9 +277,9 @@ struct Sizes {
 
 impl Sizes {
     fn of(
-        distinct: &DistinctPositions,
-        graph: &NeighbourGraph,
+        (distinct, graph): (&DistinctPositions, &NeighbourGraph),
         normals: &[[f32; 3]],
+        measured: Option<&[f32]>,
         options: &FromPoints,
         progress: &dyn Progress,
     ) -> Self {
@@ -284,7 +290,9 @@ impl Sizes {
                 collinear = degenerate;
                 radii
             }
-            size => {
+            Size::BspGlobal(triangle) => vec![common_radius(distinct, triangle, progress); distinct.len()],
+            Size::Qsplat => largest_at(distinct, measured.unwrap_or_default()),
+            size @ (Size::Knn | Size::Ellipse) => {
                 let own = normals.par_iter().zip(0..distinct.len() as u32);
                 let at =
                     |(normal, position): (&[f32; 3], u32)| half_axes_at(size, (distinct, graph), position, *normal);
@@ -350,6 +358,16 @@ impl Sizes {
         };
         axes.map(|axis| axis.as_vec3().to_array())
     }
+}
+
+/// The largest radius, scaled units, of the points at each position, whose own are in world units.
+fn largest_at(distinct: &DistinctPositions, radii: &[f32]) -> Vec<f64> {
+    let mut largest = vec![0.0f64; distinct.len()];
+    for (&position, radius) in distinct.of_point().iter().zip(radii) {
+        let own = &mut largest[position as usize];
+        *own = own.max(f64::from(*radius) * distinct.scale());
+    }
+    largest
 }
 
 fn check(options: &FromPoints) -> Result<()> {

@@ -5,7 +5,7 @@
 use epsplat::passes::footprint::footprint;
 use epsplat::passes::splat::Splat;
 use epsplat::plan::{Facts, RenderOptions, Sides};
-use epsplat::scene::{Camera, Kernel, LowPass, Scene};
+use epsplat::scene::{Camera, Epsilon, Kernel, LowPass, Scene};
 
 use super::UNIT;
 use epsplat::hardcases::precision::{E, Precision};
@@ -80,7 +80,11 @@ fn weight_error(kernel: Kernel, rho: f64) -> f64 {
             // The step and 1 - step are rounded, the difference and the quotient too.
             if smooth { (error + 5.0 * E) / (1.0 - (-a).exp()) } else { error }
         }
-        Kernel::Hat => 11.0 * E,
+        // 1 - rho errs by 11 E and is raised to the power; powers that the kernel has no products for are no test's.
+        Kernel::Cone { power } => {
+            let height = (1.0 - rho).max(0.0);
+            (height + 11.0 * E).powf(power) - height.powf(power) + 12.0 * E * height.powf(power)
+        }
         Kernel::Constant => 0.0,
     }
 }
@@ -147,12 +151,12 @@ pub fn enclose(scene: &Scene, camera: &Camera, options: &RenderOptions, splats: 
             }
         }
     }
-    accumulate(scene, options, splats, &candidates, &open, &mut pixels);
+    accumulate((scene, camera), options, splats, &candidates, &open, &mut pixels);
     pixels
 }
 
 fn accumulate(
-    scene: &Scene,
+    (scene, camera): (&Scene, &Camera),
     options: &RenderOptions,
     splats: &[Splat],
     candidates: &[Candidate],
@@ -162,12 +166,14 @@ fn accumulate(
     let (low, high) = scene.color_range();
     let (_, _, of_radius) = options.epsilon.parts();
     // Of the comparison with the farthest accepted depth: a radius takes eight more roundings.
-    let rounding = if of_radius > 0.0 { 12.0 * E } else { 4.0 * E };
+    let of_ray = matches!(options.epsilon, Epsilon::Ray(_));
+    let rounding = if of_radius > 0.0 || of_ray { 12.0 * E } else { 4.0 * E };
     for candidate in candidates {
         let splat = &splats[candidate.splat];
         let pixel = &mut pixels[candidate.pixel];
         let radius = f64::from(scene.surfels[splat.surfel as usize].shorter());
-        let back = |front: f64| options.epsilon.farthest(front, radius);
+        let (x, y) = (candidate.pixel as u32 % camera.width, candidate.pixel as u32 / camera.width);
+        let back = |front: f64| options.epsilon.farthest(front, radius, camera.along_axis(x, y));
         if candidate.depth.low > back(pixel.nearest.high) * (1.0 + rounding) {
             continue;
         }

@@ -16,8 +16,8 @@ use epsplat::frame::Frame;
 use epsplat::gpu::Gpu;
 use epsplat::gpu::layout::{ONE, View};
 use epsplat::plan::{
-    ACCUMULATORS, Accumulator, AccumulatorRow, BlendFormat, ColorNeed, Facts, Raster, RasterDepth, RenderOptions,
-    SceneNeeds, Sides, Winner, check,
+    ACCUMULATORS, Accumulator, AccumulatorRow, BlendFormat, ColorNeed, EpsilonForm, Facts, Raster, RasterDepth,
+    RenderOptions, SceneNeeds, Sides, Winner, check,
 };
 use epsplat::scene::facing::POINT_SHAPES;
 use epsplat::scene::{KernelShape, LowPass, Map, Maps, Projection, Samples, Shading};
@@ -73,7 +73,7 @@ pub fn accumulators(gpu: &Gpu) -> Vec<&'static AccumulatorRow> {
 /// accumulator and one kernel, and of each other accumulator, kernel and form of epsilon a dozen, others for each. All that go
 /// together meet two by two (`tests/shaders.rs`).
 pub fn all_needs() -> Vec<SceneNeeds> {
-    let shapes = [KernelShape::Gaussian, KernelShape::Ellipse, KernelShape::Hat, KernelShape::Constant];
+    let shapes = [KernelShape::Gaussian, KernelShape::Ellipse, KernelShape::Cone, KernelShape::Constant];
     let mut base = base_needs();
     let unmapped: Vec<_> = base.iter().copied().filter(|needs| needs.maps.is_empty()).collect();
     base.extend(unmapped.iter().map(|needs| {
@@ -84,7 +84,7 @@ pub fn all_needs() -> Vec<SceneNeeds> {
     let mut next = 0;
     for row in ACCUMULATORS {
         for kernel in shapes {
-            for epsilon_radius in [false, true] {
+            for epsilon in [EpsilonForm::Depth, EpsilonForm::Radius, EpsilonForm::Ray] {
                 for _ in 0..12 {
                     // A step that shares no factor with the number of needs, so that it comes to all of them.
                     next = (next + 101) % base.len();
@@ -92,15 +92,15 @@ pub fn all_needs() -> Vec<SceneNeeds> {
                     let accumulator = row.of;
                     let tiles = accumulator == Accumulator::Fixed && base[next].color != ColorNeed::Textured;
                     let gather = tiles && next % 2 == 0;
-                    all.push(SceneNeeds { accumulator, tiles, gather, kernel, epsilon_radius, low_pass, ..base[next] });
+                    all.push(SceneNeeds { accumulator, tiles, gather, kernel, epsilon, low_pass, ..base[next] });
                     if accumulator == Accumulator::Fixed {
                         for (wide_sums, atomics_u64) in [(true, false), (false, true), (true, true)] {
                             let next = base[next];
-                            all.push(SceneNeeds { wide_sums, atomics_u64, kernel, epsilon_radius, low_pass, ..next });
+                            all.push(SceneNeeds { wide_sums, atomics_u64, kernel, epsilon, low_pass, ..next });
                             if next.color != ColorNeed::Textured {
                                 let next =
                                     SceneNeeds { copies: true, tiles: false, gather: false, cull: false, ..next };
-                                all.push(SceneNeeds { wide_sums, kernel, epsilon_radius, low_pass, ..next });
+                                all.push(SceneNeeds { wide_sums, kernel, epsilon, low_pass, ..next });
                             }
                         }
                     }
@@ -111,7 +111,7 @@ pub fn all_needs() -> Vec<SceneNeeds> {
     let rastered: Vec<_> = base.iter().filter(|needs| needs.color != ColorNeed::Textured).collect();
     // The rasteriser's, with as many targets as the sums take.
     for (step, (depth, _)) in (0..240).zip(RasterDepth::ALL.iter().cycle()) {
-        let (kernel, base) = (shapes[step % 4], rastered[(step * 101) % rastered.len()]);
+        let (kernel, base) = (shapes[step / 2 % 4], rastered[(step * 101) % rastered.len()]);
         let low_pass = [LowPass::None, LowPass::Max, LowPass::Ewa][step / 3 % 3];
         let raster = Some(Raster { format: BlendFormat::ALL[step / 7 % 3].0, depth: *depth });
         let triangles = step / 2 % 2 == 0;
@@ -121,7 +121,7 @@ pub fn all_needs() -> Vec<SceneNeeds> {
             triangles,
             kernel,
             low_pass,
-            epsilon_radius: step % 5 == 0,
+            epsilon: [EpsilonForm::Depth, EpsilonForm::Radius, EpsilonForm::Ray][step % 5 % 3],
             sides: if unknown { Sides::Both } else { base.sides },
             cull: false,
             tiles: false,
@@ -130,8 +130,11 @@ pub fn all_needs() -> Vec<SceneNeeds> {
             ..*base
         });
     }
-    let planes: Vec<_> =
-        all.iter().copied().filter(|needs| !needs.normal && needs.color != ColorNeed::Textured).collect();
+    let planes: Vec<_> = all
+        .iter()
+        .copied()
+        .filter(|needs| !needs.normal && !needs.lit_splats && needs.color != ColorNeed::Textured)
+        .collect();
     for (step, needs) in planes.iter().step_by(3).enumerate() {
         let shape = POINT_SHAPES[step % POINT_SHAPES.len()].1;
         if needs.raster.is_some_and(|raster| raster.depth != RasterDepth::Exact && shape.rises()) {
@@ -162,7 +165,7 @@ pub fn all_needs() -> Vec<SceneNeeds> {
             atomics_u64: false,
             subgroups: false,
             wide_sums: false,
-            epsilon_radius: false,
+            epsilon: EpsilonForm::Depth,
             kernel: KernelShape::Constant,
             low_pass: LowPass::None,
             accumulator: Accumulator::Fixed,
@@ -178,7 +181,7 @@ fn shows_nearest(needs: &SceneNeeds) -> bool {
     let kept = needs.maps.is_empty() || needs.maps == Maps::of(&[Map::Depth]);
     let colors = matches!(needs.color, ColorNeed::Constant | ColorNeed::Srgb8);
     let exact = needs.raster.is_none_or(|raster| raster.depth == RasterDepth::Exact);
-    kept && colors && !needs.normal && (exact || needs.maps.is_empty())
+    kept && colors && !needs.normal && !needs.lit_splats && (exact || needs.maps.is_empty())
 }
 
 /// Several samples, not as many across as down.
@@ -193,14 +196,16 @@ fn base_needs() -> Vec<SceneNeeds> {
         // Bits that have little to do with the others.
         let mixed = |k: u32| bits.wrapping_mul(0x9e37_79b9) >> k & 1 == 1;
         let (lit, normal_map, sides, alpha) = (bit(0), bit(1), bit(2), bit(3));
-        let normal = lit || normal_map;
+        let lit_splats = lit && mixed(24);
+        let normal = (lit && !lit_splats) || normal_map;
         let shading = match (lit, bits.count_ones() % 2 == 0) {
             (false, _) => Shading::Unlit,
             (true, true) => Shading::Lambert,
             (true, false) => Shading::Phong,
         };
         for color in [ColorNeed::Constant, ColorNeed::Srgb8, ColorNeed::Linear, ColorNeed::Textured] {
-            if alpha && color == ColorNeed::Constant {
+            let of_one = color == ColorNeed::Constant;
+            if alpha && of_one || lit_splats && (of_one || color == ColorNeed::Textured) {
                 continue;
             }
             let projection = if bit(4) { Projection::Pinhole } else { Projection::Orthographic };
@@ -222,17 +227,18 @@ fn base_needs() -> Vec<SceneNeeds> {
                 raster: None,
                 triangles: false,
                 kernel: KernelShape::Ellipse,
-                epsilon_radius: false,
+                epsilon: EpsilonForm::Depth,
                 color,
                 alpha,
                 normal,
                 sides: if sides && !mixed(27) { Sides::Nearest } else { Sides::None },
-                own_normals: normal && mixed(26),
+                own_normals: (normal || lit_splats) && mixed(26),
                 clips: mixed(28),
                 curved: mixed(25),
                 cull_back: mixed(27),
                 samples: Samples::ONE,
                 shading,
+                lit_splats,
                 maps: Maps::of(&wanted),
                 ..plain
             });

@@ -14,13 +14,13 @@ use epsplat::gpu::Sources;
 use epsplat::gpu::kernel::reflect;
 use epsplat::gpu::layout::{
     AWAY, BATCH, BLOCK_SIDE, COVERED_GRID, COVERED_GRID_OF_EIGHTS, COVERED_LIST, LIST_ENDS, LIST_FAR, LIST_START,
-    MOST_GROUPS, OCCLUSION_TILE, ONE, ONE_WIDE, QUEUE_GRID, QUEUE_LISTING, QUEUE_START, TILE, TILE_WIDTH, WORKGROUP,
+    MOST_GROUPS, OCCLUSION_TILE, ONE, QUEUE_GRID, QUEUE_LISTING, QUEUE_START, TILE, TILE_WIDTH, WORKGROUP,
 };
 use epsplat::gpu::sources::FILES;
 use epsplat::passes;
-use epsplat::plan::{Accumulator, COLOR_CHANNEL, PixelLayout, SceneNeeds, Winner, color_channels};
+use epsplat::plan::{Accumulator, COLOR_CHANNEL, PixelLayout, SceneNeeds, color_channels};
 use epsplat::scene::camera::MAX_SIDE;
-use epsplat::scene::options::{LEAST_FILTERED_WEIGHT, LEAST_WEIGHT};
+use epsplat::scene::kernel::{LEAST_AT_RIM, LEAST_WEIGHT};
 use mirrors::{differences, elements, kept_as, mirrors, sums_of};
 use naga::{AddressSpace, Expression, Literal, Module};
 
@@ -153,15 +153,13 @@ fn constants_agree() {
                 assert_eq!(constant(name), exists.then_some(f64::from(value)), "{name}");
             }
         }
-        let blends = matches!(needs.winner, None | Some(Winner::Rasterised));
+        let blends = needs.weighs();
         assert_eq!(constant("LEAST_WEIGHT"), blends.then_some(LEAST_WEIGHT));
-        assert_eq!(constant("LEAST_FILTERED_WEIGHT"), blends.then_some(LEAST_FILTERED_WEIGHT));
         let colors = blends && color_channels(&needs) > 0;
         assert_eq!(constant("COLOR_CHANNEL"), colors.then_some(f64::from(COLOR_CHANNEL)));
         let one = match needs.accumulator {
-            _ if !needs.sums_in_storage() => None,
+            _ if !needs.sums_by_compute() => None,
             Accumulator::Fixed if !needs.wide_sums => Some(f64::from(ONE)),
-            Accumulator::Fixed | Accumulator::Fixed64 => Some(ONE_WIDE as f64),
             _ => None,
         };
         assert_eq!(constant("ONE"), one, "{}", needs.accumulator);
@@ -170,8 +168,9 @@ fn constants_agree() {
             assert_eq!(entry.workgroup_size, kernel.workgroup, "{}", entry.name);
         }
     }
-    // The least weight is a whole number of units, and the bits that follow from it are kept.
-    assert_eq!((f64::from(ONE) * LEAST_WEIGHT).fract(), 0.0);
+    // The least weights are whole numbers of units, and the bits that follow from them are kept.
+    assert_eq!((f64::from(ONE) * LEAST_AT_RIM).fract(), 0.0);
+    const { assert!(LEAST_WEIGHT * (1u64 << 40) as f64 == 65_536.0) };
     // A pixel's row fits beside the flag, its column below the row.
     assert_eq!((MAX_SIDE - 1) << 16 & AWAY, 0);
     const { assert!(MAX_SIDE - 1 <= 0xffff) };

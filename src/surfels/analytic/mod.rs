@@ -2,8 +2,9 @@
 
 mod lattice;
 mod ray;
+mod text;
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 use std::str::FromStr;
 
 use glam::DVec3;
@@ -35,22 +36,25 @@ pub enum Shape {
     Plane,
     /// The same square with [`CHECKER_SQUARES`] x [`CHECKER_SQUARES`] black and white squares.
     Checkerboard,
+    /// The same square with lines of text, each half as high as the one above.
+    Text,
 }
 
 impl Shape {
     /// Every shape with its name and what it is, for a command line's help.
-    pub const ALL: [(Self, &'static str, &'static str); 4] = [
+    pub const ALL: [(Self, &'static str, &'static str); 5] = [
         (Self::Sphere, "sphere", "the unit sphere"),
         (Self::Torus, "torus", "a torus around the z axis, radii 1 and 0.4"),
         (Self::Plane, "plane", "a square of edge 2 at z = 0, in one colour"),
         (Self::Checkerboard, "checkerboard", "the same square with 32 x 32 black and white squares"),
+        (Self::Text, "text", "the same square with lines of text, each half as high as the one above"),
     ];
 
     /// Which way is up in the default view of it.
     pub fn up(self) -> Up {
         match self {
             Self::Sphere => Up::Y,
-            Self::Torus | Self::Plane | Self::Checkerboard => Up::Z,
+            Self::Torus | Self::Plane | Self::Checkerboard | Self::Text => Up::Z,
         }
     }
 
@@ -59,7 +63,7 @@ impl Shape {
         match self {
             Self::Sphere => 4.0 * PI,
             Self::Torus => 4.0 * PI * PI * TORUS_MAJOR * TORUS_MINOR,
-            Self::Plane | Self::Checkerboard => 4.0,
+            Self::Plane | Self::Checkerboard | Self::Text => 4.0,
         }
     }
 
@@ -69,7 +73,7 @@ impl Shape {
         match self {
             Self::Sphere => p.length() - 1.0,
             Self::Torus => (p.truncate().length() - TORUS_MAJOR).hypot(p.z) - TORUS_MINOR,
-            Self::Plane | Self::Checkerboard => p.z,
+            Self::Plane | Self::Checkerboard | Self::Text => p.z,
         }
     }
 
@@ -81,7 +85,7 @@ impl Shape {
                 let from_axis = p.truncate().length();
                 (p.truncate() * ((from_axis - TORUS_MAJOR) / from_axis)).extend(p.z).normalize()
             }
-            Self::Plane | Self::Checkerboard => DVec3::Z,
+            Self::Plane | Self::Checkerboard | Self::Text => DVec3::Z,
         }
     }
 
@@ -94,6 +98,13 @@ impl Shape {
                 let square = |c: f64| ((c + 1.0) * 0.5 * f64::from(CHECKER_SQUARES)) as u32;
                 if (square(p.x) + square(p.y)) % 2 == 0 { [255; 3] } else { [0; 3] }
             }
+            Self::Text => {
+                if text::ink(0.5 + 0.5 * p.x, 0.5 - 0.5 * p.y) {
+                    [20, 24, 48]
+                } else {
+                    [250, 246, 236]
+                }
+            }
             // Bands along x, y and z of different widths: smooth, but with detail at several scales and directions.
             Self::Sphere | Self::Torus => {
                 let band = |c: f64, bands: f64, shift: f64| 0.5 + 0.5 * (PI * bands * c + shift).sin();
@@ -104,6 +115,18 @@ impl Shape {
                 ]
             }
         }
+    }
+
+    /// The place in a texture, [0, 1] across and up, of a point of the surface: turns around the upward axis and the latitude, or turns
+    /// around the tube from its inside; across the square and up.
+    pub fn texture_at(self, p: DVec3) -> [f32; 2] {
+        let turns = |y: f64, x: f64| 0.5 + y.atan2(x) / TAU;
+        let (u, v) = match self {
+            Self::Sphere => (turns(p.x, p.z), 0.5 + p.y.clamp(-1.0, 1.0).asin() / PI),
+            Self::Torus => (turns(p.y, p.x), turns(p.z, p.truncate().length() - TORUS_MAJOR)),
+            Self::Plane | Self::Checkerboard | Self::Text => (0.5 + 0.5 * p.x, 0.5 + 0.5 * p.y),
+        };
+        [u as f32, v as f32]
     }
 }
 
@@ -157,7 +180,7 @@ impl Iterator for Samples {
         let position = match self.shape {
             Shape::Sphere => lattice::sphere(index, self.count),
             Shape::Torus => lattice::torus(index, self.count),
-            Shape::Plane | Shape::Checkerboard => lattice::square(index, self.count),
+            Shape::Plane | Shape::Checkerboard | Shape::Text => lattice::square(index, self.count),
         };
         Some(Sample {
             position: position.to_array(),

@@ -23,7 +23,7 @@ pub fn depth_along_ray(shape: Shape, origin: DVec3, direction: DVec3) -> Option<
             [-half_chord, half_chord].into_iter().find(|&t| first(t))
         }
         Shape::Torus => torus_crossings(nearest, direction).into_iter().find(|&t| first(t)),
-        Shape::Plane | Shape::Checkerboard => {
+        Shape::Plane | Shape::Checkerboard | Shape::Text => {
             let t = -nearest.z / direction.z;
             let hit = nearest + direction * t;
             (t.is_finite() && hit.x.abs() <= 1.0 && hit.y.abs() <= 1.0 && first(t)).then_some(t)
@@ -114,7 +114,7 @@ mod tests {
 
     #[test]
     fn convex_shapes_are_met_at_the_samples_that_face_the_eye() {
-        for shape in [Shape::Sphere, Shape::Plane, Shape::Checkerboard] {
+        for shape in [Shape::Sphere, Shape::Plane, Shape::Checkerboard, Shape::Text] {
             for eye in [DVec3::new(0.3, -2.0, 3.0), DVec3::new(1.0, 2.0, 40.0)] {
                 let mut met = 0;
                 for sample in generate(shape, 2000) {

@@ -6,6 +6,9 @@
 //! eigenvalues l0 <= l1 <= l2: three points have no surface variation, l0 / (l0 + l1 + l2) = 0, and they are collinear if
 //! l1 is zero as well. It does not say where the plane lies; here it parts off a multiple of three of the points, as near
 //! to the middle as there is one, so that all clusters but the last have three, and that one up to five.
+//!
+//! As the section is written ([`common_radius`]) all surfels have one radius. Planes lie at centroids, as in the clustering that it goes by
+//! (Pauly et al. 2002), so clusters end with one to three points; of those with three that are not collinear the mean is taken.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -52,14 +55,7 @@ fn split(distinct: &DistinctPositions, triangle: Triangle, cluster: &mut [Member
     if count < TWO_TRIANGLES {
         return measure(distinct, triangle, cluster);
     }
-    let at = |member: &Member| distinct.position(member.index);
-    let mean = cluster.iter().map(at).sum::<DVec3>() / count as f64;
-    let largest = cluster.iter().fold(0.0, |m: f64, member| m.max((at(member) - mean).abs().max_element()));
-    // Of about one, so that squares are as exact for small clusters as for large ones. Distinct positions have an extent.
-    let (_, axes) = Symmetric3::scatter(cluster.iter().map(|member| (at(member) - mean) / largest)).eigen();
-    for member in &mut *cluster {
-        member.value = axes[2].dot(at(member) - mean);
-    }
+    along_principal_axis(distinct, cluster);
     let middle = count / TWO_TRIANGLES * (TWO_TRIANGLES / 2);
     cluster.select_nth_unstable_by(middle, |a, b| a.value.total_cmp(&b.value).then(a.index.cmp(&b.index)));
     let (low, high) = cluster.split_at_mut(middle);
@@ -70,6 +66,18 @@ fn split(distinct: &DistinctPositions, triangle: Triangle, cluster: &mut [Member
         progress.advance(count as u64);
     }
     low + high
+}
+
+/// How far each member lies from the centroid along the axis of the greatest variance.
+fn along_principal_axis(distinct: &DistinctPositions, cluster: &mut [Member]) {
+    let at = |member: &Member| distinct.position(member.index);
+    let mean = cluster.iter().map(at).sum::<DVec3>() / cluster.len() as f64;
+    let largest = cluster.iter().fold(0.0, |m: f64, member| m.max((at(member) - mean).abs().max_element()));
+    // Of about one, so that squares are as exact for small clusters as for large ones. Distinct positions have an extent.
+    let (_, axes) = Symmetric3::scatter(cluster.iter().map(|member| (at(member) - mean) / largest)).eigen();
+    for member in &mut *cluster {
+        member.value = axes[2].dot(at(member) - mean);
+    }
 }
 
 /// Gives the members of a cluster of up to five points their sizes; how many of them are collinear.
@@ -95,6 +103,76 @@ fn measure(distinct: &DistinctPositions, triangle: Triangle, cluster: &mut [Memb
         };
     }
     collinear
+}
+
+/// Sums over the clusters of a part.
+#[derive(Clone, Copy, Default)]
+struct Clusters {
+    /// Sizes of clusters that span a triangle, and how many they are.
+    triangles: (f64, u64),
+    /// Lengths of edges between points of others.
+    edges: (f64, u64),
+}
+
+impl Clusters {
+    fn and(self, other: Self) -> Self {
+        let add = |a: (f64, u64), b: (f64, u64)| (a.0 + b.0, a.1 + b.1);
+        Self { triangles: add(self.triangles, other.triangles), edges: add(self.edges, other.edges) }
+    }
+}
+
+/// One radius for all positions, scaled units: the mean of the clusters of three; where none spans a triangle that of the edges in
+/// clusters, and 0 where there is none either.
+pub(crate) fn common_radius(distinct: &DistinctPositions, triangle: Triangle, progress: &dyn Progress) -> f64 {
+    progress.begin("splitting into clusters", distinct.len() as u64);
+    let mut members: Vec<Member> = (0..distinct.len() as u32).map(|index| Member { value: 0.0, index }).collect();
+    let Clusters { triangles, edges } = split_at_means(distinct, triangle, &mut members, progress);
+    progress.end();
+    match (triangles, edges) {
+        ((sum, count), _) if count > 0 => sum / count as f64,
+        (_, (sum, count)) if count > 0 => sum / count as f64,
+        _ => 0.0,
+    }
+}
+
+/// Splits at centroids until clusters have three points at most. Each cut leaves points on both sides, and coordinates have too few digits and
+/// exponents for thousands of cuts in a row that part off a point or two.
+fn split_at_means(
+    distinct: &DistinctPositions,
+    triangle: Triangle,
+    cluster: &mut [Member],
+    progress: &dyn Progress,
+) -> Clusters {
+    let count = cluster.len();
+    let at = |member: &Member| distinct.position(member.index);
+    if let [a, b, c] = cluster {
+        let (b, c) = (at(b) - at(a), at(c) - at(a));
+        return match triangle_size(triangle, b, c) {
+            Some(size) => Clusters { triangles: (size, 1), ..Clusters::default() },
+            None => Clusters { edges: (mean_edge(b, c), 1), ..Clusters::default() },
+        };
+    }
+    if let [a, b] = cluster {
+        return Clusters { edges: (at(a).distance(at(b)), 1), ..Clusters::default() };
+    }
+    if count < 2 {
+        return Clusters::default();
+    }
+    along_principal_axis(distinct, cluster);
+    cluster.sort_unstable_by(|a, b| a.value.total_cmp(&b.value).then(a.index.cmp(&b.index)));
+    // Of points whose differences are below the mean's rounding all may lie on one side of it.
+    let middle = match cluster.partition_point(|member| member.value < 0.0) {
+        below if below == 0 || below == count => count / 2,
+        below => below,
+    };
+    let (low, high) = cluster.split_at_mut(middle);
+    let mut low = || split_at_means(distinct, triangle, low, progress);
+    let mut high = || split_at_means(distinct, triangle, high, progress);
+    let (low, high) = if count > SEQUENTIAL { rayon::join(low, high) } else { (low(), high()) };
+    if count > SEQUENTIAL && count <= 2 * SEQUENTIAL {
+        progress.advance(count as u64);
+    }
+    low.and(high)
 }
 
 fn mean_edge(a: DVec3, b: DVec3) -> f64 {

@@ -4,15 +4,17 @@ mod bsp;
 mod cell;
 mod ellipse;
 mod limit;
+mod qsplat;
 
 use std::str::FromStr;
 
 use glam::DVec3;
 
-pub(crate) use self::bsp::bsp_radii;
+pub(crate) use self::bsp::{bsp_radii, common_radius};
 pub(crate) use self::cell::{RADIUS_NEIGHBOURS, cell_ellipse, open_radius};
 use self::ellipse::{ELLIPSE_NEIGHBOURS, bounding_ellipse};
 pub(crate) use self::limit::local_limits;
+pub(crate) use self::qsplat::measure as measure_triangles;
 use super::estimate::NORMAL_NEIGHBOURS;
 use super::graph::NeighbourGraph;
 use super::positions::DistinctPositions;
@@ -30,6 +32,10 @@ pub enum Size {
     /// A disk from clusters of three points, by a binary space partition along principal axes ("a simple scheme to render
     /// point-sampled surfaces", section 3.3).
     Bsp(Triangle),
+    /// One disk for all, as large as such clusters are in the mean: the section as it is written ("each point as a surfel with fixed radius").
+    BspGlobal(Triangle),
+    /// At the vertices of a mesh, disks as large as the largest circle about a triangle there (Rusinkiewicz and Levoy 2000).
+    Qsplat,
 }
 
 /// What is taken of a cluster of three points as its size.
@@ -44,12 +50,22 @@ pub enum Triangle {
 
 impl Size {
     /// Every way to a size, with its name.
-    pub const ALL: [(Self, &'static str); 4] = [
+    pub const ALL: [(Self, &'static str); 7] = [
         (Self::Knn, "knn"),
         (Self::Ellipse, "ellipse"),
         (Self::Bsp(Triangle::MeanEdge), "bsp"),
         (Self::Bsp(Triangle::Circumsphere), "bsp:circumsphere"),
+        (Self::BspGlobal(Triangle::MeanEdge), "bsp:global"),
+        (Self::BspGlobal(Triangle::Circumsphere), "bsp:global-circumsphere"),
+        (Self::Qsplat, "qsplat"),
     ];
+}
+
+impl Size {
+    /// Whether it is of disks, which say how large they are and not of what surface.
+    pub fn is_of_disks(self) -> bool {
+        matches!(self, Self::Bsp(_) | Self::BspGlobal(_) | Self::Qsplat)
+    }
 }
 
 impl FromStr for Size {
@@ -87,6 +103,6 @@ pub(crate) fn half_axes_at(
     match size {
         Size::Knn if !near.is_empty() => cell_ellipse(&near, normal),
         Size::Ellipse => bounding_ellipse(near.iter().copied().take(ELLIPSE_NEIGHBOURS), normal),
-        Size::Knn | Size::Bsp(_) => [DVec3::ZERO; 2],
+        Size::Knn | Size::Bsp(_) | Size::BspGlobal(_) | Size::Qsplat => [DVec3::ZERO; 2],
     }
 }

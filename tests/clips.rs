@@ -8,9 +8,12 @@ use epsplat::frame::Frame;
 use epsplat::gpu::Sources;
 use epsplat::io::{self, Points};
 use epsplat::metrics::reconstruction;
-use epsplat::plan::{BlendFormat, Organisation, Raster, RasterDepth, RenderOptions};
+use epsplat::plan::{BlendFormat, Organisation, Raster, RasterDepth, RenderOptions, check};
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Clip, Colors, Cull, Lens, LowPass, Map, Maps, Projection, Samples, Scene, Surfel};
+use epsplat::scene::{
+    Camera, Clip, Colors, Cull, Facing, Lens, LowPass, Map, Maps, Outline, PointShape, Projection, Samples, Scene,
+    Shading, Surfel,
+};
 use epsplat::surfels::build;
 use epsplat::truth::{DiskTree, Surface, Truth};
 use glam::{DVec3, Vec3};
@@ -81,6 +84,75 @@ fn kernels_and_twins_end_disks_at_the_same_lines() {
             let (whole, report) = render(&whole, &camera, &options, &backend, &()).unwrap();
             assert!(compared(&whole, &reference).0 > 1000 && !report.needs.contains(&"clips"));
         }
+    }
+}
+
+#[test]
+fn polygons_are_drawn_by_all_alike() {
+    let Some(gpu) = common::gpu() else { return };
+    let backend = Backend::gpu(gpu);
+    let whole = Scene { clips: Vec::new(), ..clipped() };
+    for (scene, sides, projection) in
+        [(&whole, 3, Projection::Pinhole), (&whole, 7, Projection::Orthographic), (&clipped(), 4, Projection::Pinhole)]
+    {
+        let camera = sphere_camera(160, projection);
+        let options = RenderOptions { outline: Some(Outline::of_sides(sides).unwrap()), ..options(LowPass::None) };
+        let decided = RenderOptions { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
+        let (reference, _) = render(scene, &camera, &decided, &Backend::Reference, &()).unwrap();
+        let (frame, report) = render(scene, &camera, &options, &backend, &()).unwrap();
+        assert!(report.needs.contains(&"outline"));
+        let (wrong, excused) = compared(&frame, &reference);
+        assert!(wrong == 0 && excused < 400, "{wrong} wrong, {excused} excused, {sides} sides");
+        for organisation in [Organisation::Scatter, Organisation::Tile] {
+            let other = RenderOptions { organisation, ..options.clone() };
+            let (other, _) = render(scene, &camera, &other, &backend, &()).unwrap();
+            assert!(common::bits(&other) == common::bits(&frame), "{organisation:?}");
+        }
+        let raster = Some(Raster { format: BlendFormat::Rgba16Float, depth: RasterDepth::Exact });
+        let by_raster = RenderOptions { raster, ..options.clone() };
+        let (by_raster, _) = render(scene, &camera, &by_raster, &backend, &()).unwrap();
+        let [counted, expected] = [&by_raster, &frame].map(|frame| frame.map(Map::Count).unwrap());
+        let decided = reference.map(Map::Decision).unwrap().iter().map(|decision| *decision >= 1e-4);
+        assert!(decided.zip(counted.iter().zip(expected)).all(|(decided, (a, b))| !decided || a == b));
+        // The controls: disks, and polygons of another number of sides, are other pictures.
+        for outline in [None, Outline::of_sides(sides + 1).ok()] {
+            let other = RenderOptions { outline, ..options.clone() };
+            let (other, _) = render(scene, &camera, &other, &backend, &()).unwrap();
+            assert!(compared(&other, &reference).0 > 500, "{outline:?}");
+        }
+    }
+}
+
+#[test]
+fn a_polygon_has_the_area_of_its_sides() {
+    let camera = {
+        let lens = Lens::OrthographicHeight(2.5);
+        Camera::look_at((500, 500), lens, DVec3::ZERO, DVec3::Z, Some(DVec3::NEG_Y), Scene::default().up, 0.1).unwrap()
+    };
+    let disk = Surfel::disk(Vec3::new(0.0, 0.0, 4.0), Vec3::NEG_Z, 1.0);
+    let scene = Scene { surfels: vec![disk], colors: Colors::Constant([1.0; 4]), ..Scene::default() };
+    for sides in [3, 5, 16] {
+        let outline = Some(Outline::of_sides(sides).unwrap());
+        let options = RenderOptions { outline, maps: Maps::of(&[Map::Weight]), ..RenderOptions::default() };
+        let (frame, _) = render(&scene, &camera, &options, &Backend::Reference, &()).unwrap();
+        let covered = frame.map(Map::Weight).unwrap().iter().filter(|weight| **weight > 0.0).count();
+        let area = covered as f64 * (2.5f64 / 500.0).powi(2);
+        let n = f64::from(sides);
+        let expected = 0.5 * n * (std::f64::consts::TAU / n).sin();
+        assert!((area / expected - 1.0).abs() < 0.002, "{area} {expected}");
+    }
+    for options in [
+        RenderOptions { low_pass: LowPass::Max, ..RenderOptions::default() },
+        RenderOptions {
+            facing: Some(Facing { shape: PointShape::Circle, pixels: Facing::LIMITS }),
+            shading: Shading::Unlit,
+            ..RenderOptions::default()
+        },
+    ] {
+        assert!(check::options(&options, false).is_ok());
+        let outlined = RenderOptions { outline: Outline::of_sides(3).ok(), ..options };
+        let error = check::options(&outlined, true).unwrap_err().to_string();
+        assert!(error.contains("--outline"), "{error}");
     }
 }
 

@@ -16,7 +16,7 @@ use epsplat::plan::pass::Making;
 use epsplat::plan::{
     Accumulator, COLOR_CHANNEL, ColorNeed, Features, PixelLayout, RenderOptions, SceneNeeds, Winner, color_channels,
 };
-use epsplat::scene::{Facing, Kernel, KernelShape, MAPS, Map};
+use epsplat::scene::{Facing, Kernel, KernelShape, MAPS, Map, Outline};
 use naga::AddressSpace;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use rayon::prelude::*;
@@ -104,7 +104,7 @@ const ALTERNATIVES: [&[&str]; 7] = [
 ];
 
 /// Needs that no render has together (`src/plan/check.rs`, `src/plan/needs.rs`).
-const EXCLUSIVE: [(&str, &[&str]); 11] = [
+const EXCLUSIVE: [(&str, &[&str]); 12] = [
     ("samples", &["count", "depth", "index", "normal-map", "weight-map"]),
     ("color-textured", &["tiles", "gather", "copies", "raster-exact", "raster-offset"]),
     ("copies", &["tiles", "gather", "cull", "atomics-u64"]),
@@ -112,6 +112,7 @@ const EXCLUSIVE: [(&str, &[&str]); 11] = [
     ("lit-splats", &["color-constant", "color-textured", "facing", "nearest"]),
     ("facing", &["clips", "color-textured", "cull-back", "curved", "lambert", "phong", "lowpass-ewa", "lowpass-max"]),
     ("facing", &["normal", "normal-map", "own-normals", "sides"]),
+    ("outline", &["facing", "lowpass-ewa", "lowpass-max"]),
     ("sides", &["cull-back", "raster-offset"]),
     (
         "nearest",
@@ -210,7 +211,8 @@ fn host_and_kernels_agree_about_overrides() {
         };
         assert_eq!(kernel.shape(), needs.kernel);
         let facing = needs.facing.map(|shape| Facing { shape, pixels: Facing::LIMITS });
-        let options = RenderOptions { kernel, facing, ..RenderOptions::default() };
+        let outline = needs.outline.then(|| Outline::of_sides(5).unwrap());
+        let options = RenderOptions { kernel, facing, outline, ..RenderOptions::default() };
         let constants = passes::constants(&Making { needs, options: &options, surfels: 1000 });
         assert!(constants.iter().all(|(_, value)| value.is_finite()));
         let set: BTreeSet<String> = constants.into_iter().map(|(name, _)| name.to_owned()).collect();

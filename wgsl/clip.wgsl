@@ -1,5 +1,6 @@
 // Disks that end at lines in their own planes: at a border, or where the surface has an edge. A point (u, v) of the unit disk
 // is kept where neither line has it on its far side. (Zwicker et al. 2004, Perspective Accurate Splatting, section 5.)
+// Polygons end at their sides too (outline.wgsl).
 // Same interface as clip_absent.wgsl. Twin: src/scene/clip.rs, src/passes/footprint.rs.
 
 // The first of six words of a surfel's attributes: two lines.
@@ -9,11 +10,13 @@ struct Clip {
     // Kept: line . (u, v, 1) >= 0.
     first: vec3<f32>,
     second: vec3<f32>,
+    // By which the unit disk was turned in itself.
+    turn: vec2<f32>,
 }
 
 // Of a splat whose unit disk was turned in itself (rows.wgsl).
 fn clip_of(index: u32, turn: vec2<f32>) -> Clip {
-    return Clip(turned_line(index, CLIP_WORD, turn), turned_line(index, CLIP_WORD + 3u, turn));
+    return Clip(turned_line(index, CLIP_WORD, turn), turned_line(index, CLIP_WORD + 3u, turn), turn);
 }
 
 fn turned_line(index: u32, word: u32, turn: vec2<f32>) -> vec3<f32> {
@@ -32,19 +35,19 @@ fn with_clip(record: SplatRecord, clip: Clip) -> SplatRecord {
     var clipped_ = record;
     let at = 4u + FILTER_ROWS;
     clipped_[at] = words(bitcast<vec4<u32>>(vec4<f32>(clip.first, clip.second.x)));
-    clipped_[at + 1u] = words(bitcast<vec4<u32>>(vec4<f32>(clip.second.yz, 0.0, 0.0)));
+    clipped_[at + 1u] = words(bitcast<vec4<u32>>(vec4<f32>(clip.second.yz, clip.turn)));
     return clipped_;
 }
 
 fn clip_in(record: SplatRecord) -> Clip {
     let first = bitcast<vec4<f32>>(each_word(record[4u + FILTER_ROWS]));
     let second = bitcast<vec4<f32>>(each_word(record[5u + FILTER_ROWS]));
-    return Clip(first.xyz, vec3<f32>(first.w, second.xy));
+    return Clip(first.xyz, vec3<f32>(first.w, second.xy), second.zw);
 }
 
-// Whether a line has the point, (u, v, 1) times a positive factor, on its far side.
+// Whether a line, or a polygon's side, has the point, (u, v, 1) times a positive factor, on its far side.
 fn cuts(clip: Clip, p: vec3<f32>) -> bool {
-    return p.z > 0.0 && (dot(clip.first, p) < 0.0 || dot(clip.second, p) < 0.0);
+    return p.z > 0.0 && (dot(clip.first, p) < 0.0 || dot(clip.second, p) < 0.0 || beyond_outline(clip.turn, p));
 }
 
 fn clipped(fragment: Fragment, clip: Clip, abc: vec3<f32>) -> Fragment {

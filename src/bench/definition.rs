@@ -10,7 +10,9 @@ use crate::error::{Error, Result};
 use crate::plan::{
     Accumulator, BackendName, BlendFormat, Optimisation, Organisation, Raster, RasterDepth, RenderOptions,
 };
-use crate::scene::{Blend, Cull, Epsilon, Facing, Kernel, LowPass, Map, Maps, PointShape, Samples, Shading, ShadingAt};
+use crate::scene::{
+    Blend, Cull, Epsilon, Facing, Kernel, LowPass, Map, Maps, Outline, PointShape, Samples, Shading, ShadingAt,
+};
 use crate::surfels::analytic::Shape;
 use crate::truth::DEFAULT_GRID;
 
@@ -214,6 +216,8 @@ pub struct Config {
     pub facing: Option<PointShape>,
     /// Their least and largest diameter, pixels; else the paper's.
     pub pixels: Option<[f64; 2]>,
+    /// Polygons of so many sides instead of disks.
+    pub outline: Option<Outline>,
     /// Whether fragments are blended; unlit if they are not, unless the configuration says otherwise.
     #[serde(default, deserialize_with = "parsed")]
     pub blend: Option<Blend>,
@@ -300,6 +304,7 @@ impl Config {
             epsilon: self.epsilon.unwrap_or(default.epsilon),
             cull: self.cull.unwrap_or(default.cull),
             samples: self.samples.unwrap_or(default.samples),
+            outline: self.outline,
             facing: self.facing.map(|shape| Facing { shape, pixels: self.pixels.unwrap_or(Facing::LIMITS) }),
             blend: self.blend.unwrap_or_default(),
             kernel: self.kernel.unwrap_or(default.kernel),

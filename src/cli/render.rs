@@ -14,8 +14,8 @@ use epsplat::passes::unseen::{Unseen, is_empty};
 use epsplat::plan::{Accumulator, BackendName, BlendFormat, Organisation, Raster, RasterDepth, RenderOptions, check};
 use epsplat::render::{Backend, Report, render};
 use epsplat::scene::{
-    Blend, Camera, Cull, Epsilon, Facing, Kernel, Light, LowPass, MAPS, Map, Maps, PointShape, PointSize, Samples,
-    Scene, Shading, ShadingAt,
+    Blend, Camera, Cull, Epsilon, Facing, Kernel, Light, LowPass, MAPS, Map, Maps, Outline, PointShape, PointSize,
+    Samples, Scene, Shading, ShadingAt,
 };
 use epsplat::surfels::Preparation;
 use epsplat::{Error, Result, surfels};
@@ -118,7 +118,11 @@ pub struct Arguments {
     /// Their smallest and largest diameter in the image
     #[arg(long, value_name = "MIN,MAX", default_value = "1,50", value_parser = parse_pixels, requires = "facing", help_heading = "Points")]
     pixels: [f64; 2],
-    /// Blending kernel over the disk: gaussian[:SIGMA], ellipse:A,N[,smooth] (exp(-A rho^N)), hat or constant
+    /// Draw a polygon of N sides, 3 to 16, in each disk instead of the disk
+    #[arg(long, value_name = "N", help_heading = "Surface")]
+    outline: Option<Outline>,
+    /// Blending kernel over the disk: gaussian[:SIGMA], ellipse:A,N[,smooth] (exp(-A rho^N)), plateau:MID,SLOPE (the ellipse that is 1/2
+    /// at MID with that slope), cone:P ((1-rho)^P), hat (cone:1) or constant
     /// [default: ellipse:6,3]
     #[arg(long)]
     kernel: Option<Kernel>,
@@ -319,6 +323,7 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
         cull: arguments.cull,
         samples: arguments.samples,
         facing: facing(arguments),
+        outline: arguments.outline,
         low_pass: match arguments.lowpass {
             LowPassName::None => LowPass::None,
             LowPassName::Max => LowPass::Max,

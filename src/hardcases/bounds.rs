@@ -254,7 +254,9 @@ fn fragments(
                     inside: at.inside,
                     // Of a cap it may be how little the ray's other meeting misses.
                     inside_error: known(
-                        line_error(&splat.clip, rho, bound.rho) + splat.curve.map_or(0.0, |_| bound.rho),
+                        line_error(&splat.clip, rho, bound.rho)
+                            + splat.outline.map_or(0.0, |_| bound.rho + U * (50.0 * rho + 2.0))
+                            + splat.curve.map_or(0.0, |_| bound.rho),
                     ),
                     back: splat.shows_back(&at),
                     normal: splat.normal_at(&at),

@@ -137,6 +137,15 @@ const LIST: &[Entry] = &[
         projections: BOTH,
     },
     Entry {
+        name: "caps of sixteen sides",
+        about: "The same caps as polygons of the most sides that there are, the last of them turned most often.",
+        bound: "the roots' bound, and that of a side: the error of (u, v), and 50 u of it",
+        size: (64, 48),
+        stage: Stage::askew,
+        fill: |stage| shapes(stage).outline(16),
+        projections: BOTH,
+    },
+    Entry {
         name: "caps that fold",
         about: "Caps as high as they are wide, seen from the side: a ray meets them twice, once, or just misses.",
         bound: ROOTS,

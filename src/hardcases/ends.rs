@@ -16,6 +16,7 @@ pub fn cases() -> Result<Vec<HardCase>> {
 
 /// What their bounds are made of.
 const LINES: &str = "how far inside a line: its length times the error of (u, v), and 10 u of it";
+const SIDES: &str = "how far inside a side: the error of (u, v), and 50 u of it";
 const MEAN: &str = "the mean of the samples' bounds, each of its own fragments";
 
 const LIST: &[Entry] = &[
@@ -26,6 +27,15 @@ const LIST: &[Entry] = &[
         size: (64, 48),
         stage: Stage::askew,
         fill: cut_disks,
+        projections: BOTH,
+    },
+    Entry {
+        name: "triangles cut by lines",
+        about: "The same disks and needles as triangles, so that lines end polygons and polygons lines.",
+        bound: SIDES,
+        size: (64, 48),
+        stage: Stage::askew,
+        fill: |stage| Filling { covered: (0.5, 0.8), ..cut_disks(stage).outline(3) },
         projections: BOTH,
     },
     Entry {

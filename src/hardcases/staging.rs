@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use super::{Expected, HardCase};
 use crate::error::Result;
 use crate::plan::{Accumulator, Optimisation, RenderOptions};
-use crate::scene::{Camera, Cap, Clip, Colors, Epsilon, Kernel, Lens, Projection, Scene, Shading, Surfel, Up};
+use crate::scene::{Camera, Cap, Clip, Colors, Epsilon, Kernel, Lens, Outline, Projection, Scene, Shading, Surfel, Up};
 
 /// Part of `x` beyond a whole number, for the k-th of a sequence that fills [0, 1) evenly along each of six axes.
 pub fn fraction(k: usize, axis: usize) -> f64 {
@@ -189,6 +189,12 @@ impl Filling {
     /// Some pixel is reached by disks' rims alone, where sums of one word keep too few bits.
     pub fn with_lone_rims(self) -> Self {
         self.expect(&[Accumulator::Fixed32, Accumulator::Packed64], BITS)
+    }
+
+    /// As polygons of so many sides.
+    pub fn outline(mut self, sides: u32) -> Self {
+        self.options.outline = Outline::of_sides(sides).ok();
+        self
     }
 
     /// With another kernel.

@@ -163,7 +163,7 @@ pub(super) fn meet(curve: &Curve, splat: &Splat, camera: &Camera, d: DVec2) -> (
     // Seen edge-on it is met at its centre's depth.
     let to_plane = if step.z == 0.0 { 0.0 } else { -start.z / step.z };
     let depth = curve.depth + curve.radius * to_plane;
-    let inside = splat.clip.inside(start.x + to_plane * step.x, start.y + to_plane * step.y);
+    let inside = splat.inside(start.x + to_plane * step.x, start.y + to_plane * step.y);
     let plane = match camera.projection {
         Projection::Pinhole => (1.0 / depth, inside),
         Projection::Orthographic => (depth, inside),
@@ -204,7 +204,7 @@ impl Way {
         let [first, second] = roots.map(|(sigma, away)| {
             let (u, v) = (start.x + sigma * step.x, start.y + sigma * step.y);
             let depth = curve.depth + curve.radius * sigma;
-            let inside = splat.clip.inside(u, v).min(margin);
+            let inside = splat.inside(u, v).min(margin);
             Intersection { depth, rho2: u * u + v * v, inside, uv: DVec2::new(u, v), away }
         });
         if second.depth < first.depth { Self { first: second, second: first } } else { Self { first, second } }

@@ -78,7 +78,7 @@ pub fn footprint(splat: &Splat, camera: &Camera, low_pass: LowPass, x: u32, y: u
         Projection::Pinhole => (c > 0.0, a / c, b / c, (a * a + b * b) / (c * c), 1.0 / c),
         Projection::Orthographic => (true, a, b, a * a + b * b, c),
     };
-    let inside = if before { splat.clip.inside(u, v) } else { f64::INFINITY };
+    let inside = if before { splat.inside(u, v) } else { f64::INFINITY };
     let disk = before.then_some(Intersection { depth, rho2, inside, uv: DVec2::new(u, v), away: splat.away });
     filtered(splat, camera, low_pass, disk, (c, inside), (dx, dy))
 }

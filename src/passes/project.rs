@@ -94,6 +94,7 @@ pub(super) fn projected(
         normal,
         filter,
         clip: Clip::NONE,
+        outline: None,
         curve,
         point,
         copies: 1,
@@ -120,6 +121,7 @@ pub fn reference_all(scene: &Scene, camera: &Camera, options: &RenderOptions) ->
             Splat {
                 copies,
                 clip: scene.clips.get(index).copied().filter(|_| splat.point.is_none()).unwrap_or_default(),
+                outline: options.outline,
                 sides,
                 normal: if splat.away && sides != Sides::Both && splat.curve.is_none() { -normal } else { normal },
                 curve: splat.curve.map(|curve| Curve { culls: cull_back, ..curve }),

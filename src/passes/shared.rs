@@ -12,6 +12,7 @@ pub const PASS: Pass = Pass {
             pick(needs.long_words, "words_long.wgsl", "words.wgsl"),
             "records.wgsl",
             pick(needs.clips, "clip.wgsl", "clip_absent.wgsl"),
+            pick(needs.outline, "outline.wgsl", "outline_absent.wgsl"),
             pick(needs.facing.is_some(), "facing.wgsl", pick(needs.curved, "curved.wgsl", "flat.wgsl")),
             "double.wgsl",
             "rows.wgsl",
@@ -20,5 +21,11 @@ pub const PASS: Pass = Pass {
         ]
     },
     kernels: |_| Vec::new(),
-    constants: |_| Vec::new(),
+    constants: |making| {
+        making.options.outline.map_or_else(Vec::new, |outline| {
+            let (sin, cos) = outline.half_angle().sin_cos();
+            let above = outline.sides().div_ceil(2);
+            vec![("OUTLINE_SIDES", above.into()), ("OUTLINE_COS", cos), ("OUTLINE_SIN", sin)]
+        })
+    },
 };

@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use super::curved::Curve;
 use super::facing::Point;
 use crate::plan::Sides;
-use crate::scene::{Camera, Clip};
+use crate::scene::{Camera, Clip, Outline};
 
 /// A projected surfel in f64: the twin of [`crate::gpu::layout::Splat`], in world units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +35,8 @@ pub struct Splat {
     pub filter: Option<Filter>,
     /// Where the disk ends before its rim.
     pub clip: Clip,
+    /// The polygon that is drawn of it.
+    pub outline: Option<Outline>,
     /// How it curves, in a scene in which some surfel does.
     pub curve: Option<Curve>,
     /// It is a point that faces the camera.
@@ -65,7 +67,7 @@ pub struct Intersection {
     pub depth: f64,
     /// Squared radius on the unit disk; the disk ends at 1.
     pub rho2: f64,
-    /// How far inside the disk's lines ([`Clip::inside`]); it ends at 0.
+    /// How far inside the disk's lines ([`Splat::inside`]); it ends at 0.
     pub inside: f64,
     /// (u, v) on the unit disk; of a fragment of the low-pass that of the disk's centre.
     pub uv: DVec2,
@@ -74,6 +76,12 @@ pub struct Intersection {
 }
 
 impl Splat {
+    /// How far inside its lines and its polygon's sides (u, v) lies: negative where it is left out.
+    pub fn inside(&self, u: f64, v: f64) -> f64 {
+        let of_lines = self.clip.inside(u, v);
+        self.outline.map_or(of_lines, |outline| of_lines.min(outline.inside(u, v)))
+    }
+
     /// Whether `at` is of a back, in a view in which pixels show one side of a surface ([`Sides::Nearest`]).
     pub fn shows_back(&self, at: &Intersection) -> bool {
         at.away && self.sides == Sides::Nearest

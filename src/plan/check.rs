@@ -28,6 +28,9 @@ pub fn options(options: &RenderOptions, reference: bool) -> Result<()> {
     if options.facing.is_some() {
         facing(options)?;
     }
+    if options.outline.is_some() {
+        outline(options)?;
+    }
     if options.blend == Blend::Nearest {
         nearest(options, reference)?;
     }
@@ -68,6 +71,17 @@ fn facing(options: &RenderOptions) -> Result<()> {
         }
         _ if options.cull == Cull::Back => usage("points that face the camera have no backs: leave --cull back out"),
         _ => Ok(()),
+    }
+}
+
+/// A polygon is part of a disk.
+fn outline(options: &RenderOptions) -> Result<()> {
+    match options.facing {
+        Some(_) => usage("points that face the camera have shapes of their own: leave --outline out"),
+        None if options.low_pass != LowPass::None => {
+            usage("a low-pass shows splats past their outlines: leave it out with --outline")
+        }
+        None => Ok(()),
     }
 }
 

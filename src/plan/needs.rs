@@ -58,8 +58,10 @@ pub struct SceneNeeds {
     pub own_normals: bool,
     /// Surfels that face away are left out.
     pub cull_back: bool,
-    /// Disks end at lines in their planes.
+    /// Disks end at lines in their planes, or at a polygon's sides.
     pub clips: bool,
+    /// Polygons are drawn instead of disks.
+    pub outline: bool,
     /// Disks curve: neither the rasteriser nor the ellipse of `ewa` does that.
     pub curved: bool,
     /// Surfels are points of this shape that face the camera.
@@ -193,7 +195,8 @@ impl SceneNeeds {
             sides: Sides::of(facts, camera, options),
             own_normals: facts.own_normals && (lit || options.maps.has(Map::Normal)),
             cull_back: culls_back(facts, camera, options),
-            clips: facts.clips && options.facing.is_none(),
+            clips: (facts.clips || options.outline.is_some()) && options.facing.is_none(),
+            outline: options.outline.is_some(),
             curved: facts.caps && options.draws_caps(),
             facing: options.facing.map(|facing| facing.shape),
             samples: options.samples,
@@ -279,6 +282,7 @@ impl SceneNeeds {
             (self.own_normals, "own-normals"),
             (self.cull_back, "cull-back"),
             (self.clips, "clips"),
+            (self.outline, "outline"),
             (self.curved, "curved"),
             (self.facing.is_some(), "facing"),
             (self.winner.is_some(), "nearest"),

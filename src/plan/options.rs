@@ -4,7 +4,9 @@ use std::str::FromStr;
 
 use super::{Accumulator, Optimisation, Raster};
 use crate::error::Error;
-use crate::scene::{Blend, Cull, Epsilon, Facing, Kernel, Light, LowPass, Map, Maps, Samples, Shading, ShadingAt};
+use crate::scene::{
+    Blend, Cull, Epsilon, Facing, Kernel, Light, LowPass, Map, Maps, Outline, Samples, Shading, ShadingAt,
+};
 
 /// Who renders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,6 +75,8 @@ pub struct RenderOptions {
     pub samples: Samples,
     /// Surfels are points that face the camera; else each lies in its own plane.
     pub facing: Option<Facing>,
+    /// Polygons are drawn instead of disks.
+    pub outline: Option<Outline>,
     /// Whether fragments are blended.
     pub blend: Blend,
     /// Blending kernel.
@@ -135,6 +139,7 @@ impl Default for RenderOptions {
             cull: Cull::Auto,
             samples: Samples::ONE,
             facing: None,
+            outline: None,
             blend: Blend::Weighted,
             kernel: Kernel::Ellipse { a: 6.0, n: 3.0, smooth: false },
             low_pass: LowPass::None,

@@ -13,6 +13,7 @@ pub mod kernel;
 pub mod light;
 pub mod maps;
 pub mod options;
+pub mod outline;
 mod provenance;
 #[expect(clippy::module_inception, reason = "the file is named for the type it holds")]
 pub mod scene;
@@ -31,6 +32,7 @@ pub use kernel::{Kernel, KernelShape};
 pub use light::Light;
 pub use maps::{MAPS, Map, Maps};
 pub use options::{Blend, Cull, Epsilon, LowPass, Samples, Shading, ShadingAt};
+pub use outline::Outline;
 pub use provenance::Provenance;
 pub use scene::{Bounds, Scene, Up};
 pub use surfel::Surfel;

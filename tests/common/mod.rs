@@ -146,6 +146,7 @@ pub fn all_needs() -> Vec<SceneNeeds> {
             sides: Sides::None,
             cull_back: false,
             clips: false,
+            outline: false,
             curved: false,
             ..*needs
         });
@@ -172,6 +173,9 @@ pub fn all_needs() -> Vec<SceneNeeds> {
             sides: Sides::None,
             ..*needs
         });
+    }
+    for needs in &mut all {
+        needs.outline &= needs.low_pass == LowPass::None;
     }
     all
 }
@@ -234,6 +238,7 @@ fn base_needs() -> Vec<SceneNeeds> {
                 sides: if sides && !mixed(27) { Sides::Nearest } else { Sides::None },
                 own_normals: (normal || lit_splats) && mixed(26),
                 clips: mixed(28),
+                outline: mixed(28) && mixed(23),
                 curved: mixed(25),
                 cull_back: mixed(27),
                 samples: Samples::ONE,

@@ -1,0 +1,23 @@
+// Polygons instead of disks (paper 001, section 3): what lies past a side of the regular polygon inscribed in the unit disk is left out.
+// One corner lies at u = 1, so the sides above v = 0 are those below it.
+// All loops end, by 1 of src/gpu/loops.rs: 0xbbf912629e09926c
+// Same interface as outline_absent.wgsl. Twin: src/scene/outline.rs.
+
+// Sides whose middles have v >= 0.
+override OUTLINE_SIDES: u32;
+// The cosine and sine of half the angle of a side: the direction of the first one's middle, which lies at the cosine's distance.
+override OUTLINE_COS: f32;
+override OUTLINE_SIN: f32;
+
+// Of (u, v, 1) times a positive factor, of a unit disk that was turned in itself (rows.wgsl).
+fn beyond_outline(turn: vec2<f32>, p: vec3<f32>) -> bool {
+    let own = vec2<f32>(p.x * turn.x - p.y * turn.y, abs(p.x * turn.y + p.y * turn.x));
+    let step = vec2<f32>(OUTLINE_COS * OUTLINE_COS - OUTLINE_SIN * OUTLINE_SIN, 2.0 * OUTLINE_COS * OUTLINE_SIN);
+    var middle = vec2<f32>(OUTLINE_COS, OUTLINE_SIN);
+    var farthest = 0.0;
+    for (var side = 0u; side < OUTLINE_SIDES; side += 1u) {
+        farthest = max(farthest, dot(own, middle));
+        middle = vec2<f32>(middle.x * step.x - middle.y * step.y, middle.x * step.y + middle.y * step.x);
+    }
+    return farthest > OUTLINE_COS * p.z;
+}

@@ -138,7 +138,7 @@ fn broken_kernels_are_noticed() {
     let camera = sphere_camera(160, Projection::Pinhole);
     for (without, file, from, to) in [
         (None, "nearest_color.wgsl", "atomicMax(&winners", "atomicMin(&winners"),
-        (None, "nearest_color.wgsl", "u64(attribute_word(surfel, 0u))", "u64(attribute_word(surfel / 2u, 0u))"),
+        (None, "nearest_color.wgsl", "attribute_word(surfel, 0u)", "attribute_word(surfel / 2u, 0u)"),
         (Some(Optimisation::Pairs), "winner_second.wgsl", "attributes.word", "~attributes.word"),
         (None, "depth_nearest.wgsl", "front * held.world", "front * held.world * 1.0001"),
     ] {

@@ -351,7 +351,7 @@ fn absent_parts_have_their_partners_signatures() {
     alike("tile_filter", &["handed_filter", "filter_misses"]);
     alike("tile_small", &["small_list", "small_entry"]);
     alike("kernel_", &["kernel_weight"]);
-    alike("nearest_", &["keep_nearest", "nearest_at"]);
+    alike("nearest_", &["keep_nearest", "mark_of", "nearest_at"]);
     alike_in("winner_", vec!["winner_constant.wgsl", "winner_color.wgsl"], &["resolve_color"]);
     alike_in("winners", vec!["winner_second.wgsl", "nearest_color.wgsl"], &["winning_word"]);
     alike("epsilon", &["radius_of", "deepest_accepted", "farthest_accepted"]);

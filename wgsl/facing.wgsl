@@ -41,19 +41,24 @@ fn radius_across(splat: Splat) -> f32 {
     return 1.0 / (splat.a[0] * held.intrinsics.x);
 }
 
+fn largest2(lengths: vec2<f32>) -> f32 {
+    let largest = max(abs(lengths.x), abs(lengths.y));
+    return largest * largest;
+}
+
 fn met(splat: Splat, filter_: Filter, d: vec2<f32>) -> Fragment {
     let change = vec2<f32>(splat.a[0], splat.b[1]);
     let abc = vec3<f32>(change * d + vec2<f32>(splat.a[2], splat.b[2]), splat.c[2]);
     let flat_ = intersect(abc);
     let uv = homogeneous(abc);
+    // Quotients are of numbers of the splat, so that none is left to a pixel, and squares are compared: no root either.
+    let beside = abs(uv.xy) * (1.0 / uv.z);
     // A point always shows at the pixel that it lies in, as if it were a square of that size.
-    let own = 2.0 * abs(uv.xy / change);
-    let beside = abs(uv.xy) / uv.z;
-    let rho = select(min(length(beside), max(own.x, own.y)), max(beside.x, beside.y), SQUARE);
-    let rho2 = rho * rho;
+    let own = abs(uv.xy) * (2.0 / change);
+    let rho2 = select(min(dot(beside, beside), largest2(own)), largest2(beside), SQUARE);
     let depth = flat_.depth - rise(rho2) * radius_across(splat);
     var spot: Spot;
-    return Fragment(rho <= 1.0 && depth >= held.near, depth, rho2, 1.0, spot);
+    return Fragment(rho2 <= 1.0 && depth >= held.near, depth, rho2, 1.0, spot);
 }
 
 fn is_away(splat: Splat, fragment: Fragment) -> bool {

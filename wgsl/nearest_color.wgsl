@@ -4,10 +4,15 @@
 // Cleared: nothing anywhere.
 @group(0) @binding(43) var<storage, read_write> winners: array<atomic<u64>>;
 
-// Of one depth the greatest word wins, whatever the order.
-fn keep_nearest(pixel: u32, depth: f32, surfel: u32) {
+// What a surfel leaves beside its depth.
+fn mark_of(surfel: u32) -> u32 {
+    return attribute_word(surfel, 0u);
+}
+
+// Of one depth the greatest mark wins, whatever the order.
+fn keep_nearest(pixel: u32, depth: f32, mark: u32) {
     let kept = kept_depth(bitcast<u32>(depth));
-    atomicMax(&winners[pixel], (u64(kept) << 32u) | u64(attribute_word(surfel, 0u)));
+    atomicMax(&winners[pixel], (u64(kept) << 32u) | u64(mark));
 }
 
 // The bits of the nearest depth, where `visible` has it from now on.

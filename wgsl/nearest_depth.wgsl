@@ -1,6 +1,10 @@
 // What the visibility pass keeps of the fragments of a pixel: the nearest depth. Same interface as nearest_color.wgsl.
 
-fn keep_nearest(pixel: u32, depth: f32, surfel: u32) {
+fn mark_of(surfel: u32) -> u32 {
+    return 0u;
+}
+
+fn keep_nearest(pixel: u32, depth: f32, mark: u32) {
     atomicMax(&nearest[pixel], kept_depth(bitcast<u32>(depth)));
 }
 

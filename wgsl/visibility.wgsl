@@ -1,14 +1,14 @@
 // Stage 2: the nearest depth at every pixel. One invocation a splat, one workgroup a large splat. Twin: src/passes/visibility.rs.
 // The least depth is the greatest kept one (layout.wgsl).
-// All loops end, by 1, 2 of src/gpu/loops.rs: 0x816c5130a6042e8d
+// All loops end, by 1, 2 of src/gpu/loops.rs: 0x138d5d278c29a475
 
 @group(0) @binding(5) var<storage, read> projected: array<SplatRecord>;
 @group(0) @binding(6) var<storage, read_write> nearest: array<atomic<u32>>;
 
-fn cover(splat: Splat, filter_: Filter, surfel: u32, x: u32, y: u32) {
+fn cover(splat: Splat, filter_: Filter, mark: u32, x: u32, y: u32) {
     let fragment = footprint(splat, filter_, x, y);
     if (fragment.hit) {
-        keep_nearest(pixel_index(x, y), fragment.depth, surfel);
+        keep_nearest(pixel_index(x, y), fragment.depth, mark);
     }
 }
 
@@ -30,10 +30,10 @@ fn visibility(
     }
     let pixels = reach(splat);
     let filter_ = filter_in(record);
-    let surfel = surfel_in(record, slot);
+    let mark = mark_of(surfel_in(record, slot));
     var at = pixels.first;
     while (at.y <= pixels.last.y) {
-        cover(splat, filter_, surfel, at.x, at.y);
+        cover(splat, filter_, mark, at.x, at.y);
         at.x++;
         at = select(at, vec2<u32>(pixels.first.x, at.y + 1u), at.x > pixels.last.x);
     }
@@ -54,10 +54,10 @@ fn visibility_large(
     let splat = splat_of(record);
     let pixels = reach(splat);
     let filter_ = filter_in(record);
-    let surfel = surfel_in(record, slot);
+    let mark = mark_of(surfel_in(record, slot));
     for (var y = pixels.first.y + local.y; y <= pixels.last.y; y += TILE) {
         for (var x = pixels.first.x + local.x; x <= pixels.last.x; x += TILE) {
-            cover(splat, filter_, surfel, x, y);
+            cover(splat, filter_, mark, x, y);
         }
     }
 }

@@ -95,6 +95,13 @@ fn sample_writes_surfels_that_cover_the_mesh() {
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert!(report["surfels"] == 3000 && report["hole_share"].as_f64().unwrap() < 1e-3, "{report}");
     succeeds(&["sample", &bunny, "-o", text(&surfels), "--count", "10", "--method", "uniform", "--seed", "7"]);
+    succeeds(&["sample", &bunny, "-o", text(&surfels), "--count", "3000", "--shape", "cap"]);
+    assert!(String::from_utf8_lossy(&std::fs::read(&surfels).unwrap()).contains("property float cap_uu"));
+    fails(
+        &["sample", &bunny, "-o", "s.ply", "--count", "9", "--shape", "cap", "--method", "uniform"],
+        2,
+        &["half-axes"],
+    );
     fails(&["sample", &bunny, "-o", text(&surfels), "--count", "0"], 2, &["--count"]);
     fails(&["sample", &bunny, "-o", "s.obj", "--count", "9"], 2, &[".ply"]);
     fails(&["sample", &bunny, "-o", "s.ply", "--count", "9", "--priority", "beauty"], 2, &["beauty", "curvature"]);

@@ -246,3 +246,44 @@ fn the_outline_of_a_few_caps_is_that_of_their_sphere() {
     });
     assert!(5.0 * caps.0 < disks.0 && caps.1 > disks.1 + 6.0, "{caps:?} {disks:?}");
 }
+
+/// A cap is worth its shape and its normals. With either alone, on a sphere of so many surfels:
+/// `cargo test --release --test curved what_normals -- --nocapture` prints decibels.
+#[test]
+fn what_normals_across_a_splat_are_worth_alone() {
+    let Some(gpu) = common::gpu() else { return };
+    let surface = Surface::mesh(&common::meshes::sphere(6, true)).unwrap();
+    let alone = |file, from, to| {
+        let sources = Sources::default().replace(file, from, to).unwrap();
+        Backend::Gpu { gpu: Box::new(common::gpu().unwrap()), sources }
+    };
+    let backends = [
+        Backend::gpu(gpu),
+        alone("curved.wgsl", "let heights = world_heights(index) * (held.unit / r);", "let heights = vec3<f32>(0.0);"),
+        alone("normal_curved.wgsl", "attributes.bend.u * spot.uv.x + attributes.bend.v * spot.uv.y", "vec3<f32>(0.0)"),
+    ];
+    for count in [300, 1000, 3000] {
+        let on_sphere = sphere(count, 1.0).surfels;
+        let (positions, normals) = on_sphere.iter().map(|surfel| (surfel.center.map(f64::from), surfel.center)).unzip();
+        let points = Points { positions, normals: Some(normals), ..Points::default() };
+        let scene = build_within(vec![points], None, &Limits::default(), &()).unwrap().0;
+        let flat = Scene { caps: Vec::new(), ..scene.clone() };
+        let camera = Camera::framing((256, 256), Lens::Fov(30.0), &scene, 1e-3).unwrap();
+        let options = RenderOptions {
+            samples: "4".parse().unwrap(),
+            maps: Maps::of(&[Map::Depth, Map::Normal]),
+            ..RenderOptions::default()
+        };
+        let truth = Truth::cast(&surface, &camera, &options, 8, &()).unwrap();
+        let db = |scene: &Scene, backend: &Backend| {
+            let (frame, _) = render(scene, &camera, &options, backend, &()).unwrap();
+            reconstruction(&frame, &truth).unwrap().psnr_db.unwrap()
+        };
+        let [both, normals, shape] = backends.each_ref().map(|backend| db(&scene, backend));
+        let neither = db(&flat, &backends[0]);
+        println!(
+            "{count} surfels: {both:.1} dB, normals alone {normals:.1}, shape alone {shape:.1}, neither {neither:.1}"
+        );
+        assert!(both > normals && both > shape && shape > neither, "{count}: {both} {normals} {shape} {neither}");
+    }
+}

@@ -11,9 +11,9 @@ use epsplat::Error;
 use epsplat::io::{Mesh, Points, Texture};
 use epsplat::metrics::{SurfaceDistances, coverage};
 use epsplat::scene::{Clip, Colors, Scene};
-use epsplat::surfels::build;
 use epsplat::surfels::sampling::voxels::Voxel;
 use epsplat::surfels::sampling::{MeshSurface, Method, Priority, Sampling, sample};
+use epsplat::surfels::{build, curve};
 use epsplat::truth::TriangleTree;
 use glam::DVec3;
 
@@ -422,4 +422,33 @@ fn planes_are_the_surface_s_own_whatever_normals_it_is_lit_by() {
     assert!(inward.clips.iter().filter(|clip| !clip.is_none()).count() > 300);
     let rims = SurfaceDistances::of(&inward, &mesh, &tree).unwrap().rims_to_mesh.unwrap();
     assert!(rims.max < PAST * radius, "{rims:?}");
+}
+
+#[test]
+fn caps_are_curved_as_the_mesh_is() {
+    // On a fine sphere rims lie much nearer to it than those of disks.
+    let mesh = sphere(5, true);
+    let tree = TriangleTree::new(&mesh).unwrap();
+    let off = |points: Points| {
+        let (scene, _) = build(vec![points], &()).unwrap();
+        assert!(coverage(&tree, &scene, 64, 128, &()).unwrap().is_hole_free());
+        SurfaceDistances::of(&scene, &mesh, &tree).unwrap().rims_to_mesh.unwrap().rms
+    };
+    let points = by(&mesh, 2000, Priority::Area);
+    let curved = curve(points.clone(), &()).unwrap();
+    assert_eq!(curved.caps.as_ref().unwrap().len(), 2000);
+    let (disks, caps) = (off(points.clone()), off(curved));
+    assert!(4.0 * caps < disks, "{caps} {disks}");
+    // Nothing curves on the sides of a bar, though it is lit as if it were round.
+    let mut mesh = bar(4);
+    let outward = |vertex: u32| {
+        let [x, y, _] = mesh.positions[vertex as usize];
+        DVec3::new(x, y, 0.0).as_vec3().to_array()
+    };
+    mesh.normals = Some(mesh.triangles.iter().map(|triangle| triangle.map(outward)).collect());
+    let caps = curve(by(&mesh, 3000, Priority::Area), &()).unwrap().caps.unwrap();
+    let highest = caps.iter().map(|cap| f64::from(cap.highest())).fold(0.0, f64::max);
+    assert!(highest < 1e-6, "{highest}");
+    // What has no planes has no caps.
+    assert!(curve(Points { axes: None, ..points }, &()).unwrap().caps.is_none());
 }

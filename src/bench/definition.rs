@@ -152,6 +152,8 @@ pub enum Making {
     Qsplat,
     /// As `epsplat sample` does: `count` of a mesh, with ellipses that cover it.
     Sample,
+    /// The same, curved as the mesh is around them.
+    Caps,
     /// Samples of a mesh, or of a shape, `count` of them, with its normals alone, as `epsplat render` draws them.
     Scanned,
     /// Independent random points of a mesh, `count` of them, with its normals, and ellipses that hold their cells.
@@ -174,7 +176,7 @@ pub enum Rims {
 impl Making {
     /// Whether the mesh is sampled at a number of points.
     pub fn samples(self) -> bool {
-        matches!(self, Self::Sample | Self::Scanned | Self::Uniform)
+        matches!(self, Self::Sample | Self::Caps | Self::Scanned | Self::Uniform)
     }
 }
 

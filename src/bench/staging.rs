@@ -16,7 +16,7 @@ use crate::scene::{Camera, Colors, Lens, Projection, Scene, Surfel};
 use crate::surfels::analytic::{RADIUS_IN_SPACINGS, Shape, generate};
 use crate::surfels::sampling::voxels::Voxel;
 use crate::surfels::sampling::{MeshSurface, Method, Priority, sample};
-use crate::surfels::{FromPoints, Size, Triangle, build, build_textured, from_points};
+use crate::surfels::{FromPoints, Size, Triangle, build, build_textured, curve, from_points};
 use crate::truth::Surface;
 
 /// One point of a scene's sweep: how many surfels, and their mean radius in pixels.
@@ -167,6 +167,7 @@ fn of_file(
             from_points(vec![bare], &options, progress)?.points
         }
         Making::Sample => sampled(stratified)?,
+        Making::Caps => curve(sampled(stratified)?, progress)?,
         Making::Scanned => {
             let Points { positions, up, normals, .. } = sampled(stratified)?;
             Points { positions, up, normals, ..Points::default() }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use epsplat::io::{self, Texture};
+use epsplat::surfels::curve;
 use epsplat::surfels::sampling::{MOST, MeshSurface, Method, Priority, sample, voxels::Voxel};
 use epsplat::{Error, Result};
 
@@ -34,6 +35,9 @@ pub struct Arguments {
     /// How samples are placed
     #[arg(long, value_enum, default_value = "stratified")]
     method: Placement,
+    /// What surfels are: disk (ellipses in their planes) or cap (curved as the surface is around them)
+    #[arg(long, value_enum, default_value = "disk")]
+    shape: Shape,
     /// How often the mesh's box is halved; else until there is a voxel for every four samples
     #[arg(long, value_name = "HALVINGS", value_parser = clap::value_parser!(u32).range(0..=60))]
     depth: Option<u32>,
@@ -53,10 +57,21 @@ enum Placement {
     Uniform,
 }
 
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum Shape {
+    /// Ellipses in their planes
+    Disk,
+    /// Curved as the surface is around them
+    Cap,
+}
+
 pub fn run(arguments: &Arguments) -> Result<()> {
     io::ply::check_extension(&arguments.output)?;
     outputs::check([&arguments.mesh].into_iter().chain(&arguments.texture), [&arguments.output])?;
     let bars = Bars::new();
+    if arguments.shape == Shape::Cap && matches!(arguments.method, Placement::Uniform) {
+        return Err(Error::Usage("uniform samples have no half-axes to curve: leave --shape cap out".into()));
+    }
     let mut mesh = arguments.input.mesh(&arguments.mesh, &bars)?;
     mesh.notes.iter().for_each(|line| note(line));
     if let Some(path) = &arguments.texture {
@@ -72,6 +87,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     let (points, sampling) = sample(&mesh, arguments.count as usize, &method, arguments.seed, &bars)
         .map_err(|error| named(error, std::slice::from_ref(&arguments.mesh)))?;
+    let points = if arguments.shape == Shape::Cap { curve(points, &bars)? } else { points };
     sampling.notes().iter().for_each(|line| note(line));
     io::ply::write_points(&arguments.output, &points, &bars)?;
     let voxels = if sampling.voxels > 0 { format!(" in {} voxels", sampling.voxels) } else { String::new() };

@@ -233,6 +233,30 @@ fn caps_of(
     axes.par_iter().zip(distinct.of_point()).map(|(axes, &position)| around.cap(position, *axes)).collect()
 }
 
+/// Gives points with half-axes the caps of the surface that their planes touch, whatever normals it is lit by. Points without half-axes
+/// stay as they are.
+///
+/// # Errors
+/// [`Error::Usage`] for more than 2^32 - 1 points.
+pub fn curve(points: Points, progress: &dyn Progress) -> Result<Points> {
+    let Some(axes) = &points.axes else { return Ok(points) };
+    let normals: Vec<[f32; 3]> = axes
+        .par_iter()
+        .map(|axes| {
+            let [s, t] = axes.map(|axis| DVec3::from_array(axis.map(f64::from)));
+            s.cross(t).normalize_or_zero().as_vec3().to_array()
+        })
+        .collect();
+    let bounds = Bounds::of(points.positions.par_iter().map(|position| DVec3::from_array(*position)));
+    let (body, _) = body(points.positions.len(), |index| DVec3::from_array(points.positions[index]));
+    progress.begin("sorting points", 0);
+    let distinct = DistinctPositions::new(&points.positions, &bounds, origin_for(&body))?;
+    progress.end();
+    let graph = NeighbourGraph::new(&distinct, NORMAL_NEIGHBOURS, progress);
+    let caps = caps_of((&distinct, &graph), (&normals, true), axes);
+    Ok(Points { caps: Some(caps), ..points })
+}
+
 /// Turns the `normals` of positions to one side; the connected parts of the surface, if they were looked for.
 fn oriented(
     (distinct, graph): (&DistinctPositions, &NeighbourGraph),
@@ -291,7 +315,15 @@ impl Sizes {
                 radii
             }
             Size::BspGlobal(triangle) => vec![common_radius(distinct, triangle, progress); distinct.len()],
-            Size::Qsplat => largest_at(distinct, measured.unwrap_or_default()),
+            Size::Qsplat => {
+                let own = largest_at(distinct, measured.unwrap_or_default()).into_par_iter().enumerate();
+                // Vertices of no triangle are sized as points are.
+                let cell = |position: usize| {
+                    let [s, _] = half_axes_at(Size::Knn, (distinct, graph), position as u32, normals[position]);
+                    s.length()
+                };
+                own.map(|(position, radius)| if radius > 0.0 { radius } else { cell(position) }).collect()
+            }
             size @ (Size::Knn | Size::Ellipse) => {
                 let own = normals.par_iter().zip(0..distinct.len() as u32);
                 let at =

@@ -38,7 +38,7 @@ use rayon::prelude::*;
 pub use self::build::{build, build_at_vertices, build_textured, build_within};
 pub use self::coverage::{Coverage, coverage};
 pub use self::facing::build_facing;
-pub use self::from_points::{FromPoints, Surfels, from_points};
+pub use self::from_points::{FromPoints, Surfels, curve, from_points};
 pub use self::limits::Limits;
 pub use self::orient::Orientation;
 pub use self::preparation::Preparation;

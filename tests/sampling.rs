@@ -10,7 +10,7 @@ use common::meshes::{bar, sphere};
 use epsplat::Error;
 use epsplat::io::{Mesh, Points, Texture};
 use epsplat::metrics::{SurfaceDistances, coverage};
-use epsplat::scene::{Clip, Colors, Scene};
+use epsplat::scene::{Cap, Clip, Colors, Scene};
 use epsplat::surfels::sampling::voxels::Voxel;
 use epsplat::surfels::sampling::{MeshSurface, Method, Priority, Sampling, sample};
 use epsplat::surfels::{build, curve};
@@ -447,7 +447,7 @@ fn caps_are_curved_as_the_mesh_is() {
     };
     mesh.normals = Some(mesh.triangles.iter().map(|triangle| triangle.map(outward)).collect());
     let caps = curve(by(&mesh, 3000, Priority::Area), &()).unwrap().caps.unwrap();
-    let highest = caps.iter().map(|cap| f64::from(cap.highest())).fold(0.0, f64::max);
+    let highest = caps.iter().map(Cap::highest).fold(0.0, f64::max);
     assert!(highest < 1e-6, "{highest}");
     // What has no planes has no caps.
     assert!(curve(Points { axes: None, ..points }, &()).unwrap().caps.is_none());

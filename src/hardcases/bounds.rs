@@ -11,6 +11,7 @@
 //! - **Samples**: the colour of a pixel of several is the mean of theirs, and so is its bound.
 //! - **Lines** at which a disk ends: how far inside (u, v) is errs by the line's length times what (u, v) does, and 10 u of it.
 //! - **Caps** turn the normal by what their slopes do over the error of (u, v), and 30 u of it.
+//! - **Points** that face the camera come nearer by heights, which err by what they change by over the error of rho.
 //! - **Normal**: s x t errs by 6 u |s||t|, its normalisation, mapping and normalising the mean by 12 u; the mean's error is
 //!   divided by the mean's length.
 //!
@@ -240,9 +241,10 @@ fn fragments(
         for y in splat.first[1]..=splat.last[1] {
             for x in splat.first[0]..=splat.last[0] {
                 let Some(at) = footprint(splat, camera, LowPass::None, x, y).map(|(at, _)| at) else { continue };
-                let bound = match &splat.curve {
-                    Some(curve) => precision.cap(curve, splat, (x, y), &at),
-                    None => precision.fragment(splat, x, y, &at),
+                let bound = match (&splat.curve, &splat.point) {
+                    (Some(curve), _) => precision.cap(curve, splat, (x, y), &at),
+                    (None, Some(point)) => precision.point(point, splat, (x, y), &at),
+                    (None, None) => precision.fragment(splat, x, y, &at),
                 };
                 let known = |error: f64| if error.is_nan() { f64::INFINITY } else { error };
                 let rho = at.rho2.sqrt();

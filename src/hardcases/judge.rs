@@ -271,7 +271,7 @@ impl Values {
         Some(Self {
             color: *frame.color.get(index)?,
             depth: scalar(Map::Depth)?,
-            normal: *frame.normals()?.get(index)?,
+            normal: frame.normals().map_or(Some([0.0; 3]), |normals| normals.get(index).copied())?,
             weight: scalar(Map::Weight)?,
             count: scalar(Map::Count)?,
         })

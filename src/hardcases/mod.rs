@@ -20,6 +20,7 @@ mod curved;
 mod ends;
 mod extremes;
 mod judge;
+mod points;
 pub mod precision;
 mod staging;
 
@@ -76,6 +77,7 @@ pub fn cases() -> Result<Vec<HardCase>> {
     let mut all = cases::cases()?;
     all.extend(ends::cases()?);
     all.extend(curved::cases()?);
+    all.extend(points::cases()?);
     all.extend(extremes::cases()?);
     Ok(all)
 }
@@ -91,12 +93,17 @@ pub struct Truth {
 }
 
 impl HardCase {
+    /// What is judged: points that face the camera have no normals.
+    fn maps(&self) -> Maps {
+        if self.options.facing.is_some() { Maps::ON_DEVICE.but(&[Map::Normal]) } else { Maps::ON_DEVICE }
+    }
+
     /// Renders the reference and derives the bounds.
     ///
     /// # Errors
     /// Those of [`render`].
     pub fn truth(&self) -> Result<Truth> {
-        let options = RenderOptions { maps: Maps::ON_DEVICE.and(&[Map::Decision]), ..self.options.clone() };
+        let options = RenderOptions { maps: self.maps().and(&[Map::Decision]), ..self.options.clone() };
         let (frame, _) = render(&self.scene, &self.camera, &options, &Backend::Reference, &())?;
         let known = |camera: &Camera| bounds::pixels(&self.scene, camera, &self.options);
         let samples = match self.options.samples {
@@ -111,7 +118,7 @@ impl HardCase {
     /// # Errors
     /// Those of [`render`].
     pub fn judge(&self, truth: &Truth, accumulator: &'static AccumulatorRow, backend: &Backend) -> Result<Row> {
-        let options = RenderOptions { accumulator: accumulator.of, maps: Maps::ON_DEVICE, ..self.options.clone() };
+        let options = RenderOptions { accumulator: accumulator.of, maps: self.maps(), ..self.options.clone() };
         let (frame, report) = render(&self.scene, &self.camera, &options, backend, &())?;
         Ok(judge(self, truth, accumulator, &frame, &report))
     }

@@ -64,7 +64,10 @@ impl Precision {
     pub fn of(splat: &Splat, scene: &Scene, camera: &Camera) -> Self {
         let surfel = &scene.surfels[splat.surfel as usize];
         let turned = |v: [f32; 3]| camera.rotation * Vec3::from_array(v).as_dvec3();
-        let (s, t) = (turned(surfel.s), turned(surfel.t));
+        let (s, t) = match &splat.point {
+            Some(point) => point.axes().into(),
+            None => (turned(surfel.s), turned(surfel.t)),
+        };
         let p = camera.rotation * (scene.center(splat.surfel as usize) - (camera.eye - scene.origin));
         let normal = s.cross(t);
         let principal = DVec2::new(camera.cx, camera.cy);

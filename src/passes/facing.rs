@@ -61,6 +61,16 @@ impl Faced {
 }
 
 impl Point {
+    /// What it is drawn as.
+    pub fn shape(&self) -> PointShape {
+        self.shape
+    }
+
+    /// World units.
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
     /// Half-axes in camera space.
     pub fn axes(&self) -> [DVec3; 2] {
         [DVec3::X * self.radius, DVec3::Y * self.radius]

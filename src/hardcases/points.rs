@@ -1,0 +1,139 @@
+//! Points that face the camera: sizes past their limits, and shapes that cross the near depth and each other.
+
+use glam::{DVec2, DVec3};
+
+use super::HardCase;
+use super::precision::{Bound, E, Precision};
+use super::staging::{BOTH, Entry, Filling, NEAR, Stage, build, fraction};
+use crate::error::Result;
+use crate::passes::facing::Point;
+use crate::passes::splat::{Intersection, Splat};
+use crate::scene::facing::{Facing, PointShape};
+use crate::scene::{Projection, Surfel};
+
+/// The cases.
+pub fn cases() -> Result<Vec<HardCase>> {
+    build(LIST)
+}
+
+/// What their bounds are made of.
+const SHAPE: &str = "a disk's bound; and of a height what it changes by over the error of rho, and 40 e of itself";
+
+const LIST: &[Entry] = &[
+    Entry {
+        name: "points of 0 and 50 pixels",
+        about: "Circles of radii from 1e-9 to 1e3 pixels, held between 1 and 50 across, some beside the image.",
+        bound: SHAPE,
+        size: (64, 48),
+        stage: Stage::askew,
+        fill: |stage| facing(PointShape::Circle, (0.9, 1.0), sizes(stage, 1e3)),
+        projections: BOTH,
+    },
+    Entry {
+        name: "squares of a pixel",
+        about: "Squares of a pixel and less, of which each shows at the pixel that it lies in.",
+        bound: SHAPE,
+        size: (64, 48),
+        stage: Stage::askew,
+        fill: |stage| facing(PointShape::Square, (0.05, 0.2), sizes(stage, 0.5)).with_lone_rims(),
+        projections: BOTH,
+    },
+    Entry {
+        name: "spheres at the near depth",
+        about: "Centres from before the near depth to past it by a sphere's height, which comes nearer than that.",
+        bound: SHAPE,
+        size: (48, 40),
+        stage: Stage::plain,
+        fill: |stage| facing(PointShape::Sphere, (0.2, 1.0), near(stage)).with_lone_rims(),
+        projections: BOTH,
+    },
+    Entry {
+        name: "cones through each other",
+        about: "Wide cones of few depths, so that nearly every pixel is decided by heights.",
+        bound: SHAPE,
+        size: (64, 48),
+        stage: Stage::askew,
+        fill: |stage| facing(PointShape::Cone, (0.9, 1.0), crowd(stage)),
+        projections: BOTH,
+    },
+    Entry {
+        name: "paraboloids around the camera",
+        about: "Paraboloids behind the camera, around it and before it, in sizes of a pixel's part to the whole image.",
+        bound: SHAPE,
+        size: (48, 40),
+        stage: Stage::plain,
+        fill: |stage| facing(PointShape::Paraboloid, (0.2, 1.0), around(stage)).with_lone_rims(),
+        projections: BOTH,
+    },
+];
+
+fn facing(shape: PointShape, covered: (f64, f64), surfels: Vec<Surfel>) -> Filling {
+    let mut filling = Filling { excused: 0.05, ..Filling::of(surfels, covered) };
+    filling.options.facing = Some(Facing { shape, pixels: Facing::LIMITS });
+    filling
+}
+
+/// A point of a radius in pixels, at a place of the image and a depth. Its plane is of no matter.
+fn point(stage: &Stage, (x, y): (f64, f64), z: f64, pixels: f64) -> Surfel {
+    stage.disk(stage.at(x, y, z), stage.ray(stage.at(x, y, z)), pixels * stage.pixel(z))
+}
+
+fn sizes(stage: &Stage, most: f64) -> Vec<Surfel> {
+    let (width, height) = stage.size();
+    let of = |k: usize| {
+        let at = ((1.4 * fraction(k, 0) - 0.2) * width as f64, (1.4 * fraction(k, 1) - 0.2) * height as f64);
+        let pixels = most * 10f64.powf(-12.0 * fraction(k, 3).powi(2));
+        point(stage, at, 3.0 + 0.2 * fraction(k, 2), pixels)
+    };
+    (0..400).map(of).collect()
+}
+
+fn near(stage: &Stage) -> Vec<Surfel> {
+    let (width, height) = stage.size();
+    let of = |k: usize| {
+        let at = (fraction(k, 0) * width as f64, fraction(k, 1) * height as f64);
+        // Of a pinhole's points the height is a part of the depth, of others pixels are wider than the near depth is far.
+        let (z, pixels) = match stage.camera.projection {
+            Projection::Pinhole => (NEAR * (0.9 + 0.6 * fraction(k, 2)), 12.0 * fraction(k, 3)),
+            Projection::Orthographic => (0.9 * NEAR + 2.0 * stage.pixel(1.0) * fraction(k, 2), 2.5 * fraction(k, 3)),
+        };
+        point(stage, at, z, pixels)
+    };
+    (0..200).map(of).collect()
+}
+
+fn crowd(stage: &Stage) -> Vec<Surfel> {
+    let (width, height) = stage.size();
+    let of = |k: usize| {
+        let at = (fraction(k, 0) * width as f64, fraction(k, 1) * height as f64);
+        point(stage, at, [3.0, 3.01, 3.02][k % 3], 6.0 + 14.0 * fraction(k, 3))
+    };
+    (0..150).map(of).collect()
+}
+
+fn around(stage: &Stage) -> Vec<Surfel> {
+    let of = |k: usize| {
+        let center = DVec3::new(3.0 * (fraction(k, 0) - 0.5), 3.0 * (fraction(k, 1) - 0.5), 2.0 * fraction(k, 2) - 0.6);
+        stage.disk(center, DVec3::NEG_Z, 0.01 * 2f64.powf(6.0 * fraction(k, 3)))
+    };
+    (0..160).map(of).collect()
+}
+
+impl Precision {
+    /// The device's error at pixel (x, y) of a point that faces the camera, its own evaluation included: that of a disk parallel to the
+    /// image, whose radius is known as well as a turned one's, to 6 e; at the pixel that it lies in, of the distance in pixels, known to
+    /// 5 e of a pixel and 4 e of the terms; and of its height, which is evaluated at a rho that errs, to 40 e by its radius and itself.
+    pub fn point(&self, point: &Point, splat: &Splat, (x, y): (u32, u32), at: &Intersection) -> Bound {
+        let height = |rho: f64| point.shape().height((rho * rho).min(1.0)) * point.radius();
+        let rho = at.rho2.sqrt();
+        let plane = at.depth + height(rho);
+        // Of the disk it is the length that errs so, of a square at most as much by each side.
+        let disk = self.fragment(splat, x, y, &Intersection { depth: plane, rho2: at.uv.length_squared(), ..*at });
+        let step = DVec2::new(f64::from(x) - splat.anchor[0] as f64, f64::from(y) - splat.anchor[1] as f64);
+        let own = 2.0 * (5.0 * E + 4.0 * E * (step.abs().element_sum() + 1.0)) + 16.0 * E * rho;
+        let of_rho = disk.rho.max(own) + 8.0 * E * rho;
+        let changes = height((rho - of_rho).max(0.0)) - height(rho + of_rho);
+        let of_height = changes + 40.0 * E * height(rho);
+        Bound { rho: of_rho, depth: (disk.depth * plane.abs() + of_height + 4.0 * E * plane.abs()) / at.depth.abs() }
+    }
+}

@@ -113,7 +113,10 @@ fn an_adapters_64_bit_atomics_do_not_change_a_bit() {
     let without = Backend::gpu(without);
     let own = options(Accumulator::Fixed);
     let crowded = crowded().into_iter().map(|(scene, camera)| ("crowded".to_owned(), scene, camera, own.clone()));
-    let hard = cases().unwrap().into_iter().map(|case| (case.name, case.scene, case.camera, case.options));
+    let hard = cases().unwrap().into_iter().map(|case| {
+        let options = RenderOptions { maps: case.maps(), ..case.options };
+        (case.name, case.scene, case.camera, options)
+    });
     let mut seen = [false; 2];
     let broken = [("high - from_low", "high"), ("from_low + from_high", "from_low")].map(|(from, to)| {
         let sources = Sources::default().replace("accumulator_fixed_pairs.wgsl", from, to).unwrap();
@@ -121,7 +124,7 @@ fn an_adapters_64_bit_atomics_do_not_change_a_bit() {
     });
     let mut noticed = [false; 2];
     for (name, scene, camera, options) in crowded.chain(hard) {
-        let options = RenderOptions { maps: Maps::ON_DEVICE, accumulator: own.accumulator, ..options };
+        let options = RenderOptions { accumulator: own.accumulator, ..options };
         let [(one, report), (other, plain)] =
             [&with, &without].map(|backend| render(&scene, &camera, &options, backend, &()).unwrap());
         assert!(report.needs.contains(&"atomics-u64") && !plain.needs.contains(&"atomics-u64"));

@@ -94,7 +94,7 @@ pub struct Truth {
 
 impl HardCase {
     /// What is judged: points that face the camera have no normals.
-    fn maps(&self) -> Maps {
+    pub fn maps(&self) -> Maps {
         if self.options.facing.is_some() { Maps::ON_DEVICE.but(&[Map::Normal]) } else { Maps::ON_DEVICE }
     }
 

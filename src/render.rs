@@ -3,10 +3,11 @@
 pub mod inspect;
 mod kept;
 mod kernels;
+mod look;
+mod parts;
 mod reference;
 mod report;
 mod run;
-mod samples;
 pub mod sequence;
 mod store;
 pub mod sums;
@@ -66,9 +67,10 @@ pub fn render(
 pub struct Renderer<S, B> {
     source: S,
     backend: B,
+    /// That of the colour.
     kept: Kept,
-    /// For maps, where the colour has several samples.
-    of_centers: Option<Kept>,
+    /// Those of maps that are made in another way.
+    of_maps: Vec<Kept>,
 }
 
 impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
@@ -81,10 +83,10 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         check::options(options, reference)?;
         let facts = source.facts();
         check::scene(&facts, options, reference)?;
-        let [colors, centers] = samples::apart(options);
-        let of_centers = centers.map(|options| Kept::new(facts.clone(), options));
-        let colors = colors.unwrap_or_else(|| options.clone());
-        Ok(Self { source, backend, kept: Kept::new(facts, colors), of_centers })
+        let mut parts = parts::parts(&facts, options).into_iter();
+        let colors = parts.next().unwrap_or_else(|| options.clone());
+        let of_maps = parts.map(|options| Kept::new(facts.clone(), options)).collect();
+        Ok(Self { source, backend, kept: Kept::new(facts, colors), of_maps })
     }
 
     /// One frame.
@@ -92,14 +94,16 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
     /// # Errors
     /// A limit of the adapter, and whatever a device may report.
     pub fn frame(&mut self, camera: &Camera, progress: &dyn Progress) -> Result<(Frame, Report)> {
-        let Self { source, backend, kept, of_centers } = self;
+        let Self { source, backend, kept, of_maps } = self;
         let one = |kept: &mut Kept| one(&*source, (*backend).borrow(), kept, camera, progress);
-        let Some(of_centers) = of_centers else { return one(kept) };
-        // What is on the device serves both.
-        of_centers.store = kept.store.take();
-        let centers = one(of_centers)?;
-        kept.store = of_centers.store.take();
-        Ok(samples::joined(one(kept)?, centers))
+        let mut maps = Vec::new();
+        for part in of_maps {
+            // What is on the device serves all of them, as far as they need the same of it.
+            part.store = kept.store.take();
+            maps.push(one(part)?);
+            kept.store = part.store.take();
+        }
+        Ok(parts::joined(one(kept)?, maps))
     }
 
     /// Device memory that the last frame was rendered with; none for the reference.

@@ -182,7 +182,7 @@ fn list(scenes: &Scenes) -> Vec<Row<'_>> {
         let without = vec![optimisation];
         add(format!("dense, without {name}"), &scenes.dense, RenderOptions { without, ..RenderOptions::default() });
     }
-    for depth in ["exact", "offset", "ray"] {
+    for depth in ["exact", "offset"] {
         for format in ["rgba16float", "rgba32float"] {
             let raster = epsplat::plan::Raster { format: format.parse().unwrap(), depth: depth.parse().unwrap() };
             let options = RenderOptions { raster: Some(raster), ..with_maps() };

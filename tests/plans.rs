@@ -6,9 +6,12 @@ mod common;
 
 use common::scenes::{sphere, sphere_camera};
 use epsplat::gpu::AdapterDescription;
+use epsplat::passes::fragments;
 use epsplat::plan::known::Listed;
 use epsplat::plan::steps::{Look, Over, Stage, Step};
-use epsplat::plan::{Accumulator, Facts, Known, Optimisation, Organisation, Plan, Raster, RenderOptions, page_surfels};
+use epsplat::plan::{
+    Accumulator, Band, Facts, Known, Optimisation, Organisation, Plan, Raster, RenderOptions, page_surfels,
+};
 use epsplat::render::sequence::steps;
 use epsplat::scene::{Camera, Colors, LowPass, Map, Maps, Projection, Scene, Shading};
 
@@ -50,6 +53,7 @@ fn lines(plan: &Plan) -> Vec<String> {
     let step = |step: &Step| match step {
         Step::Stage(stage) => line(stage),
         Step::Look(Look::Slots(part)) => format!("look for slots of {part:?}"),
+        Step::Look(Look::Fragments(band)) => format!("look for fragments of {band}"),
         Step::Look(Look::Lists(of, _)) => format!("look for lists of {of:?}"),
         Step::Large { by_tiles, by_workgroups } => {
             format!("{}, or {}", by_tiles.iter().map(line).collect::<Vec<_>>().join(", then "), line(by_workgroups))
@@ -165,7 +169,7 @@ fn tiles_of_a_software_adapter_gather_splats_that_are_not_tiny() {
         ]
     );
     let tiny = Known { touched_tiles: 1.2, ..Known::default() };
-    let crowded = Known { crowded: true, ..known };
+    let crowded = Known { crowded: true, ..known.clone() };
     let nothing = Scene { surfels: vec![], colors: Colors::Constant([1.0; 4]), ..scene.clone() };
     assert!(!planned(&nothing, 256, &software(), &options, &known).needs.gather);
     let card = AdapterDescription { kind: "discrete", ..software() };
@@ -224,6 +228,59 @@ fn copies_are_drawn_once_and_without_tiles() {
     assert!(!planned(&scene, 64, &software(), &tile, &Known::default()).needs.copies);
 }
 
+/// Where surfaces show through each other fragments are counted and listed; all are opaque, and nothing of it is there.
+#[test]
+fn what_shows_through_is_listed() {
+    let scene = sphere(1000, 1.5);
+    let options = RenderOptions { composite: "layers".parse().unwrap(), opacity: 0.5, ..RenderOptions::default() };
+    let plan = planned(&scene, 64, &software(), &options, &Known::default());
+    assert_eq!(
+        lines(&plan),
+        [
+            PROJECT,
+            "visibility: visibility/Slots(All)",
+            "visibility: visibility_large/Large",
+            "visibility: occlude/Occlusion",
+            "bin: fragments_of_rows/Rows, start_rows, start_pixels/Rows",
+            "look for fragments of 0",
+            "accumulate: list_fragments/Slots(All), list_fragments_large/Large, sort_fragments/Pixels",
+            RESOLVE,
+            "read back 0",
+        ]
+    );
+    // Bands that were cut by their fragments.
+    let cuts = vec![Band::of(64, 0, 40), Band::of(64, 40, 24)];
+    let cut = planned(&scene, 64, &software(), &options, &Known { cuts: Some(cuts.clone()), ..Known::default() });
+    assert_eq!((cut.bands, cut.pages), (cuts, 1));
+    let opaque = RenderOptions { opacity: 1.0, ..options };
+    let plain = RenderOptions::default();
+    let [opaque, plain] = [opaque, plain].map(|options| planned(&scene, 64, &software(), &options, &Known::default()));
+    assert_eq!(opaque.needs, plain.needs);
+}
+
+/// A band with more fragments than there is room for is cut where the next row would be too many.
+#[test]
+fn bands_are_cut_by_their_fragments() {
+    let options = RenderOptions { composite: "sorted".parse().unwrap(), opacity: 0.5, ..RenderOptions::default() };
+    let plan = planned(&sphere(1000, 1.5), 8, &software(), &options, &Known::default());
+    let of = |rows: [u64; 8], most| {
+        let starts: Vec<u64> = (0..=8).map(|row| rows[..row].iter().sum()).collect();
+        let bands = fragments::cut(&plan, 0, &starts, most)?;
+        let all: u32 = bands.iter().map(|band| band.rows).sum();
+        assert_eq!(all, 8);
+        Some(bands.iter().map(|band| (band.first, band.rows)).collect::<Vec<_>>())
+    };
+    assert_eq!(of([1; 8], 100), Some(vec![(0, 8)]));
+    assert_eq!(of([1; 8], 3), Some(vec![(0, 3), (3, 3), (6, 2)]));
+    assert_eq!(of([0, 5, 0, 0, 5, 5, 0, 1], 5), Some(vec![(0, 4), (4, 1), (5, 2), (7, 1)]));
+    assert_eq!(of([0, 0, 0, 6, 0, 0, 0, 0], 5), None, "a row is as little as can be drawn");
+    // Pixels of four samples stay whole.
+    let options = RenderOptions { samples: "4".parse().unwrap(), ..options };
+    let plan = planned(&sphere(1000, 1.5), 8, &software(), &options, &Known::default());
+    let bands = fragments::cut(&plan, 0, &[0, 1, 2, 3, 4, 5, 6, 7, 8], 3).unwrap();
+    assert!(bands.iter().all(|band| band.rows == 2), "{bands:?}");
+}
+
 #[test]
 fn the_rasteriser_projects_draws_and_resolves() {
     let scene = sphere(1000, 1.5);
@@ -236,10 +293,10 @@ fn the_rasteriser_projects_draws_and_resolves() {
 #[test]
 fn sums_that_wrapped_are_fixed_from_then_on() {
     let options = RenderOptions { accumulator: Accumulator::Fixed32, ..RenderOptions::default() };
-    let of = |known| planned(&sphere(1000, 1.5), 64, &software(), &options, &known).needs;
-    assert_eq!(of(Known::default()).accumulator, Accumulator::Fixed32);
+    let of = |known: &Known| planned(&sphere(1000, 1.5), 64, &software(), &options, known).needs;
+    assert_eq!(of(&Known::default()).accumulator, Accumulator::Fixed32);
     let known = Known { overflows: 3, ..Known::default() };
-    assert_eq!((of(known).accumulator, of(known).tiles), (Accumulator::Fixed, true));
+    assert_eq!((of(&known).accumulator, of(&known).tiles), (Accumulator::Fixed, true));
 }
 
 #[test]

@@ -119,6 +119,22 @@ fn maps_are_of_the_centre_however_many_samples_there_are() {
     }
 }
 
+/// Maps may ask for more of a surfel than the colour does, as a map of normals of their own beside an unlit one.
+#[test]
+fn maps_do_not_change_the_colours_of_several_samples() {
+    let Some(gpu) = common::gpu() else { return };
+    let (mut scene, backend) = (scene(), Backend::gpu(gpu));
+    scene.normals = vec![[0.0, 0.6, 0.8]; scene.surfels.len()];
+    let with = |maps: &[Map]| {
+        let options = RenderOptions { shading: Shading::Unlit, maps: Maps::of(maps), ..options(samples("4")) };
+        render(&scene, &views()[0], &options, &backend, &()).unwrap().0
+    };
+    let plain = with(&[]);
+    for maps in [&[Map::Normal][..], &[Map::Index], &[Map::Depth, Map::Index]] {
+        assert!(with(maps).color == plain.color, "{maps:?}");
+    }
+}
+
 #[test]
 fn an_outline_has_alphas_in_between() {
     let (scene, camera) = (sphere(3000, 1.7), &views()[0]);

@@ -93,7 +93,7 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
 }
 
 /// Names of needs of which a render has one at most.
-const ALTERNATIVES: [&[&str]; 7] = [
+const ALTERNATIVES: [&[&str]; 8] = [
     &["pinhole", "orthographic"],
     &["kernel-gaussian", "kernel-ellipse", "kernel-cone", "kernel-constant"],
     &["color-constant", "color-srgb8", "color-linear", "color-textured"],
@@ -101,11 +101,14 @@ const ALTERNATIVES: [&[&str]; 7] = [
     &["epsilon-radius", "epsilon-ray"],
     &["lowpass-max", "lowpass-ewa"],
     &["lambert", "phong"],
+    &["lists-layers", "lists-sorted"],
 ];
 
 /// Needs that no render has together (`src/plan/check.rs`, `src/plan/needs.rs`).
-const EXCLUSIVE: [(&str, &[&str]); 12] = [
-    ("samples", &["count", "depth", "index", "normal-map", "weight-map"]),
+const EXCLUSIVE: [(&str, &[&str]); 14] = [
+    ("samples", &["count", "depth", "index", "normal-map", "weight-map", "transmittance", "layers-map"]),
+    ("lists", &["tiles", "gather", "copies", "cull", "atomics-u64", "raster-exact", "raster-offset", "nearest"]),
+    ("lists", &["color-textured", "count", "depth", "index", "normal-map", "weight-map"]),
     ("color-textured", &["tiles", "gather", "copies", "raster-exact", "raster-offset"]),
     ("copies", &["tiles", "gather", "cull", "atomics-u64"]),
     ("color-constant", &["alpha"]),
@@ -147,7 +150,10 @@ const EXCLUSIVE: [(&str, &[&str]); 12] = [
             "weight-map",
         ],
     ),
-    ("raster", &["wide-sums", "atomics-u64", "copies", "cull", "tiles", "gather", "index"]),
+    (
+        "raster",
+        &["wide-sums", "atomics-u64", "copies", "cull", "tiles", "gather", "index", "transmittance", "layers-map"],
+    ),
 ];
 
 #[test]

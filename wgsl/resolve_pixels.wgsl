@@ -1,5 +1,5 @@
-// Where each pixel has one sample: its colour and maps. One invocation a pixel of a covered tile. Twin: src/passes/resolve.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xfe0aad96954b729a
+// Where each pixel has one sample: its colour and maps (resolve_surface.wgsl, resolve_lists.wgsl). One invocation a pixel of a covered tile. Twin: src/passes/resolve.rs.
+// All loops end, by 1 of src/gpu/loops.rs: 0x1344ad82f017c462
 
 // One workgroup a covered tile.
 @compute @workgroup_size(WORKGROUP)
@@ -19,25 +19,4 @@ fn resolve(
             resolve_pixel(pixel, pixel, x, y + held_band.first_row);
         }
     }
-}
-
-// The pixel (x, y), the band's `pixel`th, from what `sums_of` names its sums.
-fn resolve_pixel(sums_of: u32, pixel: u32, x: u32, y: u32) {
-    let out = pixel * IMAGE_WORDS;
-    let front = front_at(pixel);
-    let weight = shown_weight(sums_of, front);
-    if (weight == 0.0) {
-        write_color(out, held.background);
-        write_normal(out, vec3<f32>(0.0));
-        write_no_depth(out);
-        write_weight(out, 0.0);
-        write_count(out, sums_of);
-        return;
-    }
-    let normal = resolve_normal(sums_of, weight, front);
-    write_color(out, shown_color(sums_of, weight, normal, x, y));
-    write_normal(out, normal);
-    write_depth(out, sums_of, weight, front);
-    write_weight(out, weight_at(sums_of));
-    write_count(out, sums_of);
 }

@@ -1,6 +1,7 @@
-// Where each pixel has several samples, which all other kernels take for pixels: the mean of their premultiplied colours. One
+// Where each pixel has several samples, which all other kernels take for pixels: the mean of their premultiplied colours
+// (resolve_surface.wgsl, resolve_lists.wgsl). One
 // invocation a pixel of a covered tile. Twin: src/passes/resolve.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xb640d7cf48a06f0c
+// All loops end, by 1 of src/gpu/loops.rs: 0xfffd4e04cc3ea70e
 
 override SAMPLES_ACROSS: u32;
 override SAMPLES_DOWN: u32;
@@ -31,19 +32,6 @@ fn resolve(
             write_mean(corner, sum);
         }
     }
-}
-
-// The premultiplied colour of the sample in a column and row of the band, its `sample`th, from what `sums_of` names its sums.
-fn sample_color(sums_of: u32, sample: u32, x: u32, row: u32) -> vec4<f32> {
-    let front = front_at(sample);
-    let weight = shown_weight(sums_of, front);
-    var color = held.background;
-    if (weight != 0.0) {
-        let normal = resolve_normal(sums_of, weight, front);
-        color = shown_color(sums_of, weight, normal, x, row + held_band.first_row);
-    }
-    // Rounded before it is added, however a compiler would join the two: by tiles or not, the bits are the same.
-    return bitcast<vec4<f32>>(bitcast<vec4<u32>>(vec4<f32>(color.rgb * color.a, color.a)) ^ vec4<u32>(held.zero));
 }
 
 // The straight mean of the samples that start at `corner`, a column and row of the band.

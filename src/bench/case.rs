@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::definition::{Config, Definition, SceneEntry};
+use super::config::Config;
+use super::definition::{Definition, SceneEntry};
 use super::staging::Staged;
 use crate::frame::Frame;
 use crate::plan::RenderOptions;

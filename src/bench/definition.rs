@@ -6,13 +6,10 @@ use std::str::FromStr;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 
+use super::config::Config;
 use crate::error::{Error, Result};
-use crate::plan::{
-    Accumulator, BackendName, BlendFormat, Optimisation, Organisation, Raster, RasterDepth, RenderOptions,
-};
-use crate::scene::{
-    Blend, Cull, Epsilon, Facing, Kernel, LowPass, Map, Maps, Outline, PointShape, Samples, Shading, ShadingAt,
-};
+use crate::plan::{BackendName, RenderOptions};
+use crate::scene::Shading;
 use crate::surfels::analytic::Shape;
 use crate::truth::DEFAULT_GRID;
 
@@ -180,70 +177,6 @@ impl Making {
     }
 }
 
-/// One way to render. What it does not say is as for `epsplat render`.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Config {
-    /// Its name.
-    pub name: String,
-    /// Who renders.
-    #[serde(deserialize_with = "named")]
-    pub backend: BackendName,
-    /// How the compute kernels keep sums.
-    #[serde(default, deserialize_with = "parsed")]
-    pub accumulator: Option<Accumulator>,
-    /// How the compute kernels draw splats.
-    #[serde(default, deserialize_with = "parsed")]
-    pub organisation: Option<Organisation>,
-    /// What is left out that makes frames of the compute kernels faster.
-    #[serde(default, deserialize_with = "all_parsed")]
-    pub without: Vec<Optimisation>,
-    /// Depth tolerance.
-    #[serde(default, deserialize_with = "parsed")]
-    pub epsilon: Option<Epsilon>,
-    /// Blending kernel.
-    #[serde(default, deserialize_with = "parsed")]
-    pub kernel: Option<Kernel>,
-    /// Low-pass filter.
-    pub lowpass: Option<LowPass>,
-    /// Which surfels are left out by the side that they show.
-    #[serde(default, deserialize_with = "parsed")]
-    pub cull: Option<Cull>,
-    /// Samples of a pixel: 1, 4, 8 or 16.
-    #[serde(default, deserialize_with = "parsed")]
-    pub samples: Option<Samples>,
-    /// Surfels are points of this shape that face the camera: square, circle, sphere, cone or paraboloid; unlit unless the configuration says
-    /// otherwise.
-    #[serde(default, deserialize_with = "parsed")]
-    pub facing: Option<PointShape>,
-    /// Their least and largest diameter, pixels; else the paper's.
-    pub pixels: Option<[f64; 2]>,
-    /// Polygons of so many sides instead of disks.
-    pub outline: Option<Outline>,
-    /// Whether fragments are blended; unlit if they are not, unless the configuration says otherwise.
-    #[serde(default, deserialize_with = "parsed")]
-    pub blend: Option<Blend>,
-    /// The rasteriser's targets.
-    #[serde(default, deserialize_with = "parsed")]
-    pub blend_format: Option<BlendFormat>,
-    /// How the rasteriser tells the visible surface.
-    #[serde(default, deserialize_with = "parsed")]
-    pub raster_depth: Option<RasterDepth>,
-    /// Shading; else the scene's, else Lambert.
-    pub shading: Option<Shading>,
-    /// What is lit: pixel or splat.
-    #[serde(default)]
-    pub shading_at: ShadingAt,
-    /// Maps that are rendered too.
-    #[serde(default, deserialize_with = "all_parsed")]
-    pub maps: Vec<Map>,
-    /// The largest RMSE against the f64 reference that is allowed.
-    pub error_limit: Option<f64>,
-    /// Whether a quick run has it.
-    #[serde(default = "yes")]
-    pub quick: bool,
-}
-
 /// A value, or the values of a sweep.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(untagged, expecting = "a number or a list of numbers is needed")]
@@ -280,78 +213,16 @@ fn one() -> u32 {
     1
 }
 
-fn yes() -> bool {
+pub(super) fn yes() -> bool {
     true
 }
 
-fn named<'de, D: Deserializer<'de>, T: FromStr<Err = Error>>(text: D) -> Result<T, D::Error> {
+pub(super) fn named<'de, D: Deserializer<'de>, T: FromStr<Err = Error>>(text: D) -> Result<T, D::Error> {
     String::deserialize(text)?.parse().map_err(D::Error::custom)
 }
 
-fn parsed<'de, D: Deserializer<'de>, T: FromStr<Err = Error>>(text: D) -> Result<Option<T>, D::Error> {
+pub(super) fn parsed<'de, D: Deserializer<'de>, T: FromStr<Err = Error>>(text: D) -> Result<Option<T>, D::Error> {
     named(text).map(Some)
-}
-
-fn all_parsed<'de, D: Deserializer<'de>, T: FromStr<Err = Error>>(texts: D) -> Result<Vec<T>, D::Error> {
-    let texts = Vec::<String>::deserialize(texts)?;
-    texts.iter().map(|text| text.parse().map_err(D::Error::custom)).collect()
-}
-
-impl Config {
-    /// The options of a render, on a scene whose own shading is `shading`.
-    pub fn options(&self, shading: Option<Shading>) -> RenderOptions {
-        let default = RenderOptions::default();
-        let raster = Raster::default();
-        RenderOptions {
-            epsilon: self.epsilon.unwrap_or(default.epsilon),
-            cull: self.cull.unwrap_or(default.cull),
-            samples: self.samples.unwrap_or(default.samples),
-            outline: self.outline,
-            facing: self.facing.map(|shape| Facing { shape, pixels: self.pixels.unwrap_or(Facing::LIMITS) }),
-            blend: self.blend.unwrap_or_default(),
-            kernel: self.kernel.unwrap_or(default.kernel),
-            low_pass: self.lowpass.unwrap_or(default.low_pass),
-            accumulator: self.accumulator().unwrap_or_default(),
-            organisation: self.organisation.unwrap_or_default(),
-            without: self.without.clone(),
-            raster: (self.backend == BackendName::Raster).then(|| Raster {
-                format: self.blend_format.unwrap_or(raster.format),
-                depth: self.raster_depth.unwrap_or(raster.depth),
-            }),
-            shading: self.shading.or(self.unlit().then_some(Shading::Unlit)).or(shading).unwrap_or(default.shading),
-            shading_at: self.shading_at,
-            maps: Maps::of(&self.maps),
-            ..default
-        }
-    }
-
-    /// Whether normals are of no use: of points that face the camera there are none, and of what is not blended none is kept.
-    fn unlit(&self) -> bool {
-        self.facing.is_some() || self.blend == Some(Blend::Nearest)
-    }
-
-    /// How the compute kernels keep sums; none if others render.
-    pub fn accumulator(&self) -> Option<Accumulator> {
-        (self.backend == BackendName::Gpu).then(|| self.accumulator.unwrap_or_default())
-    }
-
-    /// How sums are kept, by name; empty for the reference.
-    pub fn sums(&self) -> &'static str {
-        match self.backend {
-            BackendName::Gpu => self.accumulator().map_or("", Accumulator::name),
-            BackendName::Raster => self.blend_format.unwrap_or(Raster::default().format).name(),
-            BackendName::Reference => "",
-        }
-    }
-
-    /// Whether two frames must have the same bits. The rasteriser blends in no fixed order.
-    pub fn deterministic(&self) -> bool {
-        match self.backend {
-            BackendName::Gpu => self.accumulator().is_some_and(|sums| sums.row().deterministic),
-            BackendName::Raster => false,
-            BackendName::Reference => true,
-        }
-    }
 }
 
 impl Definition {

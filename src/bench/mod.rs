@@ -6,6 +6,7 @@
 pub mod bandwidth;
 pub mod card;
 mod case;
+pub mod config;
 pub mod definition;
 mod judge;
 pub mod machine;

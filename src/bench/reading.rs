@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::definition::{Config, Definition, Making, OneOrMany, SceneEntry};
+use super::config::Config;
+use super::definition::{Definition, Making, OneOrMany, SceneEntry};
 use crate::error::{Error, Result};
 use crate::plan::{BackendName, check};
 use crate::scene::camera::check_size;

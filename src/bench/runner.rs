@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use super::case::{Case, Timed};
-use super::definition::{Config, Definition, SceneEntry};
+use super::config::Config;
+use super::definition::{Definition, SceneEntry};
 use super::judge;
 use super::machine::machine;
 use super::staging::{Point, points, stage};

@@ -1,6 +1,7 @@
 //! A study's outcome as text: for a terminal, and as Markdown for a README.
 
-use super::definition::{Config, Definition};
+use super::config::Config;
+use super::definition::Definition;
 use crate::plan::{BlendFormat, Features};
 use crate::report::{Measurement, Study};
 

@@ -13,9 +13,10 @@ use epsplat::io::Texture;
 use epsplat::passes::unseen::{Unseen, is_empty};
 use epsplat::plan::{Accumulator, BackendName, BlendFormat, Organisation, Raster, RasterDepth, RenderOptions, check};
 use epsplat::render::{Backend, Report, render};
+use epsplat::scene::composite::ALL_LAYERS;
 use epsplat::scene::{
-    Blend, Camera, Cull, Epsilon, Facing, Kernel, Light, LowPass, MAPS, Map, Maps, Outline, PointShape, PointSize,
-    Samples, Scene, Shading, ShadingAt,
+    Blend, Camera, Composite, Cull, Epsilon, Facing, Kernel, Light, LowPass, MAPS, Map, Maps, Outline, PointShape,
+    PointSize, Samples, Scene, Shading, ShadingAt, Tail,
 };
 use epsplat::surfels::Preparation;
 use epsplat::{Error, Result, surfels};
@@ -41,6 +42,7 @@ use super::{note, outputs, write_json};
     epsplat render a.ply b.ply -o maps.exr --aov depth,normal --size 1920x1080\n  \
     epsplat render bunny.obj -o bunny.png --shading phong --light 1,1,1 --light headlight:0.3\n  \
     epsplat render surfels.ply -o painted.png --texture image.png\n  \
+    epsplat render bunny.obj -o glass.png --composite layers --opacity 0.5\n  \
     epsplat render scan.laz -o top.png --eye 0,0,500 --target 0,0,0 --ortho 300\n  \
     epsplat render scan.laz -o views --cameras transforms.json"
 )]
@@ -130,6 +132,17 @@ pub struct Arguments {
     /// alone, as with a depth test: unlit, and faster for points of a few pixels) [default: weighted]
     #[arg(long, value_name = "HOW")]
     blend: Option<Blend>,
+    /// What shows of the surfaces behind a pixel's nearest one: opaque (nothing; its alpha shows the background), layers (all of
+    /// them, from front to back, by the alpha of each), layers:L (the nearest L) or sorted (every fragment, in the order of depths, by
+    /// its alpha times its weight) [default: opaque]
+    #[arg(long, value_name = "HOW", help_heading = "Transparency")]
+    composite: Option<Composite>,
+    /// What all alphas are multiplied with, 0 to 1
+    #[arg(long, value_name = "A", default_value = "1", help_heading = "Transparency")]
+    opacity: f32,
+    /// What becomes of the surfaces behind the last of layers:L: sum (they are blended, as one more) or none [default: sum]
+    #[arg(long, value_name = "HOW", requires = "composite", help_heading = "Transparency")]
+    tail: Option<Tail>,
     /// Filter for splats near a pixel in size or below
     #[arg(long, value_enum, default_value_t = LowPassName::None)]
     lowpass: LowPassName,
@@ -312,6 +325,9 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
         let what = "--blend nearest has no tolerance and no weights: leave --epsilon and --kernel out";
         return Err(Error::Usage(what.into()));
     }
+    if arguments.tail.is_some() && !matches!(arguments.composite, Some(Composite::Layers(most)) if most < ALL_LAYERS) {
+        return Err(Error::Usage("a tail lies behind a last layer: give --tail with --composite layers:L".into()));
+    }
     if arguments.shading_at == ShadingAtName::Splat && arguments.shading() == ShadingName::Unlit {
         return Err(Error::Usage("nothing is lit: give --shading-at with --shading lambert or phong".into()));
     }
@@ -320,6 +336,9 @@ fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
         epsilon: arguments.epsilon.unwrap_or(default.epsilon),
         kernel: arguments.kernel.unwrap_or(default.kernel),
         blend: arguments.blend.unwrap_or_default(),
+        composite: arguments.composite.unwrap_or_default(),
+        opacity: arguments.opacity,
+        tail: arguments.tail.unwrap_or_default(),
         cull: arguments.cull,
         samples: arguments.samples,
         facing: facing(arguments),

@@ -157,8 +157,9 @@ impl AdapterDescription {
     }
 }
 
-/// The most storage buffers a kernel uses (the tiles that gather: two lists, splats, surfels, their attributes, depths, the image).
-pub const STORAGE_BUFFERS: u32 = 7;
+/// The most storage buffers a kernel uses, which is as many as core WebGPU grants (large splats' fragments: the queue, splats, surfels,
+/// their attributes, how many fragments have no place, where lists start, keys and records).
+pub const STORAGE_BUFFERS: u32 = 8;
 
 #[cfg(test)]
 mod tests {

@@ -58,7 +58,7 @@ fn fixed_file(needs: &SceneNeeds) -> &'static str {
 const PAIRS: &str = "accumulator_fixed_pairs.wgsl";
 
 /// The file of its terms.
-fn terms_file(needs: &SceneNeeds) -> &'static str {
+pub(super) fn terms_file(needs: &SceneNeeds) -> &'static str {
     if needs.wide_sums { "terms_wide.wgsl" } else { "terms.wgsl" }
 }
 

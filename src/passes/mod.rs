@@ -10,9 +10,11 @@
 //! | [`visibility`] | splats | the nearest depth of each pixel |
 //! | [`accumulate`] | splats, nearest depths | [`accumulate::PixelSums`] |
 //! | [`winner`] | splats | the same of the nearest fragment alone |
+//! | [`fragments`] | splats | a list of each pixel's fragments |
 //! | [`tiles`] | large splats, or all | the same two, or the next |
 //! | [`covered`] | nearest depths | the tiles that have anything |
 //! | [`resolve`] | sums | [`Frame`] |
+//! | [`layers`], [`sorted`] | lists | [`Frame`] |
 //!
 //! [`index`] makes a map of its own. [`unseen`] says why none of them shows where none does.
 //!
@@ -26,8 +28,10 @@ pub mod cull;
 pub mod curved;
 pub mod facing;
 pub mod footprint;
+pub mod fragments;
 pub mod homography;
 pub mod index;
+pub mod layers;
 pub mod lit;
 pub mod lowpass;
 pub mod order;
@@ -35,6 +39,7 @@ pub mod project;
 pub mod raster;
 pub mod resolve;
 pub mod shared;
+pub mod sorted;
 pub mod source;
 pub mod splat;
 pub mod tiles;
@@ -46,7 +51,7 @@ pub mod winner;
 use crate::frame::Frame;
 use crate::plan::pass::{Making, Module, Pass};
 use crate::plan::steps::{Stage, Twin};
-use crate::plan::{Plan, RenderOptions, SceneNeeds};
+use crate::plan::{Lists, Plan, RenderOptions, SceneNeeds};
 use crate::scene::{Camera, Map, Provenance, Scene};
 use splat::Splat;
 
@@ -96,9 +101,9 @@ pub fn of_maps(plan: &Plan, band: usize) -> impl Iterator<Item = Stage> {
     own_maps(&plan.needs).map(move |own| (own.runs)(plan, band).as_twin(Twin::Map(own.map)))
 }
 
-/// Whether a map asks for the order in which surfels are stored.
+/// Whether a map, or what is sorted, asks for the order in which surfels are stored.
 pub fn asks_for_order(needs: &SceneNeeds) -> bool {
-    own_maps(needs).next().is_some()
+    own_maps(needs).next().is_some() || needs.lists == Some(Lists::Sorted)
 }
 
 /// Makes of `frame`, as it was read back, what a user is given.
@@ -111,7 +116,7 @@ pub fn finish(frame: &mut Frame, needs: &SceneNeeds, provenance: &Provenance, or
 }
 
 /// The passes whose files every module has.
-const PASSES: [&Pass; 14] = [
+const PASSES: [&Pass; 17] = [
     &shared::PASS,
     &project::PASS,
     &facing::PASS,
@@ -120,11 +125,14 @@ const PASSES: [&Pass; 14] = [
     &footprint::PASS,
     &visibility::PASS,
     &winner::PASS,
+    &fragments::PASS,
     &accumulate::PASS,
     &attributes::PASS,
     &lit::PASS,
     &covered::PASS,
     &resolve::PASS,
+    &layers::PASS,
+    &sorted::PASS,
     &raster::PASS,
 ];
 

@@ -8,7 +8,7 @@ use super::covered;
 use crate::frame::Frame;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Kernel, Over, Run, Stage, Twin};
-use crate::plan::{PixelLayout, Plan, RenderOptions};
+use crate::plan::{Lists, PixelLayout, Plan, RenderOptions};
 use crate::scene::options::HIGHLIGHT;
 use crate::scene::{Camera, Colors, Light, MAPS, Map, Samples, Scene, Shading};
 
@@ -24,37 +24,63 @@ pub fn reference(
     for (pixel, sum) in sums.iter().enumerate() {
         let (x, y) = (pixel as u32 % camera.width, pixel as u32 / camera.width + first_row);
         let background = options.background.map(f64::from);
-        let (mut color, mut depth, mut normal) = (background, f64::INFINITY, DVec3::ZERO);
+        let (mut color, mut depth, mut normal, mut transmittance) = (background, f64::INFINITY, DVec3::ZERO, 1.0);
         if sum.weight > 0.0 {
-            let blended = sum.color.map(|c| c / sum.weight);
-            let mean = match &scene.colors {
-                Colors::Textured(textured) => textured.resolve(sum.place.map(|total| total / sum.weight), blended),
-                _ => blended,
-            };
-            let alpha = mean[3];
-            let straight = DVec3::new(mean[0], mean[1], mean[2]) / if alpha > 0.0 { alpha } else { f64::INFINITY };
-            normal = unit_or_zero(DVec3::from_array(sum.normal) / sum.weight);
-            // Each was turned toward the viewer.
-            if sum.back {
-                normal = -normal;
-            }
-            let toward_eye = -camera.ray(f64::from(x) + 0.5, f64::from(y) + 0.5).normalize();
-            let lit = options.lights_splats();
-            let shaded = if lit { straight } else { shade(straight, normal, toward_eye, options) };
-            color = over([shaded.x, shaded.y, shaded.z, alpha], background);
+            let of_surface;
+            (of_surface, normal) = surface(sum, scene, camera, options, (x, y));
+            color = over(of_surface, background);
+            transmittance = 1.0 - of_surface[3];
             depth = sum.depth / sum.weight;
         }
         frame.color[pixel] = color.map(|c| c as f32);
-        let mut set = |map: Map, values: &[f64]| {
-            let of_pixel = frame.map_mut(map).and_then(|all| all.chunks_exact_mut(map.width()).nth(pixel));
-            of_pixel.into_iter().flatten().zip(values).for_each(|(into, value)| *into = *value as f32);
-        };
-        set(Map::Depth, &[depth]);
-        set(Map::Normal, &normal.to_array());
-        set(Map::Weight, &[sum.weight]);
-        set(Map::Count, &[f64::from(sum.count)]);
-        set(Map::Decision, &[sum.decision]);
+        set(frame, pixel, Map::Depth, &[depth]);
+        set(frame, pixel, Map::Normal, &normal.to_array());
+        set(frame, pixel, Map::Weight, &[sum.weight]);
+        set(frame, pixel, Map::Count, &[f64::from(sum.count)]);
+        set(frame, pixel, Map::Decision, &[sum.decision]);
+        set(frame, pixel, Map::Transmittance, &[transmittance]);
+        set(frame, pixel, Map::Layers, &[f64::from(u8::from(sum.weight > 0.0))]);
     }
+}
+
+/// Sets a pixel of a map, if the frame has that.
+pub(super) fn set(frame: &mut Frame, pixel: usize, map: Map, values: &[f64]) {
+    let of_pixel = frame.map_mut(map).and_then(|all| all.chunks_exact_mut(map.width()).nth(pixel));
+    of_pixel.into_iter().flatten().zip(values).for_each(|(into, value)| *into = *value as f32);
+}
+
+/// The straight colour and the normal of the surface that `sum`, which is not nothing, is of.
+pub(super) fn surface(
+    sum: &PixelSums,
+    scene: &Scene,
+    camera: &Camera,
+    options: &RenderOptions,
+    (x, y): (u32, u32),
+) -> ([f64; 4], DVec3) {
+    let blended = sum.color.map(|c| c / sum.weight);
+    let mean = match &scene.colors {
+        Colors::Textured(textured) => textured.resolve(sum.place.map(|total| total / sum.weight), blended),
+        _ => blended,
+    };
+    // Each normal was turned toward the viewer.
+    let turned = unit_or_zero(DVec3::from_array(sum.normal) / sum.weight);
+    let normal = if sum.back { -turned } else { turned };
+    (shaded(mean, normal, camera, options, (x, y)), normal)
+}
+
+/// The straight colour, lit unless splats are, of a premultiplied one of unit `normal`, and its alpha times the opacity.
+pub(super) fn shaded(
+    [r, g, b, alpha]: [f64; 4],
+    normal: DVec3,
+    camera: &Camera,
+    options: &RenderOptions,
+    (x, y): (u32, u32),
+) -> [f64; 4] {
+    let straight = DVec3::new(r, g, b) / if alpha > 0.0 { alpha } else { f64::INFINITY };
+    let toward_eye = -camera.ray(f64::from(x) + 0.5, f64::from(y) + 0.5).normalize();
+    let lit = options.lights_splats();
+    let shaded = if lit { straight } else { shade(straight, normal, toward_eye, options) };
+    [shaded.x, shaded.y, shaded.z, alpha * f64::from(options.opacity)]
 }
 
 /// The normalised mean; 0 where opposite normals cancel.
@@ -122,7 +148,7 @@ fn irradiances(normal: DVec3, toward_eye: DVec3, lights: &[Light]) -> impl Itera
 }
 
 /// Straight alpha over straight alpha.
-fn over(front: [f64; 4], back: [f64; 4]) -> [f64; 4] {
+pub(super) fn over(front: [f64; 4], back: [f64; 4]) -> [f64; 4] {
     let behind = back[3] * (1.0 - front[3]);
     let alpha = front[3] + behind;
     if alpha > 0.0 {
@@ -141,9 +167,12 @@ pub const PASS: Pass = Pass {
         vec![
             "resolve.wgsl",
             pick(needs.samples == Samples::ONE, "resolve_pixels.wgsl", "resolve_samples.wgsl"),
+            pick(needs.lists.is_some(), "resolve_lists.wgsl", "resolve_surface.wgsl"),
             pick(!needs.maps.is_empty(), "image_maps.wgsl", "image_color.wgsl"),
             pick(needs.maps.has(Map::Normal), "normal_map.wgsl", "normal_map_absent.wgsl"),
             pick(needs.maps.has(Map::Weight), "weight_map.wgsl", "weight_map_absent.wgsl"),
+            pick(needs.maps.has(Map::Transmittance), "transmittance_map.wgsl", "transmittance_map_absent.wgsl"),
+            pick(needs.maps.has(Map::Layers), "layers_map.wgsl", "layers_map_absent.wgsl"),
             match needs.shading {
                 Shading::Unlit => "shade_unlit.wgsl",
                 Shading::Lambert => "shade_lambert.wgsl",
@@ -156,6 +185,7 @@ pub const PASS: Pass = Pass {
         let layout = PixelLayout::of(making.needs);
         let mut constants =
             vec![("LIGHTS", making.options.lights.len() as f64), ("IMAGE_WORDS", layout.image_words.into())];
+        constants.push(("OPACITY", making.options.opacity.into()));
         let words = MAPS.iter().zip(layout.map_words);
         constants.extend(words.filter_map(|(row, word)| Some((row.image_word?, f64::from(word)))));
         let Samples { across, down } = making.needs.samples;
@@ -173,7 +203,12 @@ const RESOLVE: Kernel = Kernel::new("resolve");
 pub fn steps(plan: &Plan, band: usize) -> Stage {
     let mut runs = covered::runs().to_vec();
     runs.push(Run { kernel: RESOLVE, over: Over::Covered });
-    Stage::new("resolve", band, runs).after(covered::clears(plan, band)).as_twin(Twin::Resolve)
+    let twin = match plan.needs.lists {
+        None => Twin::Resolve,
+        Some(Lists::Layers) => Twin::Layers,
+        Some(Lists::Sorted) => Twin::Sorted,
+    };
+    Stage::new("resolve", band, runs).after(covered::clears(plan, band)).as_twin(twin)
 }
 
 /// Puts `bytes` of resolved pixels into `frame`, from its pixel `first` on.

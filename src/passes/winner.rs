@@ -18,7 +18,7 @@ use crate::scene::{Camera, Colors, Scene};
 pub const PASS: Pass = Pass {
     name: "winner",
     files: |needs| match needs.winner {
-        None if needs.raster.is_none() => vec!["nearest_depth.wgsl"],
+        None if needs.raster.is_none() && needs.lists.is_none() => vec!["nearest_depth.wgsl"],
         None => Vec::new(),
         Some(Winner::Rasterised) => Vec::new(),
         Some(Winner::Depth) => vec!["winner.wgsl", "nearest_depth.wgsl", "winner_constant.wgsl"],

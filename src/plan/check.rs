@@ -7,7 +7,7 @@ use super::{RenderOptions, SceneNeeds};
 use crate::error::{Error, Result};
 use crate::gpu::adapter::AdapterDescription;
 use crate::scene::light::MAX_LIGHTS;
-use crate::scene::{Blend, Camera, Cull, LowPass, Map, Shading, options::SHININESS_RANGE};
+use crate::scene::{Blend, Camera, Composite, Cull, LowPass, Map, Shading, options::SHININESS_RANGE};
 
 fn usage(what: impl Into<String>) -> Result<()> {
     Err(Error::Usage(what.into()))
@@ -33,6 +33,12 @@ pub fn options(options: &RenderOptions, reference: bool) -> Result<()> {
     }
     if options.blend == Blend::Nearest {
         nearest(options, reference)?;
+    }
+    if !(0.0..=1.0).contains(&options.opacity) {
+        return usage(format!("the opacity is 0 to 1, not {}", options.opacity));
+    }
+    if options.composite != Composite::Opaque {
+        composite(options, reference)?;
     }
     if reference {
         return Ok(());
@@ -70,6 +76,26 @@ fn facing(options: &RenderOptions) -> Result<()> {
             usage("the rasteriser tests the depths of flat points by itself, of others with raster-depth exact alone")
         }
         _ if options.cull == Cull::Back => usage("points that face the camera have no backs: leave --cull back out"),
+        _ => Ok(()),
+    }
+}
+
+/// What shows through is drawn from lists of fragments.
+fn composite(options: &RenderOptions, reference: bool) -> Result<()> {
+    match options {
+        _ if options.blend == Blend::Nearest => {
+            usage("--blend nearest shows one fragment, behind which nothing shows: leave --composite out")
+        }
+        _ if reference => Ok(()),
+        RenderOptions { raster: Some(_), .. } => {
+            usage("the rasteriser shows the nearest surface alone: leave --composite out, or render by compute")
+        }
+        _ if options.accumulator != Accumulator::Fixed => {
+            usage("surfaces are composited of sums of the accumulator fixed: leave the accumulator out")
+        }
+        _ if options.organisation == Organisation::Tile => {
+            usage("the organisation tile shows the nearest surface alone: leave it out with --composite")
+        }
         _ => Ok(()),
     }
 }
@@ -151,6 +177,9 @@ pub fn textured(options: &RenderOptions, reference: bool) -> Result<()> {
         return usage(
             "a texture has many colours in a splat, which are lit pixel by pixel: leave --shading-at splat out",
         );
+    }
+    if options.composite != Composite::Opaque {
+        return usage("textures are drawn on the nearest surface alone: leave --composite out");
     }
     if options.raster.is_some() && !reference {
         return usage("the rasteriser blends no texture coordinates: leave the texture out, or render by compute");

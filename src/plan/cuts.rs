@@ -19,6 +19,14 @@ pub struct Band {
     pub tiles: u64,
 }
 
+impl Band {
+    /// Of `rows` rows from `first` on of an image of a width.
+    pub fn of(width: u32, first: u32, rows: u32) -> Self {
+        let [across, down] = [width, rows].map(|side| u64::from(side.div_ceil(OCCLUSION_TILE)));
+        Self { first, rows, pixels: u64::from(rows) * u64::from(width), tiles: across * down }
+    }
+}
+
 /// The image in bands of `whole` rows or a multiple, for `words` u32 words a pixel in the largest buffer, after `head` others.
 ///
 /// # Errors
@@ -44,11 +52,7 @@ pub fn bands(adapter: &AdapterDescription, camera: &Camera, whole: u32, words: u
 
 /// The image in bands of `rows` each, the last of what is left.
 pub fn strips(camera: &Camera, rows: u32) -> Vec<Band> {
-    let band = |first: u32| {
-        let rows = rows.min(camera.height - first);
-        let [across, down] = [camera.width, rows].map(|side| u64::from(side.div_ceil(OCCLUSION_TILE)));
-        Band { first, rows, pixels: u64::from(rows) * u64::from(camera.width), tiles: across * down }
-    };
+    let band = |first: u32| Band::of(camera.width, first, rows.min(camera.height - first));
     (0..camera.height).step_by(rows as usize).map(band).collect()
 }
 

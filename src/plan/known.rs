@@ -1,6 +1,8 @@
 //! What earlier tries and frames have shown of a scene on an adapter: a plan goes by it, and a frame that turns out to need more is
 //! rendered again with what it taught.
 
+use super::Band;
+
 /// Times that a frame is rendered at most. A try fails for one of four reasons: slots, lists of large splats, lists of all, sums that
 /// wrap; and each teaches what ends it, or, of a list whose length a view changes, what ends it in this view.
 pub const MOST_TRIES: usize = 6;
@@ -15,7 +17,7 @@ pub enum Listed {
 }
 
 /// What is known; at first nothing.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Known {
     /// Tiles that a splat touches on average in this view, by a sample.
     pub touched_tiles: f64,
@@ -27,6 +29,8 @@ pub struct Known {
     pub entries: [Option<u64>; 2],
     /// There are more splats than tiles can list, so that their sums are stored.
     pub crowded: bool,
+    /// Bands whose fragments fit, in this view.
+    pub cuts: Option<Vec<Band>>,
     /// Fragments of this view that made a sum of the accumulator that was asked for wrap.
     pub overflows: u64,
 }
@@ -40,6 +44,7 @@ impl Known {
     /// Forgets what holds for one view.
     pub fn forget_view(&mut self) {
         self.overflows = 0;
+        self.cuts = None;
     }
 
     /// Forgets what buffers have room for.

@@ -3,8 +3,10 @@
 
 mod accumulator;
 pub mod check;
+mod composited;
 mod cuts;
 mod facts;
+mod fragment;
 pub mod known;
 mod needs;
 mod optimisation;
@@ -18,10 +20,12 @@ pub mod tuning;
 mod view;
 
 pub use accumulator::{ACCUMULATORS, Accumulator, AccumulatorRow, Features, wide_bits};
+pub use composited::composited;
 pub use cuts::{Band, bands, page_surfels};
 pub use facts::{ColorNeed, Facts};
+pub use fragment::{FragmentLayout, KEY_WORDS};
 pub use known::Known;
-pub use needs::{EpsilonForm, SMALL_WEIGHT, SceneNeeds, Sides, Winner, culls_back};
+pub use needs::{EpsilonForm, Lists, SMALL_WEIGHT, SceneNeeds, Sides, Winner, culls_back};
 pub use optimisation::Optimisation;
 pub use options::{BackendName, Organisation, RenderOptions};
 pub use pixel::{COLOR_CHANNEL, PixelLayout, color_channels};
@@ -98,12 +102,14 @@ impl Plan {
             && tuning::PIXELS_A_CULLED_SURFEL * facts.surfels > camera.pixels() as u64
             && page >= BATCH.into()
             && !needs.copies
+            && needs.lists.is_none()
             && needs.raster.is_none();
         let needs = SceneNeeds { gather, cull, ..needs };
         // Tiles that gather store no sums.
         let sum_words = if gather { 0 } else { pixel.sum_words(&needs) };
         let head = if sum_words > 0 { needs.accumulator.row().head_words() } else { 0 };
-        let bands = bands(adapter, camera, needs.samples.down, sum_words.max(pixel.image_words), head)?;
+        let whole = || bands(adapter, camera, needs.samples.down, sum_words.max(pixel.image_words), head);
+        let bands = known.cuts.clone().map_or_else(whole, Ok)?;
         let several = bands.len() > 1;
         let looks = [Listed::Large, Listed::Small].map(|of| {
             let wanted = match of {

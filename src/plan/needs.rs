@@ -1,9 +1,11 @@
 //! What a scene and its options need, computed once: the only variant key of the kernels.
 
-use super::{Accumulator, ColorNeed, Facts, Optimisation, Organisation, Raster, RasterDepth, RenderOptions, tuning};
+use super::{
+    Accumulator, ColorNeed, Facts, Optimisation, Organisation, Raster, RasterDepth, RenderOptions, composited, tuning,
+};
 use crate::gpu::adapter::AdapterDescription;
 use crate::scene::{
-    Blend, Camera, Cull, Epsilon, KernelShape, LowPass, Map, Maps, PointShape, Projection, Samples, Shading,
+    Blend, Camera, Composite, Cull, Epsilon, KernelShape, LowPass, Map, Maps, PointShape, Projection, Samples, Shading,
 };
 
 /// What exists in this render: it chooses the WGSL files that are joined, and so the bindings, buffers and sums.
@@ -38,6 +40,8 @@ pub struct SceneNeeds {
     pub raster: Option<Raster>,
     /// The nearest fragment alone shows, and how it is found.
     pub winner: Option<Winner>,
+    /// Pixels have lists of their fragments, and what becomes of these.
+    pub lists: Option<Lists>,
     /// It draws a triangle a splat instead of a quad ([`tuning::PIXELS_A_TRIANGLE`]).
     pub triangles: bool,
     /// The kernel's formula.
@@ -110,6 +114,25 @@ pub enum Winner {
     Rasterised,
 }
 
+/// What becomes of the lists of pixels' fragments ([`fragments`](crate::passes::fragments)).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Lists {
+    /// Surfaces, blended each and composited ([`layers`](crate::passes::layers)).
+    Layers,
+    /// They are composited one by one ([`sorted`](crate::passes::sorted)).
+    Sorted,
+}
+
+impl Lists {
+    fn of(facts: &Facts, options: &RenderOptions) -> Option<Self> {
+        match composited(facts, options) {
+            Composite::Opaque => None,
+            Composite::Layers(_) => Some(Self::Layers),
+            Composite::Sorted => Some(Self::Sorted),
+        }
+    }
+}
+
 /// Terms of at least this weight keep 23 of the 32 bits that `fixed` has, as f32 would.
 pub const SMALL_WEIGHT: f64 = 1.0 / 512.0;
 
@@ -126,6 +149,8 @@ pub fn culls_back(facts: &Facts, camera: &Camera, options: &RenderOptions) -> bo
         _ if options.facing.is_some() => false,
         Cull::None => false,
         Cull::Back => facts.oriented,
+        // They are seen through what is before them.
+        Cull::Auto if composited(facts, options) != Composite::Opaque => false,
         Cull::Auto => {
             let relative = camera.eye - facts.origin;
             let reach = f64::from(facts.largest_radius);
@@ -166,6 +191,7 @@ impl SceneNeeds {
         let lit = options.shading != Shading::Unlit;
         let blends = options.blend == Blend::Weighted;
         let fixed = options.accumulator == Accumulator::Fixed && options.raster.is_none() && blends;
+        let lists = Lists::of(facts, options);
         let unblended = if options.raster.is_some() { Winner::Rasterised } else { Winner::Second };
         Self {
             projection: camera.projection,
@@ -176,11 +202,15 @@ impl SceneNeeds {
             doubled: facts.doubled,
             copies: false,
             cull: false,
-            tiles: fixed && facts.colors != ColorNeed::Textured && options.organisation != Organisation::Scatter,
+            tiles: fixed
+                && lists.is_none()
+                && facts.colors != ColorNeed::Textured
+                && options.organisation != Organisation::Scatter,
             gather: false,
             subgroups: false,
             raster: options.raster,
             winner: (!blends).then_some(unblended),
+            lists,
             triangles: options.raster.is_some() && tuning::PIXELS_A_TRIANGLE * facts.surfels > camera.pixels() as u64,
             kernel: if blends { options.kernel.shape() } else { KernelShape::Constant },
             low_pass: options.low_pass,
@@ -210,7 +240,9 @@ impl SceneNeeds {
     pub fn of(facts: &Facts, adapter: &AdapterDescription, camera: &Camera, options: &RenderOptions) -> Self {
         let picture = Self::of_picture(facts, camera, options);
         let blends = picture.winner.is_none();
-        let fixed = picture.accumulator == Accumulator::Fixed && picture.raster.is_none() && blends;
+        // Lists sum in registers.
+        let stored = blends && picture.lists.is_none();
+        let fixed = picture.accumulator == Accumulator::Fixed && picture.raster.is_none() && stored;
         let long_atomics = adapter.atomics_u64 && options.has(Optimisation::Pairs);
         let winner = picture.winner.map(|winner| match winner {
             Winner::Second if picture.color == ColorNeed::Constant => Winner::Depth,
@@ -233,7 +265,7 @@ impl SceneNeeds {
 
     /// Weighted sums are kept by compute kernels, in storage or in a tile's registers.
     pub fn sums_by_compute(&self) -> bool {
-        self.raster.is_none() && self.winner.is_none()
+        self.raster.is_none() && self.winner.is_none() && self.lists.is_none()
     }
 
     /// Fragments have weights: they are summed, or they are the rasteriser's, whose targets hold terms even of one fragment.
@@ -286,6 +318,8 @@ impl SceneNeeds {
             (self.curved, "curved"),
             (self.facing.is_some(), "facing"),
             (self.winner.is_some(), "nearest"),
+            (self.lists == Some(Lists::Layers), "lists-layers"),
+            (self.lists == Some(Lists::Sorted), "lists-sorted"),
             (self.samples != Samples::ONE, "samples"),
             (self.shading == Shading::Lambert, "lambert"),
             (self.shading == Shading::Phong, "phong"),

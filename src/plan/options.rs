@@ -5,7 +5,8 @@ use std::str::FromStr;
 use super::{Accumulator, Optimisation, Raster};
 use crate::error::Error;
 use crate::scene::{
-    Blend, Cull, Epsilon, Facing, Kernel, Light, LowPass, Map, Maps, Outline, Samples, Shading, ShadingAt,
+    Blend, Composite, Cull, Epsilon, Facing, Kernel, Light, LowPass, Map, Maps, Outline, Samples, Shading, ShadingAt,
+    Tail,
 };
 
 /// Who renders.
@@ -79,6 +80,12 @@ pub struct RenderOptions {
     pub outline: Option<Outline>,
     /// Whether fragments are blended.
     pub blend: Blend,
+    /// What shows of the surfaces behind the nearest one.
+    pub composite: Composite,
+    /// What all alphas are multiplied with, 0 to 1.
+    pub opacity: f32,
+    /// What becomes of the surfaces behind the last layer.
+    pub tail: Tail,
     /// Blending kernel.
     pub kernel: Kernel,
     /// Low-pass filter.
@@ -123,7 +130,8 @@ impl RenderOptions {
 
     /// Whether a pixel of the image differs from 0 where nothing is.
     pub fn shows_where_nothing_is(&self) -> bool {
-        self.maps.has(Map::Depth) || self.background.iter().any(|value| value.to_bits() != 0)
+        let maps = [Map::Depth, Map::Transmittance];
+        maps.iter().any(|map| self.maps.has(*map)) || self.background.iter().any(|value| value.to_bits() != 0)
     }
 
     /// Whether an optimisation is not left out.
@@ -141,6 +149,9 @@ impl Default for RenderOptions {
             facing: None,
             outline: None,
             blend: Blend::Weighted,
+            composite: Composite::Opaque,
+            opacity: 1.0,
+            tail: Tail::Sum,
             kernel: Kernel::Ellipse { a: 6.0, n: 3.0, smooth: false },
             low_pass: LowPass::None,
             accumulator: Accumulator::Fixed,

@@ -57,7 +57,7 @@ impl PixelLayout {
     /// u32 words of a pixel's sums in storage, or of its nearest colour; the rasteriser's are in textures.
     pub fn sum_words(&self, needs: &SceneNeeds) -> u32 {
         match needs.winner {
-            _ if needs.raster.is_some() => 0,
+            _ if needs.raster.is_some() || needs.lists.is_some() => 0,
             None => self.channels * needs.accumulator.row().words,
             Some(Winner::Once) => 2,
             Some(Winner::Second) => 1,

@@ -57,6 +57,10 @@ pub enum Over {
     Large,
     /// An invocation for each large splat, to list it.
     Listing,
+    /// An invocation for each row of the band.
+    Rows,
+    /// An invocation for each pixel of the band.
+    Pixels,
     /// An invocation for each tile of pixels by which hidden splats are told.
     Occlusion,
     /// Eight invocations, a row of pixels, for each tile that large splats are drawn by.
@@ -107,6 +111,10 @@ pub enum Twin {
     Accumulate,
     /// [`resolve`](crate::passes::resolve): the image.
     Resolve,
+    /// [`layers`](crate::passes::layers): the image, of lists.
+    Layers,
+    /// [`sorted`](crate::passes::sorted): the image, of lists.
+    Sorted,
     /// A map that has a pass of its own.
     Map(Map),
 }
@@ -118,7 +126,7 @@ impl Twin {
             Self::Project => "project",
             Self::Visibility => "visibility",
             Self::Accumulate => "accumulate",
-            Self::Resolve => "resolve",
+            Self::Resolve | Self::Layers | Self::Sorted => "resolve",
             Self::Map(map) => map.row().name,
         }
     }
@@ -152,6 +160,11 @@ impl Stage {
         Self { clears, ..self }
     }
 
+    /// This stage, which the reference does in another's place.
+    pub fn without_twin(self) -> Self {
+        Self { twin: None, ..self }
+    }
+
     /// This stage, in whose place the reference has `twin`.
     pub fn as_twin(self, twin: Twin) -> Self {
         Self { twin: Some(twin), ..self }
@@ -165,6 +178,8 @@ pub enum Look {
     Slots(Part),
     /// What lists hold that these stages count.
     Lists(Listed, Vec<Stage>),
+    /// The fragments of a band.
+    Fragments(usize),
 }
 
 /// A step of a frame.

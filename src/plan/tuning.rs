@@ -23,6 +23,9 @@ pub const LARGE_BY_TILES: u32 = 256;
 /// Where there are no tiles, splats whose bounds hold more pixels than this get a workgroup each instead of an invocation.
 pub const LARGE_BY_WORKGROUPS: u32 = 1024;
 
+/// Bytes of the fragments that a device keeps at a time, at most: an image that has more is drawn in more bands.
+pub const MOST_FRAGMENT_BYTES: u64 = 1 << 29;
+
 /// Rows that one thread of the f64 reference works on at a time.
 pub const REFERENCE_ROWS: u32 = 8;
 

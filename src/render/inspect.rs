@@ -19,7 +19,7 @@ use crate::plan::steps::{Stage, Step, Twin};
 use crate::plan::{
     Accumulator, Facts, Known, Optimisation, Organisation, Plan, RenderOptions, SceneNeeds, splat_words,
 };
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, Composite, Scene};
 
 /// What the first three stages leave on the device.
 #[derive(Clone, Debug)]
@@ -48,7 +48,10 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
     if options.accumulator != Accumulator::Fixed {
         return Err(Error::Usage("sums are read back in the form of the accumulator fixed: take it".into()));
     }
-    super::samples::one_alone(options)?;
+    super::parts::one_alone(options)?;
+    if options.composite != Composite::Opaque {
+        return Err(Error::Usage("stages are read back of opaque pictures: leave composite out".into()));
+    }
     // A slot for each surfel, and sums in storage.
     let mut without = options.without.clone();
     without.extend([Optimisation::Culling, Optimisation::Copies]);

@@ -10,9 +10,10 @@ use rayon::prelude::*;
 use super::report::Report;
 use super::sequence;
 use crate::frame::Frame;
+use crate::passes::asks_for_order;
 use crate::passes::order::order;
 use crate::passes::splat::Splat;
-use crate::passes::{MAP_PASSES, Strip, accumulate, project, resolve, visibility, winner};
+use crate::passes::{MAP_PASSES, Strip, accumulate, layers, project, resolve, sorted, visibility, winner};
 use crate::plan::steps::{Step, Twin};
 use crate::plan::{Facts, Plan, RenderOptions, SceneNeeds};
 use crate::progress::Progress;
@@ -35,7 +36,7 @@ pub(super) fn frame(
         splats = spent.timed("project", 1, || project::reference_all(scene, camera, options));
     }
     let (starts, members) = bin(&splats, &plan);
-    let ranks = MAP_PASSES.iter().any(|own| plan.needs.maps.has(own.map)).then(|| ranks(scene, facts));
+    let ranks = asks_for_order(&plan.needs).then(|| ranks(scene, facts));
     progress.begin("rendering rows", camera.height.into());
     let one = |band: usize| {
         let (first_row, rows) = (plan.bands[band].first, plan.bands[band].rows);
@@ -92,6 +93,8 @@ fn strip_by(strip: &Strip<'_>, twins: &[Twin], spent: &Spent) -> Frame {
             Twin::Accumulate => {
                 sums = accumulate::reference(splats(), scene, camera, options, first_row, &nearest);
             }
+            Twin::Layers => layers::reference(strip, &mut frame),
+            Twin::Sorted => sorted::reference(strip, &mut frame),
             Twin::Resolve => resolve::reference(&sums, scene, camera, options, first_row, &mut frame),
             Twin::Map(map) => {
                 let own = MAP_PASSES.iter().filter(|own| own.map == *map);

@@ -43,15 +43,15 @@ pub struct Run<'a> {
     /// Time by pass.
     pub timing: Timing,
     /// Large splats are drawn by tiles.
-    by_tiles: bool,
+    pub(super) by_tiles: bool,
     /// What the device counted so far.
     tally: Tally,
     /// What lists of large and of small splats were seen to need, in the band that needs most.
-    needed: [Option<u64>; 2],
+    pub(super) needed: [Option<u64>; 2],
     /// In some band lists had too little room.
     wanting: bool,
     /// In some band no list holds the large splats.
-    unlisted: bool,
+    pub(super) unlisted: bool,
 }
 
 impl<'a> Run<'a> {
@@ -88,6 +88,11 @@ impl<'a> Run<'a> {
                     progress.advance(self.plan.bands[*band].rows.into());
                 }
                 Step::Look(Look::Slots(part)) => self.look_for_slots(*part)?,
+                Step::Look(Look::Fragments(band)) => {
+                    if !self.look_for_fragments(*band)? {
+                        return Ok(false);
+                    }
+                }
                 Step::Look(Look::Lists(of, stages)) => {
                     if !self.look_for_lists(*of, stages)? {
                         return Ok(false);
@@ -162,7 +167,7 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    fn stage(&mut self, stage: &Stage) -> Result<()> {
+    pub(super) fn stage(&mut self, stage: &Stage) -> Result<()> {
         let (gpu, plan, store, kernels) = (self.gpu, self.plan, &*self.store, self.kernels);
         let clears = |encoder: &mut wgpu::CommandEncoder| stage.clears.iter().for_each(|c| clear(store, encoder, c));
         self.timing.pass(gpu, stage.pass, clears, |pass| {
@@ -231,57 +236,6 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// Makes room for the splats of the batches that are listed, and an eighth more for the next view.
-    fn look_for_slots(&mut self, part: Part) -> Result<()> {
-        self.timing.flush(self.gpu)?;
-        let lists: Vec<_> = self.store.pages.iter().filter_map(|page| page.buffer("drawn")).collect();
-        let listed = counts(self.gpu, &lists)?;
-        for (page, [_, batches]) in self.store.pages.iter_mut().zip(listed) {
-            let slots = u64::from(batches) * u64::from(BATCH);
-            if slots > page.slots {
-                // Whole batches: the last one may be listed anywhere.
-                let [slots, all] = [slots + slots / 8, page.surfels].map(|n| n.next_multiple_of(BATCH.into()));
-                page.grow(self.gpu, slots.min(all))?;
-            }
-        }
-        self.known.slots = part == Part::Far;
-        Ok(())
-    }
-
-    /// Makes room for the lists of a kind, whose entries `stages` count, and a quarter more for the next view. Where there are more than
-    /// a binding or a list holds, large splats are drawn without; false if tiles were to gather all.
-    fn look_for_lists(&mut self, of: Listed, stages: &[Stage]) -> Result<bool> {
-        self.timing.flush(self.gpu)?;
-        let gathers = self.plan.needs.gather;
-        if of == Listed::Large && !gathers {
-            let queues: Vec<_> = self.store.pages.iter().filter_map(|page| page.buffer("queue")).collect();
-            let large = counts(self.gpu, &queues)?.iter().any(|[large, _]| *large > 0);
-            self.by_tiles = large;
-            if !large {
-                return Ok(true);
-            }
-        }
-        stages.iter().try_for_each(|stage| self.stage(stage))?;
-        self.timing.flush(self.gpu)?;
-        let Some(lists) = self.store.buffer(list_name(of)) else { return Ok(true) };
-        let [entries, longest] = counts(self.gpu, &[lists])?.first().copied().unwrap_or_default().map(u64::from);
-        let entries = entries + entries / 4;
-        let most = (self.gpu.buffer_limit() / 4).saturating_sub(self.store.list_words(self.plan, of));
-        if entries > most || longest > LONGEST {
-            self.by_tiles = false;
-            self.unlisted = true;
-            self.known.crowded |= gathers;
-            return Ok(!gathers);
-        }
-        // What earlier bands listed is drawn by now.
-        if entries > self.store.entries(of) {
-            self.store.make_lists(self.gpu, self.plan, of, entries)?;
-        }
-        let needed = &mut self.needed[of as usize];
-        *needed = Some(needed.map_or(entries, |most| most.max(entries)));
-        Ok(true)
-    }
-
     /// That it goes on trying makes no sense.
     pub fn never_fits(gpu: &Gpu) -> Error {
         gpu.error("the room that a frame needs was measured again and again, and was never enough")
@@ -336,6 +290,8 @@ fn over<'a>(gpu: &Gpu, plan: &Plan, store: &'a Store, (band, page): (usize, usiz
         Over::Slots(_) => of_page.map_or(0, |page| page.slots),
         Over::Batches => of_page.map_or(0, |page| page.batches()),
         Over::Occlusion => plan.bands[band].tiles,
+        Over::Rows => plan.bands[band].rows.into(),
+        Over::Pixels => plan.bands[band].pixels,
         Over::Tiles => {
             let rows = plan.bands[band].rows.div_ceil(tiles::rows(&plan.needs));
             u64::from(plan.width.div_ceil(TILE_WIDTH)) * u64::from(rows) * u64::from(TILE_WIDTH)

@@ -1,6 +1,6 @@
 //! A frame as a list of steps: the papers' passes in their order.
 
-use crate::passes::{accumulate, cull, of_maps, project, raster, resolve, tiles, visibility};
+use crate::passes::{accumulate, cull, fragments, of_maps, project, raster, resolve, tiles, visibility};
 use crate::plan::known::Listed;
 use crate::plan::steps::{Look, Part, Stage, Step};
 use crate::plan::{Plan, Winner};
@@ -13,9 +13,13 @@ pub fn steps(plan: &Plan) -> Vec<Step> {
         steps.push(raster::STEP);
     }
     for band in 0..plan.bands.len() {
-        if plan.needs.raster.is_none() {
-            nearest(plan, band, &mut steps);
-            sums(plan, band, &mut steps);
+        match (plan.needs.raster, plan.needs.lists) {
+            (Some(_), _) => {}
+            (None, Some(_)) => lists(plan, band, &mut steps),
+            (None, None) => {
+                nearest(plan, band, &mut steps);
+                sums(plan, band, &mut steps);
+            }
         }
         if !plan.needs.gather {
             steps.push(Step::Stage(resolve::steps(plan, band)));
@@ -46,6 +50,17 @@ fn nearest(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
     }
     large(plan, (tiles::visibility(plan, band), visibility::large(band)), steps);
     steps.push(Step::Stage(visibility::occlude(band, Part::All)));
+}
+
+/// A list of each pixel's fragments, from front to back.
+fn lists(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
+    if plan.projects_in(band) {
+        steps.push(Step::Stage(project::steps(plan, band, Part::All)));
+    }
+    let count = [visibility::steps(plan, band, Part::All).without_twin(), visibility::large(band)];
+    let count = count.into_iter().chain([visibility::occlude(band, Part::All)]);
+    steps.extend(count.map(Step::Stage).chain(fragments::starts(band)));
+    steps.push(Step::Stage(fragments::steps(band)));
 }
 
 /// The sums of each pixel of a band; by tiles that gather, its image too.

@@ -9,13 +9,13 @@ use crate::gpu::buffers::{Buffer, Readback};
 use crate::gpu::layout::{BATCH, Band as BandUniform, LIST_START, QUEUE_START, View, WORKGROUP};
 use crate::passes::tiles::{list_name, list_words};
 use crate::passes::upload::{self, Uploaded};
-use crate::passes::{asks_for_order, covered, visibility};
+use crate::passes::{asks_for_order, covered, fragments, visibility};
 use crate::plan::known::Listed;
-use crate::plan::{Band, Known, Plan, Raster, SceneNeeds, splat_words};
+use crate::plan::{Band, FragmentLayout, KEY_WORDS, Known, Plan, Raster, SceneNeeds, SurfelLayout, splat_words};
 use crate::scene::Samples;
 
 /// Names in WGSL of buffers that have another one where kernels write them.
-const ALIASES: [(&str, &str); 8] = [
+const ALIASES: [(&str, &str); 9] = [
     ("projected", "splats"),
     ("queued", "queue"),
     ("listed", "rare"),
@@ -24,6 +24,7 @@ const ALIASES: [(&str, &str); 8] = [
     ("added", "sums"),
     ("winners", "sums"),
     ("indexed", "image"),
+    ("list_starts", "starts"),
 ];
 
 /// Names of buffers that each page has.
@@ -113,15 +114,34 @@ struct Made {
     bands: Vec<Band>,
     sum_words: u32,
     image_words: u32,
+    lists: bool,
     raster: Option<(Raster, u32)>,
+}
+
+/// What of a render's needs the buffers of surfels and splats depend on.
+#[derive(Clone, Copy, PartialEq)]
+struct Uploading {
+    /// Surfels that are the same are one.
+    copies: bool,
+    surfel: SurfelLayout,
+    splat_words: u64,
+    /// The numbers of the surfels are kept.
+    order: bool,
+}
+
+impl Uploading {
+    fn of(needs: &SceneNeeds) -> Self {
+        let (surfel, splat_words) = (SurfelLayout::of(needs), splat_words(needs));
+        Self { copies: needs.copies, surfel, splat_words, order: asks_for_order(needs) }
+    }
 }
 
 /// All buffers.
 pub struct Store {
     /// The scene's pages.
     pub pages: Vec<Page>,
-    /// Surfels that are the same are one.
-    copies: bool,
+    /// What it was uploaded for.
+    uploaded: Uploading,
     shared: Named,
     made: Option<Made>,
     /// Of the pixels of a band.
@@ -150,7 +170,7 @@ impl Store {
         });
         let pages = pages.collect::<Result<_>>()?;
         Ok(Self {
-            copies: needs.copies,
+            uploaded: Uploading::of(needs),
             pages,
             shared: Named::from_iter(uploaded.shared),
             made: None,
@@ -163,10 +183,12 @@ impl Store {
         })
     }
 
-    /// Whether the scene was uploaded for a render with such needs: options do not change, but whether copies are drawn once depends
-    /// on the accumulator.
+    /// Whether the scene was uploaded for a render with such needs: whether copies are drawn once depends on the accumulator, and maps
+    /// may need more of a surfel than colours do.
     pub fn serves(&self, needs: &SceneNeeds) -> bool {
-        self.copies == needs.copies
+        let wanted = Uploading::of(needs);
+        let numbered = self.uploaded.order || !wanted.order;
+        numbered && self.uploaded == Uploading { order: self.uploaded.order, ..wanted }
     }
 
     /// Makes the buffers that `plan` asks for.
@@ -174,7 +196,8 @@ impl Store {
         let raster = plan.needs.raster.map(|raster| (raster, plan.pixel.targets()));
         let (width, bands) = (plan.width, plan.bands.clone());
         let (sum_words, image_words) = (plan.sum_words, plan.pixel.image_words);
-        let made = Made { width, samples: plan.needs.samples, bands, sum_words, image_words, raster };
+        let (samples, lists) = (plan.needs.samples, plan.needs.lists.is_some());
+        let made = Made { width, samples, bands, sum_words, image_words, lists, raster };
         let fresh = self.made.as_ref() != Some(&made);
         if fresh {
             // The old ones make room first.
@@ -216,6 +239,10 @@ impl Store {
             }
         };
         self.frame.insert("nearest", nearest);
+        if plan.needs.lists.is_some() {
+            let words = most(&fragments::start_words);
+            self.frame.insert("starts", Buffer::storage(gpu, "starts of lists", words)?);
+        }
         if plan.sum_words > 0 {
             let words = plan.needs.accumulator.row().head_words() + pixels * u64::from(plan.sum_words);
             self.frame.insert("sums", Buffer::storage(gpu, "weighted sums", words)?);
@@ -236,6 +263,21 @@ impl Store {
         let lists = Buffer::storage(gpu, "lists of splats", self.list_words(plan, of) + entries)?;
         self.frame.insert(list_name(of), lists);
         self.entries[of as usize] = entries;
+        Ok(())
+    }
+
+    /// Makes room for `count` fragments in lists, and an eighth more for the next band or view, up to `most`.
+    pub fn make_fragments(&mut self, gpu: &Gpu, plan: &Plan, count: u64, most: u64) -> Result<()> {
+        let record = u64::from(FragmentLayout::of(&plan.needs).words);
+        if self.frame.get("keys").is_some_and(|keys| keys.len >= count * KEY_WORDS) {
+            return Ok(());
+        }
+        // The old ones make room first.
+        for (name, what, words) in [("keys", "depths of fragments", KEY_WORDS), ("fragments", "fragments", record)] {
+            self.frame.remove(name);
+            let room = (count + count / 8).min(most).max(1);
+            self.frame.insert(name, Buffer::storage(gpu, what, room * words)?);
+        }
         Ok(())
     }
 

@@ -15,7 +15,7 @@ use crate::passes::{MAP_PASSES, accumulate, resolve as resolve_pass, visibility}
 use crate::plan::known::MOST_TRIES;
 use crate::plan::steps::{Part, Stage, Step, Twin};
 use crate::plan::{Accumulator, Known, Optimisation, PixelLayout, Plan, RenderOptions, check};
-use crate::scene::{Blend, Camera};
+use crate::scene::{Blend, Camera, Composite};
 
 /// What the attribute pass leaves of an image, by the accumulator `fixed`.
 #[derive(Clone, Debug, PartialEq)]
@@ -95,10 +95,15 @@ impl Sums {
 
 /// How sums are made that leave the device.
 fn stored(options: &RenderOptions) -> Result<RenderOptions> {
-    super::samples::one_alone(options)?;
+    super::parts::one_alone(options)?;
     check::options(options, false)?;
     if options.accumulator != Accumulator::Fixed || options.raster.is_some() {
         return Err(Error::Usage("sums leave the device in the form of the accumulator fixed: take it".into()));
+    }
+    if options.composite != Composite::Opaque {
+        return Err(Error::Usage(
+            "surfaces that show through each other leave no sums: render, or leave composite out".into(),
+        ));
     }
     if options.blend == Blend::Nearest {
         return Err(Error::Usage("--blend nearest sums nothing: leave it out, or render".into()));

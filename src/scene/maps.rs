@@ -24,6 +24,11 @@ pub enum Map {
     /// surfel with the greatest weight is; of equal weights, by what the surfels are ([`index`](mod@crate::passes::index)).
     /// [`NOTHING`](crate::passes::index::NOTHING) where nothing is.
     Index,
+    /// What the surfaces of a pixel let through to the background, 1 where nothing is, 0 behind what is opaque
+    /// ([`Composite`](super::Composite)).
+    Transmittance,
+    /// How many surfaces are composited at a pixel, of [`Composite::Sorted`](super::Composite::Sorted) fragments; 0 where nothing is.
+    Layers,
 }
 
 /// How one map is named and kept.
@@ -41,6 +46,8 @@ pub struct MapRow {
     pub image_word: Option<&'static str>,
     /// The rasteriser makes it too.
     pub raster: bool,
+    /// It tells of all surfaces of a pixel and not of the nearest one.
+    pub composited: bool,
     /// Its values are whole numbers, kept in the bits of an f32.
     pub numbers: bool,
     /// Two images are compared in it.
@@ -48,7 +55,7 @@ pub struct MapRow {
 }
 
 /// The maps, in the order of [`Map`].
-pub const MAPS: [MapRow; 6] = [
+pub const MAPS: [MapRow; 8] = [
     row(Map::Depth, "depth", &["Z"], "depth", Some("DEPTH_IMAGE")),
     row(Map::Normal, "normal", &["X", "Y", "Z"], "normal-map", Some("NORMAL_IMAGE")),
     row(Map::Weight, "weight", &["Y"], "weight-map", Some("WEIGHT_IMAGE")),
@@ -60,6 +67,16 @@ pub const MAPS: [MapRow; 6] = [
         compared: false,
         ..row(Map::Index, "index", &["input", "point"], "index", Some("INDEX_IMAGE"))
     },
+    MapRow {
+        raster: false,
+        composited: true,
+        ..row(Map::Transmittance, "transmittance", &["Y"], "transmittance", Some("TRANSMITTANCE_IMAGE"))
+    },
+    MapRow {
+        raster: false,
+        composited: true,
+        ..row(Map::Layers, "layers", &["Y"], "layers-map", Some("LAYERS_IMAGE"))
+    },
 ];
 
 const fn row(
@@ -69,7 +86,7 @@ const fn row(
     need: &'static str,
     image_word: Option<&'static str>,
 ) -> MapRow {
-    MapRow { map, name, channels, need, image_word, raster: true, numbers: false, compared: true }
+    MapRow { map, name, channels, need, image_word, raster: true, composited: false, numbers: false, compared: true }
 }
 
 impl Map {
@@ -116,6 +133,9 @@ impl Maps {
         Self(set)
     };
 
+    /// Those that tell of all surfaces of a pixel.
+    pub const COMPOSITED: Self = Self::of(&[Map::Transmittance, Map::Layers]);
+
     /// Those of `maps`.
     pub const fn of(maps: &[Map]) -> Self {
         let (mut set, mut k) = (0, 0);
@@ -136,9 +156,24 @@ impl Maps {
         Self(self.0 | Self::of(others).0)
     }
 
+    /// These and all of `others`.
+    pub const fn and_all(self, others: Self) -> Self {
+        Self(self.0 | others.0)
+    }
+
     /// These but `others`.
     pub const fn but(self, others: &[Map]) -> Self {
         Self(self.0 & !Self::of(others).0)
+    }
+
+    /// Those of these that are among `others`.
+    pub const fn among(self, others: Self) -> Self {
+        Self(self.0 & others.0)
+    }
+
+    /// Those of these that are not among `others`.
+    pub const fn beside(self, others: Self) -> Self {
+        Self(self.0 & !others.0)
     }
 
     /// Each of them, in the order of [`MAPS`].
@@ -168,6 +203,7 @@ mod tests {
             assert_eq!((row.map as usize, row.name.parse::<Map>().unwrap()), (number, row.map));
         }
         assert!("colour".parse::<Map>().unwrap_err().to_string().contains("depth, normal"));
+        assert!(MAPS.iter().all(|row| row.composited == Maps::COMPOSITED.has(row.map)));
     }
 
     #[test]

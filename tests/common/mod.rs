@@ -16,7 +16,7 @@ use epsplat::frame::Frame;
 use epsplat::gpu::Gpu;
 use epsplat::gpu::layout::{ONE, View};
 use epsplat::plan::{
-    ACCUMULATORS, Accumulator, AccumulatorRow, BlendFormat, ColorNeed, EpsilonForm, Facts, Raster, RasterDepth,
+    ACCUMULATORS, Accumulator, AccumulatorRow, BlendFormat, ColorNeed, EpsilonForm, Facts, Lists, Raster, RasterDepth,
     RenderOptions, SceneNeeds, Sides, Winner, check,
 };
 use epsplat::scene::facing::POINT_SHAPES;
@@ -126,7 +126,7 @@ pub fn all_needs() -> Vec<SceneNeeds> {
             cull: false,
             tiles: false,
             gather: false,
-            maps: base.maps.but(&[Map::Index]),
+            maps: base.maps.but(&[Map::Index]).beside(Maps::COMPOSITED),
             ..*base
         });
     }
@@ -174,15 +174,41 @@ pub fn all_needs() -> Vec<SceneNeeds> {
             ..*needs
         });
     }
+    all.extend(listed(&all));
     for needs in &mut all {
         needs.outline &= needs.low_pass == LowPass::None;
     }
     all
 }
 
+/// Those of renders in which surfaces show through each other, a third of what they could be.
+fn listed(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
+    let fits = |needs: &&SceneNeeds| {
+        let fixed = needs.accumulator == Accumulator::Fixed && needs.raster.is_none() && needs.winner.is_none();
+        fixed && !needs.copies && needs.color != ColorNeed::Textured
+    };
+    let of = |(step, needs): (usize, &SceneNeeds)| {
+        let maps = [&[][..], &[Map::Transmittance], &[Map::Layers], &[Map::Transmittance, Map::Layers]];
+        let lit = needs.shading != Shading::Unlit;
+        SceneNeeds {
+            lists: Some([Lists::Layers, Lists::Sorted][step % 2]),
+            maps: if needs.samples == Samples::ONE { Maps::of(maps[step / 2 % 4]) } else { Maps::NONE },
+            normal: lit && !needs.lit_splats,
+            own_normals: needs.own_normals && lit,
+            atomics_u64: false,
+            tiles: false,
+            gather: false,
+            subgroups: false,
+            cull: false,
+            ..*needs
+        }
+    };
+    all.iter().filter(fits).step_by(3).enumerate().map(of).collect()
+}
+
 /// Whether a render with `needs` could show the nearest fragments alone.
 fn shows_nearest(needs: &SceneNeeds) -> bool {
-    let kept = needs.maps.is_empty() || needs.maps == Maps::of(&[Map::Depth]);
+    let kept = needs.maps.beside(Maps::COMPOSITED).but(&[Map::Depth]).is_empty();
     let colors = matches!(needs.color, ColorNeed::Constant | ColorNeed::Srgb8);
     let exact = needs.raster.is_none_or(|raster| raster.depth == RasterDepth::Exact);
     kept && colors && !needs.normal && !needs.lit_splats && (exact || needs.maps.is_empty())
@@ -215,7 +241,10 @@ fn base_needs() -> Vec<SceneNeeds> {
             let projection = if bit(4) { Projection::Pinhole } else { Projection::Orthographic };
             let wanted = [(1, Map::Normal), (5, Map::Depth), (6, Map::Count), (7, Map::Weight)];
             let wanted = wanted.into_iter().filter(|(k, _)| bit(*k)).map(|(_, map)| map);
-            let wanted: Vec<Map> = wanted.chain((bits % 3 == 1).then_some(Map::Index)).collect();
+            let wanted = wanted.chain((bits % 3 == 1).then_some(Map::Index));
+            let some = bits & 0b1110_0010 != 0;
+            let wanted = wanted.chain((some && bits % 5 == 1).then_some(Map::Transmittance));
+            let wanted: Vec<Map> = wanted.chain((some && bits % 7 == 1).then_some(Map::Layers)).collect();
             all.push(SceneNeeds {
                 projection,
                 accumulator: Accumulator::Fixed,

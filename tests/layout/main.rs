@@ -158,7 +158,7 @@ fn constants_agree() {
         let colors = blends && color_channels(&needs) > 0;
         assert_eq!(constant("COLOR_CHANNEL"), colors.then_some(f64::from(COLOR_CHANNEL)));
         let one = match needs.accumulator {
-            _ if !needs.sums_by_compute() => None,
+            _ if !needs.sums_by_compute() && needs.lists.is_none() => None,
             Accumulator::Fixed if !needs.wide_sums => Some(f64::from(ONE)),
             _ => None,
         };

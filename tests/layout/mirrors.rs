@@ -155,6 +155,10 @@ pub fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         // A colour, or a depth and a colour in one number.
         ("winners", Element::Plain(&[u32::SHAPE, u64::SHAPE])),
         ("added", Element::Plain(&[<[u64; 2]>::SHAPE])),
+        ("list_starts", Element::Plain(WORD)),
+        ("starts", Element::Plain(WORD)),
+        ("keys", Element::Plain(&[<[u32; 2]>::SHAPE])),
+        ("fragments", Element::Plain(WORD)),
         ("image", Element::Plain(&[f32::SHAPE, <[f32; 4]>::SHAPE])),
         ("texels", Element::Plain(WORD)),
         ("srgb_to_linear", Element::Plain(&[<[f32; 256]>::SHAPE])),

@@ -1,0 +1,173 @@
+//! Stages 2 and 3 where surfaces show through each other ([`Composite`](crate::scene::Composite)): a list of each pixel's fragments, from
+//! front to back, which [`layers`](super::layers) or [`sorted`](super::sorted) composite.
+//!
+//! The visibility pass counts the fragments of each pixel, a scan makes of the counts where each list starts, and the attribute pass puts
+//! every fragment's depth, weight and attributes there. Then each pixel's list is sorted, so nothing that follows depends on the order in
+//! which fragments came: those of one depth are in that of the surfels ([`order`](super::order)) where their order shows.
+//!
+//! **Room.** How many fragments there are is looked at before any is put anywhere. Where a band has more than a buffer holds, it is cut
+//! by the counts of its rows into bands that have not, and the frame begins again: what cannot be held at once is drawn in turns, and
+//! nothing is left out.
+
+use glam::DVec3;
+
+use super::accumulate::{decision, terms_file};
+use super::footprint::footprint;
+use super::{Strip, lit};
+use crate::gpu::layout::TILE;
+use crate::plan::pass::Pass;
+use crate::plan::steps::{Kernel, Look, Over, Part, Run, Stage, Step};
+use crate::plan::{Band, FragmentLayout, Lists, Plan};
+use crate::scene::kernel::LEAST_WEIGHT;
+
+/// A fragment of the twin.
+#[derive(Clone, Copy, Debug)]
+pub struct Fragment {
+    /// Camera-space z, world units.
+    pub depth: f64,
+    /// It shows the back of a surface that has sides.
+    pub back: bool,
+    /// The shorter half-axis of its surfel, world units.
+    pub radius: f64,
+    /// Its weight.
+    pub weight: f64,
+    /// Premultiplied linear colour, lit if splats are.
+    pub color: [f64; 4],
+    /// World space, unit, turned toward the viewer.
+    pub normal: DVec3,
+    /// The place of its surfel in the [`order`](super::order).
+    pub rank: u32,
+}
+
+/// The fragments of a pixel.
+#[derive(Clone, Debug)]
+pub struct List {
+    /// From front to back.
+    pub fragments: Vec<Fragment>,
+    /// The smallest relative distance of one of them to a decision, or of one that is none for it.
+    pub decision: f64,
+}
+
+/// The twin: the lists of the pixels of `strip`.
+pub fn reference(strip: &Strip<'_>) -> Vec<List> {
+    let Strip { scene, camera, options, first_row, rows, .. } = *strip;
+    let nothing = List { fragments: Vec::new(), decision: f64::INFINITY };
+    let mut lists = vec![nothing; camera.width as usize * rows as usize];
+    for splat in &strip.splats {
+        let surfel = splat.surfel as usize;
+        let [r, g, b, alpha] = scene.colors.linear(surfel).map(f64::from);
+        let center = scene.origin + scene.center(surfel);
+        let color = lit::reference([r * alpha, g * alpha, b * alpha, alpha], splat, center, camera, options);
+        let radius = f64::from(scene.surfels[surfel].shorter());
+        let rank = strip.ranks.map_or(0, |ranks| ranks[surfel]);
+        for y in splat.first[1].max(first_row)..=splat.last[1].min(first_row + rows - 1) {
+            for x in splat.first[0]..=splat.last[0] {
+                let Some((at, gain)) = footprint(splat, camera, options.low_pass, x, y) else { continue };
+                let list = &mut lists[((y - first_row) * camera.width + x) as usize];
+                list.decision = list.decision.min(decision(at, f64::INFINITY, camera.near));
+                if at.hit(camera) {
+                    let weight = (gain * options.kernel.weight(at.rho2)).max(LEAST_WEIGHT);
+                    let (depth, back, normal) = (at.depth, splat.shows_back(&at), splat.normal_at(&at));
+                    list.fragments.push(Fragment { depth, back, radius, weight, color, normal, rank });
+                }
+            }
+        }
+    }
+    for list in &mut lists {
+        // Of one depth the front comes before the back.
+        let key = |f: &Fragment| (f.depth, f.back, f.rank);
+        list.fragments.sort_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal));
+    }
+    lists
+}
+
+/// The pass's kernels, files and constants.
+pub const PASS: Pass = Pass {
+    name: "fragments",
+    files: |needs| {
+        let ties = match needs.lists {
+            None => return Vec::new(),
+            Some(Lists::Layers) => "fragments_untied.wgsl",
+            Some(Lists::Sorted) => "fragments_ranked.wgsl",
+        };
+        let own = ["fragments_count.wgsl", "fragments.wgsl", "fragments_sort.wgsl", ties, "layer_sums.wgsl"];
+        own.into_iter().chain([terms_file(needs)]).collect()
+    },
+    kernels: |needs| match needs.lists {
+        None => Vec::new(),
+        Some(_) => vec![OF_ROWS, START_ROWS, START_PIXELS, LIST, LIST_LARGE, SORT],
+    },
+    constants: |making| {
+        let layout = FragmentLayout::of(making.needs);
+        vec![
+            ("FRAGMENT_WORDS", layout.words.into()),
+            ("FRAGMENT_RANK", layout.rank.into()),
+            ("FRAGMENT_COLOR", layout.color.into()),
+            ("FRAGMENT_COLORS", layout.colors.into()),
+            ("FRAGMENT_NORMAL", layout.normal.into()),
+            ("FRAGMENT_RADIUS", layout.radius.into()),
+        ]
+    },
+};
+
+const OF_ROWS: Kernel = Kernel::new("fragments_of_rows");
+const START_ROWS: Kernel = Kernel::of("start_rows", [1; 3]);
+const START_PIXELS: Kernel = Kernel::new("start_pixels");
+const LIST: Kernel = Kernel::new("list_fragments");
+const LIST_LARGE: Kernel = Kernel::of("list_fragments_large", [TILE, TILE, 1]);
+const SORT: Kernel = Kernel::new("sort_fragments");
+
+/// Words of the buffer that says where lists start: what there is altogether and at most at a pixel, then where the lists of each
+/// row start and where the last one ends, then the same of each pixel.
+pub fn start_words(band: &Band) -> u64 {
+    2 + u64::from(band.rows) + 1 + band.pixels + 1
+}
+
+/// Where lists start, of fragments that the visibility pass counted; and a look at how many there are.
+pub fn starts(band: usize) -> [Step; 2] {
+    let run = |kernel, over| Run { kernel, over };
+    let runs = vec![run(OF_ROWS, Over::Rows), run(START_ROWS, Over::Once), run(START_PIXELS, Over::Rows)];
+    [Step::Stage(Stage::new("bin", band, runs)), Step::Look(Look::Fragments(band))]
+}
+
+/// The lists themselves, sorted.
+pub fn steps(band: usize) -> Stage {
+    let run = |kernel, over| Run { kernel, over };
+    let runs = vec![run(LIST, Over::Slots(Part::All)), run(LIST_LARGE, Over::Large), run(SORT, Over::Pixels)];
+    Stage::new("accumulate", band, runs)
+}
+
+/// Bands of the image for a view, whose `band` has more fragments than there is room for `most`: it is cut where the next row would be
+/// too many, by the `starts` of its rows, and those after it into as few rows as that took. None if a row alone has more.
+pub fn cut(plan: &Plan, band: usize, starts: &[u64], most: u64) -> Option<Vec<Band>> {
+    let whole = plan.needs.samples.down as usize;
+    let mut rows = Vec::new();
+    let mut first = 0;
+    let ends: Vec<usize> = (1..starts.len()).filter(|end| end % whole == 0 || end + 1 == starts.len()).collect();
+    for pair in ends.windows(2) {
+        if starts[pair[1]] - starts[first] > most {
+            rows.push(pair[0] - first);
+            first = pair[0];
+        }
+    }
+    rows.push(starts.len() - 1 - first);
+    let (mut at, mut fits) = (0, true);
+    for of_cut in &rows {
+        fits &= *of_cut > 0 && starts[at + of_cut] - starts[at] <= most;
+        at += of_cut;
+    }
+    let least = rows.iter().copied().min().filter(|_| fits)?.max(whole) as u32;
+    let mut bands = plan.bands[..band].to_vec();
+    let mut next = plan.bands[band].first;
+    for of_cut in rows {
+        bands.push(Band::of(plan.width, next, of_cut as u32));
+        next += of_cut as u32;
+    }
+    let last = plan.bands.last()?;
+    while next < last.first + last.rows {
+        let of_cut = least.min(last.first + last.rows - next);
+        bands.push(Band::of(plan.width, next, of_cut));
+        next += of_cut;
+    }
+    Some(bands)
+}

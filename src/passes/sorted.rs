@@ -1,0 +1,39 @@
+//! Stage 4 of [`Composite::Sorted`](crate::scene::Composite::Sorted): every fragment of a pixel by itself, from front to back, lit at its own normal. What it shows
+//! is its surfel's alpha times its weight.
+
+use super::Strip;
+use super::fragments;
+use super::layers::Shown;
+use super::resolve::shaded;
+use crate::frame::Frame;
+use crate::plan::Lists;
+use crate::plan::pass::Pass;
+
+/// The twin: the image of `strip`.
+pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
+    let Strip { camera, options, first_row, .. } = *strip;
+    for (pixel, list) in fragments::reference(strip).into_iter().enumerate() {
+        let at = (pixel as u32 % camera.width, pixel as u32 / camera.width + first_row);
+        let (mut shown, mut decision, mut before) = (Shown::NOTHING, list.decision, f64::NEG_INFINITY);
+        for f in &list.fragments {
+            if !shown.lets_through() {
+                break;
+            }
+            // Where two depths are one but for rounding, either may come first.
+            decision = decision.min((f.depth - before) / f.depth);
+            before = f.depth;
+            let normal = if f.back { -f.normal } else { f.normal };
+            let [r, g, b, alpha] = shaded(f.color, normal, camera, options, at);
+            shown.add([r, g, b, f.weight * alpha]);
+        }
+        shown.write(options, decision, frame, pixel);
+    }
+}
+
+/// The files.
+pub const PASS: Pass = Pass {
+    name: "sorted",
+    files: |needs| if needs.lists == Some(Lists::Sorted) { vec!["sorted.wgsl"] } else { Vec::new() },
+    kernels: |_| Vec::new(),
+    constants: |_| Vec::new(),
+};

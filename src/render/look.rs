@@ -1,0 +1,101 @@
+//! What is looked at on the device in the middle of a frame, because buffers are sized by it.
+
+use super::run::Run;
+use crate::error::{Error, Result};
+use crate::gpu::buffers::counts;
+use crate::gpu::layout::{BATCH, MOST_ROUNDS};
+use crate::passes::fragments;
+use crate::passes::tiles::{LONGEST, list_name};
+use crate::plan::known::Listed;
+use crate::plan::steps::{Part, Stage};
+use crate::plan::{FragmentLayout, KEY_WORDS, tuning};
+
+impl Run<'_> {
+    /// Makes room for the splats of the batches that are listed, and an eighth more for the next view.
+    pub(super) fn look_for_slots(&mut self, part: Part) -> Result<()> {
+        self.timing.flush(self.gpu)?;
+        let lists: Vec<_> = self.store.pages.iter().filter_map(|page| page.buffer("drawn")).collect();
+        let listed = counts(self.gpu, &lists)?;
+        for (page, [_, batches]) in self.store.pages.iter_mut().zip(listed) {
+            let slots = u64::from(batches) * u64::from(BATCH);
+            if slots > page.slots {
+                // Whole batches: the last one may be listed anywhere.
+                let [slots, all] = [slots + slots / 8, page.surfels].map(|n| n.next_multiple_of(BATCH.into()));
+                page.grow(self.gpu, slots.min(all))?;
+            }
+        }
+        self.known.slots = part == Part::Far;
+        Ok(())
+    }
+
+    /// Makes room for the lists of a kind, whose entries `stages` count, and a quarter more for the next view. Where there are more than
+    /// a binding or a list holds, large splats are drawn without; false if tiles were to gather all.
+    pub(super) fn look_for_lists(&mut self, of: Listed, stages: &[Stage]) -> Result<bool> {
+        self.timing.flush(self.gpu)?;
+        let gathers = self.plan.needs.gather;
+        if of == Listed::Large && !gathers {
+            let queues: Vec<_> = self.store.pages.iter().filter_map(|page| page.buffer("queue")).collect();
+            let large = counts(self.gpu, &queues)?.iter().any(|[large, _]| *large > 0);
+            self.by_tiles = large;
+            if !large {
+                return Ok(true);
+            }
+        }
+        stages.iter().try_for_each(|stage| self.stage(stage))?;
+        self.timing.flush(self.gpu)?;
+        let Some(lists) = self.store.buffer(list_name(of)) else { return Ok(true) };
+        let [entries, longest] = counts(self.gpu, &[lists])?.first().copied().unwrap_or_default().map(u64::from);
+        let entries = entries + entries / 4;
+        let most = (self.gpu.buffer_limit() / 4).saturating_sub(self.store.list_words(self.plan, of));
+        if entries > most || longest > LONGEST {
+            self.by_tiles = false;
+            self.unlisted = true;
+            self.known.crowded |= gathers;
+            return Ok(!gathers);
+        }
+        // What earlier bands listed is drawn by now.
+        if entries > self.store.entries(of) {
+            self.store.make_lists(self.gpu, self.plan, of, entries)?;
+        }
+        let needed = &mut self.needed[of as usize];
+        *needed = Some(needed.map_or(entries, |most| most.max(entries)));
+        Ok(true)
+    }
+
+    /// Makes room for the fragments of a band, which were counted; false if there is not enough for all of them at once, and the view is
+    /// cut into other bands.
+    pub(super) fn look_for_fragments(&mut self, band: usize) -> Result<bool> {
+        self.timing.flush(self.gpu)?;
+        let Some(starts) = self.store.buffer("starts") else { return Ok(true) };
+        let rows = u64::from(self.plan.bands[band].rows);
+        let words = starts.read(self.gpu, 2 + rows + 1)?;
+        let [total, longest] = [words[0], words[1]];
+        let sorted = LONGEST_LIST.min(4 * LONGEST_LIST / self.plan.needs.samples.count());
+        if self.gpu.adapter.is_software() && longest > sorted {
+            return Err(self.gpu.error(format!(
+                "{longest} fragments lie at one pixel, and this adapter ends loops before more than {sorted} are composited: \
+                 take --composite opaque, --backend reference, or fewer samples"
+            )));
+        }
+        let record = u64::from(FragmentLayout::of(&self.plan.needs).words).max(KEY_WORDS);
+        let most = self.gpu.buffer_limit().min(tuning::MOST_FRAGMENT_BYTES) / (4 * record);
+        // Of more than a word holds the starts of rows no longer tell how many there are in each.
+        if u64::from(total) <= most && total < u32::MAX {
+            self.store.make_fragments(self.gpu, self.plan, total.into(), most)?;
+            return Ok(true);
+        }
+        let starts: Vec<u64> = words[2..].iter().map(|start| u64::from(*start)).collect();
+        self.known.cuts = Some(fragments::cut(self.plan, band, &starts, most).ok_or_else(|| Error::Limit {
+            adapter: self.gpu.adapter.name.clone(),
+            limit: "max_storage_buffer_binding_size",
+            available: self.gpu.buffer_limit(),
+            needed: 4 * record * starts.windows(2).map(|row| row[1] - row[0]).max().unwrap_or(0),
+            what: "for the fragments of one row of pixels; choose a narrower image, or --composite opaque".into(),
+        })?);
+        Ok(false)
+    }
+}
+
+/// The most fragments that a pixel's list has on a software adapter, which ends the loops of an invocation after 65,535 rounds: a heap
+/// of n takes fewer than n (log2 n + 2) of them, and to composite it 3 n for each sample of the invocation's pixel.
+const LONGEST_LIST: u32 = MOST_ROUNDS / 8;

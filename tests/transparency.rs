@@ -1,0 +1,306 @@
+//! Surfaces that show through each other: closed forms, the twins, and what must not change a bit.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use common::bits;
+use common::scenes::{cases, crowded, front, shuffled, sphere, sphere_camera, stack};
+use epsplat::frame::Frame;
+use epsplat::gpu::{Gpu, Sources};
+use epsplat::metrics::DECISION_MARGIN;
+use epsplat::plan::{Organisation, RenderOptions};
+use epsplat::render::{Backend, Report, render};
+use epsplat::scene::composite::ALL_LAYERS;
+use epsplat::scene::{
+    Camera, Colors, Composite, Epsilon, Kernel, Map, Maps, Projection, Samples, Scene, Shading, Surfel, Tail,
+};
+use glam::Vec3;
+
+const ALL: Composite = Composite::Layers(ALL_LAYERS);
+
+fn gpu() -> Option<Backend> {
+    common::gpu().map(Backend::gpu)
+}
+
+fn options(composite: Composite) -> RenderOptions {
+    RenderOptions { composite, epsilon: Epsilon::Relative(0.02), ..RenderOptions::default() }
+}
+
+fn unlit(composite: Composite, opacity: f32) -> RenderOptions {
+    RenderOptions { opacity, shading: Shading::Unlit, maps: Maps::COMPOSITED, ..options(composite) }
+}
+
+fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Backend) -> Frame {
+    render(scene, camera, options, backend, &()).unwrap().0
+}
+
+/// All bits, those of maps of all surfaces too.
+fn all_bits(frame: &Frame) -> Vec<u32> {
+    let of = |map| frame.map(map).into_iter().flatten().map(|value| value.to_bits());
+    bits(frame).into_iter().chain(of(Map::Transmittance)).chain(of(Map::Layers)).collect()
+}
+
+/// Pixels that no fragment leaves undecided, by the reference.
+fn decided(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<bool> {
+    let options = RenderOptions { maps: Maps::of(&[Map::Decision]), ..options.clone() };
+    let reference = frame(scene, camera, &options, &Backend::Reference);
+    reference.map(Map::Decision).unwrap().iter().map(|margin| *margin > DECISION_MARGIN).collect()
+}
+
+/// `count` spheres of `surfels` each around one another, of radii from 1 down.
+fn shells(count: usize, surfels: usize) -> Scene {
+    let one = sphere(surfels, 1.5);
+    let scaled = |shell: usize| {
+        let scale = 1.0 - 0.06 * shell as f32;
+        let by = move |v: [f32; 3]| v.map(|x| x * scale);
+        one.surfels.iter().map(move |surfel| Surfel { center: by(surfel.center), s: by(surfel.s), t: by(surfel.t) })
+    };
+    let surfels = (0..count).flat_map(scaled).collect();
+    Scene { surfels, colors: Colors::Constant([0.2, 0.5, 0.8, 1.0]), ..one }
+}
+
+/// Through k shells the background shows as (1 - a)^2k, whatever they are sampled by.
+#[test]
+fn shells_let_through_what_their_alphas_say() {
+    let Some(backend) = gpu() else { return };
+    for crossings in [2, 4, 10, 20] {
+        let scene = shells(crossings / 2, 6000);
+        let camera = sphere_camera(64, Projection::Pinhole);
+        let of = RenderOptions { background: [1.0; 4], ..unlit(Composite::Layers(crossings as u32), 0.3) };
+        let of = RenderOptions { tail: Tail::None, epsilon: Epsilon::Absolute(0.02), ..of };
+        let expected = 0.7f64.powi(crossings as i32);
+        let through = frame(&scene, &camera, &of, &backend);
+        let (decided, layers) = (decided(&scene, &camera, &of), through.map(Map::Layers).unwrap());
+        let mut whole = 0;
+        for (pixel, transmittance) in through.map(Map::Transmittance).unwrap().iter().enumerate() {
+            if decided[pixel] && layers[pixel] as usize == crossings {
+                whole += 1;
+                assert!((f64::from(*transmittance) - expected).abs() < 1e-5, "{crossings}: {transmittance}");
+                // Of one colour, what is not background is it.
+                let shown = f64::from(through.color[pixel][0]);
+                assert!((shown - (0.2 + 0.8 * expected)).abs() < 1e-5, "{crossings}: {shown}");
+            }
+        }
+        // The innermost sphere covers so much.
+        assert!(whole > 200, "{crossings}: {whole}");
+    }
+}
+
+/// The same of planes of one surfel each, fragment by fragment.
+#[test]
+fn sorted_planes_let_through_what_their_alphas_say() {
+    let Some(backend) = gpu() else { return };
+    for crossings in [2, 4, 10, 20, 100] {
+        let (mut scene, camera) = stack(crossings, 0.25);
+        for (number, surfel) in scene.surfels.iter_mut().take(crossings).enumerate() {
+            surfel.center[2] += 0.25 * number as f32;
+        }
+        // The two that stretch the colours' range.
+        scene.surfels.iter_mut().skip(crossings).for_each(|surfel| surfel.center[0] = 1000.0);
+        let of = RenderOptions { kernel: Kernel::Constant, ..unlit(Composite::Sorted, 0.1) };
+        let shown = frame(&scene, &camera, &of, &backend);
+        let expected = 0.9f64.powi(crossings as i32);
+        for (transmittance, color) in shown.map(Map::Transmittance).unwrap().iter().zip(&shown.color) {
+            assert!((f64::from(*transmittance) - expected).abs() < 1e-5, "{crossings}: {transmittance}");
+            assert!((color[0] - 0.25).abs() < 1e-5 && (f64::from(color[3]) - (1.0 - expected)).abs() < 1e-5);
+        }
+    }
+}
+
+/// Device and twin composite alike at pixels that no rounding decides; kernels that are wrong do not.
+#[test]
+fn kernels_and_twins_composite_alike() {
+    let Some(backend) = gpu() else { return };
+    let broken = |file: &str, from: &str, to: &str| {
+        let sources = Sources::default().replace(file, from, to).unwrap();
+        common::gpu().map(|gpu| Backend::Gpu { gpu: Box::new(gpu), sources }).unwrap()
+    };
+    let mut all: Vec<(Scene, Camera)> = crowded();
+    all.extend(cases().into_iter().skip(2).map(|case| (case.scene, case.camera)));
+    let wrong = [
+        broken("layers.wgsl", "farthest = max(farthest, ", "farthest = min(farthest, "),
+        broken("layers.wgsl", "if (side_at(key) != side) {", "if (false) {"),
+        broken("fragments_sort.wgsl", "while (at > first && ", "while (at > first + 1u && "),
+        broken("fragments_sort.wgsl", "child + 1u < count && precedes(", "child + 1u < count && !precedes("),
+        broken("sorted.wgsl", "color.a * listed_weight(record)", "color.a"),
+        broken("resolve_lists.wgsl", "shown.transmittance * (1.0 - straight.a)", "shown.transmittance - straight.a"),
+        broken("resolve.wgsl", "alpha * OPACITY", "alpha"),
+    ];
+    let mut noticed = [0; 7];
+    let mut compared = 0;
+    for (number, (scene, camera)) in all.iter().enumerate() {
+        for composite in [ALL, Composite::Layers(2), Composite::Sorted] {
+            let own = RenderOptions { opacity: 0.7, maps: Maps::COMPOSITED, ..options(composite) };
+            let shading = if number % 2 == 0 { Shading::Lambert } else { Shading::Unlit };
+            let own = RenderOptions { shading, ..own };
+            let decided = decided(scene, camera, &own);
+            let truth = frame(scene, camera, &own, &Backend::Reference);
+            // Pixels that differ by more than f32 explains.
+            let differ = |other: &Frame| {
+                let far = |pixel: usize| {
+                    let [a, b] = [&truth, other].map(|frame| frame.color[pixel]);
+                    let alpha = a[3].max(1e-3);
+                    let colors = a.iter().zip(b).any(|(a, b)| (a - b).abs() > 2e-4 * (1.0 + a.abs()) / alpha);
+                    let [a, b] = [&truth, other].map(|frame| frame.map(Map::Layers).unwrap()[pixel]);
+                    colors || a != b
+                };
+                (0..decided.len()).filter(|pixel| decided[*pixel] && far(*pixel)).count()
+            };
+            compared += decided.iter().filter(|decided| **decided).count();
+            let own_frame = frame(scene, camera, &own, &backend);
+            let wrong_pixels = differ(&own_frame);
+            assert!(
+                wrong_pixels <= decided.len() / 1000,
+                "{number} {composite:?}: {wrong_pixels} of {}",
+                decided.len()
+            );
+            if number < 2 {
+                for (wrong, noticed) in wrong.iter().zip(&mut noticed) {
+                    *noticed += usize::from(differ(&frame(scene, camera, &own, wrong)) > decided.len() / 100);
+                }
+            }
+        }
+    }
+    assert!(compared > 100_000, "{compared}");
+    assert!(noticed.iter().all(|noticed| *noticed > 0), "{noticed:?}");
+}
+
+/// The order of surfels, how large buffers are, and 64-bit integers do not show.
+#[test]
+fn lists_do_not_show_how_they_came_to_be() {
+    let Some(backend) = gpu() else { return };
+    let small = |bytes| Backend::gpu(Gpu::with_buffer_limit(common::gpu().unwrap(), bytes));
+    // What a band holds of the first scene, and of those with many fragments a pixel.
+    let (narrow, wide) = (small(1_200_000), small(6_000_000));
+    let core = common::core_gpu().map(Backend::gpu).unwrap();
+    // Many at one place, whose order content decides.
+    let (mut dense, camera) = stack(40, 0.5);
+    if let Colors::Linear(colors) = &mut dense.colors {
+        for (number, color) in colors.iter_mut().enumerate() {
+            *color = [number as f32 / 50.0, 0.5, 1.0 - number as f32 / 50.0, 0.1 + number as f32 / 60.0];
+        }
+    }
+    let mut all = crowded();
+    all.push((dense, camera));
+    for (number, (scene, camera)) in all.iter().enumerate() {
+        for composite in [ALL, Composite::Layers(2), Composite::Sorted] {
+            for samples in [Samples::ONE, "4".parse().unwrap()] {
+                let own = RenderOptions { samples, opacity: 0.6, maps: Maps::COMPOSITED, ..options(composite) };
+                let first = all_bits(&frame(scene, camera, &own, &backend));
+                let name = format!("{number} {composite:?} {samples:?}");
+                for seed in [3, 4] {
+                    let other = shuffled(scene, seed);
+                    assert!(all_bits(&frame(&other, camera, &own, &backend)) == first, "{name}: order {seed}");
+                }
+                for (other, what) in [(if number == 0 { &narrow } else { &wide }, "bands"), (&core, "core features")] {
+                    assert!(all_bits(&frame(scene, camera, &own, other)) == first, "{name}: {what}");
+                }
+                let scattered = RenderOptions { organisation: Organisation::Scatter, ..own.clone() };
+                assert!(all_bits(&frame(scene, camera, &scattered, &backend)) == first, "{name}: scattered");
+                let mut moved = scene.clone();
+                moved.surfels.iter_mut().for_each(|surfel| surfel.center[0] = surfel.center[0].next_up());
+                assert!(number == 3 || all_bits(&frame(&moved, camera, &own, &backend)) != first, "{name}");
+            }
+        }
+    }
+}
+
+/// What is opaque costs nothing and looks as it did; a nearest layer of alpha 1 has the opaque picture's bits beside others that have not.
+#[test]
+fn opaque_layers_have_the_bits_of_the_opaque_picture() {
+    let Some(backend) = gpu() else { return };
+    let (scene, camera) = (sphere(4000, 2.0), sphere_camera(96, Projection::Pinhole));
+    let plain = frame(&scene, &camera, &options(Composite::Opaque), &backend);
+    let (layered, report): (Frame, Report) = render(&scene, &camera, &options(ALL), &backend, &()).unwrap();
+    assert!(!report.needs.contains(&"lists-layers"));
+    assert_eq!(bits(&layered), bits(&plain));
+    // One surfel lets through, somewhere.
+    let mut one = scene.clone();
+    let Colors::Srgb8(codes) = &mut one.colors else { unreachable!() };
+    let seen =
+        one.surfels.iter().position(|surfel| Vec3::from_array(surfel.center).dot(Vec3::new(1.2, 0.7, 2.4)) > 2.5);
+    codes[seen.unwrap()][3] = 128;
+    let plain = frame(&one, &camera, &options(Composite::Opaque), &backend);
+    let (layered, report): (Frame, Report) = render(&one, &camera, &options(ALL), &backend, &()).unwrap();
+    assert!(report.needs.contains(&"lists-layers"));
+    let (mut same, mut others) = (0, 0);
+    for (a, b) in plain.color.iter().zip(&layered.color) {
+        if a[3] == 1.0 {
+            assert_eq!(a.map(f32::to_bits), b.map(f32::to_bits));
+            same += 1;
+        } else if a[3] > 0.0 {
+            assert!(b[3] >= 1.0 - 1e-6, "the back shows through: {b:?}");
+            others += 1;
+        }
+    }
+    assert!(same > 2000 && others > 10, "{same} {others}");
+}
+
+/// A solid of alpha 0.5 has that opacity however densely it is sampled, in layers; sorted it has not, as its fragments add up.
+#[test]
+fn the_density_of_a_cloud_does_not_show_in_layers() {
+    let Some(backend) = gpu() else { return };
+    let camera = sphere_camera(64, Projection::Pinhole);
+    let mean = |count: usize, composite: Composite| {
+        let of = RenderOptions { epsilon: Epsilon::Absolute(0.05), ..unlit(composite, 0.5) };
+        let shown = frame(&sphere(count, 1.5 * (count as f64 / 2000.0).sqrt()), &camera, &of, &backend);
+        // Away from the outline.
+        let middle = (24..40).flat_map(|y| (24..40).map(move |x| y * 64 + x));
+        middle.map(|pixel| f64::from(shown.color[pixel][3])).sum::<f64>() / 256.0
+    };
+    let layered = [2000, 4000, 8000].map(|count| mean(count, ALL));
+    assert!(layered.iter().all(|alpha| (alpha - 0.75).abs() < 0.01), "{layered:?}");
+    let sorted = [2000, 4000, 8000].map(|count| mean(count, Composite::Sorted));
+    assert!(sorted[2] - sorted[0] > 0.05, "{sorted:?}");
+}
+
+/// Behind the last layer is one more of all that is left, or nothing.
+#[test]
+fn a_tail_is_one_more_layer() {
+    let Some(backend) = gpu() else { return };
+    let camera = front(4);
+    let colors = Colors::Linear((0..5).map(|k| [0.2 * k as f32, 0.0, 1.0 - 0.2 * k as f32, 1.0]).collect());
+    let disk = |k: usize| Surfel::disk(Vec3::new(0.2, 0.1, 5.0 + k as f32), Vec3::NEG_Z, 20.0);
+    let scene = Scene { surfels: (0..5).map(disk).collect(), colors, oriented: true, ..Scene::default() };
+    let shown = |composite, tail| {
+        let of = RenderOptions { kernel: Kernel::Constant, tail, ..unlit(composite, 0.5) };
+        let frame = frame(&scene, &camera, &of, &backend);
+        (frame.color[5], frame.map(Map::Layers).unwrap()[5])
+    };
+    let close = |(color, layers): ([f32; 4], f32), premultiplied: f32, alpha: f32, expected: f32| {
+        assert!((color[0] * color[3] - premultiplied).abs() < 1e-6 && (color[3] - alpha).abs() < 1e-6, "{color:?}");
+        assert_eq!(layers, expected);
+    };
+    // Half of 0, a quarter of 0.2, an eighth of 0.4, and so on.
+    close(shown(ALL, Tail::Sum), 0.25 * 0.2 + 0.125 * 0.4 + 0.0625 * 0.6 + 0.03125 * 0.8, 1.0 - 0.03125, 5.0);
+    close(shown(Composite::Layers(2), Tail::None), 0.25 * 0.2, 0.75, 2.0);
+    close(shown(Composite::Layers(2), Tail::Sum), 0.25 * 0.2 + 0.125 * 0.6, 0.875, 3.0);
+    close(shown(Composite::Layers(1), Tail::Sum), 0.25 * 0.5, 0.75, 2.0);
+}
+
+/// Depth, normal and the like are those of the opaque picture, beside maps of all surfaces, whatever the samples.
+#[test]
+fn maps_of_the_nearest_surface_stay() {
+    let Some(backend) = gpu() else { return };
+    let (solid, mixed) = (crowded().remove(0), crowded().remove(1));
+    let several: Samples = "4".parse().unwrap();
+    for ((scene, camera), samples, most) in
+        [(&solid, Samples::ONE, 2.0), (&solid, several, 2.0), (&mixed, Samples::ONE, 3.0), (&mixed, several, 3.0)]
+    {
+        let plain = RenderOptions { samples, maps: Maps::ON_DEVICE, ..options(Composite::Opaque) };
+        let layered = RenderOptions {
+            opacity: 0.5,
+            composite: ALL,
+            maps: Maps::ON_DEVICE.and(&[Map::Transmittance, Map::Layers]),
+            ..plain.clone()
+        };
+        let [plain, layered] = [&plain, &layered].map(|options| frame(scene, camera, options, &backend));
+        for map in Maps::ON_DEVICE.iter() {
+            assert_eq!(plain.map(map), layered.map(map), "{map:?}");
+        }
+        let (through, layers) = (layered.map(Map::Transmittance).unwrap(), layered.map(Map::Layers).unwrap());
+        assert!(through.iter().zip(layers).all(|(through, layers)| (*through == 1.0) == (*layers == 0.0)));
+        assert!(layers.iter().any(|layers| *layers >= most) && (most > 2.0 || layers[0] == 0.0), "{layers:?}");
+    }
+}

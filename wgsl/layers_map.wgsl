@@ -1,0 +1,5 @@
+override LAYERS_IMAGE: u32;
+
+fn write_layers(out: u32, layers: u32) {
+    image[out + LAYERS_IMAGE] = f32(layers);
+}

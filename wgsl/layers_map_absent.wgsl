@@ -1,0 +1,1 @@
+fn write_layers(out: u32, layers: u32) {}

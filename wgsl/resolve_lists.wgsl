@@ -1,0 +1,49 @@
+// A pixel whose surfaces show through each other: what layers.wgsl or sorted.wgsl composites of its list, over the background. Same
+// interface as resolve_surface.wgsl.
+// Twin: src/passes/layers.rs.
+
+// LEAST_TRANSMITTANCE in src/scene/composite.rs.
+const LEAST_TRANSMITTANCE: f32 = 9.31322574615478515625e-10;
+
+// What is composited so far, from front to back.
+struct Shown {
+    // Premultiplied.
+    color: vec4<f32>,
+    transmittance: f32,
+    layers: u32,
+}
+
+fn shown_nothing() -> Shown {
+    return Shown(vec4<f32>(0.0), 1.0, 0u);
+}
+
+// With a straight colour behind.
+fn with_behind(shown: Shown, straight: vec4<f32>) -> Shown {
+    let shows = shown.transmittance * straight.a;
+    return Shown(
+        shown.color + shows * vec4<f32>(straight.rgb, 1.0),
+        shown.transmittance * (1.0 - straight.a),
+        shown.layers + 1u,
+    );
+}
+
+// Straight.
+fn over_background(shown: Shown) -> vec4<f32> {
+    let alpha = shown.color.a;
+    let color = select(vec3<f32>(0.0), shown.color.rgb / alpha, alpha > 0.0);
+    return over(vec4<f32>(color, alpha), held.background);
+}
+
+fn show(pixel: u32) {}
+
+fn resolve_pixel(sums_of: u32, pixel: u32, x: u32, y: u32) {
+    let out = pixel * IMAGE_WORDS;
+    let shown = composite(pixel, x, y);
+    write_color(out, over_background(shown));
+    write_transmittance(out, shown.transmittance);
+    write_layers(out, shown.layers);
+}
+
+fn sample_color(sums_of: u32, sample: u32, x: u32, row: u32) -> vec4<f32> {
+    return premultiplied_sample(over_background(composite(sample, x, row + held_band.first_row)));
+}

@@ -1,0 +1,1 @@
+fn write_transmittance(out: u32, transmittance: f32) {}

@@ -243,7 +243,8 @@ fn what_shows_through_is_listed() {
             "visibility: occlude/Occlusion",
             "bin: fragments_of_rows/Rows, start_rows, start_pixels/Rows",
             "look for fragments of 0",
-            "accumulate: list_fragments/Slots(All), list_fragments_large/Large, sort_fragments/Pixels",
+            "accumulate: list_fragments/Slots(All), list_fragments_large/Large",
+            "sort: sort_fragments/Pixels",
             RESOLVE,
             "read back 0",
         ]

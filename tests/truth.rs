@@ -35,6 +35,24 @@ fn area(truth: &Truth) -> f64 {
     truth.coverage.iter().map(|&share| f64::from(share)).sum()
 }
 
+/// Through a sphere a ray meets its front and its back.
+#[test]
+fn rays_go_through_what_lets_them_through() {
+    let camera = camera(51, Lens::Fov(30.0), DVec3::new(0.0, 0.0, 5.0));
+    let options = RenderOptions { shading: Shading::Unlit, opacity: 0.5, ..RenderOptions::default() };
+    let mesh = Surface::mesh(&sphere(4, false)).unwrap();
+    for (surface, slack) in [(Surface::Analytic(Shape::Sphere), 0.0), (mesh, 0.01)] {
+        let truth = Truth::cast(&surface, &camera, &options, 1, &()).unwrap();
+        let opaque =
+            Truth::cast(&surface, &camera, &RenderOptions { opacity: 1.0, ..options.clone() }, 1, &()).unwrap();
+        let alphas = |of: &Truth| of.frame.color.iter().map(|color| color[3]).collect::<Vec<_>>();
+        let covered = alphas(&opaque).iter().filter(|alpha| **alpha == 1.0).count();
+        let twice = alphas(&truth).iter().filter(|alpha| **alpha == 0.75).count();
+        assert!(covered > 700 && (covered - twice) as f64 <= slack * covered as f64, "{covered} {twice}");
+        assert_eq!(truth.frame.map(Map::Depth), opaque.frame.map(Map::Depth));
+    }
+}
+
 #[test]
 fn a_sphere_has_the_outline_and_depths_of_its_formula() {
     let truth = |lens| {

@@ -10,7 +10,7 @@ use crate::plan::RenderOptions;
 use crate::progress::Progress;
 use crate::render::{Backend, Renderer, render};
 use crate::report::{ImageSet, Measurement, Numeric};
-use crate::scene::{Blend, Map, Maps};
+use crate::scene::{Blend, Composite, Map, Maps};
 use crate::truth::Truth;
 
 /// The side that pictures for the page are kept at, pixels.
@@ -93,7 +93,10 @@ pub(super) fn against_truth(
 ) -> Result<Vec<BTreeMap<String, f64>>> {
     let mut worst = vec![BTreeMap::new(); timed.len()];
     let Some(surface) = &case.staged.surface else { return Ok(worst) };
-    for (_, members) in grouped(timed.iter().map(|timed| timed.options.shading)) {
+    let seen = |timed: &Timed<'_>| {
+        (timed.options.shading, timed.options.composite != Composite::Opaque, timed.options.opacity)
+    };
+    for (_, members) in grouped(timed.iter().map(seen)) {
         let options = timed[members[0]].options;
         let cast = |camera| Truth::cast(surface, camera, options, case.definition.rays, progress);
         let truths: Vec<Truth> = case.staged.cameras.iter().map(cast).collect::<Result<_>>()?;

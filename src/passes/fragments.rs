@@ -130,11 +130,11 @@ pub fn starts(band: usize) -> [Step; 2] {
     [Step::Stage(Stage::new("bin", band, runs)), Step::Look(Look::Fragments(band))]
 }
 
-/// The lists themselves, sorted.
-pub fn steps(band: usize) -> Stage {
+/// The lists themselves, and their order.
+pub fn steps(band: usize) -> [Stage; 2] {
     let run = |kernel, over| Run { kernel, over };
-    let runs = vec![run(LIST, Over::Slots(Part::All)), run(LIST_LARGE, Over::Large), run(SORT, Over::Pixels)];
-    Stage::new("accumulate", band, runs)
+    let list = vec![run(LIST, Over::Slots(Part::All)), run(LIST_LARGE, Over::Large)];
+    [Stage::new("accumulate", band, list), Stage::new("sort", band, vec![run(SORT, Over::Pixels)])]
 }
 
 /// Bands of the image for a view, whose `band` has more fragments than there is room for `most`: it is cut where the next row would be

@@ -50,6 +50,9 @@ pub fn part(
             break;
         }
         let front = list[first];
+        // Of a front and a back at one depth but for rounding either may be the nearer surface.
+        let other = list[first..].iter().find(|f| f.back != front.back && untold(f, told));
+        decision = other.map_or(decision, |other| decision.min(other.depth / front.depth - 1.0));
         let mut sums = PixelSums { back: front.back && !last, ..PixelSums::ZERO };
         let mut end = farthest(front.depth, front.radius);
         for (number, f) in list.iter().enumerate().skip(first) {

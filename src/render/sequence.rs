@@ -60,7 +60,7 @@ fn lists(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
     let count = [visibility::steps(plan, band, Part::All).without_twin(), visibility::large(band)];
     let count = count.into_iter().chain([visibility::occlude(band, Part::All)]);
     steps.extend(count.map(Step::Stage).chain(fragments::starts(band)));
-    steps.push(Step::Stage(fragments::steps(band)));
+    steps.extend(fragments::steps(band).map(Step::Stage));
 }
 
 /// The sums of each pixel of a band; by tiles that gather, its image too.

@@ -23,7 +23,8 @@ use crate::io::{self, Mesh};
 use crate::plan::RenderOptions;
 use crate::progress::Progress;
 use crate::scene::color::SRGB8_TO_LINEAR;
-use crate::scene::{Camera, Map};
+use crate::scene::composite::LEAST_TRANSMITTANCE;
+use crate::scene::{Camera, Composite, Map};
 use crate::surfels::analytic::{Shape, depth_along_ray};
 
 /// A surface that rays can meet.
@@ -127,7 +128,8 @@ struct Pixel {
 impl Truth {
     /// Casts `grid` x `grid` rays through each pixel, at the centres of as many equal squares, and one through its
     /// centre; a second goes on from the first surface. What is nearer than the camera's near depth is not seen. Of the
-    /// options shading, lights and background are used.
+    /// options shading, lights, background and opacity are used. Where the opacity is below 1, or surfaces are composited, rays go on
+    /// through each surface by the alpha that it has, times the opacity.
     ///
     /// # Errors
     ///
@@ -167,22 +169,29 @@ impl Truth {
 fn pixel(surface: &Surface, camera: &Camera, options: &RenderOptions, grid: u32, x: u32, y: u32) -> Pixel {
     let corner = DVec2::new(x.into(), y.into());
     let see = |at: DVec2, beyond: f64| surface.first_hit(camera.ray_start(at.x, at.y), camera.ray(at.x, at.y), beyond);
+    let after = |hit: Hit| hit.distance + SAME_SURFACE * (hit.distance + surface.size());
+    let goes_through = options.opacity < 1.0 || options.composite != Composite::Opaque;
     let (mut hits, mut light, mut alpha) = (0, DVec3::ZERO, 0.0);
     for sample in 0..grid * grid {
         let place = DVec2::new((sample % grid).into(), (sample / grid).into());
         let at = corner + (place + 0.5) / f64::from(grid);
-        if let Some(hit) = see(at, camera.near) {
-            let [r, g, b, opacity] = hit.color.map(f64::from);
-            hits += 1;
-            light += opacity * shading::sent(DVec3::new(r, g, b), hit.normal, camera.ray(at.x, at.y), options);
-            alpha += opacity;
+        let mut next = see(at, camera.near);
+        hits += u32::from(next.is_some());
+        let mut transmittance = 1.0;
+        while let Some(hit) = next {
+            let [r, g, b, own] = hit.color.map(f64::from);
+            let shows = transmittance * own * f64::from(options.opacity);
+            light += shows * shading::sent(DVec3::new(r, g, b), hit.normal, camera.ray(at.x, at.y), options);
+            alpha += shows;
+            transmittance -= shows;
+            next = if goes_through && transmittance > LEAST_TRANSMITTANCE { see(at, after(hit)) } else { None };
         }
     }
     let samples = f64::from(grid * grid);
     let color = shading::in_front(light / samples, alpha / samples, options.background);
     let center = corner + 0.5;
     let first = see(center, camera.near);
-    let second = first.and_then(|hit| see(center, hit.distance + SAME_SURFACE * (hit.distance + surface.size())));
+    let second = first.and_then(|hit| see(center, after(hit)));
     let depth = |hit: Option<Hit>| hit.map_or(f32::INFINITY, |hit| hit.distance as f32);
     Pixel {
         color,

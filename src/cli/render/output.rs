@@ -56,7 +56,7 @@ pub(super) fn note_overflows(report: &Report) {
 
 /// One line: what was drawn, and how long each pass took.
 pub(super) fn summary(report: &Report, output: &Path) -> String {
-    let order = ["project_ms", "visibility_ms", "accumulate_ms", "resolve_ms"];
+    let order = ["project_ms", "visibility_ms", "accumulate_ms", "sort_ms", "resolve_ms"];
     let passes = order
         .iter()
         .filter_map(|name| report.passes.get(*name).map(|ms| format!("{} {ms:.1}", name.trim_end_matches("_ms"))));

@@ -121,7 +121,7 @@ fn kernels_and_twins_composite_alike() {
     let wrong = [
         broken("layers.wgsl", "farthest = max(farthest, ", "farthest = min(farthest, "),
         broken("layers.wgsl", "if (side_at(key) != side) {", "if (false) {"),
-        broken("fragments_sort.wgsl", "while (at > first && ", "while (at > first + 1u && "),
+        broken("fragments_network.wgsl", "b.x < a.x", "a.x < b.x"),
         broken("fragments_sort.wgsl", "child + 1u < count && precedes(", "child + 1u < count && !precedes("),
         broken("sorted.wgsl", "color.a * listed_weight(record)", "color.a"),
         broken("resolve_lists.wgsl", "shown.transmittance * (1.0 - straight.a)", "shown.transmittance - straight.a"),

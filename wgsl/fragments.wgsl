@@ -1,7 +1,7 @@
 // Stage 3 where surfaces show through each other: each pixel's fragments become a list. Their numbers, which the visibility pass left,
 // become where lists start, by a scan over rows and one over the pixels of each; then every fragment takes a place in its pixel's list.
 // Host side and twin: src/passes/fragments.rs.
-// All loops end, by 1, 2 of src/gpu/loops.rs: 0x889697132acab64f
+// All loops end, by 1, 2, 4 of src/gpu/loops.rs: 0x03d21e8719b37098
 
 // How many fragments there are and how many at most at a pixel; where the lists of each row start and where the last one ends; then the
 // same of each pixel. Past what a word holds all three stay at its end.
@@ -87,22 +87,23 @@ fn visible_count(pixel: u32) -> u32 {
 
 // The depth of each fragment, and where its record is.
 @group(0) @binding(46) var<storage, read_write> keys: array<vec2<u32>>;
-@group(0) @binding(47) var<storage, read_write> fragments: array<u32>;
+@group(0) @binding(47) var<storage, read_write> fragments: array<Words>;
 
-// A record's words: the weight, and where the others are (FragmentLayout in src/plan/fragment.rs).
-override FRAGMENT_WORDS: u32;
+// A record has so many rows of four words: the weight, and where the others are (FragmentLayout in src/plan/fragment.rs).
+override FRAGMENT_ROWS: u32;
 override FRAGMENT_COLOR: u32;
 override FRAGMENT_COLORS: u32;
 override FRAGMENT_NORMAL: u32;
 override FRAGMENT_RADIUS: u32;
+// Whether it has them.
+override FRAGMENT_HAS_NORMAL: bool;
+override FRAGMENT_HAS_RADIUS: bool;
 
-// Those of a surfel, which are the same at every pixel.
-fn list_fragment(splat: Splat, filter_: Filter, surfel: u32, attributes: Attributes, x: u32, y: u32) {
-    let fragment = footprint(splat, filter_, x, y);
-    if (!fragment.hit) {
-        return;
-    }
-    let pixel = pixel_index(x, y);
+const MOST_FRAGMENT_WORDS: u32 = 12u;
+alias Record = array<u32, MOST_FRAGMENT_WORDS>;
+
+// Gives a fragment a place in its pixel's list.
+fn list_fragment(pixel: u32, fragment: Fragment, surfel: u32, attributes: Attributes) {
     // Counted down from as many as there are; if two kernels differ about a rim, what has no place is left out.
     let left = atomicSub(&nearest[pixel], 1u);
     let at = starts[pixels_start() + pixel] + (left - 1u);
@@ -110,33 +111,53 @@ fn list_fragment(splat: Splat, filter_: Filter, surfel: u32, attributes: Attribu
         return;
     }
     keys[at] = vec2<u32>(bitcast<u32>(fragment.depth), at);
-    let first = at * FRAGMENT_WORDS;
-    fragments[first] = bitcast<u32>(fragment_weight(fragment));
-    write_rank(first, surfel);
+    var record: Record;
+    record[0] = bitcast<u32>(fragment_weight(fragment));
     for (var k = 0u; k < FRAGMENT_COLORS; k++) {
-        fragments[first + FRAGMENT_COLOR + k] = bitcast<u32>(attributes.color[k]);
+        record[FRAGMENT_COLOR + k] = bitcast<u32>(attributes.color[k]);
     }
-    if (FRAGMENT_RADIUS > FRAGMENT_NORMAL) {
+    if (FRAGMENT_HAS_NORMAL) {
         let normal = normal_at(attributes, fragment.spot);
         for (var k = 0u; k < 3u; k++) {
-            fragments[first + FRAGMENT_NORMAL + k] = bitcast<u32>(normal[k]);
+            record[FRAGMENT_NORMAL + k] = bitcast<u32>(normal[k]);
         }
     }
-    if (FRAGMENT_WORDS > FRAGMENT_RADIUS) {
-        fragments[first + FRAGMENT_RADIUS] = bitcast<u32>(attributes.radius);
+    if (FRAGMENT_HAS_RADIUS) {
+        record[FRAGMENT_RADIUS] = bitcast<u32>(attributes.radius);
+    }
+    record = with_rank(record, surfel);
+    for (var row = 0u; row < FRAGMENT_ROWS; row++) {
+        let word = 4u * row;
+        fragments[at * FRAGMENT_ROWS + row] =
+            words(vec4<u32>(record[word], record[word + 1u], record[word + 2u], record[word + 3u]));
     }
 }
 
-// The fragments of one invocation: the splat's pixels from `offset` on in steps of `step`.
+// The fragments of one invocation: the splat's pixels from `offset` on in steps of `step`. As in accumulate.wgsl each round of the outer
+// loop finds the next one and then lists it, so that the invocations of a subgroup do the costly part together.
 fn list_splat(slot: u32, splat: Splat, record: SplatRecord, offset: vec2<u32>, step: u32) {
     let filter_ = filter_in(record);
     let surfel = surfel_in(record, slot);
     let attributes = attributes_of(surfel, splat);
     let pixels = reach(splat);
-    for (var y = pixels.first.y + offset.y; y <= pixels.last.y; y += step) {
-        for (var x = pixels.first.x + offset.x; x <= pixels.last.x; x += step) {
-            list_fragment(splat, filter_, surfel, attributes, x, y);
+    let first = pixels.first + offset;
+    var at = select(first, vec2<u32>(0u, pixels.last.y + 1u), first.x > pixels.last.x);
+    loop {
+        var fragment: Fragment;
+        var place: vec2<u32>;
+        var hit = false;
+        while (at.y <= pixels.last.y && !hit) {
+            place = at;
+            fragment = footprint(splat, filter_, at.x, at.y);
+            hit = fragment.hit;
+            at.x += step;
+            let wrapped = at.x > pixels.last.x;
+            at = select(at, vec2<u32>(first.x, at.y + step), wrapped);
         }
+        if (!hit) {
+            break;
+        }
+        list_fragment(pixel_index(place.x, place.y), fragment, surfel, attributes);
     }
 }
 
@@ -178,37 +199,44 @@ fn list_of(pixel: u32) -> vec2<u32> {
     return vec2<u32>(list.x + visible[pixel], list.y);
 }
 
-fn listed_number(record: u32, word: u32) -> f32 {
-    return bitcast<f32>(fragments[record * FRAGMENT_WORDS + word]);
+fn record_at(at: u32) -> Record {
+    var record: Record;
+    for (var row = 0u; row < FRAGMENT_ROWS; row++) {
+        let four = each_word(fragments[at * FRAGMENT_ROWS + row]);
+        for (var k = 0u; k < 4u; k++) {
+            record[4u * row + k] = four[k];
+        }
+    }
+    return record;
 }
 
-fn listed_weight(record: u32) -> f32 {
-    return listed_number(record, 0u);
+fn listed_weight(record: Record) -> f32 {
+    return bitcast<f32>(record[0]);
 }
 
-fn listed_color(record: u32) -> vec4<f32> {
+fn listed_color(record: Record) -> vec4<f32> {
     var color = vec4<f32>(0.0);
     for (var k = 0u; k < FRAGMENT_COLORS; k++) {
-        color[k] = listed_number(record, FRAGMENT_COLOR + k);
+        color[k] = bitcast<f32>(record[FRAGMENT_COLOR + k]);
     }
     return color;
 }
 
 // Mapped to [0, 1].
-fn listed_normal(record: u32) -> vec3<f32> {
+fn listed_normal(record: Record) -> vec3<f32> {
     var normal = vec3<f32>(0.0);
-    if (FRAGMENT_RADIUS > FRAGMENT_NORMAL) {
+    if (FRAGMENT_HAS_NORMAL) {
         for (var k = 0u; k < 3u; k++) {
-            normal[k] = listed_number(record, FRAGMENT_NORMAL + k);
+            normal[k] = bitcast<f32>(record[FRAGMENT_NORMAL + k]);
         }
     }
     return normal;
 }
 
-fn listed_radius(record: u32) -> f32 {
+fn listed_radius(record: Record) -> f32 {
     var radius = 0.0;
-    if (FRAGMENT_WORDS > FRAGMENT_RADIUS) {
-        radius = listed_number(record, FRAGMENT_RADIUS);
+    if (FRAGMENT_HAS_RADIUS) {
+        radius = bitcast<f32>(record[FRAGMENT_RADIUS]);
     }
     return radius;
 }

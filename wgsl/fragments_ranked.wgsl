@@ -6,13 +6,21 @@
 
 override FRAGMENT_RANK: u32;
 
-fn write_rank(first: u32, surfel: u32) {
-    fragments[first + FRAGMENT_RANK] = page_first + surfel;
+const TIES: bool = true;
+
+fn with_rank(record: Record, surfel: u32) -> Record {
+    var ranked = record;
+    ranked[FRAGMENT_RANK] = page_first + surfel;
+    return ranked;
+}
+
+fn rank_at(at: u32) -> u32 {
+    return each_word(fragments[at * FRAGMENT_ROWS + FRAGMENT_RANK / 4u])[FRAGMENT_RANK % 4u];
 }
 
 fn precedes(a: vec2<u32>, b: vec2<u32>) -> bool {
     if (a.x != b.x) {
         return a.x < b.x;
     }
-    return fragments[a.y * FRAGMENT_WORDS + FRAGMENT_RANK] < fragments[b.y * FRAGMENT_WORDS + FRAGMENT_RANK];
+    return rank_at(a.y) < rank_at(b.y);
 }

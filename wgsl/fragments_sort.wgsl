@@ -1,9 +1,12 @@
-// Sorts each pixel's list from front to back, in place: positive depths order as their bits. Few are sorted by insertion, many by a
-// heap (Williams 1964), whose time does not depend on how they lie.
+// Sorts each pixel's list from front to back, in place: positive depths order as their bits. Up to sixteen are sorted by a network
+// (fragments_network.wgsl), and by insertion where those of one depth have an order; more by a heap (Williams 1964), whose time does not
+// depend on how they lie.
 // Host side: src/passes/fragments.rs.
-// All loops end, by 1, 5 of src/gpu/loops.rs: 0xca7ece5f119e0cf4
+// All loops end, by 1, 5 of src/gpu/loops.rs: 0xa2ca8352321290a1
 
 const FEW: u32 = 16u;
+
+// What little is left to do after the network.
 
 fn sort_few(first: u32, end: u32) {
     for (var k = first + 1u; k < end; k++) {
@@ -64,6 +67,8 @@ fn sort_fragments(
     if (list.y > list.x + FEW) {
         sort_many(list.x, list.y);
     } else if (list.y > list.x + 1u) {
-        sort_few(list.x, list.y);
+        if (sort_sixteen(list.x, list.y)) {
+            sort_few(list.x, list.y);
+        }
     }
 }

@@ -1,6 +1,6 @@
 // Stage 4: a pixel's fragments are parted into surfaces, each is blended as the nearest one always is, and they are composited.
 // Twin: src/passes/layers.rs.
-// All loops end, by 1, 6 of src/gpu/loops.rs: 0x7cd6223a42220899
+// All loops end, by 1, 6 of src/gpu/loops.rs: 0xbab9e02aa45f9ed9
 
 override MOST_LAYERS: u32;
 // What follows the last layer is one more.
@@ -20,8 +20,7 @@ fn is_untold(key: u32, told: vec2<f32>) -> bool {
     return depth_at(key) > select(told.x, told.y, side_at(key) == 1u);
 }
 
-fn blend_listed(key: u32, front: f32) {
-    let record = keys[key].y;
+fn blend_listed(record: Record, key: u32, front: f32) {
     let attributes = attributes_without_place(listed_color(record), vec3<f32>(0.0), no_bend(), 0.0);
     blend_weighted(0u, quantise(listed_weight(record)), depth_at(key), front, listed_normal(record), attributes);
 }
@@ -41,14 +40,15 @@ fn sum_surface(first: u32, end: u32, image: vec2<f32>) -> f32 {
         if (side_at(key) != side) {
             continue;
         }
-        let radius = listed_radius(keys[key].y);
         // The first is at the front itself.
         if (key != first && depth > farthest) {
             break;
         }
+        let record = record_at(keys[key].y);
+        let radius = listed_radius(record);
         farthest = max(farthest, farthest_shown(depth, radius, image));
         if (depth <= farthest_shown(front, radius, image)) {
-            blend_listed(key, front);
+            blend_listed(record, key, front);
         }
     }
     return farthest;
@@ -58,7 +58,7 @@ fn sum_surface(first: u32, end: u32, image: vec2<f32>) -> f32 {
 fn sum_rest(first: u32, end: u32, told: vec2<f32>) {
     for (var key = first; key < end; key++) {
         if (is_untold(key, told)) {
-            blend_listed(key, depth_at(first));
+            blend_listed(record_at(keys[key].y), key, depth_at(first));
         }
     }
 }

@@ -14,7 +14,7 @@
 //!    column it starts again with `at.y` grown. Columns and rows come from a splat's bounds, whose numbers have 15 and 16 bits, so
 //!    each of at most 2^16 rows has at most 2^16 rounds.
 //! 3. A set of **bits** in a word loses one in each round, and the loop ends when none is left: at most 32 rounds.
-//! 4. The outer loop of `accumulate_splat` goes on only if its inner one moved on in its rectangle (2).
+//! 4. The outer loops of `accumulate_splat` and `list_splat` go on only if the inner one moved on in its rectangle (2).
 //! 5. A counter **shrinks** by 1 in each round, and the loop ends at 0 or at a limit that no round changes, which is not below 0; or it
 //!    grows to more than twice itself (`sink`) and the loop ends past the length of a list, which is shorter than 2^30.
 //! 6. Each round of `composite` in `layers.wgsl` tells the fragment at `first`, as its surface reaches at least as deep, or is the last; and the

@@ -90,7 +90,14 @@ pub const PASS: Pass = Pass {
             Some(Lists::Layers) => "fragments_untied.wgsl",
             Some(Lists::Sorted) => "fragments_ranked.wgsl",
         };
-        let own = ["fragments_count.wgsl", "fragments.wgsl", "fragments_sort.wgsl", ties, "layer_sums.wgsl"];
+        let own = [
+            "fragments_count.wgsl",
+            "fragments.wgsl",
+            "fragments_sort.wgsl",
+            "fragments_network.wgsl",
+            ties,
+            "layer_sums.wgsl",
+        ];
         own.into_iter().chain([terms_file(needs)]).collect()
     },
     kernels: |needs| match needs.lists {
@@ -100,7 +107,9 @@ pub const PASS: Pass = Pass {
     constants: |making| {
         let layout = FragmentLayout::of(making.needs);
         vec![
-            ("FRAGMENT_WORDS", layout.words.into()),
+            ("FRAGMENT_ROWS", (layout.words / 4).into()),
+            ("FRAGMENT_HAS_NORMAL", u32::from(making.needs.normal).into()),
+            ("FRAGMENT_HAS_RADIUS", u32::from(layout.has_radius).into()),
             ("FRAGMENT_RANK", layout.rank.into()),
             ("FRAGMENT_COLOR", layout.color.into()),
             ("FRAGMENT_COLORS", layout.colors.into()),
@@ -170,4 +179,48 @@ pub fn cut(plan: &Plan, band: usize, starts: &[u64], most: u64) -> Option<Vec<Ba
         next += of_cut;
     }
     Some(bands)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use crate::gpu::sources::FILES;
+
+    /// The comparators of the network that sorts sixteen keys, as its text has them.
+    fn network(text: &str) -> Vec<[usize; 2]> {
+        let number = |part: &str| part.split(|c: char| !c.is_ascii_digit()).next().unwrap().parse().unwrap();
+        let pair = |line: &str| {
+            let (_, keys) = line.split_once("ordered(k")?;
+            let (a, b) = keys.split_once(", k")?;
+            assert!(line.contains(&format!("k{} = o.xy; k{} = o.zw", number(a), number(b))), "{line}");
+            Some([number(a), number(b)])
+        };
+        text.lines().filter_map(pair).collect()
+    }
+
+    /// Whether it sorts every list of zeros and ones, and so every list (Knuth, 5.3.4, theorem Z).
+    fn sorts(network: &[[usize; 2]]) -> bool {
+        (0..1u32 << 16).all(|bits| {
+            let sorted = network.iter().fold(bits, |bits, [a, b]| {
+                let swaps = (bits >> a & 1) > (bits >> b & 1);
+                if swaps { bits ^ (1 << a | 1 << b) } else { bits }
+            });
+            // As many ones as there were, all behind the zeros.
+            sorted == 0xffff & !(0xffff >> bits.count_ones())
+        })
+    }
+
+    #[test]
+    fn the_network_sorts_sixteen_keys() {
+        let (_, text) = FILES.iter().find(|(name, _)| *name == "fragments_network.wgsl").unwrap();
+        let network = network(text);
+        assert_eq!(network.len(), 60);
+        assert!(sorts(&network));
+        // Without any one of its comparators it does not.
+        for left_out in 0..network.len() {
+            let others: Vec<_> =
+                network.iter().enumerate().filter(|(k, _)| *k != left_out).map(|(_, pair)| *pair).collect();
+            assert!(!sorts(&others), "{left_out}");
+        }
+    }
 }

@@ -6,7 +6,7 @@ use super::{EpsilonForm, Lists, SceneNeeds, color_channels};
 /// not needed takes no room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FragmentLayout {
-    /// Words of a record.
+    /// Words of a record: whole rows of four.
     pub words: u32,
     /// The place of its surfel, where those of one depth are told apart by it.
     pub rank: u32,
@@ -16,8 +16,10 @@ pub struct FragmentLayout {
     pub colors: u32,
     /// The first of its normal's three.
     pub normal: u32,
-    /// Its surfel's radius.
+    /// Its surfel's radius, by which surfaces are parted.
     pub radius: u32,
+    /// Whether it has that.
+    pub has_radius: bool,
 }
 
 impl FragmentLayout {
@@ -27,8 +29,9 @@ impl FragmentLayout {
         let color = rank + u32::from(needs.lists == Some(Lists::Sorted));
         let normal = color + colors;
         let radius = normal + if needs.normal { 3 } else { 0 };
-        let parts = needs.lists == Some(Lists::Layers) && needs.epsilon == EpsilonForm::Radius;
-        Self { words: radius + u32::from(parts), rank, color, colors, normal, radius }
+        let has_radius = needs.lists == Some(Lists::Layers) && needs.epsilon == EpsilonForm::Radius;
+        let words = (radius + u32::from(has_radius)).next_multiple_of(4);
+        Self { words, rank, color, colors, normal, radius, has_radius }
     }
 }
 

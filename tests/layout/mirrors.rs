@@ -158,7 +158,7 @@ pub fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         ("list_starts", Element::Plain(WORD)),
         ("starts", Element::Plain(WORD)),
         ("keys", Element::Plain(&[<[u32; 2]>::SHAPE])),
-        ("fragments", Element::Plain(WORD)),
+        ("fragments", Element::Plain(&[<[u32; 4]>::SHAPE, <[u64; 2]>::SHAPE])),
         ("image", Element::Plain(&[f32::SHAPE, <[f32; 4]>::SHAPE])),
         ("texels", Element::Plain(WORD)),
         ("srgb_to_linear", Element::Plain(&[<[f32; 256]>::SHAPE])),

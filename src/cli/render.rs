@@ -186,8 +186,8 @@ pub struct Arguments {
     /// What lies behind the scene, linear [default: transparent]
     #[arg(long, value_name = "R,G,B[,A]", value_parser = parse_color)]
     background: Option<[f32; 4]>,
-    /// Maps beside the colour, in an EXR; index names the input and the point that show most, decision is the reference's distance to
-    /// the nearest yes-or-no
+    /// Maps beside the colour, in an EXR; index names the input and the point that show most, transmittance is what all surfaces of a pixel
+    /// let through and layers how many they are, decision is the reference's distance to the nearest yes-or-no
     #[arg(long, value_name = "MAPS", value_delimiter = ',', value_parser = map_parser())]
     aov: Vec<Map>,
     /// Times, counts and adapter as JSON, to a file or - for stdout

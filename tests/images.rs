@@ -54,6 +54,15 @@ fn cases() -> Vec<(&'static str, Scene, Camera, RenderOptions)> {
         RenderOptions { background: [1.0; 4], ..default.clone() },
     );
     case("bunny", file("bunny.obj"), (256, 256), Lens::Fov(45.0), default.clone());
+    // Of glass: the README's second picture.
+    let glass = RenderOptions {
+        composite: "layers".parse().unwrap(),
+        opacity: 0.5,
+        samples: "4".parse().unwrap(),
+        background: [1.0; 4],
+        ..default.clone()
+    };
+    case("glass", file("bunny.obj"), (512, 512), Lens::Fov(45.0), glass);
     let toward = Vec3::new(-1.0, 1.0, 1.0).normalize();
     let lights = vec![Light::Directional { toward, intensity: 0.9 }, Light::Headlight { intensity: 0.2 }];
     let lit = RenderOptions { lights, background: [0.1, 0.2, 0.4, 1.0], ..default.clone() };

@@ -1,4 +1,4 @@
-//! Stage 4 of [`Composite::Layers`](crate::scene::Composite::Layers): the fragments of a pixel are parted into surfaces, each is blended as the nearest
+//! Stage 4 of [`Composite::Layers`]: the fragments of a pixel are parted into surfaces, each is blended as the nearest
 //! one always is, and they are composited from front to back.
 //!
 //! # Where a surface ends

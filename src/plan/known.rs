@@ -29,8 +29,10 @@ pub struct Known {
     pub entries: [Option<u64>; 2],
     /// There are more splats than tiles can list, so that their sums are stored.
     pub crowded: bool,
-    /// Bands whose fragments fit, in this view.
+    /// Bands whose fragments fit, in this view, as far as bands were looked at.
     pub cuts: Option<Vec<Band>>,
+    /// How often a band of this view was cut: each time the next try comes farther down the image.
+    pub times_cut: usize,
     /// Fragments of this view that made a sum of the accumulator that was asked for wrap.
     pub overflows: u64,
 }
@@ -44,7 +46,7 @@ impl Known {
     /// Forgets what holds for one view.
     pub fn forget_view(&mut self) {
         self.overflows = 0;
-        self.cuts = None;
+        (self.cuts, self.times_cut) = (None, 0);
     }
 
     /// Forgets what buffers have room for.

@@ -54,13 +54,16 @@ impl Kept {
         let (image, camera) = (camera, &camera.sampled(self.options.samples)?);
         self.look_at(gpu, camera);
         let mut total_ms = 0.0;
-        for number in 0..MOST_TRIES {
+        let mut number = 0;
+        while number < MOST_TRIES + self.known.times_cut {
+            let first = number == 0;
+            number += 1;
             let plan = Plan::of(&self.facts, &gpu.adapter, camera, &self.options, &self.known)?;
             // A second try adds nothing to the bar.
-            let progress = if number == 0 { bar } else { &() };
+            let progress = if first { bar } else { &() };
             self.prepare((gpu, sources), source, &plan, progress)?;
             let (Some(kernels), Some(store)) = (&self.kernels, &mut self.store) else { continue };
-            if number == 0 {
+            if first {
                 progress.begin("rendering rows", camera.height.into());
             }
             let start = Instant::now();

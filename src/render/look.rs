@@ -85,6 +85,7 @@ impl Run<'_> {
             return Ok(true);
         }
         let starts: Vec<u64> = words[2..].iter().map(|start| u64::from(*start)).collect();
+        self.known.times_cut += 1;
         self.known.cuts = Some(fragments::cut(self.plan, band, &starts, most).ok_or_else(|| Error::Limit {
             adapter: self.gpu.adapter.name.clone(),
             limit: "max_storage_buffer_binding_size",

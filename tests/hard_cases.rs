@@ -158,7 +158,23 @@ fn a_broken_kernel_fails_a_hard_case() {
         ("facing.wgsl", "min(dot(beside, beside), largest2(own))", "dot(beside, beside)", "points of 0 and 50 pixels"),
         ("axes_facing.wgsl", "MOST_RADIUS * row", "1.0001 * MOST_RADIUS * row", "points of 0 and 50 pixels"),
         ("resolve_samples.wgsl", "f32(SAMPLES_ACROSS * SAMPLES_DOWN)", "16.001", "16 samples, thin parts"),
-        ("resolve_samples.wgsl", "color.rgb * color.a", "color.rgb", "16 samples, thin parts"),
+        ("resolve.wgsl", "straight.rgb * straight.a", "straight.rgb", "16 samples, thin parts"),
+        ("layers.wgsl", "farthest = max(farthest, ", "farthest = min(farthest, ", "layers closer than epsilon"),
+        ("layers.wgsl", "if (is_last) {", "if (is_last && false) {", "a tail of most of the weight"),
+        (
+            "fragments_sort.wgsl",
+            "child + 1u < count && precedes(",
+            "child + 1u < count && !precedes(",
+            "a hundred layers",
+        ),
+        (
+            "fragments_ranked.wgsl",
+            "rank_at(a.y) < rank_at(b.y)",
+            "rank_at(b.y) < rank_at(a.y)",
+            "many at one place, one by one",
+        ),
+        ("resolve_lists.wgsl", "(1.0 - straight.a)", "(1.0 - 1.001 * straight.a)", "sheets behind one another"),
+        ("resolve_lists.wgsl", "straight.rgb, 1.0", "straight.rgb, 1.00001", "alphas of nothing and nearly all"),
         ("camera_orthographic.wgsl", "h.away == 0.0", "abs(h.away) < 1e-3", "edge-on, askew, orthographic"),
     ];
     let mut unnoticed = Vec::new();

@@ -147,7 +147,11 @@ fn the_device_paints_as_its_twin_does() {
         ("texture.wgsl", "(point - place.position) * held.world", "(point - place.position) * (0.9 * held.world)"),
         ("texture.wgsl", "texel(column + 1, row + 1), share.x)", "texel(column + 1, row + 1), 0.99 * share.x)"),
         ("srgb.wgsl", "(code >> 8u) & 0xffu", "(code >> 9u) & 0xffu"),
-        ("resolve.wgsl", "textured(sums_of, weight, resolve_color(sums_of, weight))", "resolve_color(sums_of, weight)"),
+        (
+            "resolve_surface.wgsl",
+            "textured(sums_of, weight, resolve_color(sums_of, weight))",
+            "resolve_color(sums_of, weight)",
+        ),
     ] {
         let broken = Sources::default().replace(file, from, to).unwrap();
         let found = beyond_bounds(&globe, &camera(160, Projection::Pinhole), Accumulator::Fixed, &broken).unwrap();

@@ -29,7 +29,7 @@ use crate::plan::{AccumulatorRow, Facts, RenderOptions, Sides};
 use crate::scene::{Camera, Clip, Epsilon, Kernel, LowPass, Scene};
 
 /// What a division may err by, relative: WGSL grants 2.5 units in the last place.
-const DIVISION: f64 = 5.0 * U;
+pub(super) const DIVISION: f64 = 5.0 * U;
 
 /// What is known of a pixel's fragments before an accumulator is chosen. Sums are over accepted fragments.
 #[derive(Clone, Copy, Debug)]
@@ -60,7 +60,7 @@ pub struct Pixel {
     interval: f64,
 }
 
-const NOTHING: Pixel = Pixel {
+pub(super) const NOTHING: Pixel = Pixel {
     open: false,
     count: 0,
     weight: 0.0,
@@ -138,13 +138,31 @@ impl Pixel {
 }
 
 impl Pixel {
+    /// Adds an accepted fragment.
+    pub(super) fn add(&mut self, kernel: Kernel, surface: &Surface, f: &Fragment) {
+        let weight = f.weight(kernel);
+        self.count += 1;
+        self.weight += weight;
+        self.weight_error += weight_error(kernel, f);
+        self.depth_error += weight * f.depth_error;
+        self.normal_error += weight * f.normal_error;
+        self.normal += weight * f.normal;
+        self.normals = [self.normals[0].min(f.normal), self.normals[1].max(f.normal)];
+        self.depths = [self.depths[0].min(f.depth), self.depths[1].max(f.depth)];
+        for (k, value) in surface.color.into_iter().enumerate() {
+            self.color[k] += weight * value;
+            self.colors[0][k] = self.colors[0][k].min(value);
+            self.colors[1][k] = self.colors[1][k].max(value);
+        }
+    }
+
     /// What accumulator and division add to a mean, of its range.
     fn sums(&self, accumulator: &AccumulatorRow, bits: u32) -> f64 {
         (accumulator.error_bound)(f64::from(self.count), self.weight, bits) + DIVISION
     }
 
     /// The premultiplied colour and its error; nothing where there is no fragment.
-    fn premultiplied(&self, accumulator: &AccumulatorRow, bits: u32, range: &ColorRange) -> [[f64; 4]; 2] {
+    pub(super) fn premultiplied(&self, accumulator: &AccumulatorRow, bits: u32, range: &ColorRange) -> [[f64; 4]; 2] {
         if self.count == 0 {
             return [[0.0; 4]; 2];
         }
@@ -161,7 +179,7 @@ impl Pixel {
 }
 
 /// The bound on straight colour and alpha of a premultiplied mean and its error.
-fn straight([mean, error]: [[f64; 4]; 2]) -> [f64; 4] {
+pub(super) fn straight([mean, error]: [[f64; 4]; 2]) -> [f64; 4] {
     let alpha = mean[3] - error[3];
     std::array::from_fn(|k| {
         if k == 3 {
@@ -189,34 +207,39 @@ pub fn color_of_samples(samples: &[&Pixel], accumulator: &AccumulatorRow, bits: 
 }
 
 /// A fragment of the twin and how far the device may be from it.
-struct Fragment {
-    depth: f64,
+#[derive(Clone, Copy)]
+pub(super) struct Fragment {
+    pub(super) depth: f64,
     /// World units.
-    depth_error: f64,
+    pub(super) depth_error: f64,
     rho: f64,
     rho_error: f64,
     /// How far inside the lines at which the disk ends.
     inside: f64,
     inside_error: f64,
     /// It shows the back of a surface that has sides.
-    back: bool,
+    pub(super) back: bool,
     /// What light sees.
     normal: DVec3,
     normal_error: f64,
 }
 
 impl Fragment {
-    fn hits(&self, camera: &Camera) -> bool {
+    pub(super) fn weight(&self, kernel: Kernel) -> f64 {
+        kernel.weight(self.rho * self.rho)
+    }
+
+    pub(super) fn hits(&self, camera: &Camera) -> bool {
         self.rho <= 1.0 && self.inside >= 0.0 && self.depth >= camera.near
     }
 
-    fn surely_hits(&self, camera: &Camera) -> bool {
+    pub(super) fn surely_hits(&self, camera: &Camera) -> bool {
         self.rho + self.rho_error <= 1.0
             && self.inside - self.inside_error >= 0.0
             && self.depth - self.depth_error >= camera.near * (1.0 + U)
     }
 
-    fn may_hit(&self, camera: &Camera) -> bool {
+    pub(super) fn may_hit(&self, camera: &Camera) -> bool {
         // An error that is not a number knows nothing.
         !(self.rho - self.rho_error > 1.0
             || self.inside + self.inside_error < 0.0
@@ -225,7 +248,7 @@ impl Fragment {
 }
 
 /// Calls `visit` for each fragment of each splat in the image.
-fn fragments(
+pub(super) fn fragments(
     splats: &[Splat],
     scene: &Scene,
     (camera, sides): (&Camera, Sides),
@@ -287,10 +310,11 @@ fn turned_error(splat: &Splat, rho_error: f64) -> f64 {
 }
 
 /// A surfel's attributes.
-struct Surface {
-    color: [f64; 4],
+#[derive(Clone, Copy)]
+pub(super) struct Surface {
+    pub(super) color: [f64; 4],
     normal_error: f64,
-    radius: f64,
+    pub(super) radius: f64,
 }
 
 impl Surface {
@@ -397,20 +421,7 @@ pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Pi
         if !hits {
             return;
         }
-        let weight = options.kernel.weight(f.rho * f.rho);
-        known.count += 1;
-        known.weight += weight;
-        known.weight_error += weight_error(options.kernel, f);
-        known.depth_error += weight * f.depth_error;
-        known.normal_error += weight * f.normal_error;
-        known.normal += weight * f.normal;
-        known.normals = [known.normals[0].min(f.normal), known.normals[1].max(f.normal)];
-        known.depths = [known.depths[0].min(f.depth), known.depths[1].max(f.depth)];
-        for (k, value) in surface.color.into_iter().enumerate() {
-            known.color[k] += weight * value;
-            known.colors[0][k] = known.colors[0][k].min(value);
-            known.colors[1][k] = known.colors[1][k].max(value);
-        }
+        known.add(options.kernel, surface, f);
         let near = front.depth;
         known.interval = (near * relative + deepest.min(near * options.epsilon.most())).min(farthest - near).max(0.0);
     });
@@ -418,7 +429,7 @@ pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Pi
 }
 
 /// The error of a fragment's weight.
-fn weight_error(kernel: Kernel, f: &Fragment) -> f64 {
+pub(super) fn weight_error(kernel: Kernel, f: &Fragment) -> f64 {
     let psi = |rho: f64| kernel.weight(rho * rho);
     let weight = psi(f.rho);
     let moved = (psi((f.rho - f.rho_error).max(0.0)) - weight).max(weight - psi((f.rho + f.rho_error).min(1.0)));

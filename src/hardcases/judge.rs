@@ -184,7 +184,12 @@ pub fn judge(case: &HardCase, truth: &Truth, accumulator: &AccumulatorRow, frame
         covered += usize::from(there.weight > 0.0);
         let decision = truth.frame.map(Map::Decision).and_then(|map| map.get(index)).copied().unwrap_or(0.0);
         let samples = samples_of(case, truth, index);
-        if known.open || samples.iter().any(|sample| sample.open) || decision < DECISION_MARGIN {
+        let composited = truth.composited.get(index);
+        if known.open
+            || composited.is_some_and(|composited| composited.open)
+            || samples.iter().any(|sample| sample.open)
+            || decision < DECISION_MARGIN
+        {
             excused += 1;
             continue;
         }
@@ -199,7 +204,7 @@ pub fn judge(case: &HardCase, truth: &Truth, accumulator: &AccumulatorRow, frame
                 let bound = |row: &AccumulatorRow| {
                     let of_center = known.bound(row, bits, &range);
                     match samples.as_slice() {
-                        [] => of_center,
+                        [] => PixelBound { color: composited.map_or(of_center.color, |own| own.color), ..of_center },
                         all => PixelBound { color: color_of_samples(all, row, bits, &range), ..of_center },
                     }
                 };

@@ -23,6 +23,8 @@ use crate::scene::kernel::LEAST_WEIGHT;
 /// A fragment of the twin.
 #[derive(Clone, Copy, Debug)]
 pub struct Fragment {
+    /// Its surfel.
+    pub surfel: u32,
     /// Camera-space z, world units.
     pub depth: f64,
     /// It shows the back of a surface that has sides.
@@ -68,7 +70,16 @@ pub fn reference(strip: &Strip<'_>) -> Vec<List> {
                 if at.hit(camera) {
                     let weight = (gain * options.kernel.weight(at.rho2)).max(LEAST_WEIGHT);
                     let (depth, back, normal) = (at.depth, splat.shows_back(&at), splat.normal_at(&at));
-                    list.fragments.push(Fragment { depth, back, radius, weight, color, normal, rank });
+                    list.fragments.push(Fragment {
+                        surfel: splat.surfel,
+                        depth,
+                        back,
+                        radius,
+                        weight,
+                        color,
+                        normal,
+                        rank,
+                    });
                 }
             }
         }

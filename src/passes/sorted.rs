@@ -2,7 +2,7 @@
 //! is its surfel's alpha times its weight.
 
 use super::Strip;
-use super::fragments;
+use super::fragments::{self, Fragment};
 use super::layers::Shown;
 use super::resolve::shaded;
 use crate::frame::Frame;
@@ -11,17 +11,21 @@ use crate::plan::pass::Pass;
 
 /// The twin: the image of `strip`.
 pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
-    let Strip { camera, options, first_row, .. } = *strip;
+    let Strip { scene, camera, options, first_row, .. } = *strip;
+    // At one place the depths of two fragments are the same numbers, and the order of their surfels decides.
+    let place = |f: &Fragment| (scene.surfels[f.surfel as usize], scene.low.get(f.surfel as usize));
     for (pixel, list) in fragments::reference(strip).into_iter().enumerate() {
         let at = (pixel as u32 % camera.width, pixel as u32 / camera.width + first_row);
-        let (mut shown, mut decision, mut before) = (Shown::NOTHING, list.decision, f64::NEG_INFINITY);
+        let (mut shown, mut decision, mut before) = (Shown::NOTHING, list.decision, None::<&Fragment>);
         for f in &list.fragments {
             if !shown.lets_through() {
                 break;
             }
             // Where two depths are one but for rounding, either may come first.
-            decision = decision.min((f.depth - before) / f.depth);
-            before = f.depth;
+            if let Some(before) = before.filter(|before| place(before) != place(f)) {
+                decision = decision.min(1.0 - before.depth / f.depth);
+            }
+            before = Some(f);
             let normal = if f.back { -f.normal } else { f.normal };
             let [r, g, b, alpha] = shaded(f.color, normal, camera, options, at);
             shown.add([r, g, b, f.weight * alpha]);

@@ -1,0 +1,161 @@
+//! The bound on each pixel's error where surfaces show through each other: what [`bounds`](super::bounds) knows of each surface, or of each fragment,
+//! and what compositing makes of it.
+//!
+//! From front to back a pixel's transmittance T starts at 1; a surface of alpha a, known to da, and premultiplied colour p, known to dp, adds
+//! T p to the colour and leaves T (1 - a). With errors dT of T and dC of the colour, and u = 2^-24:
+//!
+//! - `dC += dT |p| + T dp + T |p| (d + 6 u)`, as p is divided by a and multiplied again, by a division of error d and six roundings;
+//! - `dT <- dT (1 - a) + (T + dT) da + 4 u T`.
+//!
+//! A pixel is **open** where these errors leave undecided which of a front and a back is nearer, where a gap of epsilon lies, what lies within
+//! epsilon of a surface's nearest fragment, or, sorted, which of two fragments is nearer, but for those of one disk's place: their depths are
+//! the same numbers, and the order of the surfels decides.
+
+use super::bounds::{ColorRange, DIVISION, Fragment, NOTHING, Pixel, Surface, fragments, straight, weight_error};
+use super::precision::E as U;
+use crate::passes::project::reference_all;
+use crate::plan::{Accumulator, Facts, RenderOptions, Sides};
+use crate::scene::{Camera, Composite, Scene, Tail};
+
+/// What is known of a pixel's colour.
+#[derive(Clone, Copy, Debug)]
+pub struct Composited {
+    /// Something may rightly be decided otherwise.
+    pub open: bool,
+    /// Bounds on linear RGB, straight, and alpha.
+    pub color: [f64; 4],
+}
+
+/// A fragment with its surfel's attributes.
+#[derive(Clone, Copy)]
+struct Listed {
+    fragment: Fragment,
+    surface: Surface,
+    /// Its surfel's centre and half-axes.
+    place: [[f32; 3]; 3],
+}
+
+/// Of each pixel of `scene` seen by `camera`.
+pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Composited> {
+    let splats = reference_all(scene, camera, options);
+    let view = (camera, Sides::of(&Facts::of(scene), camera, options));
+    let mut lists: Vec<(bool, Vec<Listed>)> = vec![(false, Vec::new()); camera.pixels()];
+    fragments(&splats, scene, view, |pixel, splat, surface, f| {
+        let (open, list) = &mut lists[pixel];
+        *open |= f.may_hit(camera) != f.surely_hits(camera);
+        if f.hits(camera) {
+            let surfel = &scene.surfels[splat.surfel as usize];
+            let place = [surfel.center, surfel.s, surfel.t];
+            list.push(Listed { fragment: *f, surface: *surface, place });
+        }
+    });
+    let range = ColorRange::of(scene);
+    let known = |(open, mut list): (bool, Vec<Listed>)| {
+        list.sort_by(|a, b| a.fragment.depth.total_cmp(&b.fragment.depth));
+        let (undecided, shown) = match options.composite {
+            Composite::Sorted => sorted(&list, options, &range),
+            _ => layers(&list, options, &range),
+        };
+        Composited { open: open || undecided, color: shown.bound() }
+    };
+    lists.into_iter().map(known).collect()
+}
+
+/// A premultiplied colour and alpha, and its error.
+type Known = [[f64; 4]; 2];
+
+/// What is composited so far, and how far the device may be from it.
+struct Shown {
+    color: Known,
+    transmittance: f64,
+    transmittance_error: f64,
+}
+
+impl Shown {
+    const NOTHING: Self = Self { color: [[0.0; 4]; 2], transmittance: 1.0, transmittance_error: 0.0 };
+
+    fn add(&mut self, [mean, error]: Known, opacity: f64) {
+        let (t, dt) = (self.transmittance, self.transmittance_error);
+        for k in 0..4 {
+            let (p, dp) = (opacity * mean[k].abs(), opacity * error[k]);
+            self.color[0][k] += t * opacity * mean[k];
+            self.color[1][k] += dt * p + t * dp + t * p * (DIVISION + 6.0 * U);
+        }
+        let (alpha, alpha_error) = (opacity * mean[3], opacity * error[3] + U * opacity * mean[3]);
+        self.transmittance = t * (1.0 - alpha);
+        self.transmittance_error = dt * (1.0 - alpha) + (t + dt) * alpha_error + 4.0 * U * t;
+    }
+
+    fn bound(&self) -> [f64; 4] {
+        if self.color[0][3] > 0.0 { straight(self.color) } else { [0.0; 4] }
+    }
+}
+
+fn sorted(list: &[Listed], options: &RenderOptions, range: &ColorRange) -> (bool, Shown) {
+    let (mut open, mut shown) = (false, Shown::NOTHING);
+    for pair in list.windows(2) {
+        let [a, b] = [&pair[0], &pair[1]];
+        let margin = a.fragment.depth_error + b.fragment.depth_error;
+        open |= a.place != b.place && b.fragment.depth - a.fragment.depth <= margin;
+    }
+    for Listed { fragment, surface, .. } in list {
+        let weight = fragment.weight(options.kernel);
+        let wrong = weight_error(options.kernel, fragment);
+        // Colours are mapped to [0, 1] and back.
+        let error = |k: usize| {
+            let mapped = range.span[k] * 4.0 * U + 2.0 * U * range.magnitude[k];
+            weight * mapped + wrong * surface.color[k].abs() + U * weight * surface.color[k].abs()
+        };
+        shown.add([surface.color.map(|c| weight * c), [0, 1, 2, 3].map(error)], f64::from(options.opacity));
+    }
+    (open, shown)
+}
+
+fn layers(list: &[Listed], options: &RenderOptions, range: &ColorRange) -> (bool, Shown) {
+    let Composite::Layers(most) = options.composite else { return (false, Shown::NOTHING) };
+    let rounding = |depth: f64| 4.0 * U * depth.abs();
+    let farthest = |f: &Listed, radius: f64| options.epsilon.farthest(f.fragment.depth, radius, 1.0);
+    let near = |a: f64, b: f64, margin: f64| (a - b).abs() <= margin;
+    let (mut open, mut shown, mut count) = (false, Shown::NOTHING, 0);
+    let mut told = [f64::NEG_INFINITY; 2];
+    let side = |f: &Listed| usize::from(f.fragment.back);
+    while let Some(first) = list.iter().position(|f| f.fragment.depth > told[side(f)]) {
+        let last = count == most;
+        if last && options.tail == Tail::None {
+            break;
+        }
+        let front = &list[first];
+        let margin = |f: &Listed| f.fragment.depth_error + front.fragment.depth_error + rounding(f.fragment.depth);
+        let other = list[first..].iter().find(|f| side(f) != side(front) && f.fragment.depth > told[side(f)]);
+        open |= other.is_some_and(|other| near(other.fragment.depth, front.fragment.depth, margin(other)));
+        let (mut end, mut end_error) = (farthest(front, front.surface.radius), front.fragment.depth_error);
+        let mut sums: Pixel = NOTHING;
+        for (number, f) in list.iter().enumerate().skip(first) {
+            let own = f.fragment.depth <= told[side(f)];
+            if own || !last && side(f) != side(front) {
+                continue;
+            }
+            if !last && number > first {
+                let window = farthest(front, f.surface.radius);
+                open |= near(f.fragment.depth, window, margin(f));
+                open |= near(f.fragment.depth, end, f.fragment.depth_error + end_error + rounding(f.fragment.depth));
+                if f.fragment.depth > end {
+                    break;
+                }
+                end = end.max(farthest(f, f.surface.radius));
+                end_error = end_error.max(f.fragment.depth_error);
+                if f.fragment.depth > window {
+                    continue;
+                }
+            }
+            sums.add(options.kernel, &f.surface, &f.fragment);
+        }
+        told[side(front)] = end;
+        if last {
+            told = [f64::INFINITY; 2];
+        }
+        shown.add(sums.premultiplied(Accumulator::Fixed.row(), 32, range), f64::from(options.opacity));
+        count += 1;
+    }
+    (open, shown)
+}

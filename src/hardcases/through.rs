@@ -1,0 +1,152 @@
+//! Surfaces that show through each other.
+
+use glam::DVec3;
+
+use super::HardCase;
+use super::staging::{BOTH, Entry, Filling, Stage, build, fraction};
+use crate::error::Result;
+use crate::scene::composite::ALL_LAYERS;
+use crate::scene::{Composite, Kernel, Surfel, Tail};
+
+/// The cases.
+pub fn cases() -> Result<Vec<HardCase>> {
+    build(LIST)
+}
+
+/// What their bounds are made of.
+const THROUGH: &str = "each surface's bound times what is let through to it, and six roundings a surface";
+
+const LAYERS: Composite = Composite::Layers(ALL_LAYERS);
+
+const LIST: &[Entry] = &[
+    Entry {
+        name: "sheets behind one another",
+        about: "Six sheets of alphas from 0.1 to 1 - 2^-8, three epsilons apart.",
+        bound: THROUGH,
+        size: (48, 40),
+        stage: Stage::askew,
+        fill: |stage| through(LAYERS, (0.9, 1.0), sheets(stage, 6, 0.1)),
+        projections: BOTH,
+    },
+    Entry {
+        name: "a hundred layers",
+        about: "A hundred disks over the whole image, an epsilon and a half apart, each of alpha 0.05.",
+        bound: THROUGH,
+        size: (24, 20),
+        stage: Stage::plain,
+        fill: |stage| through(LAYERS, (1.0, 1.0), disks(stage, 100, 0.015)).alphas(|_| 0.05),
+        projections: BOTH,
+    },
+    Entry {
+        name: "layers closer than epsilon",
+        about: "Disks a third of an epsilon apart, which are one surface of thirty epsilons, and a gap.",
+        bound: THROUGH,
+        size: (24, 20),
+        stage: Stage::plain,
+        fill: |stage| {
+            let mut all = disks(stage, 90, 0.0033);
+            all.extend(disks(stage, 3, 0.8));
+            through(LAYERS, (1.0, 1.0), all)
+        },
+        projections: BOTH,
+    },
+    Entry {
+        name: "a tail of most of the weight",
+        about: "Two layers of thirty, and all behind them as one.",
+        bound: THROUGH,
+        size: (24, 20),
+        stage: Stage::plain,
+        fill: |stage| through(Composite::Layers(2), (1.0, 1.0), disks(stage, 30, 0.02)).alphas(|_| 0.1),
+        projections: BOTH,
+    },
+    Entry {
+        name: "alphas of nothing and nearly all",
+        about: "Layers of alpha 0, 1 - 2^-8 and 1 in turns, before which one lets nothing through at some pixels.",
+        bound: THROUGH,
+        size: (48, 40),
+        stage: Stage::askew,
+        fill: |stage| {
+            let alphas = |k: usize| [0.0, 1.0 - 1.0 / 256.0, 0.5, 1.0][k % 4];
+            through(LAYERS, (0.9, 1.0), sheets(stage, 4, 0.1)).alphas(alphas)
+        },
+        projections: BOTH,
+    },
+    Entry {
+        name: "sheets that cross",
+        about: "Two sheets that pass through each other, which parts are nearer by turns.",
+        bound: THROUGH,
+        size: (48, 40),
+        stage: Stage::askew,
+        fill: |stage| {
+            let mut all = stage.sheet(3.0, 0.0, |x, _| 3.0 + 0.02 * (x - 24.0));
+            all.extend(stage.sheet(3.0, 0.0, |x, _| 3.0 - 0.02 * (x - 24.0)));
+            let filling = through(LAYERS, (0.9, 1.0), all);
+            Filling { excused: 0.3, ..filling }
+        },
+        projections: BOTH,
+    },
+    Entry {
+        name: "many fragments, one by one",
+        about: "Eight sheets of disks with colours of their own, each fragment composited by itself.",
+        bound: THROUGH,
+        size: (48, 40),
+        stage: Stage::askew,
+        fill: |stage| {
+            let filling = through(Composite::Sorted, (0.9, 1.0), sheets(stage, 8, 0.05));
+            Filling { excused: 0.05, ..filling }
+        },
+        projections: BOTH,
+    },
+    Entry {
+        name: "many at one place, one by one",
+        about: "Two hundred disks at one place, whose colours decide which comes first.",
+        bound: THROUGH,
+        size: (24, 20),
+        stage: Stage::plain,
+        fill: |stage| {
+            let disk = disks(stage, 1, 1.0);
+            through(Composite::Sorted, (1.0, 1.0), vec![disk[0]; 200]).alphas(|_| 0.02)
+        },
+        projections: BOTH,
+    },
+];
+
+fn through(composite: Composite, covered: (f64, f64), surfels: Vec<Surfel>) -> Filling {
+    let count = surfels.len();
+    let mut filling = Filling::of(surfels, covered);
+    filling.options.composite = composite;
+    filling.options.opacity = 0.9;
+    filling.options.tail = Tail::Sum;
+    filling.options.kernel = Kernel::Ellipse { a: 6.0, n: 3.0, smooth: false };
+    let color = |k: usize| {
+        let [r, g, b, a] = [0, 1, 2, 3].map(|axis| fraction(k, axis) as f32);
+        [r, g, b, 0.1 + 0.8 * a]
+    };
+    filling.colors = Some((0..count).map(color).collect());
+    filling
+}
+
+impl Filling {
+    /// With other alphas.
+    fn alphas(mut self, alpha: impl Fn(usize) -> f32) -> Self {
+        self.colors.iter_mut().flatten().enumerate().for_each(|(k, color)| color[3] = alpha(k));
+        self
+    }
+}
+
+/// Disks that face the camera, each over the whole image, `apart` times their depth.
+fn disks(stage: &Stage, count: usize, apart: f64) -> Vec<Surfel> {
+    let (width, height) = stage.size();
+    let middle = (0.5 * width as f64, 0.5 * height as f64);
+    let disk = |k: usize| {
+        let z = 3.0 * (1.0 + apart).powi(k as i32);
+        let center = stage.at(middle.0, middle.1, z);
+        stage.disk(center, DVec3::NEG_Z, 1.2 * (width + height) as f64 * stage.pixel(z))
+    };
+    (0..count).map(disk).collect()
+}
+
+/// Sheets of small disks, `apart` times their depth.
+fn sheets(stage: &Stage, count: usize, apart: f64) -> Vec<Surfel> {
+    (0..count).flat_map(|k| stage.sheet(4.0, 0.02, |_, _| 3.0 * (1.0 + apart).powi(k as i32))).collect()
+}

@@ -10,7 +10,7 @@ use epsplat::frame::Frame;
 use epsplat::gpu::{Gpu, Sources};
 use epsplat::metrics::DECISION_MARGIN;
 use epsplat::plan::{Organisation, RenderOptions};
-use epsplat::render::{Backend, Report, render};
+use epsplat::render::{Backend, Renderer, Report, render};
 use epsplat::scene::composite::ALL_LAYERS;
 use epsplat::scene::{
     Camera, Colors, Composite, Epsilon, Kernel, Map, Maps, Projection, Samples, Scene, Shading, Surfel, Tail,
@@ -277,6 +277,44 @@ fn a_tail_is_one_more_layer() {
     close(shown(Composite::Layers(2), Tail::None), 0.25 * 0.2, 0.75, 2.0);
     close(shown(Composite::Layers(2), Tail::Sum), 0.25 * 0.2 + 0.125 * 0.6, 0.875, 3.0);
     close(shown(Composite::Layers(1), Tail::Sum), 0.25 * 0.5, 0.75, 2.0);
+}
+
+/// What stays on the device from frame to frame shows in none: lists that grow and shrink, and bands that one view was cut into.
+#[test]
+fn a_kept_renderer_draws_what_a_fresh_one_does() {
+    let Some(all) = gpu() else { return };
+    let small = Backend::gpu(Gpu::with_buffer_limit(common::gpu().unwrap(), 900_000));
+    let scene = sphere(4000, 4.0);
+    let far = |factor: f64| {
+        let camera = sphere_camera(96, Projection::Pinhole);
+        Camera { fx: camera.fx * factor, fy: camera.fy * factor, ..camera }
+    };
+    let views = [far(0.3), far(1.0), far(0.3), far(0.6)];
+    for composite in [ALL, Composite::Sorted] {
+        let own = RenderOptions { opacity: 0.6, maps: Maps::of(&[Map::Depth, Map::Layers]), ..options(composite) };
+        for backend in [&all, &small] {
+            let mut kept = Renderer::new(&scene, &own, backend).unwrap();
+            for view in &views {
+                let fresh = all_bits(&frame(&scene, view, &own, &all));
+                assert!(all_bits(&kept.frame(view, &()).unwrap().0) == fresh, "{composite:?}");
+            }
+        }
+    }
+}
+
+/// Many copies of one surfel are as many fragments, for the twin too.
+#[test]
+fn copies_are_fragments_each() {
+    let Some(backend) = gpu() else { return };
+    let (mut scene, camera) = stack(1500, 0.5);
+    scene.surfels.iter_mut().skip(1500).for_each(|surfel| surfel.center[0] = 1000.0);
+    let of = RenderOptions { kernel: Kernel::Constant, ..unlit(Composite::Sorted, 0.001) };
+    let expected = 1.0 - 0.999f64.powi(1500);
+    for backend in [&backend, &Backend::Reference] {
+        let shown = frame(&scene, &camera, &of, backend);
+        assert!((f64::from(shown.color[5][3]) - expected).abs() < 1e-4, "{:?}", shown.color[5]);
+        assert_eq!(shown.map(Map::Layers).unwrap()[5], 1500.0);
+    }
 }
 
 /// Depth, normal and the like are those of the opaque picture, beside maps of all surfaces, whatever the samples.

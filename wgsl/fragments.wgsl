@@ -1,7 +1,7 @@
 // Stage 3 where surfaces show through each other: each pixel's fragments become a list. Their numbers, which the visibility pass left,
 // become where lists start, by a scan over rows and one over the pixels of each; then every fragment takes a place in its pixel's list.
 // Host side and twin: src/passes/fragments.rs.
-// All loops end, by 1, 2, 4 of src/gpu/loops.rs: 0x03d21e8719b37098
+// All loops end, by 1, 2, 4 of src/gpu/loops.rs: 0x9da8b6de3d8bd24e
 
 // How many fragments there are and how many at most at a pixel; where the lists of each row start and where the last one ends; then the
 // same of each pixel. Past what a word holds all three stay at its end.
@@ -195,8 +195,9 @@ fn list_fragments_large(
 // Where a pixel's list starts and ends.
 fn list_of(pixel: u32) -> vec2<u32> {
     let list = vec2<u32>(starts[pixels_start() + pixel], starts[pixels_start() + pixel + 1u]);
-    // What found no fragment is before the others.
-    return vec2<u32>(list.x + visible[pixel], list.y);
+    // Places for which no fragment was found are before the others; below none, one had no place.
+    let left = visible[pixel];
+    return vec2<u32>(list.x + select(left, 0u, left > list.y - list.x), list.y);
 }
 
 fn record_at(at: u32) -> Record {

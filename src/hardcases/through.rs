@@ -21,7 +21,7 @@ const LAYERS: Composite = Composite::Layers(ALL_LAYERS);
 const LIST: &[Entry] = &[
     Entry {
         name: "sheets behind one another",
-        about: "Six sheets of alphas from 0.1 to 1 - 2^-8, three epsilons apart.",
+        about: "Six sheets of disks with alphas from 0.1 to 0.9, ten epsilons apart.",
         bound: THROUGH,
         size: (48, 40),
         stage: Stage::askew,
@@ -61,13 +61,17 @@ const LIST: &[Entry] = &[
     },
     Entry {
         name: "alphas of nothing and nearly all",
-        about: "Layers of alpha 0, 1 - 2^-8 and 1 in turns, before which one lets nothing through at some pixels.",
+        about: "Sheets of alpha 0, 1 - 2^-8, 1/2 and 1 behind one another, and one behind that, which nobody sees.",
         bound: THROUGH,
         size: (48, 40),
         stage: Stage::askew,
         fill: |stage| {
-            let alphas = |k: usize| [0.0, 1.0 - 1.0 / 256.0, 0.5, 1.0][k % 4];
-            through(LAYERS, (0.9, 1.0), sheets(stage, 4, 0.1)).alphas(alphas)
+            let surfels = sheets(stage, 5, 0.1);
+            let of_sheet = surfels.len() / 5;
+            let alphas = |k: usize| [0.0, 1.0 - 1.0 / 256.0, 0.5, 1.0, 0.7][k / of_sheet];
+            let mut filling = through(LAYERS, (0.9, 1.0), surfels).alphas(alphas);
+            filling.options.opacity = 1.0;
+            filling
         },
         projections: BOTH,
     },

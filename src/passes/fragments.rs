@@ -176,7 +176,9 @@ pub fn cut(plan: &Plan, band: usize, starts: &[u64], most: u64) -> Option<Vec<Ba
         fits &= *of_cut > 0 && starts[at + of_cut] - starts[at] <= most;
         at += of_cut;
     }
-    let least = rows.iter().copied().min().filter(|_| fits)?.max(whole) as u32;
+    // The last piece is what was left.
+    let full = &rows[..rows.len().saturating_sub(1).max(1)];
+    let least = full.iter().copied().min().filter(|_| fits)?.max(whole) as u32;
     let mut bands = plan.bands[..band].to_vec();
     let mut next = plan.bands[band].first;
     for of_cut in rows {

@@ -10,7 +10,7 @@
 //! normals have sides a front and a back are two surfaces, however near they lie.
 //!
 //! Sums are those of [`accumulate`](mod@super::accumulate), in integers, of the same terms, so a layer of alpha 1 that is nearest has the bits of the
-//! opaque picture; and a picture all of whose alphas are 1 is drawn as one.
+//! opaque picture that leaves no backs out; and a picture all of whose alphas are 1 is drawn as one.
 
 use super::Strip;
 use super::accumulate::PixelSums;
@@ -114,6 +114,11 @@ impl Shown {
         self.transmittance >= LEAST_TRANSMITTANCE
     }
 
+    /// The relative distance to letting nothing more through.
+    pub(super) fn decision(&self) -> f64 {
+        (self.transmittance / LEAST_TRANSMITTANCE - 1.0).abs()
+    }
+
     /// A straight colour behind.
     pub(super) fn add(&mut self, [r, g, b, alpha]: [f64; 4]) {
         let shows = self.transmittance * alpha;
@@ -141,11 +146,12 @@ pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
     for (pixel, list) in fragments::reference(strip).into_iter().enumerate() {
         let (x, y) = (pixel as u32 % camera.width, pixel as u32 / camera.width + first_row);
         let along = camera.along_axis(x, y);
-        let (layers, decision) = part(&list.fragments, (most, options.tail), Parting::Runs, (options, along));
+        let (layers, mut decision) = part(&list.fragments, (most, options.tail), Parting::Runs, (options, along));
         let mut shown = Shown::NOTHING;
         for sums in layers {
             if shown.lets_through() {
                 shown.add(surface(&sums, scene, camera, options, (x, y)).0);
+                decision = decision.min(shown.decision());
             }
         }
         shown.write(options, list.decision.min(decision), frame, pixel);

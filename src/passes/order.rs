@@ -2,8 +2,8 @@
 //! neighbours in the image, cut into runs, and the runs dealt out over the scene.
 //!
 //! Invocations of a subgroup then draw splats of one place: they loop alike, and hidden ones fail together. Runs that are
-//! in work at the same time lie far apart, so that their atomics do not wait for each other. No image depends on it: sums
-//! and minima take no notice of order. (Schuetz et al. 2021, "Rendering Point Clouds with Compute Shaders and Vertex
+//! in work at the same time lie far apart, so that their atomics do not wait for each other. Sums and minima take no
+//! notice of order; of fragments at one depth what is sorted and the map of indices take the first, which depends on what surfels are alone. (Schuetz et al. 2021, "Rendering Point Clouds with Compute Shaders and Vertex
 //! Order Optimization".)
 
 use rayon::prelude::*;

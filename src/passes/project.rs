@@ -13,9 +13,9 @@ use super::splat::Splat;
 use crate::gpu::layout::QUEUE_START;
 use crate::plan::pass::{Making, Pass};
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
-use crate::plan::{Facts, RenderOptions, Sides, culls_back};
+use crate::plan::{Facts, RenderOptions, Sides, composited, culls_back};
 use crate::plan::{Organisation, Plan, tuning};
-use crate::scene::{Camera, Cap, Clip, LowPass, Scene, Surfel, copies, has_copies};
+use crate::scene::{Camera, Cap, Clip, Composite, LowPass, Scene, Surfel, copies, has_copies};
 
 /// A surfel with its index; and its cap, in a scene in which some surfel curves.
 pub type Indexed<'a> = (u32, &'a Surfel, Option<Cap>);
@@ -109,7 +109,9 @@ pub fn reference_all(scene: &Scene, camera: &Camera, options: &RenderOptions) ->
     let eye = camera.eye - scene.origin;
     let facts = Facts::of(scene);
     let (cull_back, sides) = (culls_back(&facts, camera, options), Sides::of(&facts, camera, options));
-    let copies = (has_copies(scene) && options.draws_copies_once()).then(|| copies(scene));
+    // Lists have each of them.
+    let once = options.draws_copies_once() && composited(&facts, options) == Composite::Opaque;
+    let copies = (has_copies(scene) && once).then(|| copies(scene));
     let cap = |index: usize| scene.caps.get(index).copied().filter(|_| options.draws_caps());
     let project = |(index, surfel): (usize, &Surfel)| {
         let copies = copies.as_ref().map_or(1, |copies| copies[index]);

@@ -13,7 +13,10 @@ use crate::plan::pass::Pass;
 pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
     let Strip { scene, camera, options, first_row, .. } = *strip;
     // At one place the depths of two fragments are the same numbers, and the order of their surfels decides.
-    let place = |f: &Fragment| (scene.surfels[f.surfel as usize], scene.low.get(f.surfel as usize));
+    let place = |f: &Fragment| {
+        let surfel = f.surfel as usize;
+        (scene.surfels[surfel], scene.low.get(surfel), scene.caps.get(surfel))
+    };
     for (pixel, list) in fragments::reference(strip).into_iter().enumerate() {
         let at = (pixel as u32 % camera.width, pixel as u32 / camera.width + first_row);
         let (mut shown, mut decision, mut before) = (Shown::NOTHING, list.decision, None::<&Fragment>);
@@ -29,6 +32,7 @@ pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
             let normal = if f.back { -f.normal } else { f.normal };
             let [r, g, b, alpha] = shaded(f.color, normal, camera, options, at);
             shown.add([r, g, b, f.weight * alpha]);
+            decision = decision.min(shown.decision());
         }
         shown.write(options, decision, frame, pixel);
     }

@@ -70,7 +70,7 @@ impl Run<'_> {
         let rows = u64::from(self.plan.bands[band].rows);
         let words = starts.read(self.gpu, 2 + rows + 1)?;
         let [total, longest] = [words[0], words[1]];
-        let sorted = LONGEST_LIST.min(4 * LONGEST_LIST / self.plan.needs.samples.count());
+        let sorted = LONGEST_LIST.min(MOST_COMPOSITED / self.plan.needs.samples.count());
         if self.gpu.adapter.is_software() && longest > sorted {
             return Err(self.gpu.error(format!(
                 "{longest} fragments lie at one pixel, and this adapter ends loops before more than {sorted} are composited: \
@@ -98,5 +98,10 @@ impl Run<'_> {
 }
 
 /// The most fragments that a pixel's list has on a software adapter, which ends the loops of an invocation after 65,535 rounds: a heap
-/// of n takes fewer than n (log2 n + 2) of them, and to composite it 3 n for each sample of the invocation's pixel.
+/// of n takes fewer than n (log2 n + 2) of them.
 const LONGEST_LIST: u32 = MOST_ROUNDS / 8;
+
+/// The most that the samples of a pixel have there together, as one invocation composites them: a fragment takes five rounds at most, where
+/// fronts and backs alternate (it is looked at, passed over for the other side, ends a run, is skipped, and starts a surface), and as many
+/// again are left for other invocations of the subgroup, in whose rounds this one waits.
+const MOST_COMPOSITED: u32 = MOST_ROUNDS / 5;

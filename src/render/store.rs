@@ -269,12 +269,16 @@ impl Store {
     /// Makes room for `count` fragments in lists, and an eighth more for the next band or view, up to `most`.
     pub fn make_fragments(&mut self, gpu: &Gpu, plan: &Plan, count: u64, most: u64) -> Result<()> {
         let record = u64::from(FragmentLayout::of(&plan.needs).words);
-        if self.frame.get("keys").is_some_and(|keys| keys.len >= count * KEY_WORDS) {
+        let buffers = [("keys", "depths of fragments", KEY_WORDS), ("fragments", "fragments", record)];
+        let holds = |(name, _, words): &(&str, &str, u64)| {
+            self.frame.get(name).is_some_and(|buffer| buffer.len >= count * words)
+        };
+        if buffers.iter().all(holds) {
             return Ok(());
         }
         // The old ones make room first.
-        for (name, what, words) in [("keys", "depths of fragments", KEY_WORDS), ("fragments", "fragments", record)] {
-            self.frame.remove(name);
+        buffers.iter().for_each(|(name, ..)| drop(self.frame.remove(name)));
+        for (name, what, words) in buffers {
             let room = (count + count / 8).min(most).max(1);
             self.frame.insert(name, Buffer::storage(gpu, what, room * words)?);
         }

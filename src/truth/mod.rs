@@ -1,8 +1,8 @@
 //! What a surface looks like when no splat is asked: ray casting, the ground truth of reconstruction errors.
 //!
 //! Rays and hits are f64. An analytic [`Shape`] is met by its formula, a mesh by each triangle, found through a tree of
-//! boxes ([`triangles`]); the disks that stand for a surface are found in the same way ([`disks`]). Only the first surface
-//! on a ray is shaded: there are no layers of transparency, as in a render.
+//! boxes ([`triangles`]); the disks that stand for a surface are found in the same way ([`disks`]). The first surface
+//! on a ray is shaded, and where surfaces let something through, those behind it.
 
 mod disk;
 pub mod disks;

@@ -1,6 +1,7 @@
 //! The sequence: project, visibility, accumulate, resolve, on every backend.
 
 pub mod inspect;
+mod encoded;
 mod kept;
 mod kernels;
 mod look;
@@ -83,6 +84,7 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         check::options(options, reference)?;
         let facts = source.facts();
         check::scene(&facts, options, reference)?;
+        let options = &encoded::of(&facts, options);
         let mut parts = parts::parts(&facts, options).into_iter();
         let colors = parts.next().unwrap_or_else(|| options.clone());
         let of_maps = parts.map(|options| Kept::new(facts.clone(), options)).collect();
@@ -103,7 +105,11 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
             maps.push(one(part)?);
             kept.store = part.store.take();
         }
-        Ok(parts::joined(one(kept)?, maps))
+        let (mut frame, report) = parts::joined(one(kept)?, maps);
+        if kept.facts.encoded {
+            encoded::decode(&mut frame);
+        }
+        Ok((frame, report))
     }
 
     /// Device memory that the last frame was rendered with; none for the reference.

@@ -1,7 +1,7 @@
 // Stage 3 where surfaces show through each other: each pixel's fragments become a list. Their numbers, which the visibility pass left,
 // become where lists start, by a scan over rows and one over the pixels of each; then every fragment takes a place in its pixel's list.
 // Host side and twin: src/passes/fragments.rs.
-// All loops end, by 1, 2, 4 of src/gpu/loops.rs: 0x9da8b6de3d8bd24e
+// All loops end, by 1, 2, 4 of src/gpu/loops.rs: 0xc019266e3ad69be4
 
 // How many fragments there are and how many at most at a pixel; where the lists of each row start and where the last one ends; then the
 // same of each pixel. Past what a word holds all three stay at its end.
@@ -102,8 +102,12 @@ override FRAGMENT_HAS_RADIUS: bool;
 const MOST_FRAGMENT_WORDS: u32 = 12u;
 alias Record = array<u32, MOST_FRAGMENT_WORDS>;
 
-// Gives a fragment a place in its pixel's list.
+// Gives a fragment a place in its pixel's list, unless it is too faint to be listed.
 fn list_fragment(pixel: u32, fragment: Fragment, surfel: u32, attributes: Attributes) {
+    let weight = fragment_weight(fragment);
+    if (!is_listed(weight * OPACITY * (held.color_low.a + held.color_span.a * attributes.color.a))) {
+        return;
+    }
     // Counted down from as many as there are; if two kernels differ about a rim, what has no place is left out.
     let left = atomicSub(&nearest[pixel], 1u);
     let at = starts[pixels_start() + pixel] + (left - 1u);
@@ -112,7 +116,7 @@ fn list_fragment(pixel: u32, fragment: Fragment, surfel: u32, attributes: Attrib
     }
     keys[at] = vec2<u32>(bitcast<u32>(fragment.depth), at);
     var record: Record;
-    record[0] = bitcast<u32>(fragment_weight(fragment));
+    record[0] = bitcast<u32>(weight);
     for (var k = 0u; k < FRAGMENT_COLORS; k++) {
         record[FRAGMENT_COLOR + k] = bitcast<u32>(attributes.color[k]);
     }

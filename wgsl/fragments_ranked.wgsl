@@ -8,6 +8,14 @@ override FRAGMENT_RANK: u32;
 
 const TIES: bool = true;
 
+// Rules in src/passes/sorted.rs.
+override LEAST_ALPHA: f32;
+
+// By the alpha of a fragment.
+fn is_listed(alpha: f32) -> bool {
+    return alpha >= LEAST_ALPHA;
+}
+
 fn with_rank(record: Record, surfel: u32) -> Record {
     var ranked = record;
     ranked[FRAGMENT_RANK] = page_first + surfel;

@@ -2,6 +2,10 @@
 
 const TIES: bool = false;
 
+fn is_listed(alpha: f32) -> bool {
+    return true;
+}
+
 fn with_rank(record: Record, surfel: u32) -> Record {
     return record;
 }

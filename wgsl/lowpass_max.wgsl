@@ -1,8 +1,8 @@
 // The larger of the object-space kernel and a round screen-space one (Botsch et al. 2005, section 4.2): the smaller rho.
 // Twin: src/passes/lowpass.rs.
 
-// The circle about a pixel's corners: a splat reaches the centre of the pixel it lies in. See RADIUS in the twin.
-const FILTER_RADIUS: f32 = 0.7072;
+// Design::radius in the twin, pixels.
+override FILTER_RADIUS: f32;
 
 fn low_pass(h: ptr<function, Homography>) -> Filter {
     if (!(*h).centered) {

@@ -26,6 +26,9 @@ pub(super) struct Reading {
     /// Keep the points that a LAS file marks as withheld, which is deleted; else they are left out and counted
     #[arg(long)]
     keep_withheld: bool,
+    /// Draw the Gaussians of a 3DGS file as surfels, without their shortest axis, even if they are not flat
+    #[arg(long)]
+    flatten: bool,
 }
 
 /// Which points become surfels, and how large those may be.
@@ -84,7 +87,11 @@ impl InputFormat {
 impl Reading {
     /// The points of a file.
     pub(super) fn points(&self, path: &Path, bars: &Bars) -> Result<Points> {
-        let options = ReadOptions { format: self.input.input_format, keep_withheld: self.keep_withheld };
+        let options = ReadOptions {
+            format: self.input.input_format,
+            keep_withheld: self.keep_withheld,
+            flatten: self.flatten,
+        };
         io::read_with(path, options, bars)
     }
 
@@ -101,6 +108,6 @@ impl Reading {
         let format = self.input.input_format.and_then(|format| Format::READ.iter().find(|(_, known)| *known == format));
         let format = format.map_or(String::new(), |(name, _)| format!(" --input-format {name}"));
         let withheld = if self.keep_withheld { " --keep-withheld" } else { "" };
-        format + withheld
+        format + withheld + if self.flatten { " --flatten" } else { "" }
     }
 }

@@ -1,5 +1,6 @@
 //! `epsplat render`: files in, a picture and its maps out, or one for each of many cameras.
 
+mod options;
 mod output;
 mod view;
 mod views;
@@ -11,18 +12,18 @@ use clap::{Args, ValueEnum};
 use epsplat::gpu::Gpu;
 use epsplat::io::Texture;
 use epsplat::passes::unseen::{Unseen, is_empty};
-use epsplat::plan::{Accumulator, BackendName, BlendFormat, Organisation, Raster, RasterDepth, RenderOptions, check};
+use epsplat::plan::{Accumulator, BackendName, BlendFormat, Organisation, RasterDepth};
 use epsplat::render::{Backend, Report, render};
-use epsplat::scene::composite::ALL_LAYERS;
 use epsplat::scene::{
-    Blend, Camera, Composite, Cull, Epsilon, Facing, Kernel, Light, LowPass, MAPS, Map, Maps, Outline, PointShape,
-    PointSize, Samples, Scene, Shading, ShadingAt, Tail,
+    Blend, Camera, Composite, Cull, Epsilon, Kernel, Light, MAPS, Map, Outline, PointShape, PointSize, Samples, Scene,
+    Tail,
 };
 use epsplat::surfels::Preparation;
 use epsplat::{Error, Result, surfels};
 use glam::DVec3;
 use serde::Serialize;
 
+use self::options::{for_scene, options};
 use self::output::{Format, note_overflows, summary};
 use self::view::{ChosenView, View};
 use super::parse::{parse_color, parse_intrinsics, parse_pixels, parse_scale, parse_size, parse_up, parse_vector};
@@ -133,8 +134,9 @@ pub struct Arguments {
     #[arg(long, value_name = "HOW")]
     blend: Option<Blend>,
     /// What shows of the surfaces behind a pixel's nearest one: opaque (nothing; its alpha shows the background), layers (all of
-    /// them, from front to back, by the alpha of each), layers:L (the nearest L) or sorted (every fragment, in the order of depths, by
-    /// its alpha times its weight) [default: opaque]
+    /// them, from front to back, by the alpha of each), layers:L (the nearest L), sorted (every fragment, in the order of depths, by
+    /// its alpha times its weight) or gaussians (the same by the rules of 2D Gaussian splatting) [default: opaque, of Gaussians
+    /// gaussians]
     #[arg(long, value_name = "HOW", help_heading = "Transparency")]
     composite: Option<Composite>,
     /// What all alphas are multiplied with, 0 to 1
@@ -143,12 +145,13 @@ pub struct Arguments {
     /// What becomes of the surfaces behind the last of layers:L: sum (they are blended, as one more) or none [default: sum]
     #[arg(long, value_name = "HOW", requires = "composite", help_heading = "Transparency")]
     tail: Option<Tail>,
-    /// Filter for splats near a pixel in size or below
-    #[arg(long, value_enum, default_value_t = LowPassName::None)]
-    lowpass: LowPassName,
+    /// Filter for splats near a pixel in size or below [default: none]
+    #[arg(long, value_enum)]
+    lowpass: Option<LowPassName>,
     /// Samples of a pixel: 1, 4, 8 or 16. Edges are as smooth as they are many; maps are of the pixel's centre
-    #[arg(long, value_name = "N", default_value = "4", help_heading = "Surface")]
-    samples: Samples,
+    /// [default: 4, of Gaussians 1]
+    #[arg(long, value_name = "N", help_heading = "Surface")]
+    samples: Option<Samples>,
     /// auto: surfels that face away from the eye are left out where the scene is a closed mesh seen from outside, as nobody
     /// sees them but past its outline; back: they are left out of any scene whose normals have a side; none: a pixel shows
     /// the side that is nearest
@@ -167,7 +170,7 @@ pub struct Arguments {
     /// How --backend raster tests depth: exact (in the shader, as compute does) or offset (by the rasteriser) [default: exact]
     #[arg(long, value_name = "HOW")]
     raster_depth: Option<RasterDepth>,
-    /// Shading of the blended colour [default: lambert; unlit with --facing and --blend nearest]
+    /// Shading of the blended colour [default: lambert; unlit with --facing, --blend nearest, and of Gaussians]
     #[arg(long, value_enum)]
     shading: Option<ShadingName>,
     /// What is lit: each pixel, at its blended normal, or each splat, at its centre, whose lit colours are blended
@@ -215,6 +218,8 @@ enum LowPassName {
     Max,
     /// Convolved with the pixel: no aliasing either
     Ewa,
+    /// As 2D Gaussian splatting does it: a Gaussian of a pixel beside that of the splat
+    Gaussians,
 }
 
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
@@ -241,13 +246,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 }
 
 impl Arguments {
-    /// Points that face the camera have no normals, and of what is not blended none is kept.
-    fn shading(&self) -> ShadingName {
-        let unlit = self.facing.is_some() || self.blend == Some(Blend::Nearest);
-        let unless_chosen = if unlit { ShadingName::Unlit } else { ShadingName::Lambert };
-        self.shading.unwrap_or(unless_chosen)
-    }
-
     /// The files that are read, but those of `--cameras`.
     fn files(&self) -> impl Iterator<Item = &PathBuf> {
         self.inputs.iter().chain(&self.camera).chain(&self.texture)
@@ -264,6 +262,7 @@ fn one(arguments: &Arguments) -> Result<()> {
 
     let bars = Bars::new();
     let (scene, preparation) = scene(arguments, &bars)?;
+    let options = for_scene(arguments, options, &scene)?;
     let (camera, chosen) = view.camera(&scene, Camera::default_near(&scene))?;
     let chosen = chosen.map(|view| ChosenView::new(view, &scene, arguments.up, preparation.guessed_up));
     chosen.iter().for_each(|view| note(&view.sentence()));
@@ -315,103 +314,6 @@ fn scene(arguments: &Arguments, bars: &Bars) -> Result<(Scene, Preparation)> {
     Ok((scene, preparation))
 }
 
-fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
-    let maps = Maps::of(&arguments.aov);
-    if !maps.is_empty() && format == Format::Png {
-        return Err(Error::Usage("a PNG holds no maps: give --aov with an .exr output".into()));
-    }
-    check_chosen(arguments)?;
-    if arguments.blend == Some(Blend::Nearest) && (arguments.epsilon.is_some() || arguments.kernel.is_some()) {
-        let what = "--blend nearest has no tolerance and no weights: leave --epsilon and --kernel out";
-        return Err(Error::Usage(what.into()));
-    }
-    if arguments.tail.is_some() && !matches!(arguments.composite, Some(Composite::Layers(most)) if most < ALL_LAYERS) {
-        return Err(Error::Usage("a tail lies behind a last layer: give --tail with --composite layers:L".into()));
-    }
-    if arguments.shading_at == ShadingAtName::Splat && arguments.shading() == ShadingName::Unlit {
-        return Err(Error::Usage("nothing is lit: give --shading-at with --shading lambert or phong".into()));
-    }
-    let default = RenderOptions::default();
-    let options = RenderOptions {
-        epsilon: arguments.epsilon.unwrap_or(default.epsilon),
-        kernel: arguments.kernel.unwrap_or(default.kernel),
-        blend: arguments.blend.unwrap_or_default(),
-        composite: arguments.composite.unwrap_or_default(),
-        opacity: arguments.opacity,
-        tail: arguments.tail.unwrap_or_default(),
-        cull: arguments.cull,
-        samples: arguments.samples,
-        facing: facing(arguments),
-        outline: arguments.outline,
-        low_pass: match arguments.lowpass {
-            LowPassName::None => LowPass::None,
-            LowPassName::Max => LowPass::Max,
-            LowPassName::Ewa => LowPass::Ewa,
-        },
-        accumulator: arguments.accumulator.unwrap_or_default(),
-        organisation: arguments.organisation.unwrap_or_default(),
-        raster: raster(arguments),
-        shading: match arguments.shading() {
-            ShadingName::Unlit => Shading::Unlit,
-            ShadingName::Lambert => Shading::Lambert,
-            ShadingName::Phong => Shading::Phong,
-        },
-        shading_at: match arguments.shading_at {
-            ShadingAtName::Pixel => ShadingAt::Pixel,
-            ShadingAtName::Splat => ShadingAt::Splat,
-        },
-        shininess: shininess(arguments)?.unwrap_or(default.shininess),
-        lights: if arguments.lights.is_empty() { default.lights } else { arguments.lights.clone() },
-        background: arguments.background.unwrap_or(default.background),
-        maps,
-        without: default.without,
-    };
-    check::options(&options, arguments.backend.0 == Some(BackendName::Reference))?;
-    if arguments.texture.is_some() && arguments.facing.is_some() {
-        return Err(Error::Usage("points that face the camera have no plane to paint: leave --texture out".into()));
-    }
-    if arguments.texture.is_some() {
-        check::textured(&options, arguments.backend.0 == Some(BackendName::Reference))?;
-    }
-    Ok(options)
-}
-
-/// How points face the camera, if they do.
-fn facing(arguments: &Arguments) -> Option<Facing> {
-    let pixels = if let PointSize::Pixels(diameter) = arguments.point_size { [diameter; 2] } else { arguments.pixels };
-    arguments.facing.map(|shape| Facing { shape, pixels })
-}
-
-/// The exponent of highlights, if there are any.
-fn shininess(arguments: &Arguments) -> Result<Option<f32>> {
-    match arguments.shininess {
-        Some(_) if arguments.shading() != ShadingName::Phong => {
-            Err(Error::Usage("--shininess is of highlights: give it with --shading phong".into()))
-        }
-        chosen => Ok(chosen),
-    }
-}
-
-/// Fails for a choice that the backend does not have.
-fn check_chosen(arguments: &Arguments) -> Result<()> {
-    let chosen = check::Chosen {
-        accumulator: arguments.accumulator.is_some(),
-        organisation: arguments.organisation.is_some(),
-        without: false,
-        raster: arguments.blend_format.is_some() || arguments.raster_depth.is_some(),
-    };
-    check::chosen(arguments.backend.0, chosen)
-}
-
-/// The rasteriser's options, if it renders.
-fn raster(arguments: &Arguments) -> Option<Raster> {
-    let default = Raster::default();
-    (arguments.backend.0 == Some(BackendName::Raster)).then(|| Raster {
-        format: arguments.blend_format.unwrap_or(default.format),
-        depth: arguments.raster_depth.unwrap_or(default.depth),
-    })
-}
-
 fn backend(arguments: &Arguments) -> Result<Backend> {
     if arguments.backend.0 == Some(BackendName::Reference) {
         if arguments.adapter.is_some() {
@@ -429,30 +331,5 @@ fn backend(arguments: &Arguments) -> Result<Backend> {
             Ok(Backend::Reference)
         }
         Err(error) => Err(error),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use clap::Parser;
-
-    use super::*;
-
-    #[derive(Parser)]
-    struct Alone {
-        #[command(flatten)]
-        arguments: Arguments,
-    }
-
-    #[test]
-    fn what_nobody_asks_for_is_the_librarys_default_but_for_samples() {
-        let of = |given: &[&str]| {
-            let all = ["render", "in.ply", "-o", "out.exr"].iter().chain(given);
-            options(&Alone::try_parse_from(all).unwrap().arguments, Format::Exr).unwrap()
-        };
-        let samples: Samples = "4".parse().unwrap();
-        assert_eq!(of(&[]), RenderOptions { samples, ..RenderOptions::default() });
-        assert_ne!(of(&["--epsilon", "rel:0.01"]).epsilon, RenderOptions::default().epsilon);
     }
 }

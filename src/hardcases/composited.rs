@@ -14,6 +14,7 @@
 use super::bounds::{ColorRange, DIVISION, Fragment, NOTHING, Pixel, Surface, fragments, straight, weight_error};
 use super::precision::E as U;
 use crate::passes::project::reference_all;
+use crate::passes::sorted::Rules;
 use crate::plan::{Accumulator, Facts, RenderOptions, Sides};
 use crate::scene::{Camera, Composite, Scene, Tail};
 
@@ -53,7 +54,7 @@ pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Co
     let known = |(open, mut list): (bool, Vec<Listed>)| {
         list.sort_by(|a, b| a.fragment.depth.total_cmp(&b.fragment.depth));
         let (undecided, shown) = match options.composite {
-            Composite::Sorted => sorted(&list, options, &range),
+            Composite::Sorted | Composite::Gaussians => sorted(&list, options),
             _ => layers(&list, options, &range),
         };
         Composited { open: open || undecided, color: shown.bound() }
@@ -65,6 +66,7 @@ pub fn pixels(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Vec<Co
 type Known = [[f64; 4]; 2];
 
 /// What is composited so far, and how far the device may be from it.
+#[derive(Clone, Copy)]
 struct Shown {
     color: Known,
     transmittance: f64,
@@ -74,7 +76,7 @@ struct Shown {
 impl Shown {
     const NOTHING: Self = Self { color: [[0.0; 4]; 2], transmittance: 1.0, transmittance_error: 0.0 };
 
-    fn add(&mut self, [mean, error]: Known, opacity: f64) {
+    fn with(mut self, [mean, error]: Known, opacity: f64) -> Self {
         let (t, dt) = (self.transmittance, self.transmittance_error);
         for k in 0..4 {
             let (p, dp) = (opacity * mean[k].abs(), opacity * error[k]);
@@ -84,6 +86,7 @@ impl Shown {
         let (alpha, alpha_error) = (opacity * mean[3], opacity * error[3] + U * opacity * mean[3]);
         self.transmittance = t * (1.0 - alpha);
         self.transmittance_error = dt * (1.0 - alpha) + (t + dt) * alpha_error + 4.0 * U * t;
+        self
     }
 
     fn bound(&self) -> [f64; 4] {
@@ -91,8 +94,10 @@ impl Shown {
     }
 }
 
-fn sorted(list: &[Listed], options: &RenderOptions, range: &ColorRange) -> (bool, Shown) {
+/// By what rules say of a fragment it is **open** too whether it is listed, and whether it is the last.
+fn sorted(list: &[Listed], options: &RenderOptions) -> (bool, Shown) {
     let (mut open, mut shown) = (false, Shown::NOTHING);
+    let (rules, opacity) = (Rules::of(options), f64::from(options.opacity));
     for pair in list.windows(2) {
         let [a, b] = [&pair[0], &pair[1]];
         let margin = a.fragment.depth_error + b.fragment.depth_error;
@@ -101,12 +106,23 @@ fn sorted(list: &[Listed], options: &RenderOptions, range: &ColorRange) -> (bool
     for Listed { fragment, surface, .. } in list {
         let weight = fragment.weight(options.kernel);
         let wrong = weight_error(options.kernel, fragment);
-        // Colours are mapped to [0, 1] and back.
-        let error = |k: usize| {
-            let mapped = range.span[k] * 4.0 * U + 2.0 * U * range.magnitude[k];
-            weight * mapped + wrong * surface.color[k].abs() + U * weight * surface.color[k].abs()
-        };
-        shown.add([surface.color.map(|c| weight * c), [0, 1, 2, 3].map(error)], f64::from(options.opacity));
+        let error = |k: usize| (wrong + 4.0 * U * weight) * surface.color[k].abs();
+        let (alpha, alpha_error) = (opacity * weight * surface.color[3], opacity * error(3) + U);
+        open |= rules.least_alpha > 0.0 && (alpha - rules.least_alpha).abs() <= alpha_error;
+        if alpha < rules.least_alpha {
+            continue;
+        }
+        // What is cut off above is so for all of a premultiplied colour.
+        let cut = (rules.most_alpha / alpha).min(1.0);
+        let next = shown.with([surface.color.map(|c| cut * weight * c), [0, 1, 2, 3].map(error)], opacity);
+        open |= (next.transmittance - rules.least_shown).abs() <= next.transmittance_error;
+        let shows_more = next.transmittance >= rules.least_shown;
+        if shows_more || !rules.leaves_last {
+            shown = next;
+        }
+        if !shows_more {
+            break;
+        }
     }
     (open, shown)
 }
@@ -154,7 +170,7 @@ fn layers(list: &[Listed], options: &RenderOptions, range: &ColorRange) -> (bool
         if last {
             told = [f64::INFINITY; 2];
         }
-        shown.add(sums.premultiplied(Accumulator::Fixed.row(), 32, range), f64::from(options.opacity));
+        shown = shown.with(sums.premultiplied(Accumulator::Fixed.row(), 32, range), f64::from(options.opacity));
         count += 1;
     }
     (open, shown)

@@ -58,6 +58,7 @@ impl Mesh {
             Some(Colors::Srgb8(colors)) => colors.len() == vertices,
             Some(Colors::Linear(colors)) => colors.len() == vertices,
             Some(Colors::Textured(textured)) => textured.colors().len() == vertices,
+            Some(Colors::Harmonics(harmonics)) => harmonics.colors().len() == vertices,
             Some(Colors::Constant(_)) | None => true,
         };
         let lengths = [

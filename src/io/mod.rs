@@ -44,6 +44,8 @@ pub struct ReadOptions {
     pub format: Option<Format>,
     /// Points that a LAS file marks as withheld, which is deleted, are read like all others.
     pub keep_withheld: bool,
+    /// Gaussians that are ellipsoids become surfels without their shortest axis, however thick they are.
+    pub flatten: bool,
 }
 
 /// Reads any supported file: PLY, LAS, LAZ (COPC too), OBJ, and with the features of those names E57 and PCD; see [`Input::open`].
@@ -66,7 +68,7 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
 pub fn read_with(path: &Path, options: ReadOptions, progress: &dyn Progress) -> Result<Points> {
     let input = Input::open(path, options.format)?;
     match input.format {
-        Format::Ply => ply::read(input, progress),
+        Format::Ply => ply::read(input, options.flatten, progress),
         Format::Las => las::read(input, options.keep_withheld, progress),
         Format::Obj => obj::read(input, progress),
         Format::E57 => read_e57(input, progress),

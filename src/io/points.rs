@@ -1,6 +1,7 @@
 //! What one input file holds, before it becomes surfels.
 
 pub use crate::scene::Up;
+use crate::scene::color::srgb_to_linear;
 use crate::scene::{Cap, Clip, Colors};
 
 /// Points as a file gives them: f64 world coordinates and whatever attributes exist.
@@ -22,8 +23,12 @@ pub struct Points {
     pub clips: Option<Vec<Clip>>,
     /// How the disks of the half-axes curve.
     pub caps: Option<Vec<Cap>>,
-    /// Colours, [`Colors::Srgb8`] or [`Colors::Linear`].
+    /// Colours, [`Colors::Srgb8`], [`Colors::Linear`] or [`Colors::Harmonics`].
     pub colors: Option<Colors>,
+    /// They are Gaussians, whose colours are codes of sRGB ([`Scene::encoded`](crate::scene::Scene::encoded)).
+    pub encoded: bool,
+    /// They were ellipsoids.
+    pub flattened: Option<Flattened>,
     /// Texture coordinates (u, v), origin bottom left as in OBJ.
     pub texture: Option<Vec<[f32; 2]>>,
     /// The direction that the format, by convention, calls up.
@@ -45,6 +50,35 @@ pub struct Points {
     pub numbers: Option<Vec<u32>>,
 }
 
+/// Ellipsoids whose shortest half-axis was left out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Flattened {
+    /// All of them.
+    pub count: u64,
+    /// Those whose shortest half-axis is longer than a tenth of the middle one.
+    pub thick: u64,
+    /// The median ratio of the two; of several files the largest.
+    pub ratio: f64,
+}
+
+impl Flattened {
+    /// Those of two inputs.
+    pub(crate) fn of_both(one: Option<Self>, other: Option<Self>) -> Option<Self> {
+        let (Some(one), Some(other)) = (one, other) else { return one.or(other) };
+        let (count, thick) = (one.count + other.count, one.thick + other.thick);
+        Some(Self { count, thick, ratio: one.ratio.max(other.ratio) })
+    }
+
+    /// What a user should hear of it.
+    pub(crate) fn sentence(&self) -> String {
+        let Self { count, thick, ratio } = self;
+        format!(
+            "{count} ellipsoids became surfels without their shortest axis: {thick} were thicker than a tenth of their width, half of all \
+             than {ratio:.3} of it"
+        )
+    }
+}
+
 /// The triangles of a mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Faces {
@@ -55,6 +89,23 @@ pub struct Faces {
 }
 
 impl Points {
+    /// With colours in linear light that are the same from every side, whatever they were.
+    #[must_use]
+    pub fn in_light(mut self) -> Self {
+        if let Some(Colors::Harmonics(harmonics)) = self.colors {
+            let colors = harmonics.colors().iter().map(|[r, g, b, a]| [r.max(0.0), g.max(0.0), b.max(0.0), *a]);
+            self.colors = Some(Colors::Linear(colors.collect()));
+        }
+        if let (true, Some(Colors::Linear(colors))) = (std::mem::take(&mut self.encoded), &mut self.colors) {
+            for color in colors {
+                let [r, g, b, a] = *color;
+                let [r, g, b] = [r, g, b].map(|code| srgb_to_linear(code.into()) as f32);
+                *color = [r, g, b, a];
+            }
+        }
+        self
+    }
+
     /// Keeps what each point has of the points whose flag is set; without some of them they do not cover a closed surface. Which points of the file they are, [`Provenance`](crate::scene::Provenance)
     /// keeps.
     pub(crate) fn retain(&mut self, keep: &[bool]) {
@@ -100,6 +151,10 @@ fn retain_colors(colors: &mut Colors, keep: &[bool]) {
         Colors::Srgb8(codes) => retain(codes, keep),
         Colors::Linear(colors) => retain(colors, keep),
         Colors::Constant(_) => {}
+        Colors::Harmonics(harmonics) => {
+            let kept = keep.iter().enumerate().filter(|(_, keep)| **keep).map(|(index, _)| index);
+            *harmonics = harmonics.taken(&kept.collect::<Vec<_>>());
+        }
         Colors::Textured(textured) => {
             let kept = keep.iter().enumerate().filter(|(_, keep)| **keep).map(|(index, _)| index);
             *textured = textured.taken(&kept.collect::<Vec<_>>());

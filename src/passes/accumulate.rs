@@ -30,8 +30,8 @@
 //! - **float**, **cas**: f32 sums, by atomic add or by compare and exchange. A sum of n terms in any order errs by at most
 //!   `(n - 1) u` of itself, and so does the weight's: `2 n u + 4 u`. The order shows.
 
+use super::attributes;
 use super::footprint::footprint;
-use super::lit;
 use super::splat::{Intersection, Splat};
 use super::visibility::Nearest;
 use crate::gpu::layout::TILE;
@@ -159,10 +159,9 @@ pub fn reference<'a>(
     let rows = (nearest.len() / width) as u32;
     let mut sums = vec![PixelSums::ZERO; nearest.len()];
     for splat in splats {
-        let [r, g, b, alpha] = scene.colors.linear(splat.surfel as usize).map(f64::from);
         let surfel = &scene.surfels[splat.surfel as usize];
         let center = scene.origin + scene.center(splat.surfel as usize);
-        let color = lit::reference([r * alpha, g * alpha, b * alpha, alpha], splat, center, camera, options);
+        let color = attributes::color(scene, splat, camera, options);
         let radius = f64::from(surfel.shorter());
         let times = f64::from(splat.copies);
         for y in splat.first[1].max(first_row)..=splat.last[1].min(first_row + rows - 1) {

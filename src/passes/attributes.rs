@@ -1,9 +1,11 @@
 //! What is blended beside the weight: colour, normal, depth, fragment count, and a place in a texture. Each is a file that adds its
 //! terms to a pixel's sums and one that resolves them, or an absent one.
 
+use super::lit;
+use super::splat::Splat;
 use crate::plan::pass::Pass;
-use crate::plan::{ColorNeed, PixelLayout, RasterDepth, Sides, SurfelLayout, color_channels};
-use crate::scene::Map;
+use crate::plan::{ColorNeed, PixelLayout, RasterDepth, RenderOptions, Sides, SurfelLayout, color_channels};
+use crate::scene::{Camera, Map, Scene};
 
 /// The files and constants.
 pub const PASS: Pass = Pass {
@@ -31,13 +33,14 @@ pub const PASS: Pass = Pass {
             ColorNeed::Srgb8 => &["color_srgb8.wgsl", "srgb.wgsl", "color_sums.wgsl"],
             ColorNeed::Linear => &["color_linear.wgsl", "color_sums.wgsl"],
             ColorNeed::Textured => &["color_textured.wgsl", "srgb.wgsl", "color_sums.wgsl"],
+            ColorNeed::Harmonics(_) => &["color_harmonics.wgsl", "color_sums.wgsl"],
         });
         files
     },
     kernels: |_| Vec::new(),
     constants: |making| {
         let (layout, surfel) = (PixelLayout::of(making.needs), SurfelLayout::of(making.needs));
-        vec![
+        let mut constants = vec![
             ("CHANNELS", layout.channels.into()),
             ("ATTRIBUTE_WORDS", surfel.words.into()),
             ("COPIES_WORD", surfel.copies.into()),
@@ -51,6 +54,18 @@ pub const PASS: Pass = Pass {
             ("DEPTH_CHANNEL", layout.depth_channel.into()),
             ("COUNT_CHANNEL", layout.count_channel.into()),
             ("PLACE_CHANNEL", layout.place_channel.into()),
-        ]
+        ];
+        if let ColorNeed::Harmonics(degree) = making.needs.color {
+            constants.push(("HARMONICS_DEGREE", degree.into()));
+        }
+        constants
     },
 };
+
+/// The twin: the premultiplied colour of a splat, as it is seen from the camera and lit if splats are.
+pub fn color(scene: &Scene, splat: &Splat, camera: &Camera, options: &RenderOptions) -> [f64; 4] {
+    let surfel = splat.surfel as usize;
+    let direction = camera.direction_to(scene.origin + scene.center(surfel));
+    let [r, g, b, alpha] = scene.colors.seen(surfel, direction);
+    lit::reference([r * alpha, g * alpha, b * alpha, alpha], splat, direction, options)
+}

@@ -17,7 +17,7 @@
 
 use glam::{DVec2, DVec3, Vec3};
 
-use super::lowpass::{Design, RADIUS};
+use super::lowpass::Design;
 use crate::gpu::layout::{LIST_FAR, QUEUE_START};
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage};
@@ -49,7 +49,7 @@ fn reach(surfel: &Surfel) -> f64 {
 pub fn filter_reach(design: &Design) -> f64 {
     match design.low_pass {
         LowPass::None => 0.0,
-        LowPass::Max => RADIUS,
+        LowPass::Max | LowPass::Gaussians => design.radius,
         LowPass::Ewa => design.blur.sqrt(),
     }
 }

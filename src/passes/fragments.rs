@@ -13,7 +13,7 @@ use glam::DVec3;
 
 use super::accumulate::{decision, terms_file};
 use super::footprint::footprint;
-use super::{Strip, lit};
+use super::{Strip, attributes};
 use crate::gpu::layout::TILE;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Kernel, Look, Over, Part, Run, Stage, Step};
@@ -57,9 +57,7 @@ pub fn reference(strip: &Strip<'_>) -> Vec<List> {
     let mut lists = vec![nothing; camera.width as usize * rows as usize];
     for splat in &strip.splats {
         let surfel = splat.surfel as usize;
-        let [r, g, b, alpha] = scene.colors.linear(surfel).map(f64::from);
-        let center = scene.origin + scene.center(surfel);
-        let color = lit::reference([r * alpha, g * alpha, b * alpha, alpha], splat, center, camera, options);
+        let color = attributes::color(scene, splat, camera, options);
         let radius = f64::from(scene.surfels[surfel].shorter());
         let rank = strip.ranks.map_or(0, |ranks| ranks[surfel]);
         for y in splat.first[1].max(first_row)..=splat.last[1].min(first_row + rows - 1) {

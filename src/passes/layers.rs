@@ -99,6 +99,7 @@ impl PixelSums {
 }
 
 /// What is composited so far, from front to back.
+#[derive(Clone, Copy)]
 pub(super) struct Shown {
     /// Premultiplied.
     color: [f64; 4],
@@ -109,22 +110,23 @@ pub(super) struct Shown {
 impl Shown {
     pub(super) const NOTHING: Self = Self { color: [0.0; 4], transmittance: 1.0, layers: 0 };
 
-    /// Whether what lies behind still shows.
-    pub(super) fn lets_through(&self) -> bool {
-        self.transmittance >= LEAST_TRANSMITTANCE
+    /// Whether it lets `least` through, so that what lies behind still shows.
+    pub(super) fn lets_through(&self, least: f64) -> bool {
+        self.transmittance >= least
     }
 
-    /// The relative distance to letting nothing more through.
-    pub(super) fn decision(&self) -> f64 {
-        (self.transmittance / LEAST_TRANSMITTANCE - 1.0).abs()
+    /// The relative distance to letting just `least` through.
+    pub(super) fn decision(&self, least: f64) -> f64 {
+        (self.transmittance / least - 1.0).abs()
     }
 
-    /// A straight colour behind.
-    pub(super) fn add(&mut self, [r, g, b, alpha]: [f64; 4]) {
+    /// With a straight colour behind.
+    pub(super) fn with(mut self, [r, g, b, alpha]: [f64; 4]) -> Self {
         let shows = self.transmittance * alpha;
         self.color.iter_mut().zip([r, g, b, 1.0]).for_each(|(sum, value)| *sum += shows * value);
         self.transmittance *= 1.0 - alpha;
         self.layers += 1;
+        self
     }
 
     /// Writes it, over the background, into a pixel of `frame`.
@@ -149,9 +151,9 @@ pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
         let (layers, mut decision) = part(&list.fragments, (most, options.tail), Parting::Runs, (options, along));
         let mut shown = Shown::NOTHING;
         for sums in layers {
-            if shown.lets_through() {
-                shown.add(surface(&sums, scene, camera, options, (x, y)).0);
-                decision = decision.min(shown.decision());
+            if shown.lets_through(LEAST_TRANSMITTANCE) {
+                shown = shown.with(surface(&sums, scene, camera, options, (x, y)).0);
+                decision = decision.min(shown.decision(LEAST_TRANSMITTANCE));
             }
         }
         shown.write(options, list.decision.min(decision), frame, pixel);

@@ -7,7 +7,6 @@ use super::resolve::shade;
 use super::splat::Splat;
 use crate::plan::pass::Pass;
 use crate::plan::{RenderOptions, Sides};
-use crate::scene::{Camera, Projection};
 
 /// The files and constants.
 pub const PASS: Pass = Pass {
@@ -20,22 +19,12 @@ pub const PASS: Pass = Pass {
     constants: |making| vec![("TURNS_LIT", u32::from(making.needs.sides == Sides::None).into())],
 };
 
-/// The twin: the premultiplied colour of a splat whose centre is at `center` (world), lit if splats are.
-pub fn reference(
-    premultiplied: [f64; 4],
-    splat: &Splat,
-    center: DVec3,
-    camera: &Camera,
-    options: &RenderOptions,
-) -> [f64; 4] {
+/// The twin: the premultiplied colour of a splat whose centre is seen along `direction`, lit if splats are.
+pub fn reference(premultiplied: [f64; 4], splat: &Splat, direction: DVec3, options: &RenderOptions) -> [f64; 4] {
     let [r, g, b, alpha] = premultiplied;
     if !options.lights_splats() || alpha <= 0.0 {
         return premultiplied;
     }
-    let seen = match camera.projection {
-        Projection::Pinhole => (center - camera.eye).normalize_or_zero(),
-        Projection::Orthographic => camera.rotation.row(2),
-    };
-    let lit = shade(DVec3::new(r, g, b) / alpha, splat.lit_normal(), -seen, options) * alpha;
+    let lit = shade(DVec3::new(r, g, b) / alpha, splat.lit_normal(), -direction, options) * alpha;
     [lit.x, lit.y, lit.z, alpha]
 }

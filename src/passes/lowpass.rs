@@ -5,6 +5,8 @@
 //!
 //! - **max** (Botsch et al. 2005, section 4.2): a circle of radius [`RADIUS`], beside the disk; the smaller rho counts. A
 //!   splat then reaches the centre of the pixel that it lies in, so a surface sampled once a pixel has no holes.
+//! - **gaussians** ([`gaussian`]): the same circle for the surfels of 2D Gaussian splatting, where a Gaussian of a fixed standard deviation
+//!   stands beside that of the disk; its radius is as many of them as the kernel's disk has.
 //! - **ewa** (Zwicker et al. 2001): the disk's affine image J at its centre, convolved with the pixel's Gaussian:
 //!   `Q = J J^T + blur I`, weight times `sqrt(|J J^T| / |Q|)`. Exact for a Gaussian kernel; other kernels are convolved as
 //!   the Gaussian of the same variance.
@@ -18,7 +20,7 @@ use super::facing::Faced;
 use super::splat::{Filter, Intersection, Splat};
 use crate::plan::RenderOptions;
 use crate::plan::pass::Pass;
-use crate::scene::{Camera, Kernel, LowPass, Projection};
+use crate::scene::{Camera, Kernel, LowPass, Projection, gaussian};
 
 /// The radius of `max`, pixels: half a pixel's diagonal, and a little for rounding.
 pub const RADIUS: f64 = 0.7072;
@@ -51,13 +53,14 @@ pub const PASS: Pass = Pass {
     name: "lowpass",
     files: |needs| match needs.low_pass {
         LowPass::None => vec!["lowpass_none.wgsl"],
-        LowPass::Max => vec!["filter.wgsl", "lowpass_max.wgsl"],
+        LowPass::Max | LowPass::Gaussians => vec!["filter.wgsl", "lowpass_max.wgsl"],
         LowPass::Ewa => vec!["filter.wgsl", "lowpass_ewa.wgsl"],
     },
     kernels: |_| Vec::new(),
     constants: |making| match making.needs.low_pass {
+        LowPass::None => Vec::new(),
+        LowPass::Max | LowPass::Gaussians => vec![("FILTER_RADIUS", Design::of(making.options).radius)],
         LowPass::Ewa => vec![("FILTER_BLUR", blur(making.options.kernel))],
-        LowPass::None | LowPass::Max => Vec::new(),
     },
 };
 
@@ -68,6 +71,8 @@ pub struct Design {
     pub low_pass: LowPass,
     /// What `ewa` adds to J J^T, pixels squared.
     pub blur: f64,
+    /// The radius of `max`, or of `gaussians`, pixels.
+    pub radius: f64,
     /// Surfels are points that face the camera.
     pub facing: Option<Faced>,
 }
@@ -76,9 +81,14 @@ impl Design {
     /// That of `options`.
     pub fn of(options: &RenderOptions) -> Self {
         let blur = if options.low_pass == LowPass::Ewa { blur(options.kernel) } else { 0.0 };
+        let radius = match (options.low_pass, options.kernel) {
+            (LowPass::Gaussians, Kernel::Gaussian { sigma }) => gaussian::LOW_PASS_SIGMA / sigma,
+            _ => RADIUS,
+        };
         Self {
             low_pass: options.low_pass,
             blur,
+            radius,
             facing: options.facing.map(|facing| Faced::new(facing, options.samples)),
         }
     }
@@ -88,9 +98,9 @@ impl Design {
 pub fn filter(design: &Design, center: DVec2, s: DVec2, t: DVec2, depths: [f64; 2]) -> Option<Filter> {
     match design.low_pass {
         LowPass::None => None,
-        LowPass::Max => {
-            let r = 1.0 / RADIUS;
-            Some(Filter { center, depths, r: [r, 0.0, r], extent: DVec2::splat(RADIUS), gain: 1.0 })
+        LowPass::Max | LowPass::Gaussians => {
+            let r = 1.0 / design.radius;
+            Some(Filter { center, depths, r: [r, 0.0, r], extent: DVec2::splat(design.radius), gain: 1.0 })
         }
         LowPass::Ewa => {
             let blur = design.blur;
@@ -131,7 +141,7 @@ pub fn filtered(
     };
     let round = Intersection { depth, rho2, inside, uv: DVec2::ZERO, away: splat.away };
     match (low_pass, disk) {
-        (LowPass::Max, Some(disk)) if rho2 > 1.0 || rho2 >= disk.rho2 => Some((disk, 1.0)),
+        (LowPass::Max | LowPass::Gaussians, Some(disk)) if rho2 > 1.0 || rho2 >= disk.rho2 => Some((disk, 1.0)),
         _ => Some((round, filter.gain)),
     }
 }

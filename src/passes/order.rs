@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::gpu::layout::BATCH;
 use crate::morton;
-use crate::scene::{Bounds, Cap, Clip, Scene, Surfel};
+use crate::scene::{Bounds, Cap, Clip, Colors, Scene, Surfel};
 
 /// Surfels of a run: whole batches. Of 64, 512 and 4096 the middle gave the shortest frames on a software adapter.
 const RUN: usize = 512;
@@ -39,8 +39,13 @@ pub fn order(scene: &Scene, core: &Bounds) -> Vec<u32> {
     };
     let mut along: Vec<u64> = surfels.par_iter().enumerate().map(place).collect();
     let content = |place: u64| content(scene, place as u32 as usize);
+    let harmonics = |place: u64| match &scene.colors {
+        Colors::Harmonics(harmonics) => bytemuck::cast_slice(harmonics.terms(place as u32 as usize)),
+        _ => &[0u32; 0],
+    };
     along.par_sort_unstable_by(|a, b| {
-        (a >> 32).cmp(&(b >> 32)).then_with(|| content(*a).cmp(&content(*b))).then_with(|| a.cmp(b))
+        let by_content = || content(*a).cmp(&content(*b)).then_with(|| harmonics(*a).cmp(harmonics(*b)));
+        (a >> 32).cmp(&(b >> 32)).then_with(by_content).then_with(|| a.cmp(b))
     });
     // What is left of the last run stays last, so that each run is stored as one batch.
     let (runs, rest) = along.as_chunks::<RUN>();

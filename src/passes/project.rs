@@ -65,8 +65,8 @@ pub(super) fn projected(
     if let Some(filter) = &filter {
         let center = DVec2::new(projected.anchor[0] as f64, projected.anchor[1] as f64) + 0.5 + filter.center;
         let (low, high) = (center - filter.extent, center + filter.extent);
-        // The disk itself shows only beside the filter of `max`.
-        let beside = design.low_pass == LowPass::Max;
+        // The disk itself shows only beside a filter that is not `ewa`'s.
+        let beside = design.low_pass != LowPass::Ewa;
         projected.low = if beside { projected.low.min(low) } else { low };
         projected.high = if beside { projected.high.max(high) } else { high };
     }

@@ -136,6 +136,10 @@ impl ScenePage<'_> {
         match (self.needs.color, &self.scene.colors) {
             (ColorNeed::Srgb8, Colors::Srgb8(codes)) => into[0] = u32::from_le_bytes(codes[index]),
             (ColorNeed::Linear, colors) => bits(&[colors.linear(index)], into),
+            (ColorNeed::Harmonics(_), Colors::Harmonics(harmonics)) => {
+                bits(&[harmonics.colors()[index]], into);
+                harmonics.terms(index).iter().zip(&mut into[4..]).for_each(|(value, into)| *into = value.to_bits());
+            }
             (ColorNeed::Textured, Colors::Textured(textured)) => {
                 let [center, u_slope, v_slope] = textured.mapped(index, low);
                 bits(&[textured.colors()[index], center, u_slope, v_slope], into);

@@ -7,7 +7,7 @@ use super::{RenderOptions, SceneNeeds};
 use crate::error::{Error, Result};
 use crate::gpu::adapter::AdapterDescription;
 use crate::scene::light::MAX_LIGHTS;
-use crate::scene::{Blend, Camera, Composite, Cull, LowPass, Map, Shading, options::SHININESS_RANGE};
+use crate::scene::{Blend, Camera, Composite, Cull, KernelShape, LowPass, Map, Shading, options::SHININESS_RANGE};
 
 fn usage(what: impl Into<String>) -> Result<()> {
     Err(Error::Usage(what.into()))
@@ -33,6 +33,9 @@ pub fn options(options: &RenderOptions, reference: bool) -> Result<()> {
     }
     if options.blend == Blend::Nearest {
         nearest(options, reference)?;
+    }
+    if options.low_pass == LowPass::Gaussians && options.kernel.shape() != KernelShape::Gaussian {
+        return usage("the low-pass gaussians stands beside a kernel gaussian: take that, or another low-pass");
     }
     if !(0.0..=1.0).contains(&options.opacity) {
         return usage(format!("the opacity is 0 to 1, not {}", options.opacity));
@@ -204,11 +207,14 @@ pub fn scene(facts: &Facts, options: &RenderOptions, reference: bool) -> Result<
              normals a side with epsplat surfels",
         );
     }
+    if facts.encoded && options.shading != Shading::Unlit {
+        return usage("Gaussians have the colours that pictures of them show, light and all: take --shading unlit");
+    }
     if options.facing.is_some() && facts.colors == ColorNeed::Textured {
         return usage("points that face the camera have no plane to paint: leave the texture out");
     }
     match facts.colors {
-        ColorNeed::Linear | ColorNeed::Textured if options.blend == Blend::Nearest => {
+        ColorNeed::Linear | ColorNeed::Textured | ColorNeed::Harmonics(_) if options.blend == Blend::Nearest => {
             return usage(
                 "--blend nearest keeps colours of 8 bits, and these are finer: take --epsilon abs:0 --kernel constant, which \
                  averages what lies at one depth",

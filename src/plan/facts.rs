@@ -16,6 +16,8 @@ pub enum ColorNeed {
     Linear,
     /// Four f32 each, of the texture's mean over the disk, and a place in the texture, which is looked up once a pixel.
     Textured,
+    /// Four f32 each and the terms of spherical harmonics of this degree, which are summed once a splat.
+    Harmonics(u32),
 }
 
 /// Surfels that are kept in [`Facts::sample`], about.
@@ -36,6 +38,8 @@ pub struct Facts {
     pub core: Bounds,
     /// Smallest and largest colour, [`Scene::color_range`].
     pub color: ([f32; 4], [f32; 4]),
+    /// [`Scene::encoded`].
+    pub encoded: bool,
     /// Where the colours come from.
     pub colors: ColorNeed,
     /// The texture's width and height, and the range of places in it.
@@ -74,12 +78,14 @@ impl Facts {
             body: scene.body().0,
             core: scene.core(),
             color: (low, high),
-            colors: match scene.colors {
+            encoded: scene.encoded,
+            colors: match &scene.colors {
                 Colors::Textured(_) => ColorNeed::Textured,
                 _ if low == high => ColorNeed::Constant,
                 Colors::Constant(_) => ColorNeed::Constant,
                 Colors::Srgb8(_) => ColorNeed::Srgb8,
                 Colors::Linear(_) => ColorNeed::Linear,
+                Colors::Harmonics(harmonics) => ColorNeed::Harmonics(harmonics.degree()),
             },
             texture: match &scene.colors {
                 Colors::Textured(textured) => Some((textured.texture().size(), textured.range())),

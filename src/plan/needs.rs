@@ -128,7 +128,7 @@ impl Lists {
         match composited(facts, options) {
             Composite::Opaque => None,
             Composite::Layers(_) => Some(Self::Layers),
-            Composite::Sorted => Some(Self::Sorted),
+            Composite::Sorted | Composite::Gaussians => Some(Self::Sorted),
         }
     }
 }
@@ -284,6 +284,7 @@ impl SceneNeeds {
             ColorNeed::Srgb8 => "color-srgb8",
             ColorNeed::Linear => "color-linear",
             ColorNeed::Textured => "color-textured",
+            ColorNeed::Harmonics(_) => "color-harmonics",
         };
         let kernel = match self.kernel {
             KernelShape::Gaussian => "kernel-gaussian",
@@ -298,6 +299,7 @@ impl SceneNeeds {
         let flags = [
             (self.low_pass == LowPass::Max, "lowpass-max"),
             (self.low_pass == LowPass::Ewa, "lowpass-ewa"),
+            (self.low_pass == LowPass::Gaussians, "lowpass-gaussians"),
             (self.wide_sums, "wide-sums"),
             (self.atomics_u64, "atomics-u64"),
             (self.long_words, "long-words"),

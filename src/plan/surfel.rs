@@ -3,6 +3,7 @@
 use super::{ColorNeed, SceneNeeds};
 use crate::gpu::layout::{Filter, Splat};
 use crate::scene::LowPass;
+use crate::scene::harmonics::terms_of;
 
 /// Where a surfel's attributes lie in its record, by word. What is not needed takes no room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,6 +29,7 @@ impl SurfelLayout {
             ColorNeed::Constant => 0,
             ColorNeed::Srgb8 => 1,
             ColorNeed::Linear => 4,
+            ColorNeed::Harmonics(degree) => 4 + 3 * terms_of(degree) as u32,
             // A colour, a place and two slopes.
             ColorNeed::Textured => 16,
         };

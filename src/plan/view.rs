@@ -2,12 +2,12 @@
 
 use glam::DVec3;
 
-use super::{Facts, RenderOptions};
+use super::{Facts, RenderOptions, composited};
 use crate::gpu::layout::View;
 use crate::scene::light::MAX_LIGHTS;
 use crate::scene::options::HIGHLIGHT;
 use crate::scene::texture::PlaceRange;
-use crate::scene::{Bounds, Camera, Light, Projection, Shading};
+use crate::scene::{Bounds, Camera, Composite, Light, Projection, Shading};
 
 /// x as the nearest f32 and the nearest f32 to what that leaves.
 fn split(x: f64) -> (f32, f32) {
@@ -44,7 +44,7 @@ impl View {
     /// The view by `camera` of the scene that `facts` are of.
     pub fn new(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Self {
         let Facts { bounds, body, core, color, largest_radius, .. } = facts;
-        let [low, high] = lit_range([color.0, color.1], options);
+        let [low, span] = mapped(lit_range([color.0, color.1], options), composited(facts, options));
         let largest_radius = f64::from(*largest_radius);
         let eye_relative = camera.eye - facts.origin;
         let unit = device_unit(body, bounds, eye_relative);
@@ -60,7 +60,6 @@ impl View {
         };
         let (intrinsics, intrinsics_low) =
             split_all([camera.fx * per_unit, camera.fy * per_unit, camera.cx, camera.cy]);
-        let span: [f32; 4] = std::array::from_fn(|k| high[k] - low[k]);
         let ([texture_width, texture_height], place) = match facts.texture {
             Some((size, PlaceRange { middle: [u, v], span, most_reach_2 })) => (size, [u, v, span, most_reach_2]),
             None => ([0; 2], [0.0; 4]),
@@ -126,6 +125,14 @@ fn lit_range([low, high]: [[f32; 4]; 2], options: &RenderOptions) -> [[f32; 4]; 
         lit[1][k] = ((high[k] * light).max(0.0) + highlight) * 1.000_01;
     }
     lit
+}
+
+/// The least value and the span of colours in `range`, by which they are mapped to [0, 1] before they are summed. What is composited fragment
+/// by fragment is not summed, and not mapped where it varies: small alphas keep their digits.
+fn mapped([low, high]: [[f32; 4]; 2], composite: Composite) -> [[f32; 4]; 2] {
+    let summed = !matches!(composite, Composite::Sorted | Composite::Gaussians);
+    let of = |k: usize| if summed || low[k] == high[k] { [low[k], high[k] - low[k]] } else { [0.0, 1.0] };
+    [std::array::from_fn(|k| of(k)[0]), std::array::from_fn(|k| of(k)[1])]
 }
 
 /// The lights as the kernels see them: a direction, zero for a headlight, and an intensity.

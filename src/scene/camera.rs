@@ -257,6 +257,14 @@ impl Camera {
         1.0 / self.ray(f64::from(x) + 0.5, f64::from(y) + 0.5).length()
     }
 
+    /// The direction along which a point is seen, world coordinates: a unit vector, that of the camera's axis in orthographic images.
+    pub fn direction_to(&self, point: DVec3) -> DVec3 {
+        match self.projection {
+            Projection::Pinhole => (point - self.eye).normalize_or_zero(),
+            Projection::Orthographic => self.rotation.row(2),
+        }
+    }
+
     /// Pixels of the image.
     pub fn pixels(&self) -> usize {
         self.width as usize * self.height as usize

@@ -1,6 +1,9 @@
 //! Colour: 8-bit values are sRGB, everything that is blended is linear.
 
+use glam::DVec3;
+
 pub use super::srgb::{SRGB8_TO_LINEAR, linear_to_srgb, srgb_to_linear};
+use super::harmonics::Harmonics;
 use super::texture::Textured;
 
 /// The colours of a scene or of one input, with straight alpha.
@@ -14,6 +17,8 @@ pub enum Colors {
     Linear(Vec<[f32; 4]>),
     /// A place in a texture each.
     Textured(Textured),
+    /// One that changes with the view each.
+    Harmonics(Harmonics),
 }
 
 /// The colour of surfels that come without one: a light grey that shading can darken and highlights cannot clip.
@@ -27,7 +32,7 @@ impl Default for Colors {
 }
 
 impl Colors {
-    /// The linear colour of surfel `index`, straight alpha; of a texture the mean over its disk.
+    /// The linear colour of surfel `index`, straight alpha; of a texture the mean over its disk, of harmonics the one that has no direction.
     pub fn linear(&self, index: usize) -> [f32; 4] {
         match self {
             Self::Constant(color) => *color,
@@ -38,6 +43,18 @@ impl Colors {
             }
             Self::Linear(colors) => colors[index],
             Self::Textured(textured) => textured.colors()[index],
+            Self::Harmonics(harmonics) => {
+                let [r, g, b, a] = harmonics.colors()[index];
+                [r.max(0.0), g.max(0.0), b.max(0.0), a]
+            }
+        }
+    }
+
+    /// The colour of surfel `index` as it is seen along a direction, a unit vector from the eye.
+    pub fn seen(&self, index: usize, direction: DVec3) -> [f64; 4] {
+        match self {
+            Self::Harmonics(harmonics) => harmonics.seen(index, direction),
+            _ => self.linear(index).map(f64::from),
         }
     }
 }

@@ -13,6 +13,8 @@
 //! - **sorted** the opacity of one *fragment* at the surfel's centre, which falls off with the kernel: `alpha_i = A w_i a_i`. So a denser
 //!   cloud is more opaque.
 //!
+//! By the rules of Gaussian surfels ([`gaussian`](super::gaussian)) alphas are cut off below and above besides.
+//!
 //! Either way, from front to back in linear light, `shown += T colour` and `T *= 1 - alpha`, from a transmittance T of 1; what is left of it
 //! shows the background.
 
@@ -30,6 +32,8 @@ pub enum Composite {
     Layers(u32),
     /// Every fragment, in the order of depths; of one depth in that of the [`order`](crate::passes::order).
     Sorted,
+    /// The same by the rules of Gaussian surfels ([`gaussian`](super::gaussian)).
+    Gaussians,
 }
 
 /// As many layers as there are surfaces.
@@ -44,12 +48,13 @@ impl FromStr for Composite {
             None if text == "opaque" => Some(Self::Opaque),
             None if text == "layers" => Some(Self::Layers(ALL_LAYERS)),
             None if text == "sorted" => Some(Self::Sorted),
+            None if text == "gaussians" => Some(Self::Gaussians),
             Some(("layers", number)) => layers(number),
             _ => None,
         };
         named.ok_or_else(|| {
             Error::Usage(format!(
-                "surfaces are composited opaque, layers (all of them), layers:L (the nearest L) or sorted, not {text:?}"
+                "surfaces are composited opaque, layers (all of them), layers:L (the nearest L), sorted or gaussians, not {text:?}"
             ))
         })
     }
@@ -92,6 +97,7 @@ mod tests {
             ("layers", Composite::Layers(ALL_LAYERS)),
             ("layers:3", Composite::Layers(3)),
             ("sorted", Composite::Sorted),
+            ("gaussians", Composite::Gaussians),
         ] {
             assert_eq!(text.parse::<Composite>().unwrap(), composite);
         }

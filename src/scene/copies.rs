@@ -19,7 +19,7 @@ const FEWEST: usize = 1024;
 
 /// Whether one surfel of `scene` seems to have many copies; of a sample, the same each time.
 pub(crate) fn has_copies(scene: &Scene) -> bool {
-    if matches!(scene.colors, Colors::Textured(_)) {
+    if matches!(scene.colors, Colors::Textured(_) | Colors::Harmonics(_)) {
         return false;
     }
     let step = scene.surfels.len().div_ceil(SAMPLED).max(1);
@@ -54,7 +54,7 @@ fn by_content(scene: &Scene, a: usize, b: usize) -> Ordering {
     let clip = |index: usize| scene.clips.get(index).copied().unwrap_or_default().0.map(|line| line.map(f32::to_bits));
     let cap = |index: usize| scene.caps.get(index).copied().unwrap_or_default().0.map(f32::to_bits);
     let color = |index: usize| match &scene.colors {
-        Colors::Constant(_) | Colors::Textured(_) => [0; 4],
+        Colors::Constant(_) | Colors::Textured(_) | Colors::Harmonics(_) => [0; 4],
         Colors::Srgb8(codes) => codes[index].map(u32::from),
         Colors::Linear(colors) => colors[index].map(f32::to_bits),
     };

@@ -190,6 +190,8 @@ pub enum LowPass {
     Max,
     /// The kernel convolved with the pixel (EWA, Zwicker et al. 2001): no aliasing either.
     Ewa,
+    /// That of [`Max`](Self::Max), with the round kernel of Gaussian surfels ([`gaussian`](super::gaussian)): `exp(-d^2)`, d in pixels.
+    Gaussians,
 }
 
 /// How a resolved pixel gets its colour.

@@ -62,6 +62,9 @@ pub struct Scene {
     pub normals: Vec<[f32; 3]>,
     /// One colour for all, or one for each surfel in the same order.
     pub colors: Colors,
+    /// They are codes of sRGB, as displays take them, instead of linear light, and are composited as they are: the surfels are Gaussians
+    /// ([`gaussian`](super::gaussian)), or among some.
+    pub encoded: bool,
     /// Normals were given, so they tell the two sides of a surface apart; estimated ones do not.
     pub oriented: bool,
     /// The surfels close their surfaces and face outward, so that their backs are seen from inside alone.
@@ -171,7 +174,8 @@ impl Scene {
     }
 
     /// Smallest and largest premultiplied linear colour `(r a, g a, b a, a)` of the scene, each component on its own,
-    /// every product rounded to f32 once. The same for any order of surfels; zero for a scene without surfels.
+    /// every product rounded to f32 once. Of harmonics the range that no view exceeds. The same for any order of surfels; zero for a
+    /// scene without surfels.
     pub fn color_range(&self) -> ([f32; 4], [f32; 4]) {
         if self.surfels.is_empty() {
             return ([0.0; 4], [0.0; 4]);
@@ -188,6 +192,7 @@ impl Scene {
             Colors::Srgb8(codes) => codes.len(),
             Colors::Linear(colors) => colors.len(),
             Colors::Textured(textured) => textured.colors().len(),
+            Colors::Harmonics(harmonics) => harmonics.colors().len(),
         };
         let merge = |(low, high): ([f32; 4], [f32; 4]), (other_low, other_high): ([f32; 4], [f32; 4])| {
             let low = std::array::from_fn(|i| f32::min(low[i], other_low[i]));
@@ -197,8 +202,16 @@ impl Scene {
         (0..count)
             .into_par_iter()
             .fold(nothing, |range, index| {
-                let color = premultiplied(self.colors.linear(index));
-                merge(range, (color, color))
+                match &self.colors {
+                    Colors::Harmonics(harmonics) => {
+                        let high = premultiplied(harmonics.most(index));
+                        merge(range, ([0.0, 0.0, 0.0, high[3]], high))
+                    }
+                    colors => {
+                        let color = premultiplied(colors.linear(index));
+                        merge(range, (color, color))
+                    }
+                }
             })
             .reduce(nothing, merge)
     }

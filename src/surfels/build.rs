@@ -85,7 +85,7 @@ pub fn build_within(
 ///
 /// Those of [`build`].
 pub fn build_at_vertices(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Preparation)> {
-    let inputs = inputs.into_iter().map(|input| mesh::of_mesh(input, By::Vertices)).collect();
+    let inputs = inputs.into_iter().map(|input| mesh::of_mesh(input.in_light(), By::Vertices)).collect();
     // Samples are where the surfels are, however those curve.
     let flat = Limits { curved: false, ..Limits::default() };
     built(gather::gather(inputs)?, &flat, progress).map(|(made, _)| made)
@@ -127,7 +127,9 @@ pub(super) fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Prog
         None
     };
     let mut surfels = given.surfels(estimated.as_ref(), origin);
-    let oriented = preparation.estimated_normals == 0 && !preparation.has_random_sides();
+    // Nobody says which side of a Gaussian is its front.
+    let oriented =
+        preparation.estimated_normals == 0 && !preparation.has_random_sides() && !gathered.points.encoded;
     let caps = match estimated {
         Some(estimated) if limits.curved && preparation.estimated_radii > 0 => {
             estimated.caps(&given, &surfels, oriented)
@@ -140,12 +142,12 @@ pub(super) fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Prog
     let low = low_parts(&surfels, relative);
     preparation.rounding = rounding(&surfels, &low, relative);
     let normals = own_normals(&given, &surfels);
-    let Gathered { points: Points { colors, closed, clips, texture, .. }, provenance, .. } = gathered;
+    let Gathered { points: Points { colors, encoded, closed, clips, texture, .. }, provenance, .. } = gathered;
     let (colors, closed) = (colors::folded(colors), closed && oriented);
     // Most scenes have no disk that ends before its rim.
     let clips: Vec<Clip> = clips.unwrap_or_default().into_iter().map(Clip::usable).collect();
     let clips = if clips.iter().all(Clip::is_none) { Vec::new() } else { clips };
-    let scene = Scene { origin, surfels, low, clips, caps, normals, colors, oriented, closed, up, provenance };
+    let scene = Scene { origin, surfels, low, clips, caps, normals, colors, encoded, oriented, closed, up, provenance };
     // As the default view sees it.
     preparation.strays = scene.framed().1;
     Ok(((scene, preparation), texture))

@@ -1,97 +1,151 @@
 //! The colours of several inputs as one.
 
-use crate::scene::Colors;
 use crate::scene::color::{DEFAULT_COLOR, linear_to_srgb};
+use crate::scene::harmonics::terms_of;
+use crate::scene::{Colors, Harmonics};
 
-/// Joins colours input by input. 8-bit colours stay so as long as nothing else comes.
+/// The colours of inputs, until all have come. 8-bit colours stay so if nothing else comes.
+#[derive(Default)]
 pub(crate) struct ColorGatherer {
+    inputs: Vec<Input>,
+}
+
+struct Input {
     colors: Option<Colors>,
-    /// Points so far, with colours or without.
+    /// Its points, with colours or without.
     count: usize,
-    /// How many colours were not usable and became [`DEFAULT_COLOR`].
+    /// Colours are codes ([`Scene::encoded`](crate::scene::Scene::encoded)).
+    encoded: bool,
+}
+
+/// Those of all points.
+pub(crate) struct GatheredColors {
+    /// None if none came with any.
+    pub colors: Option<Colors>,
+    /// They are codes: those of an input were.
+    pub encoded: bool,
+    /// How many were not usable and became [`DEFAULT_COLOR`], or lost terms of their harmonics.
     pub replaced: u64,
+    /// How many had an alpha outside of [0, 1].
+    pub clamped: u64,
 }
 
 impl ColorGatherer {
-    pub fn new() -> Self {
-        Self { colors: None, count: 0, replaced: 0 }
+    /// Adds `count` points and their colours, codes if `encoded`; missing ones get the default, surplus ones are ignored.
+    pub fn append(&mut self, colors: Option<Colors>, count: usize, encoded: bool) {
+        self.inputs.push(Input { colors, count, encoded });
     }
 
-    /// Adds `count` points and their colours; missing ones get the default, surplus ones are ignored.
-    pub fn append(&mut self, colors: Option<Colors>, count: usize) {
-        let before = self.count;
-        let total = before + count;
-        self.count = total;
-        match colors {
-            None => match &mut self.colors {
-                None => {}
-                Some(Colors::Srgb8(codes)) => codes.resize(total, default_code()),
-                Some(Colors::Linear(colors)) => colors.resize(total, DEFAULT_COLOR),
-                Some(Colors::Constant(_) | Colors::Textured(_)) => {}
-            },
-            Some(Colors::Srgb8(mut added)) => {
-                added.resize(count, default_code());
-                match self.colors.take() {
-                    Some(Colors::Linear(mut colors)) => {
-                        let added = Colors::Srgb8(added);
-                        colors.extend((0..count).map(|i| added.linear(i)));
-                        self.colors = Some(Colors::Linear(colors));
-                    }
-                    Some(Colors::Srgb8(mut codes)) => {
-                        codes.extend(added);
-                        self.colors = Some(Colors::Srgb8(codes));
-                    }
-                    _ if before == 0 => self.colors = Some(Colors::Srgb8(added)),
-                    _ => {
-                        let mut codes = vec![default_code(); before];
-                        codes.extend(added);
-                        self.colors = Some(Colors::Srgb8(codes));
-                    }
-                }
+    /// The colours of all points.
+    pub fn finish(self) -> GatheredColors {
+        let encoded = self.inputs.iter().any(|input| input.encoded);
+        let mut all = GatheredColors { colors: None, encoded, replaced: 0, clamped: 0 };
+        let has_codes_alone = |input: &Input| matches!(input.colors, None | Some(Colors::Srgb8(_)));
+        if self.inputs.iter().all(|input| input.colors.is_none()) && !encoded {
+            return all;
+        }
+        if self.inputs.iter().all(has_codes_alone) && !encoded {
+            all.colors = Some(Colors::Srgb8(codes(self.inputs)));
+            return all;
+        }
+        let degree = |input: &Input| if let Some(Colors::Harmonics(own)) = &input.colors { own.degree() } else { 0 };
+        let degree = self.inputs.iter().map(degree).max().unwrap_or(0);
+        let (mut colors, mut terms) = (Vec::new(), Vec::new());
+        for input in self.inputs {
+            let count = input.count;
+            let (own, own_terms) = input.linear(&mut all);
+            append(&mut colors, own);
+            if degree > 0 {
+                append(&mut terms, widened(own_terms, (count, degree), &mut all.replaced));
             }
-            Some(Colors::Linear(mut added)) => {
-                for color in &mut added {
-                    if !is_usable(color) {
-                        *color = DEFAULT_COLOR;
-                        self.replaced += 1;
-                    }
-                    color[3] = color[3].clamp(0.0, 1.0);
-                }
-                added.resize(count, DEFAULT_COLOR);
-                self.append_linear(added, before);
+        }
+        all.colors = Some(match degree {
+            0 => Colors::Linear(colors),
+            _ => Harmonics::new(colors, degree, terms).map_or_else(Colors::default, Colors::Harmonics),
+        });
+        all
+    }
+}
+
+impl Input {
+    /// A straight colour each, as the scene has it, and the harmonics' terms with their degree.
+    fn linear(self, all: &mut GatheredColors) -> (Vec<[f32; 4]>, Option<(u32, Vec<f32>)>) {
+        let (mut colors, terms) = match self.colors {
+            None => (Vec::new(), None),
+            Some(codes @ Colors::Srgb8(_)) => {
+                let of_file = if let Colors::Srgb8(codes) = &codes { codes.len() } else { 0 };
+                ((0..of_file.min(self.count)).map(|i| codes.linear(i)).collect(), None)
             }
+            Some(Colors::Linear(colors)) => (colors, None),
             // The inputs of a scene may have different textures: the means over the disks.
-            Some(Colors::Textured(textured)) => {
-                let mut added = textured.colors().to_vec();
-                added.resize(count, DEFAULT_COLOR);
-                self.append_linear(added, before);
+            Some(Colors::Textured(textured)) => (textured.colors().to_vec(), None),
+            Some(Colors::Constant(color)) => (vec![color; self.count], None),
+            Some(Colors::Harmonics(harmonics)) => {
+                let (colors, degree, terms) = harmonics.into_parts();
+                (colors, Some((degree, terms)))
             }
-            Some(Colors::Constant(color)) => {
-                let usable = is_usable(&color);
-                self.replaced += if usable { 0 } else { count as u64 };
-                self.append_linear(vec![if usable { color } else { DEFAULT_COLOR }; count], before);
-            }
-        }
-    }
-
-    fn append_linear(&mut self, added: Vec<[f32; 4]>, before: usize) {
-        let mut colors = match self.colors.take() {
-            Some(Colors::Linear(colors)) => colors,
-            Some(codes @ Colors::Srgb8(_)) => (0..before).map(|i| codes.linear(i)).collect(),
-            _ => vec![DEFAULT_COLOR; before],
         };
-        if colors.is_empty() {
-            colors = added;
-        } else {
-            colors.extend(added);
+        let encodes = all.encoded && !self.encoded;
+        for color in &mut colors {
+            if !is_usable(color) {
+                *color = DEFAULT_COLOR;
+                all.replaced += 1;
+            }
+            all.clamped += u64::from(!(0.0..=1.0).contains(&color[3]));
+            color[3] = color[3].clamp(0.0, 1.0);
         }
-        self.colors = Some(Colors::Linear(colors));
+        colors.resize(self.count, DEFAULT_COLOR);
+        if encodes {
+            for color in &mut colors {
+                let [r, g, b, a] = *color;
+                let [r, g, b] = [r, g, b].map(|light| linear_to_srgb(light.into()) as f32);
+                *color = [r, g, b, a];
+            }
+        }
+        (colors, terms)
     }
+}
 
-    /// The colours of all points. None if none came with any.
-    pub fn finish(self) -> Option<Colors> {
-        self.colors
+/// Puts `added` behind `all`; what is first is moved.
+fn append<T>(all: &mut Vec<T>, mut added: Vec<T>) {
+    if all.is_empty() {
+        *all = added;
+    } else {
+        all.append(&mut added);
     }
+}
+
+/// The terms of `count` points at a degree that may be higher than their own; those that are no numbers become 0.
+fn widened(terms: Option<(u32, Vec<f32>)>, (count, degree): (usize, u32), replaced: &mut u64) -> Vec<f32> {
+    let each = 3 * terms_of(degree);
+    let Some((own_degree, mut terms)) = terms else { return vec![0.0; count * each] };
+    let own_each = 3 * terms_of(own_degree);
+    for of_point in terms.chunks_exact_mut(own_each) {
+        let mut unusable = false;
+        for term in of_point.iter_mut().filter(|term| !(term.abs() <= LARGEST)) {
+            (*term, unusable) = (0.0, true);
+        }
+        *replaced += u64::from(unusable);
+    }
+    if own_degree == degree {
+        return terms;
+    }
+    let mut wide = vec![0.0; count * each];
+    for (wide, own) in wide.chunks_exact_mut(each).zip(terms.chunks_exact(own_each)) {
+        wide[..own_each].copy_from_slice(own);
+    }
+    wide
+}
+
+/// The 8-bit codes of inputs that have nothing else.
+fn codes(inputs: Vec<Input>) -> Vec<[u8; 4]> {
+    let mut all = Vec::new();
+    for input in inputs {
+        let mut own = if let Some(Colors::Srgb8(codes)) = input.colors { codes } else { Vec::new() };
+        own.resize(input.count, default_code());
+        append(&mut all, own);
+    }
+    all
 }
 
 /// The same colours, as [`Colors::Constant`] where there is one only. The default where there are none.
@@ -108,9 +162,12 @@ pub(crate) fn folded(colors: Option<Colors>) -> Colors {
     first.map_or(colors, Colors::Constant)
 }
 
-/// Whether the colour, and its products and differences on the way through f32, stay finite. NaN is not usable.
+/// The largest channel of a colour, whose products and differences on the way through f32 stay finite.
+const LARGEST: f32 = 1e18;
+
+/// NaN is not usable.
 fn is_usable(color: &[f32; 4]) -> bool {
-    color.iter().all(|c| c.abs() <= 1e18)
+    color.iter().all(|c| c.abs() <= LARGEST)
 }
 
 /// The 8-bit sRGB code nearest to [`DEFAULT_COLOR`].
@@ -125,12 +182,12 @@ mod tests {
     use super::*;
 
     fn joined(inputs: Vec<(Option<Colors>, usize)>) -> (Colors, u64) {
-        let mut gatherer = ColorGatherer::new();
+        let mut gatherer = ColorGatherer::default();
         for (colors, count) in inputs {
-            gatherer.append(colors, count);
+            gatherer.append(colors, count, false);
         }
-        let replaced = gatherer.replaced;
-        (folded(gatherer.finish()), replaced)
+        let all = gatherer.finish();
+        (folded(all.colors), all.replaced)
     }
 
     #[test]
@@ -169,5 +226,35 @@ mod tests {
         let bad = vec![[f32::NAN, 0.0, 0.0, 1.0], [1e30, 0.0, 0.0, 1e30], [0.0; 4]];
         let (colors, replaced) = joined(vec![(Some(Colors::Linear(bad)), 3)]);
         assert_eq!((colors, replaced), (Colors::Linear(vec![DEFAULT_COLOR, DEFAULT_COLOR, [0.0; 4]]), 2));
+    }
+
+    #[test]
+    fn harmonics_have_the_highest_degree_and_others_none() {
+        let of_degree = |degree: u32, term: f32| {
+            let terms = vec![term; 2 * 3 * terms_of(degree)];
+            Harmonics::new(vec![[0.25, -0.5, 2.0, 0.5]; 2], degree, terms).map(Colors::Harmonics)
+        };
+        let (all, replaced) = joined(vec![(of_degree(1, 0.5), 2), (None, 1), (of_degree(2, f32::NAN), 2)]);
+        let Colors::Harmonics(all) = all else { unreachable!() };
+        assert_eq!((all.degree(), replaced), (2, 2));
+        assert_eq!((all.colors()[0], all.colors()[2]), ([0.25, -0.5, 2.0, 0.5], DEFAULT_COLOR));
+        assert_eq!(all.terms(1), [[0.5; 9].as_slice(), &[0.0; 15]].concat());
+        assert!(all.terms(2).iter().chain(all.terms(4)).all(|term| *term == 0.0));
+    }
+
+    #[test]
+    fn beside_codes_all_are_codes() {
+        let mut gatherer = ColorGatherer::default();
+        gatherer.append(Some(Colors::Srgb8(vec![[0, 255, 128, 51]])), 1, false);
+        gatherer.append(Some(Colors::Linear(vec![[1.5, -0.5, 0.25, 2.0]])), 1, true);
+        gatherer.append(None, 1, false);
+        let all = gatherer.finish();
+        let Some(Colors::Linear(colors)) = all.colors else { unreachable!() };
+        assert!(all.encoded);
+        assert_eq!((all.replaced, all.clamped), (0, 1));
+        let expected = [[0.0, 1.0, 128.0 / 255.0, 0.2], [1.5, -0.5, 0.25, 1.0], [218.0 / 255.0; 4]];
+        for (found, expected) in colors.iter().flatten().zip(expected.iter().flatten()).take(11) {
+            assert!((found - expected).abs() < 2e-3, "{colors:?}");
+        }
     }
 }

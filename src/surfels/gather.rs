@@ -1,9 +1,10 @@
 //! All inputs as one set of points with finite coordinates.
 
 use super::colors::ColorGatherer;
-use super::{LARGEST_COORDINATE, Preparation};
+use super::{LARGEST_COORDINATE, Preparation, usable_axes};
+use crate::io::points::Flattened;
 use crate::io::{Points, Up};
-use crate::scene::Provenance;
+use crate::scene::{Colors, Provenance};
 use crate::{Error, Result};
 
 /// The usable points of all inputs, in order.
@@ -21,23 +22,31 @@ pub(crate) struct Gathered {
 pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
     let (mut preparation, mut provenance) = (Preparation::default(), Provenance::default());
     let mut points = Points { closed: true, ..Points::default() };
-    let (mut colors, mut flags, input_count) = (ColorGatherer::new(), Vec::new(), inputs.len());
+    let (mut colors, mut flags, input_count) = (ColorGatherer::default(), Vec::new(), inputs.len());
     for mut input in inputs {
-        let keep: Vec<bool> = input.positions.iter().map(is_usable).collect();
+        let mut keep: Vec<bool> = input.positions.iter().map(is_usable).collect();
+        if input.encoded {
+            for (index, keep) in keep.iter_mut().enumerate().filter(|(_, keep)| **keep) {
+                *keep = has_shape(&input, index);
+                preparation.shapeless += u64::from(!*keep);
+            }
+        }
         let kept = keep.iter().filter(|&&keep| keep).count();
         preparation.points += keep.len() as u64;
         preparation.withheld += input.withheld;
         preparation.loose += input.loose;
+        preparation.flattened = Flattened::of_both(preparation.flattened, input.flattened);
         provenance.push(flags.len() as u64, std::mem::take(&mut input.left_out), input.numbers.take());
         if kept < keep.len() {
             input.retain(&keep);
         }
         flags.extend(keep);
-        colors.append(input.colors.take(), kept);
+        colors.append(input.colors.take(), kept, input.encoded);
         join(&mut points, input);
     }
-    preparation.dropped_non_finite = (flags.len() - points.positions.len()) as u64;
-    if preparation.dropped_non_finite > 0 {
+    let dropped = (flags.len() - points.positions.len()) as u64;
+    preparation.dropped_non_finite = dropped - preparation.shapeless;
+    if dropped > 0 {
         provenance.retain(&flags);
     }
     if points.positions.is_empty() {
@@ -47,8 +56,9 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
         // -0 + 0 is 0: one position, one bit pattern.
         *coordinate += 0.0;
     }
-    preparation.replaced_colors = colors.replaced;
-    points.colors = colors.finish();
+    let colors = colors.finish();
+    (preparation.replaced_colors, preparation.clamped_alphas) = (colors.replaced, colors.clamped);
+    (points.colors, points.encoded) = (colors.colors, colors.encoded);
     Ok(Gathered { points, provenance, preparation })
 }
 
@@ -83,6 +93,10 @@ fn nothing_to_draw(inputs: usize, preparation: &Preparation) -> String {
         ),
         (0, _) => "no input was given, so there is nothing to draw".to_owned(),
         (_, 0) => "the input holds no points, so there is nothing to draw".to_owned(),
+        (_, points) if preparation.shapeless == points => format!(
+            "none of the {points} Gaussians read has scales, a rotation and an opacity that are numbers and span a surface, so there is \
+             nothing to draw"
+        ),
         (_, points) => format!(
             "none of the {points} points read has three finite coordinates of at most {LARGEST_COORDINATE:e} in \
              size, so there is nothing to draw"
@@ -96,6 +110,17 @@ impl Gathered {
         self.points.retain(keep);
         self.provenance.retain(keep);
     }
+}
+
+/// Whether a Gaussian has a surface and an opacity: what others lack is estimated, but of a Gaussian nothing can be.
+fn has_shape(points: &Points, index: usize) -> bool {
+    let alpha = match &points.colors {
+        Some(Colors::Linear(colors)) => colors.get(index),
+        Some(Colors::Harmonics(harmonics)) => harmonics.colors().get(index),
+        _ => None,
+    };
+    let axes = points.axes.as_ref().and_then(|axes| usable_axes(*axes.get(index)?));
+    axes.is_some() && alpha.is_none_or(|color| color[3].is_finite())
 }
 
 pub(crate) fn is_usable(position: &[f64; 3]) -> bool {

@@ -2,6 +2,7 @@
 
 #[cfg(doc)]
 use super::{LARGEST_COORDINATE, Limits};
+use crate::io::points::Flattened;
 #[cfg(doc)]
 use crate::scene::Scene;
 
@@ -14,11 +15,15 @@ pub struct Preparation {
     pub withheld: u64,
     /// Vertices that are in the meshes but not among `points`: no triangle with an area names them.
     pub loose: u64,
+    /// Gaussians left out because their scales, rotation or opacity are no numbers, or span no surface.
+    pub shapeless: u64,
+    /// Ellipsoids that were made surfels.
+    pub flattened: Option<Flattened>,
     /// Points left out because a coordinate is not finite or exceeds [`LARGEST_COORDINATE`].
     pub dropped_non_finite: u64,
     /// Points left out as outliers, which [`Limits::outliers`] asks for.
     pub dropped_outliers: u64,
-    /// Surfels in the scene: `points - dropped_non_finite - dropped_outliers`.
+    /// Surfels in the scene: `points - shapeless - dropped_non_finite - dropped_outliers`.
     pub surfels: u64,
     /// Surfels whose normal was missing, zero or not finite, and was estimated from neighbours.
     pub estimated_normals: u64,
@@ -31,6 +36,8 @@ pub struct Preparation {
     pub common_radius: Option<(u64, f64)>,
     /// Surfels whose colour was not finite and was replaced by [`DEFAULT_COLOR`](crate::scene::color::DEFAULT_COLOR).
     pub replaced_colors: u64,
+    /// Surfels whose alpha was not from 0 to 1 and became the nearer of the two.
+    pub clamped_alphas: u64,
     /// Points whose texture coordinates were not finite or too large and became 0; counted where a texture paints them.
     pub replaced_places: u64,
     /// Different positions among the surfels; None if nothing had to be estimated, so nobody looked.
@@ -66,9 +73,15 @@ impl Preparation {
                 "were left out: they are marked as withheld, which is deleted (--keep-withheld keeps them)",
             ),
             (self.loose > 0).then(|| format!("{} vertices of no triangle were left out", self.loose)),
+            (self.shapeless > 0).then(|| {
+                let what = "were left out: their scales, rotation or opacity are no numbers, or span no surface";
+                format!("{} Gaussians {what}", self.shapeless)
+            }),
+            self.flattened.map(|flattened| flattened.sentence()),
             counted(self.dropped_non_finite, "were dropped: a coordinate is not finite or too large"),
             counted(self.dropped_outliers, "were dropped: they lie too far from their neighbours"),
-            counted(self.replaced_colors, "had a colour that is not finite and became grey"),
+            counted(self.replaced_colors, "had a colour that is not finite and became grey, or lost its change with the view"),
+            counted(self.clamped_alphas, "had an alpha that is not from 0 to 1 and got the nearer of the two"),
             counted(self.replaced_places, "had texture coordinates that are not finite or too large and became 0"),
         ];
         let common = self.common_radius.map(|(points, radius)| {

@@ -184,8 +184,8 @@ fn reversed(scene: &Scene) -> Scene {
     match &mut reversed.colors {
         Colors::Srgb8(colors) => colors.reverse(),
         Colors::Linear(colors) => colors.reverse(),
-        // The first is of no surfel, the second of no generated scene.
-        Colors::Constant(_) | Colors::Textured(_) => {}
+        // The first is of no surfel, the others of no generated scene.
+        Colors::Constant(_) | Colors::Textured(_) | Colors::Harmonics(_) => {}
     }
     reversed
 }

@@ -18,7 +18,8 @@ use super::super::progress::Bars;
 use super::super::{note, outputs, write_json};
 use super::output::{Format, note_overflows};
 use super::view::{DEFAULT_SIZE, View};
-use super::{Arguments, backend, options, scene};
+use super::options::{for_scene, options};
+use super::{Arguments, backend, scene};
 
 /// Frames that wait for a writer or are in its hands take no more host memory than this, bytes, unless one frame does.
 const MOST_WAITING: u64 = 1 << 30;
@@ -60,6 +61,7 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
 
     let bars = Bars::new();
     let (scene, _) = scene(arguments, &bars)?;
+    let options = for_scene(arguments, options, &scene)?;
     let near = Camera::default_near(&scene);
     let largest = views.iter().map(|(_, view)| view.pixels()).max().unwrap_or(1);
     let writers = writers(largest, options.maps);

@@ -15,6 +15,8 @@
 //! The header has a comment `up y` or `up z` where that is known, and `closed` for surfels that cover a closed surface: no other
 //! program says it in a PLY file, and none stumbles over it.
 //!
+//! Files of Gaussians, whose vertices have other names, are read too ([`read`]).
+//!
 //! The names of normals, colours and texture coordinates are those of MeshLab, which ignores the half-axes, as do
 //! CloudCompare and Open3D: to them such a file is a cloud with normals and colours.
 
@@ -22,6 +24,7 @@ mod ascii;
 mod binary;
 mod contents;
 mod faces;
+mod gaussian;
 mod header;
 mod read;
 mod vertex;

@@ -3,7 +3,7 @@
 use super::contents::Contents;
 use super::faces::{Faces, Triangles};
 use super::header::{self, Encoding};
-use super::{ascii, binary};
+use super::{ascii, binary, gaussian};
 use crate::io::fault::{self, Fault};
 use crate::io::{Input, Material, Mesh, Points, Texture};
 use crate::io::{closed, triangles};
@@ -27,6 +27,10 @@ use std::sync::Arc;
 /// radii get them from the triangles around them, as in an OBJ file: normals weighted by area, and radii with which disks
 /// cover the triangles.
 ///
+/// Vertices with `scale_0` and `rot_0` are Gaussians, as 2D Gaussian splatting writes them, or flat ones of 3D Gaussian splatting: they get
+/// half-axes of so many standard deviations that nothing shows beyond ([`EXTENT`](crate::scene::gaussian::EXTENT)), and colours with alpha that
+/// change with the view if the file says so. With `flatten` ellipsoids lose their shortest axis, however thick they are.
+///
 /// A comment `up y` or `up z` in the header says which way is up, and `closed` that surfels cover a closed surface.
 ///
 /// Other properties are skipped, and so are other elements: those before the last one that is read by their declared
@@ -37,8 +41,8 @@ use std::sync::Arc;
 /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where
 /// the header is not PLY's, `x`, `y` or `z` is missing, the file ends before the vertices or faces that its header
 /// promises, a number in text is none, a list has a negative length, or a face names a vertex that does not exist.
-pub fn read(input: Input, progress: &dyn Progress) -> Result<Points> {
-    let (mut points, faces, _) = contents(input, false, progress)?;
+pub fn read(input: Input, flatten: bool, progress: &dyn Progress) -> Result<Points> {
+    let (mut points, faces, _) = contents(input, (false, flatten), progress)?;
     if faces.triangles.is_empty() {
         return Ok(points);
     }
@@ -68,7 +72,8 @@ pub fn read(input: Input, progress: &dyn Progress) -> Result<Points> {
 /// As [`read`].
 pub fn read_mesh(input: Input, progress: &dyn Progress) -> Result<Mesh> {
     let folder = input.path.parent().unwrap_or(Path::new("")).to_owned();
-    let (points, faces, textures) = contents(input, true, progress)?;
+    let (points, faces, textures) = contents(input, (true, true), progress)?;
+    let points = points.in_light();
     let Triangles { triangles, texture, texture_numbers } = faces;
     fn corners<T: Copy>(triangles: &[[u32; 3]], of_vertices: &[T]) -> Vec<[T; 3]> {
         triangles.iter().map(|corners| corners.map(|vertex| of_vertices[vertex as usize])).collect()
@@ -109,8 +114,12 @@ fn beside(folder: &Path, name: &str) -> PathBuf {
 }
 
 /// The vertices, the triangles, which name vertices that exist, and the names of textures. With `surface`, faces may have texture
-/// coordinates.
-fn contents(input: Input, surface: bool, progress: &dyn Progress) -> Result<(Points, Triangles, Vec<String>)> {
+/// coordinates; with `flatten` Gaussians may be thick.
+fn contents(
+    input: Input,
+    (surface, flatten): (bool, bool),
+    progress: &dyn Progress,
+) -> Result<(Points, Triangles, Vec<String>)> {
     let Input { file, length, path, .. } = input;
     let in_file = |fault: Fault| fault.of(&path);
     let mut reader = BufReader::with_capacity(1 << 16, file);
@@ -126,6 +135,7 @@ fn contents(input: Input, surface: bool, progress: &dyn Progress) -> Result<(Poi
     };
     progress.end();
     let Contents { mut points, faces } = contents.map_err(in_file)?;
+    gaussian::check(&points, flatten).map_err(in_file)?;
     points.up = header.up;
     points.closed = header.closed;
     let triangles = faces.finish(&points.positions).map_err(in_file)?;

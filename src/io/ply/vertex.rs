@@ -1,5 +1,6 @@
 //! What the properties of a PLY vertex mean, and the points they become.
 
+use super::gaussian::{GaussianLayout, Gaussians};
 use super::header::{Element, Kind, Scalar};
 use crate::io::Points;
 use crate::io::fault::{Fault, reserve};
@@ -55,7 +56,7 @@ impl Coding {
 }
 
 /// Where a row's attributes are: each number an index into `columns`.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Layout {
     pub(super) columns: Vec<Column>,
     /// All scalar properties of a row, used or not, in order.
@@ -71,6 +72,7 @@ pub(super) struct Layout {
     color: Option<[(usize, Coding); 3]>,
     alpha: Option<(usize, Coding)>,
     texture: Option<[usize; 2]>,
+    gaussian: Option<GaussianLayout>,
 }
 
 /// The lines at which an ellipse ends ([`Clip`]), in units of its half-axes.
@@ -111,6 +113,12 @@ impl Layout {
                 .collect();
             return Err(Fault::Malformed(format!("its vertices have no property {}", missing.join(", "))));
         };
+        let has = |name: &str| places.iter().any(|(place, _)| *place == name);
+        let gaussian = GaussianLayout::of(has, |name| column(&[name]))?;
+        if gaussian.is_some() {
+            let position = [x, y, z];
+            return Ok(Self { columns, scalars, row_size: offset, position, gaussian, ..Self::default() });
+        }
         let mut triple = |names: [&[&str]; 3]| Some([column(names[0])?, column(names[1])?, column(names[2])?]);
         let normal = triple([&["nx", "normal_x"], &["ny", "normal_y"], &["nz", "normal_z"]]);
         let color =
@@ -140,6 +148,7 @@ impl Layout {
             color,
             alpha,
             texture,
+            gaussian: None,
         })
     }
 
@@ -162,6 +171,7 @@ pub(super) struct Vertices<'a> {
     texture: Vec<[f32; 2]>,
     srgb8: Vec<[u8; 4]>,
     linear: Vec<[f32; 4]>,
+    gaussians: Option<Gaussians<'a>>,
 }
 
 impl<'a> Vertices<'a> {
@@ -184,7 +194,8 @@ impl<'a> Vertices<'a> {
         };
         reserve(&mut srgb8, codes)?;
         reserve(&mut linear, lights)?;
-        Ok(Self { layout, positions, normals, radii, axes, clips, caps, texture, srgb8, linear })
+        let gaussians = layout.gaussian.as_ref().map(|own| Gaussians::with_capacity(own, rows)).transpose()?;
+        Ok(Self { layout, positions, normals, radii, axes, clips, caps, texture, srgb8, linear, gaussians })
     }
 
     pub(super) fn len(&self) -> u64 {
@@ -196,6 +207,9 @@ impl<'a> Vertices<'a> {
         let layout = self.layout;
         let [x, y, z] = layout.position;
         self.positions.extend((0..rows).map(|row| [value(x, row), value(y, row), value(z, row)]));
+        if let Some(gaussians) = &mut self.gaussians {
+            (0..rows).for_each(|row| gaussians.push(|column| value(column, row)));
+        }
         if let Some(normal) = layout.normal {
             self.normals.extend((0..rows).map(|row| normal.map(|column| value(column, row) as f32)));
         }
@@ -239,7 +253,7 @@ impl<'a> Vertices<'a> {
             (true, true) => Some(Colors::Srgb8(self.srgb8)),
             (true, false) => Some(Colors::Linear(self.linear)),
         };
-        Points {
+        let mut points = Points {
             positions: self.positions,
             normals: layout.normal.map(|_| self.normals),
             radii: layout.radius.map(|_| self.radii),
@@ -250,6 +264,10 @@ impl<'a> Vertices<'a> {
             texture: layout.texture.map(|_| self.texture),
             up: None,
             ..Points::default()
+        };
+        if let Some(gaussians) = self.gaussians {
+            gaussians.finish(&mut points);
         }
+        points
     }
 }

@@ -116,7 +116,7 @@ impl Properties {
                 None => ColorProperties::Absent,
                 Some(Colors::Srgb8(codes)) if codes.iter().all(|code| code[3] == 255) => ColorProperties::Srgb8,
                 Some(Colors::Srgb8(_)) => ColorProperties::Srgb8Alpha,
-                Some(Colors::Linear(_) | Colors::Constant(_) | Colors::Textured(_)) => ColorProperties::Linear,
+                Some(_) => ColorProperties::Linear,
             },
             texture: points.texture.is_some(),
             up: points.up,
@@ -229,7 +229,8 @@ pub fn write(
     })
 }
 
-/// Writes all that `points` hold, so that [`read`](super::read) gives them back.
+/// Writes all that `points` hold, so that [`read`](super::read) gives them back; of Gaussians the surfels, in linear light that is the same
+/// from every side.
 ///
 /// With half-axes, normals that are missing are their product s x t, and radii that are missing their longer one.
 ///
@@ -238,6 +239,13 @@ pub fn write(
 /// [`Error::Write`](crate::Error::Write) where the system cannot write.
 pub fn write_points(path: &Path, points: &Points, progress: &dyn Progress) -> Result<()> {
     const TOLD: usize = 1 << 16;
+    let in_light;
+    let points = if points.encoded {
+        in_light = points.clone().in_light();
+        &in_light
+    } else {
+        points
+    };
     let count = points.positions.len();
     progress.begin("writing points", count as u64);
     let vertices = points.positions.iter().enumerate().map(|(index, position)| {
@@ -257,6 +265,7 @@ pub fn write_points(path: &Path, points: &Points, progress: &dyn Progress) -> Re
                 Some(Colors::Linear(colors)) => colors.get(index).map(|color| Color::Linear(*color)),
                 Some(Colors::Constant(color)) => Some(Color::Linear(*color)),
                 Some(Colors::Textured(textured)) => textured.colors().get(index).map(|color| Color::Linear(*color)),
+                Some(colors @ Colors::Harmonics(_)) => Some(Color::Linear(colors.linear(index))),
                 None => None,
             },
             texture: of(&points.texture, index).unwrap_or_default(),

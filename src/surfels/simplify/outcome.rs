@@ -190,7 +190,7 @@ pub(super) fn scene(
     let colors = match scene.colors {
         Colors::Constant(color) => Colors::Constant(color),
         Colors::Srgb8(_) => Colors::Srgb8(chosen.iter().map(|chosen| srgb8(chosen.color)).collect()),
-        Colors::Linear(_) | Colors::Textured(_) => Colors::Linear(chosen.iter().map(|chosen| chosen.color).collect()),
+        Colors::Linear(_) | Colors::Textured(_) | Colors::Harmonics(_) => Colors::Linear(chosen.iter().map(|chosen| chosen.color).collect()),
     };
     let [moment, area] = chosen.iter().fold([0.0; 2], |sum, chosen| [sum[0] + chosen.sums[0], sum[1] + chosen.sums[1]]);
     let max = chosen.iter().map(|chosen| chosen.largest).fold(0.0, f64::max);
@@ -207,6 +207,7 @@ pub(super) fn scene(
             clips: if clips.iter().all(Clip::is_none) { Vec::new() } else { clips },
             caps: if caps.iter().all(Cap::is_flat) { Vec::new() } else { caps },
             colors,
+            encoded: scene.encoded,
             oriented: scene.oriented,
             closed: scene.closed,
             up: scene.up,

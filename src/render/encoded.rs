@@ -1,0 +1,28 @@
+//! Scenes whose colours are codes of sRGB, as those of Gaussians are ([`gaussian`](crate::scene::gaussian)): they are composited as they are, over
+//! the code of the background, and the picture becomes linear light, as all frames are.
+
+use rayon::prelude::*;
+
+use crate::frame::Frame;
+use crate::plan::{Facts, RenderOptions};
+use crate::scene::color::{linear_to_srgb, srgb_to_linear};
+
+/// The options by which the scene that `facts` are of is drawn.
+pub(super) fn of(facts: &Facts, options: &RenderOptions) -> RenderOptions {
+    let mut options = options.clone();
+    if facts.encoded {
+        let [r, g, b, a] = options.background;
+        let [r, g, b] = [r, g, b].map(|light| linear_to_srgb(light.into()) as f32);
+        options.background = [r, g, b, a];
+    }
+    options
+}
+
+/// Makes linear light of a frame's codes.
+pub(super) fn decode(frame: &mut Frame) {
+    frame.color.par_iter_mut().with_min_len(1 << 12).for_each(|color| {
+        let [r, g, b, a] = *color;
+        let [r, g, b] = [r, g, b].map(|code| srgb_to_linear(code.into()) as f32);
+        *color = [r, g, b, a];
+    });
+}

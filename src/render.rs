@@ -1,7 +1,7 @@
 //! The sequence: project, visibility, accumulate, resolve, on every backend.
 
-pub mod inspect;
 mod encoded;
+pub mod inspect;
 mod kept;
 mod kernels;
 mod look;

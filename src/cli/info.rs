@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use epsplat::Result;
 use epsplat::io::Points;
-use epsplat::scene::Colors;
+use epsplat::scene::{Colors, Scene, gaussian};
 use epsplat::surfels::{self, Coverage, Preparation};
 use serde::Serialize;
 
@@ -36,6 +36,8 @@ struct Info {
     normals: bool,
     radii: bool,
     colors: &'static str,
+    /// What it says of Gaussians, if they are some.
+    gaussians: Option<Gaussians>,
     /// Texture coordinates, by which `render --texture` paints.
     texture: bool,
     up: &'static str,
@@ -54,6 +56,41 @@ struct Info {
     preparation: Preparation,
 }
 
+/// What a file of Gaussians holds.
+#[derive(Serialize)]
+struct Gaussians {
+    /// Of the harmonics by which colours change with the view, 0 for none.
+    degree: u32,
+    /// The least, the median and the greatest of those that are drawn.
+    opacities: [f32; 3],
+    /// The median of the longer and of the shorter standard deviation, world units.
+    deviations: [f32; 2],
+}
+
+impl Gaussians {
+    fn of(scene: &Scene) -> Option<Self> {
+        if !scene.encoded {
+            return None;
+        }
+        let sorted = |values: &mut dyn Iterator<Item = f32>| {
+            let mut values: Vec<f32> = values.collect();
+            values.sort_by(f32::total_cmp);
+            values
+        };
+        let middle = |values: &[f32]| values[values.len() / 2];
+        let count = scene.surfels.len();
+        let opacities = sorted(&mut (0..count).map(|index| scene.colors.linear(index)[3]));
+        let deviation = |axis: f32| axis / gaussian::EXTENT as f32;
+        let longer = sorted(&mut scene.surfels.iter().map(|surfel| deviation(surfel.radius())));
+        let shorter = sorted(&mut scene.surfels.iter().map(|surfel| deviation(surfel.shorter())));
+        Some(Self {
+            degree: if let Colors::Harmonics(harmonics) = &scene.colors { harmonics.degree() } else { 0 },
+            opacities: [opacities[0], middle(&opacities), opacities[count - 1]],
+            deviations: [middle(&longer), middle(&shorter)],
+        })
+    }
+}
+
 pub fn run(arguments: &Arguments) -> Result<()> {
     outputs::check([&arguments.input], &arguments.json)?;
     let bars = Bars::new();
@@ -63,10 +100,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let held = (points.positions.len() as u64, points.normals.is_some(), points.radii.is_some(), colors(&points));
     let (scene, preparation) =
         surfels::build(vec![points], &bars).map_err(|error| named(error, std::slice::from_ref(&arguments.input)))?;
-    let coverage = surfels::coverage(&scene, &bars)?;
+    let gaussians = Gaussians::of(&scene);
+    // They are no samples of a surface that others would have to close.
+    let coverage = if gaussians.is_some() { None } else { surfels::coverage(&scene, &bars)? };
     let lacking = [
         (preparation.estimated_normals > 0, "normals"),
-        (!scene.oriented, "a side for its normals"),
+        (!scene.oriented && gaussians.is_none(), "a side for its normals"),
         (preparation.estimated_radii > 0, "radii"),
         (coverage.is_some_and(|coverage| coverage.covered < COVERED), "surfels that close the surface"),
     ];
@@ -78,6 +117,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         normals: held.1,
         radii: held.2,
         colors: held.3,
+        gaussians,
         texture,
         up: scene.up.name(),
         min: bounds.min.to_array(),
@@ -107,6 +147,7 @@ fn colors(points: &Points) -> &'static str {
     match points.colors {
         None => "none",
         Some(Colors::Srgb8(_)) => "8-bit sRGB",
+        Some(Colors::Harmonics(_)) => "spherical harmonics",
         Some(_) => "float",
     }
 }
@@ -118,9 +159,21 @@ fn table(input: &std::path::Path, info: &Info) -> String {
     // Writing to a string cannot fail.
     let _ = writeln!(text, "{}", input.display());
     let _ = writeln!(text, "  points    {}", info.points);
-    let _ = writeln!(text, "  normals   {}", given(info.normals));
-    let _ = writeln!(text, "  radii     {}", given(info.radii));
-    let _ = writeln!(text, "  colours   {}", info.colors);
+    if let Some(Gaussians { degree, opacities: [least, median, greatest], deviations: [longer, shorter] }) =
+        info.gaussians
+    {
+        let changes = match degree {
+            0 => "colours the same from every side".to_owned(),
+            _ => format!("colours change with the view by harmonics of degree {degree}"),
+        };
+        let _ = writeln!(text, "  kind      Gaussian surfels: {changes}");
+        let _ = writeln!(text, "  opacity   {least:.3} to {greatest:.3}, half of them below {median:.3}");
+        let _ = writeln!(text, "  sizes     standard deviations of {longer:.4} and {shorter:.4} (medians)");
+    } else {
+        let _ = writeln!(text, "  normals   {}", given(info.normals));
+        let _ = writeln!(text, "  radii     {}", given(info.radii));
+        let _ = writeln!(text, "  colours   {}", info.colors);
+    }
     if info.texture {
         let _ = writeln!(text, "  texture   coordinates given: `epsplat render --texture IMAGE.png` paints by them");
     }

@@ -87,11 +87,8 @@ impl InputFormat {
 impl Reading {
     /// The points of a file.
     pub(super) fn points(&self, path: &Path, bars: &Bars) -> Result<Points> {
-        let options = ReadOptions {
-            format: self.input.input_format,
-            keep_withheld: self.keep_withheld,
-            flatten: self.flatten,
-        };
+        let options =
+            ReadOptions { format: self.input.input_format, keep_withheld: self.keep_withheld, flatten: self.flatten };
         io::read_with(path, options, bars)
     }
 

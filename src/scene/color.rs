@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-pub use super::srgb::{SRGB8_TO_LINEAR, linear_to_srgb, srgb_to_linear};
 use super::harmonics::Harmonics;
+pub use super::srgb::{SRGB8_TO_LINEAR, linear_to_srgb, srgb_to_linear};
 use super::texture::Textured;
 
 /// The colours of a scene or of one input, with straight alpha.

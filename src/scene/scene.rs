@@ -201,16 +201,14 @@ impl Scene {
         };
         (0..count)
             .into_par_iter()
-            .fold(nothing, |range, index| {
-                match &self.colors {
-                    Colors::Harmonics(harmonics) => {
-                        let high = premultiplied(harmonics.most(index));
-                        merge(range, ([0.0, 0.0, 0.0, high[3]], high))
-                    }
-                    colors => {
-                        let color = premultiplied(colors.linear(index));
-                        merge(range, (color, color))
-                    }
+            .fold(nothing, |range, index| match &self.colors {
+                Colors::Harmonics(harmonics) => {
+                    let high = premultiplied(harmonics.most(index));
+                    merge(range, ([0.0, 0.0, 0.0, high[3]], high))
+                }
+                colors => {
+                    let color = premultiplied(colors.linear(index));
+                    merge(range, (color, color))
                 }
             })
             .reduce(nothing, merge)

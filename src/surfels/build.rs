@@ -128,8 +128,7 @@ pub(super) fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Prog
     };
     let mut surfels = given.surfels(estimated.as_ref(), origin);
     // Nobody says which side of a Gaussian is its front.
-    let oriented =
-        preparation.estimated_normals == 0 && !preparation.has_random_sides() && !gathered.points.encoded;
+    let oriented = preparation.estimated_normals == 0 && !preparation.has_random_sides() && !gathered.points.encoded;
     let caps = match estimated {
         Some(estimated) if limits.curved && preparation.estimated_radii > 0 => {
             estimated.caps(&given, &surfels, oriented)

@@ -80,7 +80,10 @@ impl Preparation {
             self.flattened.map(|flattened| flattened.sentence()),
             counted(self.dropped_non_finite, "were dropped: a coordinate is not finite or too large"),
             counted(self.dropped_outliers, "were dropped: they lie too far from their neighbours"),
-            counted(self.replaced_colors, "had a colour that is not finite and became grey, or lost its change with the view"),
+            counted(
+                self.replaced_colors,
+                "had a colour that is not finite and became grey, or lost its change with the view",
+            ),
             counted(self.clamped_alphas, "had an alpha that is not from 0 to 1 and got the nearer of the two"),
             counted(self.replaced_places, "had texture coordinates that are not finite or too large and became 0"),
         ];

@@ -4,6 +4,7 @@
 
 pub mod command;
 pub mod enclosure;
+pub mod gaussians;
 pub mod judged;
 pub mod meshes;
 pub mod modules;

@@ -213,6 +213,7 @@ pub fn shuffled(scene: &Scene, seed: u64) -> Scene {
         Colors::Srgb8(codes) => Colors::Srgb8(order.iter().map(|&k| codes[k]).collect()),
         Colors::Linear(colors) => Colors::Linear(order.iter().map(|&k| colors[k]).collect()),
         Colors::Textured(textured) => Colors::Textured(textured.taken(&order)),
+        Colors::Harmonics(harmonics) => Colors::Harmonics(harmonics.taken(&order)),
     };
     let low = order.iter().filter_map(|&k| scene.low.get(k).copied()).collect();
     let clips = order.iter().filter_map(|&k| scene.clips.get(k).copied()).collect();

@@ -76,6 +76,7 @@ fn check_lengths(points: &Points) -> Result<(), String> {
         Colors::Srgb8(codes) => codes.len(),
         Colors::Linear(colors) => colors.len(),
         Colors::Textured(textured) => textured.colors().len(),
+        Colors::Harmonics(harmonics) => harmonics.colors().len(),
     });
     let lengths = [points.normals.as_ref().map(Vec::len), points.radii.as_ref().map(Vec::len), colors];
     if lengths.into_iter().flatten().all(|length| length == points.positions.len()) {

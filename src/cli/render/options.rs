@@ -2,7 +2,9 @@
 
 use epsplat::plan::{BackendName, Raster, RenderOptions, check};
 use epsplat::scene::composite::ALL_LAYERS;
-use epsplat::scene::{Blend, Composite, Facing, Kernel, LowPass, Maps, PointSize, Samples, Scene, Shading, ShadingAt, gaussian};
+use epsplat::scene::{
+    Blend, Composite, Facing, Kernel, LowPass, Maps, PointSize, Samples, Scene, Shading, ShadingAt, gaussian,
+};
 use epsplat::{Error, Result};
 
 use super::super::note;

@@ -16,9 +16,9 @@ use serde::Serialize;
 
 use super::super::progress::Bars;
 use super::super::{note, outputs, write_json};
+use super::options::{for_scene, options};
 use super::output::{Format, note_overflows};
 use super::view::{DEFAULT_SIZE, View};
-use super::options::{for_scene, options};
 use super::{Arguments, backend, scene};
 
 /// Frames that wait for a writer or are in its hands take no more host memory than this, bytes, unless one frame does.

@@ -35,13 +35,18 @@ pub(super) struct GaussianLayout {
 
 impl GaussianLayout {
     /// None if the vertices, whose properties `has` knows and `column` gives places, are no Gaussians.
-    pub(super) fn of(has: impl Fn(&str) -> bool, mut column: impl FnMut(&str) -> Option<usize>) -> Result<Option<Self>, Fault> {
+    pub(super) fn of(
+        has: impl Fn(&str) -> bool,
+        mut column: impl FnMut(&str) -> Option<usize>,
+    ) -> Result<Option<Self>, Fault> {
         if !(has("scale_0") && has("rot_0")) {
             return Ok(None);
         }
         let mut wanted = |name: String| {
             column(&name).ok_or_else(|| {
-                Fault::Malformed(format!("its vertices have scale_0 and rot_0, as Gaussians do, but no property {name}"))
+                Fault::Malformed(format!(
+                    "its vertices have scale_0 and rot_0, as Gaussians do, but no property {name}"
+                ))
             })
         };
         let dimensions = if has("scale_2") { 3 } else { 2 };

@@ -190,7 +190,9 @@ pub(super) fn scene(
     let colors = match scene.colors {
         Colors::Constant(color) => Colors::Constant(color),
         Colors::Srgb8(_) => Colors::Srgb8(chosen.iter().map(|chosen| srgb8(chosen.color)).collect()),
-        Colors::Linear(_) | Colors::Textured(_) | Colors::Harmonics(_) => Colors::Linear(chosen.iter().map(|chosen| chosen.color).collect()),
+        Colors::Linear(_) | Colors::Textured(_) | Colors::Harmonics(_) => {
+            Colors::Linear(chosen.iter().map(|chosen| chosen.color).collect())
+        }
     };
     let [moment, area] = chosen.iter().fold([0.0; 2], |sum, chosen| [sum[0] + chosen.sums[0], sum[1] + chosen.sums[1]]);
     let max = chosen.iter().map(|chosen| chosen.largest).fold(0.0, f64::max);

@@ -96,10 +96,10 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
 const ALTERNATIVES: [&[&str]; 8] = [
     &["pinhole", "orthographic"],
     &["kernel-gaussian", "kernel-ellipse", "kernel-cone", "kernel-constant"],
-    &["color-constant", "color-srgb8", "color-linear", "color-textured"],
+    &["color-constant", "color-srgb8", "color-linear", "color-textured", "color-harmonics"],
     &["raster-exact", "raster-offset"],
     &["epsilon-radius", "epsilon-ray"],
-    &["lowpass-max", "lowpass-ewa"],
+    &["lowpass-max", "lowpass-ewa", "lowpass-gaussians"],
     &["lambert", "phong"],
     &["lists-layers", "lists-sorted"],
 ];
@@ -121,6 +121,7 @@ const EXCLUSIVE: [(&str, &[&str]); 14] = [
         "nearest",
         &[
             "atomics-u64",
+            "color-harmonics",
             "color-linear",
             "color-textured",
             "copies",

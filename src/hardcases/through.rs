@@ -6,7 +6,7 @@ use super::HardCase;
 use super::staging::{BOTH, Entry, Filling, Stage, build, fraction};
 use crate::error::Result;
 use crate::scene::composite::ALL_LAYERS;
-use crate::scene::{Composite, Kernel, Surfel, Tail};
+use crate::scene::{Composite, Kernel, Surfel, Tail, gaussian};
 
 /// The cases.
 pub fn cases() -> Result<Vec<HardCase>> {
@@ -97,6 +97,21 @@ const LIST: &[Entry] = &[
         stage: Stage::askew,
         fill: |stage| {
             let filling = through(Composite::Sorted, (0.9, 1.0), sheets(stage, 8, 0.05));
+            Filling { excused: 0.05, ..filling }
+        },
+        projections: BOTH,
+    },
+    Entry {
+        name: "by the rules of Gaussians",
+        about: "Eight sheets of disks with alphas of 0.01 to 1: the faint and what lies behind the opaque is left out.",
+        bound: THROUGH,
+        size: (48, 40),
+        stage: Stage::askew,
+        fill: |stage| {
+            let alphas = |k: usize| [1.0, 0.01, 0.5, 0.999, 0.3, 0.06, 0.95][k % 7];
+            let mut filling = through(Composite::Gaussians, (0.9, 1.0), sheets(stage, 8, 0.05)).alphas(alphas);
+            filling.options.kernel = gaussian::KERNEL;
+            filling.options.opacity = 1.0;
             Filling { excused: 0.05, ..filling }
         },
         projections: BOTH,

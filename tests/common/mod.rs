@@ -234,9 +234,11 @@ fn base_needs() -> Vec<SceneNeeds> {
             (true, true) => Shading::Lambert,
             (true, false) => Shading::Phong,
         };
-        for color in [ColorNeed::Constant, ColorNeed::Srgb8, ColorNeed::Linear, ColorNeed::Textured] {
+        let harmonics = ColorNeed::Harmonics(1 + bits % 3);
+        for color in [ColorNeed::Constant, ColorNeed::Srgb8, ColorNeed::Linear, ColorNeed::Textured, harmonics] {
             let of_one = color == ColorNeed::Constant;
-            if alpha && of_one || lit_splats && (of_one || color == ColorNeed::Textured) {
+            let rare = color == harmonics && !(lit_splats || bits % 3 == 0);
+            if rare || alpha && of_one || lit_splats && (of_one || color == ColorNeed::Textured) {
                 continue;
             }
             let projection = if bit(4) { Projection::Pinhole } else { Projection::Orthographic };

@@ -2,7 +2,7 @@
 
 use super::mutate::Grammar;
 use super::random::Random;
-use super::render::{SIZE, draw};
+use super::render::{SIZE, draw, shaded};
 use super::session::sentence;
 use super::{Outcome, Target};
 use epsplat::io::Points;
@@ -141,7 +141,7 @@ pub fn seen(file: CameraFile, valid: Option<usize>) -> Result<Outcome, String> {
         Pose::LookAt(eye, target, up) => Camera::look_at(SIZE, file.lens, eye, target, up, scene.up, near),
     });
     match posed {
-        Ok(camera) => draw(scene, &camera, Shading::Lambert),
+        Ok(camera) => draw(scene, &camera, &shaded(Shading::Lambert)),
         Err(error) if valid.is_some() => Err(format!("a valid camera cannot be: {error}")),
         Err(error) => sentence(&error, None).map(|()| Outcome::Read),
     }

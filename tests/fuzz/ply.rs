@@ -37,6 +37,14 @@ pub const TARGET: Target = Target {
             "radius",
             "red",
             "alpha",
+            "scale_0",
+            "scale_2",
+            "rot_3",
+            "opacity",
+            "f_dc_2",
+            "f_rest_44",
+            "nan",
+            "-1e9",
             "\nproperty list uint double l\n",
             "\nelement vertex 4294967295\n",
             "\nelement ghost 18446744073709551615\n",
@@ -57,6 +65,55 @@ pub const TARGET: Target = Target {
 const INTEGERS: [&str; 12] =
     ["char", "int8", "uchar", "uint8", "short", "int16", "ushort", "uint16", "int", "int32", "uint", "uint32"];
 const REALS: [&str; 4] = ["float", "float32", "double", "float64"];
+
+/// Terms of spherical harmonics.
+const REST: [&str; 45] = [
+    "f_rest_0",
+    "f_rest_1",
+    "f_rest_2",
+    "f_rest_3",
+    "f_rest_4",
+    "f_rest_5",
+    "f_rest_6",
+    "f_rest_7",
+    "f_rest_8",
+    "f_rest_9",
+    "f_rest_10",
+    "f_rest_11",
+    "f_rest_12",
+    "f_rest_13",
+    "f_rest_14",
+    "f_rest_15",
+    "f_rest_16",
+    "f_rest_17",
+    "f_rest_18",
+    "f_rest_19",
+    "f_rest_20",
+    "f_rest_21",
+    "f_rest_22",
+    "f_rest_23",
+    "f_rest_24",
+    "f_rest_25",
+    "f_rest_26",
+    "f_rest_27",
+    "f_rest_28",
+    "f_rest_29",
+    "f_rest_30",
+    "f_rest_31",
+    "f_rest_32",
+    "f_rest_33",
+    "f_rest_34",
+    "f_rest_35",
+    "f_rest_36",
+    "f_rest_37",
+    "f_rest_38",
+    "f_rest_39",
+    "f_rest_40",
+    "f_rest_41",
+    "f_rest_42",
+    "f_rest_43",
+    "f_rest_44",
+];
 
 /// How numbers are written.
 #[derive(Clone, Copy)]
@@ -110,6 +167,15 @@ fn vertex_properties(random: &mut Random) -> Vec<Property> {
         if random.one_in(3) {
             names.extend(group);
         }
+    }
+    let gaussian = random.one_in(3);
+    if gaussian {
+        names.extend([
+            "rot_0", "rot_1", "rot_2", "rot_3", "opacity", "f_dc_0", "f_dc_1", "f_dc_2", "scale_0", "scale_1",
+        ]);
+        names.extend(random.one_in(3).then_some("scale_2"));
+        // Of the degrees 0 to 3.
+        names.extend(&REST[..[0, 9, 24, 45][random.below(4)]]);
     }
     let one_color_type = random.one_in(2).then_some("uchar");
     let mut properties: Vec<Property> = names
@@ -170,6 +236,11 @@ fn generate(random: &mut Random) -> (Vec<u8>, usize) {
                         "y" => point[1],
                         "z" => point[2],
                         "red" | "green" | "blue" | "r" | "g" | "b" => random.between(0.0, 300.0),
+                        "opacity" => [0.0, -1e9, 1e9, f64::NAN, 3.0, -2.0][random.below(6)],
+                        _ if name.starts_with("scale_") && random.one_in(40) => {
+                            [f64::NAN, -400.0, 400.0][random.below(3)]
+                        }
+                        _ if name.starts_with("scale_") => random.between(-6.0, -1.0),
                         "radius" | "scale" if random.one_in(8) => place.point(random)[0],
                         "radius" | "scale" => random.between(0.0, 0.2),
                         _ => random.between(-1.0, 1.0),

@@ -3,10 +3,10 @@
 use super::Outcome;
 use super::session::sentence;
 use epsplat::frame::Frame;
-use epsplat::io::Points;
+use epsplat::io::{Points, ReadOptions};
 use epsplat::plan::RenderOptions;
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, Lens, Map, Maps, Scene, Shading};
+use epsplat::scene::{Camera, Colors, Composite, Lens, LowPass, Map, Maps, Scene, Shading, gaussian};
 use epsplat::surfels::{LARGEST_COORDINATE, build};
 use epsplat::{Error, io};
 use std::path::Path;
@@ -19,7 +19,8 @@ pub const SIZE: (u32, u32) = (16, 16);
 
 /// Reads a file of points and draws them.
 pub fn points(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
-    let points = match (io::read(path, &()), valid) {
+    let options = ReadOptions { flatten: true, ..ReadOptions::default() };
+    let points = match (io::read_with(path, options, &()), valid) {
         (Ok(points), _) => points,
         (Err(error), Some(_)) => return Err(format!("a valid file is refused: {error}")),
         (Err(error), None) => return sentence(&error, Some(path)).map(|()| Outcome::Refused),
@@ -33,7 +34,8 @@ pub fn points(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
         return Ok(Outcome::Read);
     }
     let usable = |p: &[f64; 3]| p.iter().all(|c| c.abs() <= LARGEST_COORDINATE);
-    let drawable = points.positions.iter().any(usable);
+    // Gaussians may lack what cannot be estimated.
+    let drawable = points.positions.iter().any(usable) && !points.encoded;
     // What is narrower has half-axes whose products an f32 cannot hold.
     let narrow = epsplat::surfels::bounds(&points).extent().max_element() < 1e-15;
     let (scene, _) = match build(vec![points], &()) {
@@ -53,8 +55,11 @@ pub fn points(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
         }
         Err(error) => return Err(format!("no camera frames the scene: {error}")),
     };
-    draw(&scene, &camera, Shading::Lambert)?;
-    draw(&scene, &camera, Shading::Unlit)
+    if scene.encoded {
+        return draw(&scene, &camera, &gaussians());
+    }
+    draw(&scene, &camera, &shaded(Shading::Lambert))?;
+    draw(&scene, &camera, &shaded(Shading::Unlit))
 }
 
 /// The largest absolute coordinate or radius of a scene, world units.
@@ -86,10 +91,25 @@ fn check_lengths(points: &Points) -> Result<(), String> {
     }
 }
 
+/// The default with a shading.
+pub fn shaded(shading: Shading) -> RenderOptions {
+    RenderOptions { shading, ..RenderOptions::default() }
+}
+
+/// What Gaussians are drawn with.
+fn gaussians() -> RenderOptions {
+    RenderOptions {
+        kernel: gaussian::KERNEL,
+        low_pass: LowPass::Gaussians,
+        composite: Composite::Gaussians,
+        ..shaded(Shading::Unlit)
+    }
+}
+
 /// Draws `scene` with the reference and looks at each pixel of each map.
-pub fn draw(scene: &Scene, camera: &Camera, shading: Shading) -> Result<Outcome, String> {
+pub fn draw(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Result<Outcome, String> {
     let maps = Maps::ON_DEVICE.and(&[Map::Decision]);
-    let options = RenderOptions { maps, shading, ..RenderOptions::default() };
+    let options = RenderOptions { maps, ..options.clone() };
     let (frame, _) = render(scene, camera, &options, &Backend::Reference, &())
         .map_err(|error| format!("the scene cannot be drawn: {error}"))?;
     check(&frame).map(|()| Outcome::Drawn)

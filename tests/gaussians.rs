@@ -164,7 +164,8 @@ fn a_large_file_is_what_the_published_formulas_say() {
     };
     for backend in backends() {
         let error = rmse(&frame(&scene, &camera, &options(), &backend));
-        assert!(error < 2e-6, "{error:e}");
+        println!("{error:e}");
+        assert!(error < 1e-6, "{error:e}");
     }
     let Some(_) = gpu() else { return };
     for (name, from, to) in [

@@ -97,6 +97,7 @@ impl SceneEntry {
                 not_beside("count", counts && !self.surfels.samples(), "file, unless surfels are sampled")?;
                 not_beside("radius", self.radius.is_some(), "file (footprint_px serves)")?;
                 not_beside("noise", self.noise.is_some(), "file")?;
+                not_beside("surfels = gaussians", self.surfels == Making::Gaussians, "file: they are made of a shape")?;
                 let is_mesh =
                     file.extension().is_some_and(|e| ["obj", "ply"].iter().any(|m| e.eq_ignore_ascii_case(m)));
                 if self.truth && !is_mesh {
@@ -106,8 +107,8 @@ impl SceneEntry {
             (None, Some(_)) if self.texture.is_some() || self.source.is_some() => {
                 return Err("texture, source: they are of a file".into());
             }
-            (None, Some(_)) if !matches!(self.surfels, Making::File | Making::Scanned) => {
-                return Err("surfels: of a shape they are scanned, or as generated".into());
+            (None, Some(_)) if !matches!(self.surfels, Making::File | Making::Scanned | Making::Gaussians) => {
+                return Err("surfels: of a shape they are scanned, gaussians, or as generated".into());
             }
             (None, Some(_)) if self.count.is_none() => return Err("count: a shape needs its number of surfels".into()),
             (None, Some(_)) => {}

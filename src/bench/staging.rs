@@ -13,7 +13,7 @@ use crate::progress::Progress;
 use crate::random::Random;
 use crate::scene::camera::DEFAULT_FOV;
 use crate::scene::{Camera, Colors, Lens, Projection, Scene, Surfel};
-use crate::surfels::analytic::{RADIUS_IN_SPACINGS, Shape, generate};
+use crate::surfels::analytic::{RADIUS_IN_SPACINGS, Shape, gaussians, generate};
 use crate::surfels::sampling::voxels::Voxel;
 use crate::surfels::sampling::{MeshSurface, Method, Priority, sample};
 use crate::surfels::{FromPoints, Size, Triangle, build, build_textured, curve, from_points};
@@ -77,9 +77,13 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
         }
         (None, Some(shape)) => {
             let surface = entry.truth.then_some(Surface::Analytic(shape));
-            let mut points = of_shape(shape, point.count.unwrap_or(1), entry.radius);
+            let count = point.count.unwrap_or(1);
+            let mut points = match entry.surfels {
+                Making::Gaussians => gaussians(shape, count),
+                _ => of_shape(shape, count, entry.radius),
+            };
             if let Some(noise) = entry.noise {
-                scatter(&mut points, noise * (shape.area() / point.count.unwrap_or(1) as f64).sqrt());
+                scatter(&mut points, noise * (shape.area() / count as f64).sqrt());
             }
             let radii = points.radii.clone().filter(|_| entry.surfels != Making::Scanned);
             (Points { radii, ..points }, surface)
@@ -154,7 +158,8 @@ fn of_file(
     };
     let stratified = Method::Stratified { priority: &priority, depth: None };
     let points = match entry.surfels {
-        Making::File => io::read(file, progress)?,
+        // Gaussians are made of shapes: reading a definition makes sure of it.
+        Making::File | Making::Gaussians => io::read(file, progress)?,
         Making::Points => bare()?,
         Making::Normals => normals()?,
         Making::Knn => sized(Size::Knn)?,

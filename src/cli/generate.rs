@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use epsplat::io::ply;
-use epsplat::surfels::analytic::{Shape, generate};
+use epsplat::surfels::analytic::{Shape, gaussians, generate};
 use epsplat::{Progress, Result};
 
 use super::progress::Bars;
@@ -16,7 +16,8 @@ use super::{note, outputs};
 /// (the same with 32x32 squares) or text (the same with lines of text, each half as high as the one above). Radii are 1.5 times the spacing.
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat generate sphere --count 1000000 -o sphere.ply\n  \
-    epsplat generate torus --count 20000 --texture -o torus.ply")]
+    epsplat generate torus --count 20000 --texture -o torus.ply\n  \
+    epsplat generate torus --count 100000 --gaussians -o gaussians.ply")]
 pub struct Arguments {
     /// sphere, torus, plane, checkerboard or text
     shape: Shape,
@@ -27,6 +28,10 @@ pub struct Arguments {
     /// tube; across and up a square
     #[arg(long)]
     texture: bool,
+    /// Write Gaussian surfels instead, as 2D Gaussian splatting has them: opacities of 0.1 to 0.95, and harmonics of degree 3 of a light
+    /// beside the eye
+    #[arg(long, conflicts_with = "texture")]
+    gaussians: bool,
     /// The file: .ply
     #[arg(short, long)]
     output: PathBuf,
@@ -36,6 +41,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     ply::check_extension(&arguments.output)?;
     outputs::check([""; 0], [&arguments.output])?;
     let bars = Bars::new();
+    if arguments.gaussians {
+        ply::write_points(&arguments.output, &gaussians(arguments.shape, arguments.count), &bars)?;
+        note(&format!("{}: {} Gaussians", arguments.output.display(), arguments.count));
+        return Ok(());
+    }
     bars.begin("writing surfels", arguments.count);
     let vertices = generate(arguments.shape, arguments.count).enumerate().map(|(index, sample)| {
         // Once in a while, not once a surfel: the bar is behind a lock.

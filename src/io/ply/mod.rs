@@ -29,6 +29,7 @@ mod header;
 mod read;
 mod vertex;
 mod write;
+mod write_gaussians;
 
 pub(super) use read::companions;
 pub use read::{read, read_mesh};

@@ -1,6 +1,7 @@
 //! From surfels to PLY bytes.
 
 use super::vertex::{CAP_NAMES, CLIP_NAMES};
+use super::write_gaussians;
 use crate::io::atomic::{Output, write_whole};
 use crate::io::{Points, Up};
 use crate::scene::color::{DEFAULT_COLOR, SRGB8_TO_LINEAR, linear_to_srgb};
@@ -229,8 +230,7 @@ pub fn write(
     })
 }
 
-/// Writes all that `points` hold, so that [`read`](super::read) gives them back; of Gaussians the surfels, in linear light that is the same
-/// from every side.
+/// Writes all that `points` hold, so that [`read`](super::read) gives them back; Gaussians as files of 2D Gaussian splatting have them, in f32.
 ///
 /// With half-axes, normals that are missing are their product s x t, and radii that are missing their longer one.
 ///
@@ -239,13 +239,9 @@ pub fn write(
 /// [`Error::Write`](crate::Error::Write) where the system cannot write.
 pub fn write_points(path: &Path, points: &Points, progress: &dyn Progress) -> Result<()> {
     const TOLD: usize = 1 << 16;
-    let in_light;
-    let points = if points.encoded {
-        in_light = points.clone().in_light();
-        &in_light
-    } else {
-        points
-    };
+    if points.encoded {
+        return write_gaussians::write(path, points, progress);
+    }
     let count = points.positions.len();
     progress.begin("writing points", count as u64);
     let vertices = points.positions.iter().enumerate().map(|(index, position)| {

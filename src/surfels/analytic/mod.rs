@@ -1,5 +1,6 @@
 //! Generated scenes whose geometry has a formula: the ground truth of depth, normal and coverage.
 
+mod gaussians;
 mod lattice;
 mod ray;
 mod text;
@@ -9,6 +10,7 @@ use std::str::FromStr;
 
 use glam::DVec3;
 
+pub use self::gaussians::gaussians;
 pub use self::ray::depth_along_ray;
 use crate::scene::Up;
 use crate::{Error, Result};

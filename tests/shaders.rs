@@ -63,6 +63,9 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
         let entries: BTreeSet<&str> = module.entry_points.iter().map(|entry| entry.name.as_str()).collect();
         let drawn: &[&str] = if needs.raster.is_some() {
             match needs.winner {
+                None if needs.peels.is_some() => {
+                    &["shape", "shape_to_peel", "shape_with_attributes", "raster_visibility", "raster_attributes"]
+                }
                 None => &["shape", "shape_with_attributes", "raster_visibility", "raster_attributes"],
                 Some(_) => &["shape", "shape_with_attributes", "raster_nearest"],
             }
@@ -105,7 +108,25 @@ const ALTERNATIVES: [&[&str]; 8] = [
 ];
 
 /// Needs that no render has together (`src/plan/check.rs`, `src/plan/needs.rs`).
-const EXCLUSIVE: [(&str, &[&str]); 14] = [
+const EXCLUSIVE: [(&str, &[&str]); 16] = [
+    (
+        "peels",
+        &["wide-sums", "atomics-u64", "copies", "cull", "tiles", "gather", "index", "transmittance", "layers-map"],
+    ),
+    (
+        "peels",
+        &[
+            "lists-layers",
+            "lists-sorted",
+            "raster-offset",
+            "nearest",
+            "color-textured",
+            "count",
+            "depth",
+            "normal-map",
+            "weight-map",
+        ],
+    ),
     ("samples", &["count", "depth", "index", "normal-map", "weight-map", "transmittance", "layers-map"]),
     ("lists", &["tiles", "gather", "copies", "cull", "atomics-u64", "raster-exact", "raster-offset", "nearest"]),
     ("lists", &["color-textured", "count", "depth", "index", "normal-map", "weight-map"]),

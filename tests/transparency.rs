@@ -9,7 +9,9 @@ use common::scenes::{cases, crowded, front, shuffled, sphere, sphere_camera, sta
 use epsplat::frame::Frame;
 use epsplat::gpu::{Gpu, Sources};
 use epsplat::metrics::DECISION_MARGIN;
-use epsplat::plan::{Organisation, RenderOptions};
+use epsplat::passes::layers::{Parting, part};
+use epsplat::passes::{Strip, fragments, project};
+use epsplat::plan::{BlendFormat, Organisation, Raster, RasterDepth, RenderOptions};
 use epsplat::render::{Backend, Renderer, Report, render};
 use epsplat::scene::composite::ALL_LAYERS;
 use epsplat::scene::{
@@ -341,4 +343,69 @@ fn maps_of_the_nearest_surface_stay() {
         assert!(through.iter().zip(layers).all(|(through, layers)| (*through == 1.0) == (*layers == 0.0)));
         assert!(layers.iter().any(|layers| *layers >= most) && (most > 2.0 || layers[0] == 0.0), "{layers:?}");
     }
+}
+
+/// How many layers the fragments of each pixel are parted into.
+fn parted(scene: &Scene, camera: &Camera, options: &RenderOptions, parting: Parting) -> Vec<usize> {
+    let splats = project::reference_all(scene, camera, options);
+    let (splats, rows) = (splats.iter().collect(), camera.height);
+    let strip = Strip { scene, camera, options, splats, ranks: None, first_row: 0, rows };
+    let count = |(pixel, list): (usize, &fragments::List)| {
+        let along = camera.along_axis(pixel as u32 % camera.width, pixel as u32 / camera.width);
+        part(&list.fragments, (ALL_LAYERS, Tail::None), parting, (options, along)).0.len()
+    };
+    fragments::reference(&strip).iter().enumerate().map(count).collect()
+}
+
+/// Depth peeling by the rasteriser shows the layers that lists do, but where a run of fragments is longer than a window; a rasteriser that peels
+/// nothing, or too much, does not.
+#[test]
+fn the_rasteriser_peels_what_lists_part() {
+    let Some(gpu) = common::gpu() else { return };
+    if !gpu.adapter.vertex_storage {
+        return;
+    }
+    let backend = Backend::gpu(gpu);
+    let raster = Some(Raster { format: BlendFormat::Rgba32Float, depth: RasterDepth::Exact });
+    let broken = |from: &str, to: &str| {
+        let sources = Sources::default().replace("raster_peeled.wgsl", from, to).unwrap();
+        common::gpu().map(|gpu| Backend::Gpu { gpu: Box::new(gpu), sources }).unwrap()
+    };
+    let wrong = [broken("front != 0u && ", "false && "), broken("+ side]", "]")];
+    let (scene, camera) = (shells(3, 4000), sphere_camera(96, Projection::Pinhole));
+    let mut noticed = [0; 2];
+    for (layers, oriented) in [(1, true), (2, true), (4, false), (6, true), (9, false)] {
+        let scene = Scene { oriented, ..scene.clone() };
+        let of = RenderOptions { opacity: 0.6, tail: Tail::None, ..options(Composite::Layers(layers)) };
+        let [runs, windows] = [Parting::Runs, Parting::Window].map(|parting| parted(&scene, &camera, &of, parting));
+        let alike = runs.iter().zip(windows).map(|(runs, windows)| *runs == windows);
+        let decided: Vec<bool> =
+            decided(&scene, &camera, &of).into_iter().zip(alike).map(|(decided, alike)| decided && alike).collect();
+        let compared = decided.iter().filter(|decided| **decided).count();
+        assert!(compared > 5000, "{layers}: {compared}");
+        let listed = frame(&scene, &camera, &of, &backend);
+        let differ = |backend: &Backend| {
+            let peeled = frame(&scene, &camera, &RenderOptions { raster, ..of.clone() }, backend);
+            let far = |pixel: &usize| {
+                peeled.color[*pixel]
+                    .iter()
+                    .zip(listed.color[*pixel])
+                    .any(|(a, b)| (a - b).abs() > 2e-5 * (1.0 + b.abs()))
+            };
+            (0..decided.len()).filter(|pixel| decided[*pixel]).filter(far).count()
+        };
+        let own = differ(&backend);
+        assert!(own <= compared / 500, "{layers}: {own} of {compared}");
+        for (wrong, noticed) in wrong.iter().zip(&mut noticed) {
+            *noticed += usize::from(differ(wrong) > decided.len() / 10);
+        }
+    }
+    assert!(noticed.iter().all(|noticed| *noticed > 0), "{noticed:?}");
+    let refused = |options: RenderOptions| {
+        let options = RenderOptions { raster, ..options };
+        render(&scene, &camera, &options, &backend, &()).unwrap_err().to_string()
+    };
+    assert!(refused(options(ALL)).contains("1 to 64 layers"));
+    assert!(refused(options(Composite::Layers(2))).contains("take --tail none"));
+    assert!(refused(options(Composite::Sorted)).contains("sorts no fragments"));
 }

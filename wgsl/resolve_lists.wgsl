@@ -34,8 +34,6 @@ fn over_background(shown: Shown) -> vec4<f32> {
     return over(vec4<f32>(color, alpha), held.background);
 }
 
-fn show(pixel: u32) {}
-
 fn resolve_pixel(sums_of: u32, pixel: u32, x: u32, y: u32) {
     let out = pixel * IMAGE_WORDS;
     let shown = composite(pixel, x, y);

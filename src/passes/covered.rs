@@ -13,7 +13,8 @@ pub const PASS: Pass = Pass {
     files: |_| vec!["covered.wgsl"],
     kernels: |_| vec![LIST, ARRANGE],
     constants: |making| {
-        let list_empty = making.options.shows_where_nothing_is();
+        // Of peeled layers the last one may be empty.
+        let list_empty = making.options.shows_where_nothing_is() || making.needs.peels.is_some();
         vec![("LIST_EMPTY", u32::from(list_empty).into()), ("TILE_ROWS", super::tiles::rows(making.needs).into())]
     },
 };

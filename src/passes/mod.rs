@@ -35,6 +35,7 @@ pub mod layers;
 pub mod lit;
 pub mod lowpass;
 pub mod order;
+pub mod peel;
 pub mod project;
 pub mod raster;
 pub mod resolve;
@@ -116,7 +117,7 @@ pub fn finish(frame: &mut Frame, needs: &SceneNeeds, provenance: &Provenance, or
 }
 
 /// The passes whose files every module has.
-const PASSES: [&Pass; 17] = [
+const PASSES: [&Pass; 18] = [
     &shared::PASS,
     &project::PASS,
     &facing::PASS,
@@ -133,6 +134,7 @@ const PASSES: [&Pass; 17] = [
     &resolve::PASS,
     &layers::PASS,
     &sorted::PASS,
+    &peel::PASS,
     &raster::PASS,
 ];
 

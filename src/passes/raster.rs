@@ -30,7 +30,8 @@ pub const PASS: Pass = Pass {
         Some(raster) => {
             let mut files = vec!["raster.wgsl", "accumulator_raster.wgsl", targets_file(needs)];
             files.extend(match (raster.depth, needs.winner) {
-                (RasterDepth::Exact, None) => &["raster_own_depths.wgsl", "raster_exact.wgsl"][..],
+                _ if needs.peels.is_some() => &["raster_own_depths.wgsl", "raster_peeled.wgsl"][..],
+                (RasterDepth::Exact, None) => &["raster_own_depths.wgsl", "raster_exact.wgsl"],
                 (RasterDepth::Exact, Some(_)) => &["raster_own_depths.wgsl", "raster_nearest_exact.wgsl"],
                 (RasterDepth::Offset, None) => &["raster_offset.wgsl"],
                 (RasterDepth::Offset, Some(_)) => &["raster_nearest_offset.wgsl"],
@@ -131,8 +132,9 @@ pub fn draws(raster: Raster, needs: &SceneNeeds) -> Vec<Draw> {
             false,
         )];
     }
+    let shape = if needs.peels.is_some() { "shape_to_peel" } else { "shape" };
     vec![
-        draw("visibility", ("shape", "raster_visibility"), vec![], depth(near_first, true), true),
+        draw("visibility", (shape, "raster_visibility"), vec![], depth(near_first, true), true),
         draw(
             "accumulate",
             ("shape_with_attributes", "raster_attributes"),

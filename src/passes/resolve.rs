@@ -167,7 +167,7 @@ pub const PASS: Pass = Pass {
         vec![
             "resolve.wgsl",
             pick(needs.samples == Samples::ONE, "resolve_pixels.wgsl", "resolve_samples.wgsl"),
-            pick(needs.lists.is_some(), "resolve_lists.wgsl", "resolve_surface.wgsl"),
+            pick(needs.lists.is_some() || needs.peels.is_some(), "resolve_lists.wgsl", "resolve_surface.wgsl"),
             pick(!needs.maps.is_empty(), "image_maps.wgsl", "image_color.wgsl"),
             pick(needs.maps.has(Map::Normal), "normal_map.wgsl", "normal_map_absent.wgsl"),
             pick(needs.maps.has(Map::Weight), "weight_map.wgsl", "weight_map_absent.wgsl"),

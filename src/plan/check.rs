@@ -6,8 +6,11 @@ use super::{
 use super::{RenderOptions, SceneNeeds};
 use crate::error::{Error, Result};
 use crate::gpu::adapter::AdapterDescription;
+use crate::passes::peel::MOST_LAYERS;
 use crate::scene::light::MAX_LIGHTS;
-use crate::scene::{Blend, Camera, Composite, Cull, KernelShape, LowPass, Map, Shading, options::SHININESS_RANGE};
+use crate::scene::{
+    Blend, Camera, Composite, Cull, KernelShape, LowPass, Map, Shading, Tail, options::SHININESS_RANGE,
+};
 
 fn usage(what: impl Into<String>) -> Result<()> {
     Err(Error::Usage(what.into()))
@@ -90,9 +93,7 @@ fn composite(options: &RenderOptions, reference: bool) -> Result<()> {
             usage("--blend nearest shows one fragment, behind which nothing shows: leave --composite out")
         }
         _ if reference => Ok(()),
-        RenderOptions { raster: Some(_), .. } => {
-            usage("the rasteriser shows the nearest surface alone: leave --composite out, or render by compute")
-        }
+        RenderOptions { raster: Some(raster), .. } => peeled(options, raster.depth),
         _ if options.accumulator != Accumulator::Fixed => {
             usage("surfaces are composited of sums of the accumulator fixed: leave the accumulator out")
         }
@@ -100,6 +101,21 @@ fn composite(options: &RenderOptions, reference: bool) -> Result<()> {
             usage("the organisation tile shows the nearest surface alone: leave it out with --composite")
         }
         _ => Ok(()),
+    }
+}
+
+/// The rasteriser draws layers one after the other.
+fn peeled(options: &RenderOptions, depth: RasterDepth) -> Result<()> {
+    match options.composite {
+        Composite::Layers(1..=MOST_LAYERS) if options.tail == Tail::None && depth == RasterDepth::Exact => Ok(()),
+        Composite::Layers(1..=MOST_LAYERS) => usage(
+            "the rasteriser peels layers with exact depths, and what lies behind the last one is left out: take --tail none and \
+             --raster-depth exact",
+        ),
+        Composite::Layers(_) => usage(format!(
+            "the rasteriser peels 1 to {MOST_LAYERS} layers, one after the other: take --composite layers:L with so many, or render by compute"
+        )),
+        _ => usage("the rasteriser sorts no fragments: take --composite layers:L, or render by compute"),
     }
 }
 

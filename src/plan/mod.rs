@@ -36,6 +36,7 @@ pub use view::device_unit;
 use crate::error::Result;
 use crate::gpu::adapter::AdapterDescription;
 use crate::gpu::layout::{BATCH, ONE};
+use crate::passes::peel::PEELED_WORDS;
 use crate::scene::Camera;
 use known::Listed;
 use steps::Part;
@@ -108,9 +109,16 @@ impl Plan {
         // Tiles that gather store no sums.
         let sum_words = if gather { 0 } else { pixel.sum_words(&needs) };
         let head = if sum_words > 0 { needs.accumulator.row().head_words() } else { 0 };
-        let whole = || bands(adapter, camera, needs.samples.down, sum_words.max(pixel.image_words), head);
+        let peeled = if needs.peels.is_some() { PEELED_WORDS } else { 0 };
+        let words = sum_words.max(pixel.image_words).max(peeled);
+        let whole = || bands(adapter, camera, needs.samples.down, words, head);
         let bands = known.cuts.clone().map_or_else(whole, Ok)?;
         let several = bands.len() > 1;
+        if several && needs.peels.is_some() {
+            let what =
+                "the rasteriser peels layers of the whole image, and this one is too large: choose a smaller one";
+            return Err(adapter.error(what));
+        }
         let looks = [Listed::Large, Listed::Small].map(|of| {
             let wanted = match of {
                 Listed::Large => needs.tiles && (gather || known.large != Some(false)),
@@ -126,7 +134,7 @@ impl Plan {
             width: camera.width,
             bands,
             pages: facts.surfels.div_ceil(page) as usize,
-            lists_empty: options.shows_where_nothing_is(),
+            lists_empty: options.shows_where_nothing_is() || needs.peels.is_some(),
             projects_each_band: several && (cull || gather),
             looks_for_slots: cull && (several || !known.slots),
             large_by_tiles: needs.tiles && (looks[0] || known.entries_of(Listed::Large).is_some()),
@@ -139,7 +147,7 @@ impl Plan {
         let needs = SceneNeeds::of_picture(facts, camera, options);
         Self {
             // What a device draws in another way, the twins draw as all else.
-            needs: SceneNeeds { raster: None, tiles: false, ..needs },
+            needs: SceneNeeds { raster: None, tiles: false, lists: Lists::of(facts, options), peels: None, ..needs },
             pixel: PixelLayout::of(&needs),
             sum_words: 0,
             one: 1,

@@ -4,6 +4,7 @@ use super::{
     Accumulator, ColorNeed, Facts, Optimisation, Organisation, Raster, RasterDepth, RenderOptions, composited, tuning,
 };
 use crate::gpu::adapter::AdapterDescription;
+use crate::passes::peel;
 use crate::scene::{
     Blend, Camera, Composite, Cull, Epsilon, KernelShape, LowPass, Map, Maps, PointShape, Projection, Samples, Shading,
 };
@@ -42,6 +43,8 @@ pub struct SceneNeeds {
     pub winner: Option<Winner>,
     /// Pixels have lists of their fragments, and what becomes of these.
     pub lists: Option<Lists>,
+    /// The layers that it peels, one after the other.
+    pub peels: Option<u32>,
     /// It draws a triangle a splat instead of a quad ([`tuning::PIXELS_A_TRIANGLE`]).
     pub triangles: bool,
     /// The kernel's formula.
@@ -124,7 +127,8 @@ pub enum Lists {
 }
 
 impl Lists {
-    fn of(facts: &Facts, options: &RenderOptions) -> Option<Self> {
+    /// Those of a picture, whoever renders it.
+    pub(super) fn of(facts: &Facts, options: &RenderOptions) -> Option<Self> {
         match composited(facts, options) {
             Composite::Opaque => None,
             Composite::Layers(_) => Some(Self::Layers),
@@ -192,6 +196,7 @@ impl SceneNeeds {
         let blends = options.blend == Blend::Weighted;
         let fixed = options.accumulator == Accumulator::Fixed && options.raster.is_none() && blends;
         let lists = Lists::of(facts, options);
+        let peels = lists.and(peel::layers(options));
         let unblended = if options.raster.is_some() { Winner::Rasterised } else { Winner::Second };
         Self {
             projection: camera.projection,
@@ -210,7 +215,8 @@ impl SceneNeeds {
             subgroups: false,
             raster: options.raster,
             winner: (!blends).then_some(unblended),
-            lists,
+            lists: if options.raster.is_some() { None } else { lists },
+            peels,
             triangles: options.raster.is_some() && tuning::PIXELS_A_TRIANGLE * facts.surfels > camera.pixels() as u64,
             kernel: if blends { options.kernel.shape() } else { KernelShape::Constant },
             low_pass: options.low_pass,
@@ -322,6 +328,7 @@ impl SceneNeeds {
             (self.winner.is_some(), "nearest"),
             (self.lists == Some(Lists::Layers), "lists-layers"),
             (self.lists == Some(Lists::Sorted), "lists-sorted"),
+            (self.peels.is_some(), "peels"),
             (self.samples != Samples::ONE, "samples"),
             (self.shading == Shading::Lambert, "lambert"),
             (self.shading == Shading::Phong, "phong"),

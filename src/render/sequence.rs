@@ -1,6 +1,6 @@
 //! A frame as a list of steps: the papers' passes in their order.
 
-use crate::passes::{accumulate, cull, fragments, of_maps, project, raster, resolve, tiles, visibility};
+use crate::passes::{accumulate, cull, fragments, of_maps, peel, project, raster, resolve, tiles, visibility};
 use crate::plan::known::Listed;
 use crate::plan::steps::{Look, Part, Stage, Step};
 use crate::plan::{Plan, Winner};
@@ -10,7 +10,10 @@ pub fn steps(plan: &Plan) -> Vec<Step> {
     let mut steps = Vec::new();
     if plan.needs.raster.is_some() {
         steps.push(Step::Stage(project::steps(plan, 0, Part::All)));
-        steps.push(raster::STEP);
+        match plan.needs.peels {
+            Some(layers) => steps.extend(peel::steps(plan, layers)),
+            None => steps.push(raster::STEP),
+        }
     }
     for band in 0..plan.bands.len() {
         match (plan.needs.raster, plan.needs.lists) {

@@ -7,6 +7,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::{Buffer, Readback};
 use crate::gpu::layout::{BATCH, Band as BandUniform, LIST_START, QUEUE_START, View, WORKGROUP};
+use crate::passes::peel::PEELED_WORDS;
 use crate::passes::tiles::{list_name, list_words};
 use crate::passes::upload::{self, Uploaded};
 use crate::passes::{asks_for_order, covered, fragments, visibility};
@@ -15,7 +16,7 @@ use crate::plan::{Band, FragmentLayout, KEY_WORDS, Known, Plan, Raster, SceneNee
 use crate::scene::Samples;
 
 /// Names in WGSL of buffers that have another one where kernels write them.
-const ALIASES: [(&str, &str); 9] = [
+const ALIASES: [(&str, &str); 10] = [
     ("projected", "splats"),
     ("queued", "queue"),
     ("listed", "rare"),
@@ -25,6 +26,7 @@ const ALIASES: [(&str, &str); 9] = [
     ("winners", "sums"),
     ("indexed", "image"),
     ("list_starts", "starts"),
+    ("told", "peeled"),
 ];
 
 /// Names of buffers that each page has.
@@ -115,6 +117,7 @@ struct Made {
     sum_words: u32,
     image_words: u32,
     lists: bool,
+    peels: bool,
     raster: Option<(Raster, u32)>,
 }
 
@@ -197,7 +200,8 @@ impl Store {
         let (width, bands) = (plan.width, plan.bands.clone());
         let (sum_words, image_words) = (plan.sum_words, plan.pixel.image_words);
         let (samples, lists) = (plan.needs.samples, plan.needs.lists.is_some());
-        let made = Made { width, samples, bands, sum_words, image_words, lists, raster };
+        let peels = plan.needs.peels.is_some();
+        let made = Made { width, samples, bands, sum_words, image_words, lists, peels, raster };
         let fresh = self.made.as_ref() != Some(&made);
         if fresh {
             // The old ones make room first.
@@ -242,6 +246,10 @@ impl Store {
         if plan.needs.lists.is_some() {
             let words = most(&fragments::start_words);
             self.frame.insert("starts", Buffer::storage(gpu, "starts of lists", words)?);
+        }
+        if plan.needs.peels.is_some() {
+            let words = pixels * u64::from(PEELED_WORDS);
+            self.frame.insert("peeled", Buffer::storage(gpu, "peeled layers", words)?);
         }
         if plan.sum_words > 0 {
             let words = plan.needs.accumulator.row().head_words() + pixels * u64::from(plan.sum_words);

@@ -176,6 +176,7 @@ pub fn all_needs() -> Vec<SceneNeeds> {
         });
     }
     all.extend(listed(&all));
+    all.extend(peeled(&all));
     for needs in &mut all {
         needs.outline &= needs.low_pass == LowPass::None;
     }
@@ -205,6 +206,17 @@ fn listed(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
         }
     };
     all.iter().filter(fits).step_by(3).enumerate().map(of).collect()
+}
+
+/// Those of the rasteriser that peels layers.
+fn peeled(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
+    let exact = |needs: &&SceneNeeds| needs.raster.is_some_and(|raster| raster.depth == RasterDepth::Exact);
+    let of = |needs: &SceneNeeds| {
+        let lit = needs.shading != Shading::Unlit;
+        let (normal, own_normals) = (lit && !needs.lit_splats, needs.own_normals && lit);
+        SceneNeeds { peels: Some(3), maps: Maps::NONE, normal, own_normals, ..*needs }
+    };
+    all.iter().filter(exact).filter(|needs| needs.winner.is_none()).map(of).collect()
 }
 
 /// Whether a render with `needs` could show the nearest fragments alone.

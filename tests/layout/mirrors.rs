@@ -157,6 +157,8 @@ pub fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         ("added", Element::Plain(&[<[u64; 2]>::SHAPE])),
         ("list_starts", Element::Plain(WORD)),
         ("starts", Element::Plain(WORD)),
+        ("peeled", Element::Plain(WORD)),
+        ("told", Element::Plain(WORD)),
         ("keys", Element::Plain(&[<[u32; 2]>::SHAPE])),
         ("fragments", Element::Plain(&[<[u32; 4]>::SHAPE, <[u64; 2]>::SHAPE])),
         ("image", Element::Plain(&[f32::SHAPE, <[f32; 4]>::SHAPE])),

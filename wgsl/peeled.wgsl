@@ -1,0 +1,47 @@
+// What the rasteriser's layers show so far: after each one, what it blended goes over what is behind it. Host side: src/passes/peel.rs.
+// All loops end, by 1 of src/gpu/loops.rs: 0x45cb747d269c2bf7
+
+// Of each pixel: the premultiplied colour, the transmittance, the layers, and the nearest depths of raster_peeled.wgsl.
+@group(0) @binding(49) var<storage, read_write> peeled: array<u32>;
+
+const PEELED_WORDS: u32 = 8u;
+const PEELED_FRONTS: u32 = 6u;
+
+fn composite(pixel: u32, x: u32, y: u32) -> Shown {
+    let at = pixel * PEELED_WORDS;
+    let color = bitcast<vec4<f32>>(vec4<u32>(peeled[at], peeled[at + 1u], peeled[at + 2u], peeled[at + 3u]));
+    let layers = peeled[at + 5u];
+    // The buffer was cleared.
+    return Shown(color, select(bitcast<f32>(peeled[at + 4u]), 1.0, layers == 0u), layers);
+}
+
+// One invocation a pixel.
+@compute @workgroup_size(WORKGROUP)
+fn peel(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    hold();
+    let pixel = linear_index(workgroup, workgroups, local);
+    if (pixel >= band_pixels()) {
+        return;
+    }
+    let weight = sum_at(pixel, WEIGHT_CHANNEL);
+    if (weight == 0.0) {
+        return;
+    }
+    let x = pixel % held.width;
+    let y = pixel / held.width;
+    let front = front_at(pixel);
+    let normal = resolve_normal(pixel, weight, front);
+    let shown = with_behind(composite(pixel, x, y), shaded(resolve_color(pixel, weight), normal, x, y));
+    let at = pixel * PEELED_WORDS;
+    let color = bitcast<vec4<u32>>(shown.color);
+    for (var k = 0u; k < 4u; k++) {
+        peeled[at + k] = color[k];
+    }
+    peeled[at + 4u] = bitcast<u32>(shown.transmittance);
+    peeled[at + 5u] = shown.layers;
+    peeled[at + PEELED_FRONTS + select(0u, bitcast<u32>(front) & SIDE_BIT, SIDES)] = bitcast<u32>(front);
+}

@@ -231,6 +231,51 @@ fn order_and_memory_do_not_show() {
     }
 }
 
+/// Of a far cloud thousands of fragments lie at a pixel, more than a device sorts: lists that end where nothing more shows have the picture of
+/// whole ones, to the bit; those that end earlier have not.
+#[test]
+fn far_clouds_are_drawn_to_the_bits_of_whole_lists() {
+    let Some(backend) = gpu() else { return };
+    let (scene, _) = scene(&torus(6_000, 1, 21));
+    let far = |distance: f64| {
+        let eye = distance * DVec3::new(0.3, -0.7, 0.6);
+        Camera::look_at((48, 48), Lens::Fov(45.0), eye, DVec3::ZERO, Some(DVec3::Z), Up::Z, 0.01).unwrap()
+    };
+    let needs = |options: &RenderOptions, backend: &Backend| {
+        let (frame, report) = render(&scene, &far(25.0), options, backend, &()).unwrap();
+        (bits(&frame), report.needs.contains(&"veils"))
+    };
+    let small = || Gpu::with_buffer_limit(common::gpu().unwrap(), 330_000);
+    let sources = Sources::default();
+    let early = sources
+        .replace("fragments_veils.wgsl", "(held_back >= ENOUGH_HELD)", "(held_back >= ENOUGH_HELD / 8u)")
+        .unwrap();
+    for composite in [Composite::Gaussians, Composite::Sorted] {
+        let of = RenderOptions { composite, opacity: 0.9, ..options() };
+        let (whole, veiled) = needs(&of, &backend);
+        assert!(!veiled);
+        let (ended, veiled) = needs(&of, &Backend::gpu(small()));
+        assert!(veiled && ended == whole, "{composite:?}: {veiled}");
+        let broken = Backend::Gpu { gpu: Box::new(small()), sources: early.clone() };
+        assert!(needs(&of, &broken).0 != whole, "{composite:?}");
+    }
+    // All of it at a few pixels, where of two fragments at one depth but for rounding either may come first: of two that are alike a colour
+    // changes by little.
+    let camera = far(2000.0);
+    let of = RenderOptions { maps: Maps::of(&[Map::Decision]), ..options() };
+    let twin = frame(&scene, &camera, &of, &Backend::Reference);
+    let shown = frame(&scene, &camera, &options(), &backend);
+    let mut compared = 0;
+    for (pixel, margin) in twin.map(Map::Decision).unwrap().iter().enumerate() {
+        if *margin > DECISION_MARGIN || twin.color[pixel][3] > 0.99 {
+            compared += usize::from(twin.color[pixel][3] > 0.5);
+            let [a, b] = [twin.color[pixel], shown.color[pixel]].map(codes);
+            assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 0.02), "{pixel}: {a:?} {b:?}");
+        }
+    }
+    assert!(compared >= 4, "{compared}");
+}
+
 #[test]
 fn the_oracles_harmonics_are_the_programs() {
     for direction in [DVec3::new(0.3, -0.8, 0.2), DVec3::new(-0.1, 0.2, -0.9), DVec3::X, DVec3::Z] {
@@ -358,6 +403,7 @@ fn a_file_is_drawn_as_it_was_trained() {
     assert!(far(&render(&["--composite", "sorted"]).0) > 100);
     assert!(far(&render(&["--lowpass", "none"]).0) > 100);
     fails(&["render", text(&path), "-o", text(&output), "--shading", "lambert"], 2, &["take --shading unlit"]);
+    assert!(far(&render(&["--outline", "6"]).0) > 100);
     fails(
         &["render", text(&path), "-o", text(&output), "--lowpass", "gaussians", "--kernel", "hat"],
         2,

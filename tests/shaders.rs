@@ -108,7 +108,12 @@ const ALTERNATIVES: [&[&str]; 8] = [
 ];
 
 /// Needs that no render has together (`src/plan/check.rs`, `src/plan/needs.rs`).
-const EXCLUSIVE: [(&str, &[&str]); 16] = [
+const EXCLUSIVE: [(&str, &[&str]); 18] = [
+    (
+        "veils",
+        &["tiles", "gather", "copies", "cull", "atomics-u64", "raster-exact", "raster-offset", "nearest", "peels"],
+    ),
+    ("veils", &["color-textured", "count", "depth", "index", "normal-map", "weight-map", "lists-layers"]),
     (
         "peels",
         &["wide-sums", "atomics-u64", "copies", "cull", "tiles", "gather", "index", "transmittance", "layers-map"],

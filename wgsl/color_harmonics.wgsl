@@ -1,6 +1,6 @@
 // A surfel's colour from four f32 and spherical harmonics, by the direction that its centre is seen along: straight alpha. A term has
 // three words after the four: red, green and blue. Twin: src/scene/harmonics.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xa6df962e60b1a9f6
+// All loops end, by 1 of src/gpu/loops.rs: 0x8f3393ef138ea48e
 
 override HARMONICS_DEGREE: u32;
 
@@ -32,6 +32,10 @@ fn harmonics(d: vec3<f32>) -> array<f32, MOST_TERMS> {
         terms[14] = -0.59004358992664351 * d.x * (xx - 3.0 * yy);
     }
     return terms;
+}
+
+fn surfel_alpha(index: u32) -> f32 {
+    return bitcast<f32>(attribute_word(index, 3u));
 }
 
 fn premultiplied_color(index: u32) -> vec4<f32> {

@@ -1,5 +1,9 @@
 // A surfel's colour from four f32: linear, straight alpha.
 
+fn surfel_alpha(index: u32) -> f32 {
+    return bitcast<f32>(attribute_word(index, 3u));
+}
+
 fn premultiplied_color(index: u32) -> vec4<f32> {
     let color = attribute_vector(index, 0u);
     return vec4<f32>(color.rgb * color.a, color.a);

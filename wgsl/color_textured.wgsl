@@ -5,6 +5,10 @@ fn color_part(index: u32, part: u32) -> vec4<f32> {
     return attribute_vector(index, 4u * part);
 }
 
+fn surfel_alpha(index: u32) -> f32 {
+    return color_part(index, 0u).a;
+}
+
 fn premultiplied_color(index: u32) -> vec4<f32> {
     let color = color_part(index, 0u);
     return vec4<f32>(color.rgb * color.a, color.a);

@@ -1,7 +1,7 @@
 // Stage 3 where surfaces show through each other: each pixel's fragments become a list. Their numbers, which the visibility pass left,
 // become where lists start, by a scan over rows and one over the pixels of each; then every fragment takes a place in its pixel's list.
 // Host side and twin: src/passes/fragments.rs.
-// All loops end, by 1, 2, 4 of src/gpu/loops.rs: 0xc019266e3ad69be4
+// All loops end, by 1, 2, 4 of src/gpu/loops.rs: 0x099889a819ef66ae
 
 // How many fragments there are and how many at most at a pixel; where the lists of each row start and where the last one ends; then the
 // same of each pixel. Past what a word holds all three stay at its end.
@@ -102,10 +102,10 @@ override FRAGMENT_HAS_RADIUS: bool;
 const MOST_FRAGMENT_WORDS: u32 = 12u;
 alias Record = array<u32, MOST_FRAGMENT_WORDS>;
 
-// Gives a fragment a place in its pixel's list, unless it is too faint to be listed.
+// Gives a fragment a place in its pixel's list, unless it is too faint or too deep to be listed.
 fn list_fragment(pixel: u32, fragment: Fragment, surfel: u32, attributes: Attributes) {
     let weight = fragment_weight(fragment);
-    if (!is_listed(weight * OPACITY * (held.color_low.a + held.color_span.a * attributes.color.a))) {
+    if (!is_listed(pixel, fragment, weight * OPACITY * (held.color_low.a + held.color_span.a * attributes.color.a))) {
         return;
     }
     // Counted down from as many as there are; if two kernels differ about a rim, what has no place is left out.

@@ -12,8 +12,8 @@ const TIES: bool = true;
 override LEAST_ALPHA: f32;
 
 // By the alpha of a fragment.
-fn is_listed(alpha: f32) -> bool {
-    return alpha >= LEAST_ALPHA;
+fn is_listed(pixel: u32, fragment: Fragment, alpha: f32) -> bool {
+    return alpha >= LEAST_ALPHA && is_before_end(pixel, fragment.depth);
 }
 
 fn with_rank(record: Record, surfel: u32) -> Record {

@@ -2,7 +2,7 @@
 
 const TIES: bool = false;
 
-fn is_listed(alpha: f32) -> bool {
+fn is_listed(pixel: u32, fragment: Fragment, alpha: f32) -> bool {
     return true;
 }
 

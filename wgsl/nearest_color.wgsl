@@ -10,8 +10,8 @@ fn mark_of(surfel: u32) -> u32 {
 }
 
 // Of one depth the greatest mark wins, whatever the order.
-fn keep_nearest(pixel: u32, depth: f32, mark: u32) {
-    let kept = kept_depth(bitcast<u32>(depth));
+fn keep_nearest(pixel: u32, fragment: Fragment, mark: u32) {
+    let kept = kept_depth(bitcast<u32>(fragment.depth));
     atomicMax(&winners[pixel], (u64(kept) << 32u) | u64(mark));
 }
 

@@ -4,8 +4,8 @@ fn mark_of(surfel: u32) -> u32 {
     return 0u;
 }
 
-fn keep_nearest(pixel: u32, depth: f32, mark: u32) {
-    atomicMax(&nearest[pixel], kept_depth(bitcast<u32>(depth)));
+fn keep_nearest(pixel: u32, fragment: Fragment, mark: u32) {
+    atomicMax(&nearest[pixel], kept_depth(bitcast<u32>(fragment.depth)));
 }
 
 // The bits of the nearest depth, where `visible` has it from now on.

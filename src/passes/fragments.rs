@@ -99,15 +99,10 @@ pub const PASS: Pass = Pass {
             Some(Lists::Layers) => "fragments_untied.wgsl",
             Some(Lists::Sorted) => "fragments_ranked.wgsl",
         };
-        let own = [
-            "fragments_count.wgsl",
-            "fragments.wgsl",
-            "fragments_sort.wgsl",
-            "fragments_network.wgsl",
-            ties,
-            "layer_sums.wgsl",
-        ];
-        own.into_iter().chain([terms_file(needs)]).collect()
+        // Else veils count.
+        let count = (!needs.veils).then_some("fragments_count.wgsl");
+        let all = ["fragments.wgsl", "fragments_sort.wgsl", "fragments_network.wgsl", ties, "layer_sums.wgsl"];
+        all.into_iter().chain(count).chain([terms_file(needs)]).collect()
     },
     kernels: |needs| match needs.lists {
         None => Vec::new(),
@@ -136,9 +131,9 @@ const LIST_LARGE: Kernel = Kernel::of("list_fragments_large", [TILE, TILE, 1]);
 const SORT: Kernel = Kernel::new("sort_fragments");
 
 /// Words of the buffer that says where lists start: what there is altogether and at most at a pixel, then where the lists of each
-/// row start and where the last one ends, then the same of each pixel.
+/// row start and where the last one ends, then the same of each pixel, and where lists end by [`veils`](super::veils).
 pub fn start_words(band: &Band) -> u64 {
-    2 + u64::from(band.rows) + 1 + band.pixels + 1
+    2 + u64::from(band.rows) + 1 + band.pixels + 1 + band.pixels
 }
 
 /// Where lists start, of fragments that the visibility pass counted; and a look at how many there are.

@@ -46,6 +46,7 @@ pub mod splat;
 pub mod tiles;
 pub mod unseen;
 pub mod upload;
+pub mod veils;
 pub mod visibility;
 pub mod winner;
 
@@ -117,7 +118,7 @@ pub fn finish(frame: &mut Frame, needs: &SceneNeeds, provenance: &Provenance, or
 }
 
 /// The passes whose files every module has.
-const PASSES: [&Pass; 18] = [
+const PASSES: [&Pass; 19] = [
     &shared::PASS,
     &project::PASS,
     &facing::PASS,
@@ -127,6 +128,7 @@ const PASSES: [&Pass; 18] = [
     &visibility::PASS,
     &winner::PASS,
     &fragments::PASS,
+    &veils::PASS,
     &accumulate::PASS,
     &attributes::PASS,
     &lit::PASS,

@@ -8,7 +8,7 @@
 
 use super::footprint::footprint;
 use super::splat::Splat;
-use super::{covered, winner};
+use super::{covered, veils, winner};
 use crate::gpu::layout::TILE;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
@@ -95,7 +95,7 @@ pub fn steps(plan: &Plan, band: usize, part: Part) -> Stage {
         Part::Far => stage,
         Part::All | Part::Near => {
             let nearest = Clear::of("nearest", 0, plan.bands[band].pixels);
-            let clears = [nearest].into_iter().chain(winner::clears(plan, band));
+            let clears = [nearest].into_iter().chain(winner::clears(plan, band)).chain(veils::clears(plan, band));
             stage.after(clears.collect()).as_twin(Twin::Visibility)
         }
     }

@@ -33,6 +33,9 @@ pub struct Known {
     pub cuts: Option<Vec<Band>>,
     /// How often a band of this view was cut: each time the next try comes farther down the image.
     pub times_cut: usize,
+    /// A pixel has more fragments than are sorted, or a row more than a buffer holds: lists end where nothing more shows
+    /// ([`veils`](crate::passes::veils)).
+    pub veiled: bool,
     /// Fragments of this view that made a sum of the accumulator that was asked for wrap.
     pub overflows: u64,
 }
@@ -57,6 +60,6 @@ impl Known {
 
     /// Forgets what holds for one size of image.
     pub fn forget_image(&mut self) {
-        (self.entries, self.large) = ([None; 2], None);
+        (self.entries, self.large, self.veiled) = ([None; 2], None, false);
     }
 }

@@ -37,6 +37,7 @@ use crate::error::Result;
 use crate::gpu::adapter::AdapterDescription;
 use crate::gpu::layout::{BATCH, ONE};
 use crate::passes::peel::PEELED_WORDS;
+use crate::passes::veils::VEIL_WORDS;
 use crate::scene::Camera;
 use known::Listed;
 use steps::Part;
@@ -105,12 +106,14 @@ impl Plan {
             && !needs.copies
             && needs.lists.is_none()
             && needs.raster.is_none();
-        let needs = SceneNeeds { gather, cull, ..needs };
+        let veils = needs.lists == Some(Lists::Sorted) && known.veiled;
+        let needs = SceneNeeds { gather, cull, veils, ..needs };
         // Tiles that gather store no sums.
         let sum_words = if gather { 0 } else { pixel.sum_words(&needs) };
         let head = if sum_words > 0 { needs.accumulator.row().head_words() } else { 0 };
         let peeled = if needs.peels.is_some() { PEELED_WORDS } else { 0 };
-        let words = sum_words.max(pixel.image_words).max(peeled);
+        let veils = if needs.veils { VEIL_WORDS } else { 0 };
+        let words = sum_words.max(pixel.image_words).max(peeled).max(veils);
         let whole = || bands(adapter, camera, needs.samples.down, words, head);
         let bands = known.cuts.clone().map_or_else(whole, Ok)?;
         let several = bands.len() > 1;

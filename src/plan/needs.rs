@@ -45,6 +45,8 @@ pub struct SceneNeeds {
     pub lists: Option<Lists>,
     /// The layers that it peels, one after the other.
     pub peels: Option<u32>,
+    /// Lists end where nothing more shows: without that some would be too long.
+    pub veils: bool,
     /// It draws a triangle a splat instead of a quad ([`tuning::PIXELS_A_TRIANGLE`]).
     pub triangles: bool,
     /// The kernel's formula.
@@ -217,6 +219,7 @@ impl SceneNeeds {
             winner: (!blends).then_some(unblended),
             lists: if options.raster.is_some() { None } else { lists },
             peels,
+            veils: false,
             triangles: options.raster.is_some() && tuning::PIXELS_A_TRIANGLE * facts.surfels > camera.pixels() as u64,
             kernel: if blends { options.kernel.shape() } else { KernelShape::Constant },
             low_pass: options.low_pass,
@@ -329,6 +332,7 @@ impl SceneNeeds {
             (self.lists == Some(Lists::Layers), "lists-layers"),
             (self.lists == Some(Lists::Sorted), "lists-sorted"),
             (self.peels.is_some(), "peels"),
+            (self.veils, "veils"),
             (self.samples != Samples::ONE, "samples"),
             (self.shading == Shading::Lambert, "lambert"),
             (self.shading == Shading::Phong, "phong"),

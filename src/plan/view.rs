@@ -96,7 +96,7 @@ impl View {
             texture_width,
             texture_height,
             epsilon_most: options.epsilon.most().min(LARGEST_FRACTION) as f32,
-            padding_0: 0,
+            veil_first: ((nearest_of(body, eye_relative, camera) * unit).max(camera.near * unit) as f32).to_bits(),
             place,
         }
     }
@@ -109,6 +109,13 @@ fn farthest_of(bounds: &Bounds, eye: DVec3, camera: &Camera) -> f64 {
         camera.rotation.row(2).dot(DVec3::new(pick(0), pick(1), pick(2)) - eye)
     };
     (0..8).map(corner).fold(0.0, f64::max)
+}
+
+/// The least depth of a corner of `bounds`, negative behind the camera; world units.
+fn nearest_of(bounds: &Bounds, eye: DVec3, camera: &Camera) -> f64 {
+    let axis = camera.rotation.row(2);
+    let least = |k: usize| (axis[k] * (bounds.min[k] - eye[k])).min(axis[k] * (bounds.max[k] - eye[k]));
+    least(0) + least(1) + least(2)
 }
 
 /// The range of premultiplied colours in `range` once they are lit, if splats are.

@@ -8,7 +8,7 @@ use crate::passes::fragments;
 use crate::passes::tiles::{LONGEST, list_name};
 use crate::plan::known::Listed;
 use crate::plan::steps::{Part, Stage};
-use crate::plan::{FragmentLayout, KEY_WORDS, tuning};
+use crate::plan::{FragmentLayout, KEY_WORDS, Lists, tuning};
 
 impl Run<'_> {
     /// Makes room for the splats of the batches that are listed, and an eighth more for the next view.
@@ -72,6 +72,9 @@ impl Run<'_> {
         let [total, longest] = [words[0], words[1]];
         let sorted = LONGEST_LIST.min(MOST_COMPOSITED / self.plan.needs.samples.count());
         if self.gpu.adapter.is_software() && longest > sorted {
+            if self.veil() {
+                return Ok(false);
+            }
             return Err(self.gpu.error(format!(
                 "{longest} fragments lie at one pixel, and this adapter ends loops before more than {sorted} are composited: \
                  take --composite opaque, --backend reference, or fewer samples"
@@ -85,8 +88,12 @@ impl Run<'_> {
             return Ok(true);
         }
         let starts: Vec<u64> = words[2..].iter().map(|start| u64::from(*start)).collect();
+        let cut = fragments::cut(self.plan, band, &starts, most);
+        if cut.is_none() && self.veil() {
+            return Ok(false);
+        }
         self.known.times_cut += 1;
-        self.known.cuts = Some(fragments::cut(self.plan, band, &starts, most).ok_or_else(|| Error::Limit {
+        self.known.cuts = Some(cut.ok_or_else(|| Error::Limit {
             adapter: self.gpu.adapter.name.clone(),
             limit: "max_storage_buffer_binding_size",
             available: self.gpu.buffer_limit(),
@@ -94,6 +101,19 @@ impl Run<'_> {
             what: "for the fragments of one row of pixels; choose a narrower image, or --composite opaque".into(),
         })?);
         Ok(false)
+    }
+}
+
+impl Run<'_> {
+    /// Has lists end where nothing more shows, from the next try on; false if that changes nothing.
+    fn veil(&mut self) -> bool {
+        let veils = self.plan.needs.lists == Some(Lists::Sorted) && !self.plan.needs.veils;
+        if veils {
+            // Bands are cut anew, by what is listed then.
+            (self.known.veiled, self.known.cuts) = (true, None);
+            self.known.times_cut += 1;
+        }
+        veils
     }
 }
 

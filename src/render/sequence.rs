@@ -1,6 +1,6 @@
 //! A frame as a list of steps: the papers' passes in their order.
 
-use crate::passes::{accumulate, cull, fragments, of_maps, peel, project, raster, resolve, tiles, visibility};
+use crate::passes::{accumulate, cull, fragments, of_maps, peel, project, raster, resolve, tiles, veils, visibility};
 use crate::plan::known::Listed;
 use crate::plan::steps::{Look, Part, Stage, Step};
 use crate::plan::{Plan, Winner};
@@ -61,7 +61,7 @@ fn lists(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
         steps.push(Step::Stage(project::steps(plan, band, Part::All)));
     }
     let count = [visibility::steps(plan, band, Part::All).without_twin(), visibility::large(band)];
-    let count = count.into_iter().chain([visibility::occlude(band, Part::All)]);
+    let count = count.into_iter().chain(veils::steps(plan, band)).chain([visibility::occlude(band, Part::All)]);
     steps.extend(count.map(Step::Stage).chain(fragments::starts(band)));
     steps.extend(fragments::steps(band).map(Step::Stage));
 }

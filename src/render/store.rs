@@ -10,6 +10,7 @@ use crate::gpu::layout::{BATCH, Band as BandUniform, LIST_START, QUEUE_START, Vi
 use crate::passes::peel::PEELED_WORDS;
 use crate::passes::tiles::{list_name, list_words};
 use crate::passes::upload::{self, Uploaded};
+use crate::passes::veils::VEIL_WORDS;
 use crate::passes::{asks_for_order, covered, fragments, visibility};
 use crate::plan::known::Listed;
 use crate::plan::{Band, FragmentLayout, KEY_WORDS, Known, Plan, Raster, SceneNeeds, SurfelLayout, splat_words};
@@ -117,6 +118,7 @@ struct Made {
     sum_words: u32,
     image_words: u32,
     lists: bool,
+    veils: bool,
     peels: bool,
     raster: Option<(Raster, u32)>,
 }
@@ -199,9 +201,9 @@ impl Store {
         let raster = plan.needs.raster.map(|raster| (raster, plan.pixel.targets()));
         let (width, bands) = (plan.width, plan.bands.clone());
         let (sum_words, image_words) = (plan.sum_words, plan.pixel.image_words);
-        let (samples, lists) = (plan.needs.samples, plan.needs.lists.is_some());
+        let (samples, lists, veils) = (plan.needs.samples, plan.needs.lists.is_some(), plan.needs.veils);
         let peels = plan.needs.peels.is_some();
-        let made = Made { width, samples, bands, sum_words, image_words, lists, peels, raster };
+        let made = Made { width, samples, bands, sum_words, image_words, lists, veils, peels, raster };
         let fresh = self.made.as_ref() != Some(&made);
         if fresh {
             // The old ones make room first.
@@ -246,6 +248,10 @@ impl Store {
         if plan.needs.lists.is_some() {
             let words = most(&fragments::start_words);
             self.frame.insert("starts", Buffer::storage(gpu, "starts of lists", words)?);
+        }
+        if plan.needs.veils {
+            let words = pixels * u64::from(VEIL_WORDS);
+            self.frame.insert("veils", Buffer::storage(gpu, "veils", words)?);
         }
         if plan.needs.peels.is_some() {
             let words = pixels * u64::from(PEELED_WORDS);

@@ -194,6 +194,7 @@ fn listed(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
         let lit = needs.shading != Shading::Unlit;
         SceneNeeds {
             lists: Some([Lists::Layers, Lists::Sorted][step % 2]),
+            veils: step % 6 == 1,
             maps: if needs.samples == Samples::ONE { Maps::of(maps[step / 2 % 4]) } else { Maps::NONE },
             normal: lit && !needs.lit_splats,
             own_normals: needs.own_normals && lit,

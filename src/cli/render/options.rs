@@ -103,7 +103,8 @@ pub(super) fn for_scene(arguments: &Arguments, options: RenderOptions, scene: &S
     if kernel != gaussian::KERNEL {
         note("warning: --kernel takes the place of the Gaussians' own: leave it out for pictures as they were trained");
     }
-    let own_low_pass = arguments.lowpass.is_none() && matches!(kernel, Kernel::Gaussian { .. });
+    let own_low_pass =
+        arguments.lowpass.is_none() && options.outline.is_none() && matches!(kernel, Kernel::Gaussian { .. });
     let options = RenderOptions {
         kernel,
         low_pass: if own_low_pass { LowPass::Gaussians } else { options.low_pass },

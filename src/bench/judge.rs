@@ -6,6 +6,7 @@ use super::case::{Case, Timed};
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::metrics::{Reconstruction, compare, reconstruction};
+use crate::passes::peel;
 use crate::plan::RenderOptions;
 use crate::progress::Progress;
 use crate::render::{Backend, Renderer, render};
@@ -44,7 +45,8 @@ pub(super) fn against_reference(case: &Case<'_>, timed: &[Timed<'_>], progress: 
     let maps = Maps::of(&[Map::Count, Map::Decision]);
     let key = |timed: &Timed<'_>| RenderOptions {
         accumulator: default.accumulator,
-        raster: None,
+        // Layers that the rasteriser peels are others than those of lists.
+        raster: timed.options.raster.filter(|_| peel::layers(&timed.options).is_some()),
         maps,
         ..timed.options.clone()
     };

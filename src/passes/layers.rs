@@ -27,7 +27,7 @@ use crate::scene::{Composite, Map, Tail};
 pub enum Parting {
     /// At the first gap of epsilon.
     Runs,
-    /// An epsilon behind the nearest fragment: what runs are compared with.
+    /// An epsilon behind the nearest fragment: what the rasteriser peels, and runs are compared with.
     Window,
 }
 
@@ -145,10 +145,12 @@ impl Shown {
 pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
     let Strip { scene, camera, options, first_row, .. } = *strip;
     let most = if let Composite::Layers(most) = options.composite { most } else { 1 };
+    // The rasteriser's layers are windows (peel.rs).
+    let parting = if options.raster.is_some() { Parting::Window } else { Parting::Runs };
     for (pixel, list) in fragments::reference(strip).into_iter().enumerate() {
         let (x, y) = (pixel as u32 % camera.width, pixel as u32 / camera.width + first_row);
         let along = camera.along_axis(x, y);
-        let (layers, mut decision) = part(&list.fragments, (most, options.tail), Parting::Runs, (options, along));
+        let (layers, mut decision) = part(&list.fragments, (most, options.tail), parting, (options, along));
         let mut shown = Shown::NOTHING;
         for sums in layers {
             if shown.lets_through(LEAST_TRANSMITTANCE) {

@@ -46,7 +46,7 @@ pub(super) fn against_reference(case: &Case<'_>, timed: &[Timed<'_>], progress: 
     let key = |timed: &Timed<'_>| RenderOptions {
         accumulator: default.accumulator,
         // Layers that the rasteriser peels are others than those of lists.
-        raster: timed.options.raster.filter(|_| peel::layers(&timed.options).is_some()),
+        raster: timed.options.raster.filter(|_| peel::layers(timed.options).is_some()),
         maps,
         ..timed.options.clone()
     };

@@ -3,7 +3,7 @@
 //! Of a far cloud thousands of fragments may lie at a pixel, more than a device sorts or a buffer holds, though the nearest ones hide the
 //! others. So in a view in which lists turn out to be too long, the visibility pass adds up, in [`VEILS`] steps of depth, what the
 //! fragments hold back, `-ln(1 - alpha)`, and the list ends with the first step up to which the sum H is at least
-//! `ln(1 / s) + ` [`MARGIN`], s being the transmittance below which nothing more is composited
+//! `ln(1 / s) + MARGIN`, s being the transmittance below which nothing more is composited
 //! ([`Rules::least_shown`](super::sorted::Rules)).
 //!
 //! **No bit of the image changes.** What is listed is a front part of all fragments in the order of depths, as steps do not overlap. Each

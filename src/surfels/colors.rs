@@ -67,9 +67,12 @@ impl ColorGatherer {
     }
 }
 
+/// The degree of harmonics, and their terms.
+type Terms = (u32, Vec<f32>);
+
 impl Input {
     /// A straight colour each, as the scene has it, and the harmonics' terms with their degree.
-    fn linear(self, all: &mut GatheredColors) -> (Vec<[f32; 4]>, Option<(u32, Vec<f32>)>) {
+    fn linear(self, all: &mut GatheredColors) -> (Vec<[f32; 4]>, Option<Terms>) {
         let (mut colors, terms) = match self.colors {
             None => (Vec::new(), None),
             Some(codes @ Colors::Srgb8(_)) => {
@@ -116,13 +119,13 @@ fn append<T>(all: &mut Vec<T>, mut added: Vec<T>) {
 }
 
 /// The terms of `count` points at a degree that may be higher than their own; those that are no numbers become 0.
-fn widened(terms: Option<(u32, Vec<f32>)>, (count, degree): (usize, u32), replaced: &mut u64) -> Vec<f32> {
+fn widened(terms: Option<Terms>, (count, degree): (usize, u32), replaced: &mut u64) -> Vec<f32> {
     let each = 3 * terms_of(degree);
     let Some((own_degree, mut terms)) = terms else { return vec![0.0; count * each] };
     let own_each = 3 * terms_of(own_degree);
     for of_point in terms.chunks_exact_mut(own_each) {
         let mut unusable = false;
-        for term in of_point.iter_mut().filter(|term| !(term.abs() <= LARGEST)) {
+        for term in of_point.iter_mut().filter(|term| !is_held(**term)) {
             (*term, unusable) = (0.0, true);
         }
         *replaced += u64::from(unusable);
@@ -165,9 +168,13 @@ pub(crate) fn folded(colors: Option<Colors>) -> Colors {
 /// The largest channel of a colour, whose products and differences on the way through f32 stay finite.
 const LARGEST: f32 = 1e18;
 
+fn is_held(value: f32) -> bool {
+    value.abs() <= LARGEST
+}
+
 /// NaN is not usable.
 fn is_usable(color: &[f32; 4]) -> bool {
-    color.iter().all(|c| c.abs() <= LARGEST)
+    color.iter().all(|c| is_held(*c))
 }
 
 /// The 8-bit sRGB code nearest to [`DEFAULT_COLOR`].

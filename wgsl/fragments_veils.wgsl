@@ -2,7 +2,7 @@
 // are and how much they hold back, as optical depth, -ln(1 - alpha). The list ends with the step by which so little shows through that what
 // lies behind is never composited: sums of integers say so in any order. Same interface as fragments_count.wgsl.
 // Host side and proof: src/passes/veils.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x1d4af4b0b5ef81f5
+// All loops end, by 1 of src/gpu/loops.rs: 0x3da875d8f5417ed9
 
 // Of each pixel and step, from the nearest on: fragments, and what they hold back.
 @group(0) @binding(50) var<storage, read_write> veils: array<atomic<u32>>;
@@ -10,11 +10,12 @@
 const VEILS: u32 = 16u;
 // Of an optical depth of 1.
 const VEIL_UNITS: f32 = 1024.0;
-// Nothing is seen through more.
-const LEAST_LEFT: f32 = 1e-13;
+// No fragment counts for more: nearer to an alpha of 1 its rounding would show.
+const LEAST_LEFT: f32 = 1e-3;
 
-// Fragments that are fainter are not listed, so they are not counted.
+// Fragments that are fainter are not listed, so they are not counted, and those that may not be hold nothing back.
 override LEAST_COUNTED: f32;
+override LEAST_HELD: f32;
 // Of units, with which nothing more shows.
 override ENOUGH_HELD: u32;
 
@@ -38,7 +39,9 @@ fn keep_nearest(pixel: u32, fragment: Fragment, mark: u32) {
     let at = 2u * (pixel * VEILS + veil_of(fragment.depth));
     let held_back = -log(max(1.0 - min(alpha, MOST_ALPHA), LEAST_LEFT));
     atomicAdd(&veils[at], 1u);
-    atomicAdd(&veils[at + 1u], u32(VEIL_UNITS * held_back));
+    if (alpha >= LEAST_HELD) {
+        atomicAdd(&veils[at + 1u], u32(VEIL_UNITS * held_back));
+    }
 }
 
 // Of a pixel that has anything something that is not nothing, as there is no nearest depth.

@@ -1,5 +1,5 @@
 // What the rasteriser's layers show so far: after each one, what it blended goes over what is behind it. Host side: src/passes/peel.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x45cb747d269c2bf7
+// All loops end, by 1 of src/gpu/loops.rs: 0xc4c82ac464bb604b
 
 // Of each pixel: the premultiplied colour, the transmittance, the layers, and the nearest depths of raster_peeled.wgsl.
 @group(0) @binding(49) var<storage, read_write> peeled: array<u32>;
@@ -27,21 +27,25 @@ fn peel(
     if (pixel >= band_pixels()) {
         return;
     }
+    let front = front_at(pixel);
+    if (bitcast<u32>(front) == NOTHING) {
+        return;
+    }
+    let at = pixel * PEELED_WORDS;
+    peeled[at + PEELED_FRONTS + select(0u, bitcast<u32>(front) & SIDE_BIT, SIDES)] = bitcast<u32>(front);
+    // A target of few bits may have kept nothing of a faint layer, which is peeled all the same.
     let weight = sum_at(pixel, WEIGHT_CHANNEL);
     if (weight == 0.0) {
         return;
     }
     let x = pixel % held.width;
     let y = pixel / held.width;
-    let front = front_at(pixel);
     let normal = resolve_normal(pixel, weight, front);
     let shown = with_behind(composite(pixel, x, y), shaded(resolve_color(pixel, weight), normal, x, y));
-    let at = pixel * PEELED_WORDS;
     let color = bitcast<vec4<u32>>(shown.color);
     for (var k = 0u; k < 4u; k++) {
         peeled[at + k] = color[k];
     }
     peeled[at + 4u] = bitcast<u32>(shown.transmittance);
     peeled[at + 5u] = shown.layers;
-    peeled[at + PEELED_FRONTS + select(0u, bitcast<u32>(front) & SIDE_BIT, SIDES)] = bitcast<u32>(front);
 }

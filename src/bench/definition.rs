@@ -155,7 +155,7 @@ pub enum Making {
     Scanned,
     /// Independent random points of a mesh, `count` of them, with its normals, and ellipses that hold their cells.
     Uniform,
-    /// Of a shape Gaussians, as `epsplat generate --gaussians` makes them; unlit, as their colours are what pictures show.
+    /// Of a shape Gaussians, as `epsplat generate --gaussians` makes them.
     Gaussians,
 }
 

@@ -7,6 +7,7 @@ use super::config::Config;
 use super::definition::{Definition, Making, OneOrMany, SceneEntry};
 use crate::error::{Error, Result};
 use crate::plan::{BackendName, check};
+use crate::scene::Shading;
 use crate::scene::camera::check_size;
 
 impl Definition {
@@ -110,6 +111,12 @@ impl SceneEntry {
             (None, Some(_)) if !matches!(self.surfels, Making::File | Making::Scanned | Making::Gaussians) => {
                 return Err("surfels: of a shape they are scanned, gaussians, or as generated".into());
             }
+            (None, Some(_)) if self.surfels == Making::Gaussians && self.shading != Some(Shading::Unlit) => {
+                return Err("shading: Gaussians have the colours that pictures of them show: it is unlit".into());
+            }
+            (None, Some(_)) if self.surfels == Making::Gaussians && (self.noise.is_some() || self.radius.is_some()) => {
+                return Err("noise, radius: Gaussians are generated as they are".into());
+            }
             (None, Some(_)) if self.count.is_none() => return Err("count: a shape needs its number of surfels".into()),
             (None, Some(_)) => {}
         }
@@ -187,7 +194,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::plan::Accumulator;
-    use crate::scene::{Epsilon, LowPass, Map, Shading};
+    use crate::scene::{Epsilon, LowPass, Map};
 
     const HEAD: &str = "name = \"n\"\nabout = \"a\"\n";
     const SCENE: &str = "[[scene]]\nname = \"s\"\nshape = \"sphere\"\ncount = 10\n";

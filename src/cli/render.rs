@@ -145,7 +145,7 @@ pub struct Arguments {
     /// What becomes of the surfaces behind the last of layers:L: sum (they are blended, as one more) or none [default: sum]
     #[arg(long, value_name = "HOW", requires = "composite", help_heading = "Transparency")]
     tail: Option<Tail>,
-    /// Filter for splats near a pixel in size or below [default: none]
+    /// Filter for splats near a pixel in size or below [default: none, of Gaussians gaussians]
     #[arg(long, value_enum)]
     lowpass: Option<LowPassName>,
     /// Samples of a pixel: 1, 4, 8 or 16. Edges are as smooth as they are many; maps are of the pixel's centre

@@ -61,10 +61,11 @@ fn content(scene: &Scene, index: usize) -> ([[u32; 3]; 8], [u32; 4]) {
     let normal = scene.normals.get(index).copied().unwrap_or_default();
     let Clip([first, second]) = scene.clips.get(index).copied().unwrap_or_default();
     let Cap(cap) = scene.caps.get(index).copied().unwrap_or_default();
-    (
-        [center, low, s, t, first, second, cap, normal].map(|part| part.map(f32::to_bits)),
-        scene.colors.linear(index).map(f32::to_bits),
-    )
+    let color = match &scene.colors {
+        Colors::Harmonics(harmonics) => harmonics.colors()[index],
+        colors => colors.linear(index),
+    };
+    ([center, low, s, t, first, second, cap, normal].map(|part| part.map(f32::to_bits)), color.map(f32::to_bits))
 }
 
 /// A step near the golden ratio of `runs` that comes to each of them once.

@@ -71,8 +71,10 @@ pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
             }
             before = Some(f);
             let next = shown.with([r, g, b, alpha]);
-            // So does what an alpha near 1 lets through.
-            sensitivity += alpha / (1.0 - alpha) * steepness;
+            // So does what an alpha near 1 lets through; where what lies behind would hardly show that is of no matter.
+            if rules.leaves_last {
+                sensitivity += alpha / (1.0 - alpha) * steepness;
+            }
             decision = decision.min(next.decision(rules.least_shown) / sensitivity);
             let shows_more = next.lets_through(rules.least_shown);
             if shows_more || !rules.leaves_last {

@@ -190,7 +190,7 @@ pub enum LowPass {
     Max,
     /// The kernel convolved with the pixel (EWA, Zwicker et al. 2001): no aliasing either.
     Ewa,
-    /// That of [`Max`](Self::Max), with the round kernel of Gaussian surfels ([`gaussian`](super::gaussian)): `exp(-d^2)`, d in pixels.
+    /// That of [`Max`](Self::Max), with the round kernel of Gaussian surfels ([`gaussian`](super::gaussian)): `exp(-d^2)`, d in pixels, or in samples where a pixel has several.
     Gaussians,
 }
 

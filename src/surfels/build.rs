@@ -85,10 +85,12 @@ pub fn build_within(
 ///
 /// Those of [`build`].
 pub fn build_at_vertices(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Preparation)> {
-    let inputs = inputs.into_iter().map(|input| mesh::of_mesh(input.in_light(), By::Vertices)).collect();
+    let inputs = inputs.into_iter().map(|input| mesh::of_mesh(input, By::Vertices)).collect();
+    let mut gathered = gather::gather(inputs)?;
+    gathered.points = std::mem::take(&mut gathered.points).in_light();
     // Samples are where the surfels are, however those curve.
     let flat = Limits { curved: false, ..Limits::default() };
-    built(gather::gather(inputs)?, &flat, progress).map(|(made, _)| made)
+    built(gathered, &flat, progress).map(|(made, _)| made)
 }
 
 /// The scene, and the texture coordinates of its surfels.

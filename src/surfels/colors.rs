@@ -38,7 +38,7 @@ impl ColorGatherer {
 
     /// The colours of all points.
     pub fn finish(self) -> GatheredColors {
-        let encoded = self.inputs.iter().any(|input| input.encoded);
+        let encoded = self.inputs.iter().any(|input| input.encoded && input.count > 0);
         let mut all = GatheredColors { colors: None, encoded, replaced: 0, clamped: 0 };
         let has_codes_alone = |input: &Input| matches!(input.colors, None | Some(Colors::Srgb8(_)));
         if self.inputs.iter().all(|input| input.colors.is_none()) && !encoded {

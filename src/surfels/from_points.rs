@@ -91,7 +91,8 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
     if options.size == Size::Qsplat {
         inputs.iter_mut().try_for_each(measure_triangles)?;
     }
-    let mut gathered = gather(inputs.into_iter().map(Points::in_light).collect())?;
+    let mut gathered = gather(inputs)?;
+    gathered.points = std::mem::take(&mut gathered.points).in_light();
     if options.estimate_normals {
         (gathered.points.normals, gathered.points.axes) = (None, None);
     }

@@ -93,9 +93,9 @@ fn nothing_to_draw(inputs: usize, preparation: &Preparation) -> String {
         ),
         (0, _) => "no input was given, so there is nothing to draw".to_owned(),
         (_, 0) => "the input holds no points, so there is nothing to draw".to_owned(),
-        (_, points) if preparation.shapeless == points => format!(
-            "none of the {points} Gaussians read has scales, a rotation and an opacity that are numbers and span a surface, so there is \
-             nothing to draw"
+        (_, points) if preparation.shapeless > 0 => format!(
+            "none of the {points} Gaussians read has a place, scales, a rotation, an opacity and a colour that are numbers and span a \
+             surface, so there is nothing to draw"
         ),
         (_, points) => format!(
             "none of the {points} points read has three finite coordinates of at most {LARGEST_COORDINATE:e} in \
@@ -112,15 +112,15 @@ impl Gathered {
     }
 }
 
-/// Whether a Gaussian has a surface and an opacity: what others lack is estimated, but of a Gaussian nothing can be.
+/// Whether a Gaussian has a surface, an opacity and a colour: what others lack is estimated, but of a Gaussian nothing can be.
 fn has_shape(points: &Points, index: usize) -> bool {
-    let alpha = match &points.colors {
+    let color = match &points.colors {
         Some(Colors::Linear(colors)) => colors.get(index),
         Some(Colors::Harmonics(harmonics)) => harmonics.colors().get(index),
         _ => None,
     };
     let axes = points.axes.as_ref().and_then(|axes| usable_axes(*axes.get(index)?));
-    axes.is_some() && alpha.is_none_or(|color| color[3].is_finite())
+    axes.is_some() && color.is_none_or(|color| color.iter().all(|c| c.is_finite()))
 }
 
 pub(crate) fn is_usable(position: &[f64; 3]) -> bool {

@@ -15,7 +15,7 @@ pub struct Preparation {
     pub withheld: u64,
     /// Vertices that are in the meshes but not among `points`: no triangle with an area names them.
     pub loose: u64,
-    /// Gaussians left out because their scales, rotation or opacity are no numbers, or span no surface.
+    /// Gaussians left out because their scales, rotation, opacity or colour are no numbers, or span no surface.
     pub shapeless: u64,
     /// Ellipsoids that were made surfels.
     pub flattened: Option<Flattened>,
@@ -74,7 +74,8 @@ impl Preparation {
             ),
             (self.loose > 0).then(|| format!("{} vertices of no triangle were left out", self.loose)),
             (self.shapeless > 0).then(|| {
-                let what = "were left out: their scales, rotation or opacity are no numbers, or span no surface";
+                let what =
+                    "were left out: their scales, rotation, opacity or colour are no numbers, or span no surface";
                 format!("{} Gaussians {what}", self.shapeless)
             }),
             self.flattened.map(|flattened| flattened.sentence()),

@@ -42,7 +42,11 @@ pub(super) fn options(arguments: &Arguments, format: Format) -> Result<RenderOpt
     let default = RenderOptions::default();
     let options = RenderOptions {
         epsilon: arguments.epsilon.unwrap_or(default.epsilon),
-        kernel: arguments.kernel.unwrap_or(default.kernel),
+        kernel: arguments.kernel.unwrap_or(match arguments.lowpass {
+            // It stands beside a Gaussian.
+            Some(LowPassName::Gaussians) => gaussian::KERNEL,
+            _ => default.kernel,
+        }),
         blend: arguments.blend.unwrap_or_default(),
         composite: arguments.composite.unwrap_or_default(),
         opacity: arguments.opacity,
@@ -93,6 +97,11 @@ pub(super) fn for_scene(arguments: &Arguments, options: RenderOptions, scene: &S
     if !scene.encoded {
         return Ok(options);
     }
+    if arguments.shading_at == ShadingAtName::Splat && arguments.shading.is_none() {
+        return Err(Error::Usage(
+            "Gaussians have the colours that pictures of them show: leave --shading-at out".into(),
+        ));
+    }
     let shading = if arguments.shading.is_some() { options.shading } else { Shading::Unlit };
     let options = RenderOptions { shading, ..options };
     // Points that face the camera, the rasteriser and what is not blended have no such rules.
@@ -100,7 +109,8 @@ pub(super) fn for_scene(arguments: &Arguments, options: RenderOptions, scene: &S
         return Ok(options);
     }
     let kernel = arguments.kernel.unwrap_or(gaussian::KERNEL);
-    if kernel != gaussian::KERNEL {
+    let own = |sigma: f64| (sigma * gaussian::EXTENT - 1.0).abs() < 1e-6;
+    if !matches!(kernel, Kernel::Gaussian { sigma } if own(sigma)) {
         note("warning: --kernel takes the place of the Gaussians' own: leave it out for pictures as they were trained");
     }
     let own_low_pass =

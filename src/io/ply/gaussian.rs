@@ -107,8 +107,13 @@ impl<'a> Gaussians<'a> {
         let mut axes: Vec<(f64, DVec3)> = deviations.zip(units).collect();
         if axes.len() == 3 {
             // Equal ones stay in the file's order.
-            let shortest = (0..3).fold(2, |least, k| if axes[k].0 < axes[least].0 { k } else { least });
+            // One that is no number comes first, so that none is left.
+            let shortest =
+                (0..3).fold(2, |least, k| if axes[k].0 < axes[least].0 || axes[k].0.is_nan() { k } else { least });
             let (thickness, _) = axes.remove(shortest);
+            if thickness.is_nan() {
+                axes[0].0 = f64::NAN;
+            }
             self.ratios.push((thickness / axes[0].0.min(axes[1].0)) as f32);
         }
         let half_axis = |(deviation, unit): (f64, DVec3)| (rotation * unit * (EXTENT * deviation)).as_vec3().to_array();
@@ -131,7 +136,9 @@ impl<'a> Gaussians<'a> {
             // Harmonics of nothing are a colour.
             degree if degree > 0 && changes => Harmonics::new(self.colors, degree, self.terms).map(Colors::Harmonics),
             _ => {
-                let colors = self.colors.into_iter().map(|[r, g, b, a]| [r.max(0.0), g.max(0.0), b.max(0.0), a]);
+                // What is no number stays none.
+                let seen = |c: f32| if c < 0.0 { 0.0 } else { c };
+                let colors = self.colors.into_iter().map(|[r, g, b, a]| [seen(r), seen(g), seen(b), a]);
                 Some(Colors::Linear(colors.collect()))
             }
         };

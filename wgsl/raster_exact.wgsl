@@ -5,7 +5,7 @@
 @fragment
 fn raster_visibility(corner: Corner) -> @builtin(frag_depth) f32 {
     let fragment = fragment_of(corner);
-    if (!fragment.hit) {
+    if (!fragment.hit || is_peeled(fragment, corner.radius, vec2<u32>(corner.position.xy))) {
         discard;
     }
     return fragment.depth * depth_scale();
@@ -17,7 +17,7 @@ fn raster_attributes(corner: Corner) -> Targets {
     let pixel = vec2<u32>(corner.position.xy);
     let place = pixel_index(pixel.x, pixel.y);
     let front = front_at(place);
-    if (!is_shown(fragment, front, corner.radius, pixel)) {
+    if (!is_shown(fragment, front, corner.radius, pixel) || is_peeled(fragment, corner.radius, pixel)) {
         discard;
     }
     blend(place, fragment, front, carried(corner));

@@ -11,7 +11,8 @@
 //! epsilon of a surface's nearest fragment, or, sorted, which of two fragments is nearer, but for those of one disk's place: their depths are
 //! the same numbers, and the order of the surfels decides.
 
-use super::bounds::{ColorRange, DIVISION, Fragment, NOTHING, Pixel, Surface, fragments, straight, weight_error};
+use super::bounds::{ColorRange, DIVISION, NOTHING, Pixel, straight};
+use super::fragment_bounds::{Fragment, Surface, fragments, weight_error};
 use super::precision::E as U;
 use crate::passes::project::reference_all;
 use crate::passes::sorted::Rules;

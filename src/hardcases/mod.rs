@@ -20,6 +20,7 @@ pub mod composited;
 mod curved;
 mod ends;
 mod extremes;
+mod fragment_bounds;
 mod judge;
 mod points;
 pub mod precision;

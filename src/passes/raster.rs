@@ -29,13 +29,14 @@ pub const PASS: Pass = Pass {
         None => Vec::new(),
         Some(raster) => {
             let mut files = vec!["raster.wgsl", "accumulator_raster.wgsl", targets_file(needs)];
-            files.extend(match (raster.depth, needs.winner) {
-                _ if needs.peels.is_some() => &["raster_own_depths.wgsl", "raster_peeled.wgsl"][..],
-                (RasterDepth::Exact, None) => &["raster_own_depths.wgsl", "raster_exact.wgsl"],
+            let peeled = if needs.peels.is_some() { "raster_peeled.wgsl" } else { "raster_peeled_absent.wgsl" };
+            let own: &[&str] = match (raster.depth, needs.winner) {
+                (RasterDepth::Exact, None) => &["raster_own_depths.wgsl", "raster_exact.wgsl", peeled],
                 (RasterDepth::Exact, Some(_)) => &["raster_own_depths.wgsl", "raster_nearest_exact.wgsl"],
                 (RasterDepth::Offset, None) => &["raster_offset.wgsl"],
                 (RasterDepth::Offset, Some(_)) => &["raster_nearest_offset.wgsl"],
-            });
+            };
+            files.extend(own);
             files
         }
     },

@@ -1,0 +1,5 @@
+// One layer is drawn, before which there is none. Same interface as raster_peeled.wgsl.
+
+fn is_peeled(fragment: Fragment, radius: f32, pixel: vec2<u32>) -> bool {
+    return false;
+}

@@ -14,7 +14,8 @@ use epsplat::gpu::sources::FILES;
 use epsplat::passes;
 use epsplat::plan::pass::Making;
 use epsplat::plan::{
-    Accumulator, COLOR_CHANNEL, ColorNeed, Features, PixelLayout, RenderOptions, SceneNeeds, Winner, color_channels,
+    Accumulator, COLOR_CHANNEL, ColorNeed, Features, Oit, PixelLayout, RenderOptions, SceneNeeds, Winner,
+    color_channels,
 };
 use epsplat::scene::{Facing, Kernel, KernelShape, MAPS, Map, Outline};
 use naga::AddressSpace;
@@ -73,9 +74,9 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
             &[]
         };
         let own: BTreeSet<&str> = kernels.iter().map(|kernel| kernel.name).chain(drawn.iter().copied()).collect();
-        // Of a render by tiles each module has entry points that only the other needs.
+        // Of a render by tiles each module has entry points that only the other needs; weights by depth need no visibility pass.
         let shared = entries.difference(&own).count();
-        let leaves = made.of_tiles() || needs.gather;
+        let leaves = made.of_tiles() || needs.gather || needs.oit == Some(Oit::Weighted);
         assert!(own.is_subset(&entries) && (shared == 0) != leaves, "{entries:?}");
         for (_, variable) in module.global_variables.iter().filter(|(_, v)| v.binding.is_some()) {
             let buffer = matches!(variable.space, AddressSpace::Uniform | AddressSpace::Storage { .. });
@@ -101,14 +102,14 @@ const ALTERNATIVES: [&[&str]; 8] = [
     &["kernel-gaussian", "kernel-ellipse", "kernel-cone", "kernel-constant"],
     &["color-constant", "color-srgb8", "color-linear", "color-textured", "color-harmonics"],
     &["raster-exact", "raster-offset"],
-    &["epsilon-radius", "epsilon-ray"],
+    &["epsilon-radius", "epsilon-ray", "oit-weighted", "oit-moments"],
     &["lowpass-max", "lowpass-ewa", "lowpass-gaussians"],
     &["lambert", "phong"],
     &["lists-layers", "lists-sorted"],
 ];
 
 /// Needs that no render has together (`src/plan/check.rs`, `src/plan/needs.rs`).
-const EXCLUSIVE: [(&str, &[&str]); 18] = [
+const EXCLUSIVE: [(&str, &[&str]); 21] = [
     (
         "veils",
         &["tiles", "gather", "copies", "cull", "atomics-u64", "raster-exact", "raster-offset", "nearest", "peels"],
@@ -132,6 +133,9 @@ const EXCLUSIVE: [(&str, &[&str]); 18] = [
             "weight-map",
         ],
     ),
+    ("oit", &["tiles", "gather", "copies", "cull", "raster-exact", "raster-offset", "nearest", "peels", "veils"]),
+    ("oit", &["lists-layers", "lists-sorted", "color-textured", "epsilon-radius", "epsilon-ray", "sides"]),
+    ("oit", &["count", "depth", "index", "normal", "normal-map", "weight-map"]),
     ("samples", &["count", "depth", "index", "normal-map", "weight-map", "transmittance", "layers-map"]),
     ("lists", &["tiles", "gather", "copies", "cull", "atomics-u64", "raster-exact", "raster-offset", "nearest"]),
     ("lists", &["color-textured", "count", "depth", "index", "normal-map", "weight-map"]),
@@ -294,6 +298,7 @@ fn the_channels_of_a_pixel_do_not_overlap() {
             (pixel.normal_channel, of(needs.normal, 3)),
             (pixel.depth_channel, of(needs.maps.has(Map::Depth), 1)),
             (pixel.count_channel, of(needs.maps.has(Map::Count), 1)),
+            (pixel.held_back_channel, of(needs.oit.is_some(), 1)),
             (pixel.place_channel, of(needs.color == ColorNeed::Textured, 4)),
         ]);
         let maps = MAPS.iter().zip(pixel.map_words).filter(|(row, _)| needs.maps.has(row.map));
@@ -337,6 +342,9 @@ fn absent_parts_have_their_partners_signatures() {
         absent.into_iter().map(|name| (name, vec![name.replace("_absent", "")])).collect();
     let normals = pairs.iter_mut().filter(|(name, _)| *name == "normal_absent.wgsl");
     normals.for_each(|(_, partners)| partners.push("normal_flat.wgsl".into()));
+    for (_, partners) in pairs.iter_mut().filter(|(name, _)| *name == "oit_absent.wgsl") {
+        partners.push("oit_weighted.wgsl".into());
+    }
     for name in ["flat.wgsl", "normal_flat.wgsl", "tile_flat.wgsl"] {
         pairs.push((name, vec![name.replace("flat", "curved")]));
     }
@@ -387,6 +395,8 @@ fn absent_parts_have_their_partners_signatures() {
     alike("nearest_", &["keep_nearest", "mark_of", "nearest_at"]);
     alike_in("winner_", vec!["winner_constant.wgsl", "winner_color.wgsl"], &["resolve_color"]);
     alike_in("winners", vec!["winner_second.wgsl", "nearest_color.wgsl"], &["winning_word"]);
+    let oit = ["oit_absent.wgsl", "oit_weighted.wgsl", "oit_moments.wgsl"];
+    alike_in("oit", oit.to_vec(), &["weight_before"]);
     alike("epsilon", &["radius_of", "deepest_accepted", "farthest_accepted"]);
     let shared = ["homography", "intersect", "ray", "seen_at"];
     let (pinhole, orthographic) =

@@ -11,7 +11,7 @@ use epsplat::gpu::{Gpu, Sources};
 use epsplat::metrics::DECISION_MARGIN;
 use epsplat::passes::layers::{Parting, part};
 use epsplat::passes::{Strip, fragments, project};
-use epsplat::plan::{BlendFormat, Organisation, Raster, RasterDepth, RenderOptions};
+use epsplat::plan::{BlendFormat, Facts, Organisation, Raster, RasterDepth, RenderOptions, depths};
 use epsplat::render::{Backend, Renderer, Report, render};
 use epsplat::scene::composite::ALL_LAYERS;
 use epsplat::scene::{
@@ -349,7 +349,8 @@ fn maps_of_the_nearest_surface_stay() {
 fn parted(scene: &Scene, camera: &Camera, options: &RenderOptions, parting: Parting) -> Vec<usize> {
     let splats = project::reference_all(scene, camera, options);
     let (splats, rows) = (splats.iter().collect(), camera.height);
-    let strip = Strip { scene, camera, options, splats, ranks: None, first_row: 0, rows };
+    let depths = depths(&Facts::of(scene), camera);
+    let strip = Strip { scene, camera, options, splats, ranks: None, depths, first_row: 0, rows };
     let count = |(pixel, list): (usize, &fragments::List)| {
         let along = camera.along_axis(pixel as u32 % camera.width, pixel as u32 / camera.width);
         part(&list.fragments, (ALL_LAYERS, Tail::None), parting, (options, along)).0.len()

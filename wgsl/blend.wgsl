@@ -37,7 +37,10 @@ fn weight_of(fragment: Fragment) -> Term {
 }
 
 fn blend(pixel: u32, fragment: Fragment, front: f32, attributes: Attributes) {
-    blend_weighted(pixel, weight_of(fragment), fragment.depth, front, normal_at(attributes, fragment.spot), attributes);
+    let weight = fragment_weight(fragment);
+    accumulate_held_back(pixel, weight, attributes.color);
+    let weighed = quantise(weight_before(pixel, fragment.depth, weight));
+    blend_weighted(pixel, weighed, fragment.depth, front, normal_at(attributes, fragment.spot), attributes);
 }
 
 // A weight of 0 adds nothing to any sum.

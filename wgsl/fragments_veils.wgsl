@@ -2,7 +2,7 @@
 // are and how much they hold back, as optical depth, -ln(1 - alpha). The list ends with the step by which so little shows through that what
 // lies behind is never composited: sums of integers say so in any order. Same interface as fragments_count.wgsl.
 // Host side and proof: src/passes/veils.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x3da875d8f5417ed9
+// All loops end, by 1 of src/gpu/loops.rs: 0x9b37ce054ecaded7
 
 // Of each pixel and step, from the nearest on: fragments, and what they hold back.
 @group(0) @binding(50) var<storage, read_write> veils: array<atomic<u32>>;
@@ -26,7 +26,7 @@ fn mark_of(surfel: u32) -> u32 {
 
 // Bits of positive depths are in their order, and as far apart as their logarithms, about.
 fn veil_of(depth: f32) -> u32 {
-    let first = held.veil_first;
+    let first = bitcast<u32>(held.first);
     let width = (max(bitcast<u32>(held.farthest), first) - first) / VEILS + 1u;
     return min((max(bitcast<u32>(depth), first) - first) / width, VEILS - 1u);
 }

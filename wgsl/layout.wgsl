@@ -44,8 +44,8 @@ struct View {
     texture_height: u32,
     // What an epsilon by the radius does not exceed, as a fraction of the nearest depth.
     epsilon_most: f32,
-    // Bits of the depth at which the scene's body starts, device units.
-    veil_first: u32,
+    // The depth at which the scene's body starts, device units.
+    first: f32,
     // The middle of the range of texture coordinates, its span, and the largest squared reach in units of the span.
     place: vec4<f32>,
 }

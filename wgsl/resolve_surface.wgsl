@@ -12,7 +12,8 @@ fn shown_weight(sums_of: u32, front: f32) -> f32 {
 
 // The straight colour and alpha of a surface, from what `sums_of` names its sums.
 fn surface_color(sums_of: u32, weight: f32, normal: vec3<f32>, x: u32, y: u32) -> vec4<f32> {
-    return shaded(textured(sums_of, weight, resolve_color(sums_of, weight)), normal, x, y);
+    let color = shaded(textured(sums_of, weight, resolve_color(sums_of, weight)), normal, x, y);
+    return with_held_back(color, sums_of, weight);
 }
 
 // The pixel (x, y), the band's `pixel`th, from what `sums_of` names its sums.

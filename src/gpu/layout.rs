@@ -102,7 +102,7 @@ pub struct View {
     pub texture_width: u32,
     pub texture_height: u32,
     pub epsilon_most: f32,
-    pub veil_first: u32,
+    pub first: f32,
     pub place: [f32; 4],
 }
 

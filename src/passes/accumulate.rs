@@ -123,6 +123,8 @@ pub struct PixelSums {
     pub depth: f64,
     /// Of [`Textured::terms`](crate::scene::Textured::terms), places in a texture.
     pub place: [f64; 4],
+    /// What fragments hold back, as optical depth; where all of a pixel are summed ([`oit`](super::oit)).
+    pub held_back: f64,
     /// Accepted fragments.
     pub count: u32,
     /// The smallest relative distance of a fragment to a decision; see [`Map::Decision`].
@@ -138,6 +140,7 @@ impl PixelSums {
         back: false,
         depth: 0.0,
         place: [0.0; 4],
+        held_back: 0.0,
         count: 0,
         decision: f64::INFINITY,
     };
@@ -232,7 +235,7 @@ pub const PASS: Pass = Pass {
         false => Vec::new(),
     },
     constants: |making| {
-        let wide = wide_bits(making.options.kernel, making.surfels);
+        let wide = wide_bits(making.options, making.surfels);
         vec![
             ("FRACTION_BITS", making.needs.accumulator.row().fraction_bits(making.surfels).into()),
             ("ONE", f64::from(wide).exp2()),

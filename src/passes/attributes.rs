@@ -54,6 +54,7 @@ pub const PASS: Pass = Pass {
             ("DEPTH_CHANNEL", layout.depth_channel.into()),
             ("COUNT_CHANNEL", layout.count_channel.into()),
             ("PLACE_CHANNEL", layout.place_channel.into()),
+            ("HELD_BACK_CHANNEL", layout.held_back_channel.into()),
         ];
         if let ColorNeed::Harmonics(degree) = making.needs.color {
             constants.push(("HARMONICS_DEGREE", degree.into()));

@@ -26,6 +26,7 @@ pub const PASS: Pass = Pass {
                     EpsilonForm::Depth => "epsilon.wgsl",
                     EpsilonForm::Radius => "epsilon_radius.wgsl",
                     EpsilonForm::Ray => "epsilon_ray.wgsl",
+                    EpsilonForm::All => "epsilon_all.wgsl",
                 },
             },
         ];

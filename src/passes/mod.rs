@@ -12,6 +12,7 @@
 //! | [`winner`] | splats | the same of the nearest fragment alone |
 //! | [`fragments`] | splats | a list of each pixel's fragments |
 //! | [`tiles`] | large splats, or all | the same two, or the next |
+//! | [`moments`], [`oit`] | splats | [`accumulate::PixelSums`] of all of them |
 //! | [`covered`] | nearest depths | the tiles that have anything |
 //! | [`resolve`] | sums | [`Frame`] |
 //! | [`layers`], [`sorted`] | lists | [`Frame`] |
@@ -34,6 +35,8 @@ pub mod index;
 pub mod layers;
 pub mod lit;
 pub mod lowpass;
+pub mod moments;
+pub mod oit;
 pub mod order;
 pub mod peel;
 pub mod project;
@@ -69,6 +72,8 @@ pub struct Strip<'a> {
     pub splats: Vec<&'a Splat>,
     /// The place of each surfel in the [`order`] in which a device stores them, where a map asks for it.
     pub ranks: Option<&'a [u32]>,
+    /// Where the scene's body starts and past its last surfel, camera-space z, world units.
+    pub depths: [f64; 2],
     /// Its first row.
     pub first_row: u32,
     /// How many it has.
@@ -118,7 +123,7 @@ pub fn finish(frame: &mut Frame, needs: &SceneNeeds, provenance: &Provenance, or
 }
 
 /// The passes whose files every module has.
-const PASSES: [&Pass; 19] = [
+const PASSES: [&Pass; 20] = [
     &shared::PASS,
     &project::PASS,
     &facing::PASS,
@@ -129,6 +134,7 @@ const PASSES: [&Pass; 19] = [
     &winner::PASS,
     &fragments::PASS,
     &veils::PASS,
+    &oit::PASS,
     &accumulate::PASS,
     &attributes::PASS,
     &lit::PASS,

@@ -65,7 +65,11 @@ pub(super) fn surface(
     // Each normal was turned toward the viewer.
     let turned = unit_or_zero(DVec3::from_array(sum.normal) / sum.weight);
     let normal = if sum.back { -turned } else { turned };
-    (shaded(mean, normal, camera, options, (x, y)), normal)
+    let mut color = shaded(mean, normal, camera, options, (x, y));
+    if options.composite.is_order_free() {
+        color[3] = -(-sum.held_back).exp_m1();
+    }
+    (color, normal)
 }
 
 /// The straight colour, lit unless splats are, of a premultiplied one of unit `normal`, and its alpha times the opacity.

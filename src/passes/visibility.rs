@@ -8,7 +8,7 @@
 
 use super::footprint::footprint;
 use super::splat::Splat;
-use super::{covered, veils, winner};
+use super::{covered, moments, oit, veils, winner};
 use crate::gpu::layout::TILE;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
@@ -71,11 +71,16 @@ pub const PASS: Pass = Pass {
         if needs.raster.is_none() { vec!["visibility.wgsl", "occlusion.wgsl", "front.wgsl"] } else { Vec::new() }
     },
     kernels: |needs| match (needs.raster, needs.cull) {
+        (None, false) if oit::marks(needs) => vec![OCCLUDE],
         (None, false) => vec![VISIBILITY, VISIBILITY_LARGE, OCCLUDE],
         (None, true) => vec![VISIBILITY, VISIBILITY_LARGE, OCCLUDE, OCCLUDE_OPEN],
         (Some(_), _) => Vec::new(),
     },
-    constants: |making| vec![("HIDES", u32::from(making.options.has(Optimisation::Hiding)).into())],
+    constants: |making| {
+        // Of what shows through nothing is hidden.
+        let hides = making.options.has(Optimisation::Hiding) && making.needs.oit.is_none();
+        vec![("HIDES", u32::from(hides).into())]
+    },
 };
 
 const VISIBILITY: Kernel = Kernel::new("visibility");
@@ -96,7 +101,7 @@ pub fn steps(plan: &Plan, band: usize, part: Part) -> Stage {
         Part::All | Part::Near => {
             let nearest = Clear::of("nearest", 0, plan.bands[band].pixels);
             let clears = [nearest].into_iter().chain(winner::clears(plan, band)).chain(veils::clears(plan, band));
-            stage.after(clears.collect()).as_twin(Twin::Visibility)
+            stage.after(clears.chain(moments::clears(plan, band)).collect()).as_twin(Twin::Visibility)
         }
     }
 }

@@ -11,14 +11,16 @@ use super::footprint::footprint;
 use super::splat::Splat;
 use crate::plan::pass::Pass;
 use crate::plan::steps::Clear;
-use crate::plan::{Plan, RenderOptions, Winner};
+use crate::plan::{Oit, Plan, RenderOptions, Winner};
 use crate::scene::{Camera, Colors, Scene};
 
 /// The files.
 pub const PASS: Pass = Pass {
     name: "winner",
     files: |needs| match needs.winner {
-        None if needs.raster.is_none() && needs.lists.is_none() => vec!["nearest_depth.wgsl"],
+        // Moments and lists keep something else.
+        None if needs.oit == Some(Oit::Moments) || needs.lists.is_some() => Vec::new(),
+        None if needs.raster.is_none() => vec!["nearest_depth.wgsl"],
         None => Vec::new(),
         Some(Winner::Rasterised) => Vec::new(),
         Some(Winner::Depth) => vec!["winner.wgsl", "nearest_depth.wgsl", "winner_constant.wgsl"],

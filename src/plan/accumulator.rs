@@ -5,9 +5,9 @@ use std::str::FromStr;
 
 use serde::{Serialize, Serializer};
 
+use super::RenderOptions;
 use crate::error::Error;
 use crate::gpu::layout::ONE;
-use crate::scene::Kernel;
 use crate::scene::kernel::LEAST_AT_RIM;
 
 /// How sums are kept on the device.
@@ -171,14 +171,19 @@ impl AccumulatorRow {
 
 /// Fraction bits that `fixed64`, and `fixed` where terms may be small, keep of a term in a scene of `surfels` drawn by `kernel`: 40, and of
 /// kernels that fall below [`LEAST_AT_RIM`] as many as the sums of all surfels leave free of 64, up to 56, so that a pixel of which their
-/// tails alone tell keeps its digits.
-pub fn wide_bits(kernel: Kernel, surfels: u64) -> u32 {
-    if kernel.floor() < LEAST_AT_RIM { surfels.leading_zeros().clamp(40, 56) } else { 40 }
+/// tails alone tell keeps its digits. So does one of which far fragments alone tell, where those weigh less ([`Oit`](super::Oit)).
+pub fn wide_bits(options: &RenderOptions, surfels: u64) -> u32 {
+    if options.kernel.floor() < LEAST_AT_RIM || options.composite.is_order_free() {
+        surfels.leading_zeros().clamp(40, 56)
+    } else {
+        40
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::{Composite, Kernel};
 
     #[test]
     fn every_accumulator_has_its_row_its_file_and_its_own_name() {
@@ -192,11 +197,12 @@ mod tests {
 
     #[test]
     fn wide_bits_leave_room_for_every_surfel_and_24_digits_to_the_least_weight_of_few() {
-        let steep = Kernel::Ellipse { a: 20.0, n: 3.0, smooth: false };
+        let of = |a: f64| RenderOptions { kernel: Kernel::Ellipse { a, n: 3.0, smooth: false }, ..Default::default() };
+        let far = RenderOptions { composite: Composite::Weighted, ..of(6.0) };
         for (surfels, bits) in [(0, 56), (255, 56), (256, 55), (65_535, 48), (1_000_000, 44), (1 << 24, 40)] {
-            assert_eq!(wide_bits(steep, surfels), bits, "{surfels}");
+            assert_eq!(wide_bits(&of(20.0), surfels), bits, "{surfels}");
             assert!(u128::from(surfels) << bits < 1 << 64 || bits == 40);
-            assert_eq!(wide_bits(Kernel::Ellipse { a: 6.0, n: 3.0, smooth: true }, surfels), 40);
+            assert_eq!((wide_bits(&far, surfels), wide_bits(&of(6.0), surfels)), (bits, 40));
         }
     }
 

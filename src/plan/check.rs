@@ -93,10 +93,27 @@ fn composite(options: &RenderOptions, reference: bool) -> Result<()> {
             usage("--blend nearest shows one fragment, behind which nothing shows: leave --composite out")
         }
         _ if reference => Ok(()),
+        _ if options.composite.is_order_free() => order_free(options),
         RenderOptions { raster: Some(raster), .. } => peeled(options, raster.depth),
         _ if options.accumulator != Accumulator::Fixed => {
             usage("surfaces are composited of sums of the accumulator fixed: leave the accumulator out")
         }
+        _ if options.organisation == Organisation::Tile => {
+            usage("the organisation tile shows the nearest surface alone: leave it out with --composite")
+        }
+        _ => Ok(()),
+    }
+}
+
+/// What is summed in any order is scattered, by weights that may be small.
+fn order_free(options: &RenderOptions) -> Result<()> {
+    match options {
+        RenderOptions { raster: Some(_), .. } => {
+            usage("the rasteriser sums one surface: take --composite layers:L, or render by compute")
+        }
+        RenderOptions { accumulator: Accumulator::Fixed32 | Accumulator::Packed64, .. } => usage(
+            "far fragments weigh too little for sums of 32 bits: take the accumulator fixed, fixed64, float or cas",
+        ),
         _ if options.organisation == Organisation::Tile => {
             usage("the organisation tile shows the nearest surface alone: leave it out with --composite")
         }

@@ -25,17 +25,18 @@ pub use cuts::{Band, bands, page_surfels};
 pub use facts::{ColorNeed, Facts};
 pub use fragment::{FragmentLayout, KEY_WORDS};
 pub use known::Known;
-pub use needs::{EpsilonForm, Lists, SMALL_WEIGHT, SceneNeeds, Sides, Winner, culls_back};
+pub use needs::{EpsilonForm, Lists, Oit, SMALL_WEIGHT, SceneNeeds, Sides, Winner, culls_back};
 pub use optimisation::Optimisation;
 pub use options::{BackendName, Organisation, RenderOptions};
 pub use pixel::{COLOR_CHANNEL, PixelLayout, color_channels};
 pub use raster::{BlendFormat, Raster, RasterDepth};
 pub use surfel::{SurfelLayout, splat_words};
-pub use view::device_unit;
+pub use view::{depths, device_unit};
 
 use crate::error::Result;
 use crate::gpu::adapter::AdapterDescription;
 use crate::gpu::layout::{BATCH, ONE};
+use crate::passes::moments::MOMENT_WORDS;
 use crate::passes::peel::PEELED_WORDS;
 use crate::passes::veils::VEIL_WORDS;
 use crate::scene::Camera;
@@ -105,6 +106,7 @@ impl Plan {
             && page >= BATCH.into()
             && !needs.copies
             && needs.lists.is_none()
+            && needs.oit.is_none()
             && needs.raster.is_none();
         let veils = needs.lists == Some(Lists::Sorted) && known.veiled;
         let needs = SceneNeeds { gather, cull, veils, ..needs };
@@ -113,7 +115,8 @@ impl Plan {
         let head = if sum_words > 0 { needs.accumulator.row().head_words() } else { 0 };
         let peeled = if needs.peels.is_some() { PEELED_WORDS } else { 0 };
         let veils = if needs.veils { VEIL_WORDS } else { 0 };
-        let words = sum_words.max(pixel.image_words).max(peeled).max(veils);
+        let moments = if needs.oit == Some(Oit::Moments) { MOMENT_WORDS } else { 0 };
+        let words = sum_words.max(pixel.image_words).max(peeled).max(veils).max(moments);
         let whole = || bands(adapter, camera, needs.samples.down, words, head);
         let bands = known.cuts.clone().map_or_else(whole, Ok)?;
         let several = bands.len() > 1;
@@ -133,7 +136,7 @@ impl Plan {
             needs,
             pixel,
             sum_words,
-            one: if needs.wide_sums { 1 << wide_bits(options.kernel, facts.surfels) } else { ONE.into() },
+            one: if needs.wide_sums { 1 << wide_bits(options, facts.surfels) } else { ONE.into() },
             width: camera.width,
             bands,
             pages: facts.surfels.div_ceil(page) as usize,

@@ -43,6 +43,8 @@ pub struct SceneNeeds {
     pub winner: Option<Winner>,
     /// Pixels have lists of their fragments, and what becomes of these.
     pub lists: Option<Lists>,
+    /// Every fragment is summed, by what is before it as far as sums in any order tell.
+    pub oit: Option<Oit>,
     /// The layers that it peels, one after the other.
     pub peels: Option<u32>,
     /// Lists end where nothing more shows: without that some would be too long.
@@ -94,6 +96,8 @@ pub enum EpsilonForm {
     Radius,
     /// The slope of the pixel's ray.
     Ray,
+    /// There is none, and every depth counts.
+    All,
 }
 
 impl EpsilonForm {
@@ -128,11 +132,30 @@ pub enum Lists {
     Sorted,
 }
 
+/// What weighs a fragment beside its kernel, where all of a pixel are summed in any order ([`oit`](crate::passes::oit)).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Oit {
+    /// Its depth.
+    Weighted,
+    /// What the moments of all fragments say of its depth ([`moments`](crate::passes::moments)).
+    Moments,
+}
+
+impl Oit {
+    fn of(options: &RenderOptions) -> Option<Self> {
+        match options.composite {
+            Composite::Weighted => Some(Self::Weighted),
+            Composite::Moments => Some(Self::Moments),
+            _ => None,
+        }
+    }
+}
+
 impl Lists {
     /// Those of a picture, whoever renders it.
     pub(super) fn of(facts: &Facts, options: &RenderOptions) -> Option<Self> {
         match composited(facts, options) {
-            Composite::Opaque => None,
+            Composite::Opaque | Composite::Weighted | Composite::Moments => None,
             Composite::Layers(_) => Some(Self::Layers),
             Composite::Sorted | Composite::Gaussians => Some(Self::Sorted),
         }
@@ -182,8 +205,9 @@ impl Sides {
     pub fn of(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Self {
         let tells_nearest = options.raster.is_none_or(|raster| raster.depth == RasterDepth::Exact);
         let both = options.facing.is_none() && !culls_back(facts, camera, options);
+        let of_one_surface = tells_nearest && Oit::of(options).is_none();
         match facts.oriented && both && options.blend == Blend::Weighted {
-            true if tells_nearest => Self::Nearest,
+            true if of_one_surface => Self::Nearest,
             true => Self::Both,
             false => Self::None,
         }
@@ -199,11 +223,12 @@ impl SceneNeeds {
         let fixed = options.accumulator == Accumulator::Fixed && options.raster.is_none() && blends;
         let lists = Lists::of(facts, options);
         let peels = lists.and(peel::layers(options));
+        let oit = Oit::of(options);
         let unblended = if options.raster.is_some() { Winner::Rasterised } else { Winner::Second };
         Self {
             projection: camera.projection,
             accumulator: options.accumulator,
-            wide_sums: fixed && (low[3] != high[3] || may_be_small(options)),
+            wide_sums: fixed && (low[3] != high[3] || may_be_small(options) || oit.is_some()),
             atomics_u64: false,
             long_words: false,
             doubled: facts.doubled,
@@ -211,6 +236,7 @@ impl SceneNeeds {
             cull: false,
             tiles: fixed
                 && lists.is_none()
+                && oit.is_none()
                 && facts.colors != ColorNeed::Textured
                 && options.organisation != Organisation::Scatter,
             gather: false,
@@ -218,12 +244,17 @@ impl SceneNeeds {
             raster: options.raster,
             winner: (!blends).then_some(unblended),
             lists: if options.raster.is_some() { None } else { lists },
+            oit,
             peels,
             veils: false,
             triangles: options.raster.is_some() && tuning::PIXELS_A_TRIANGLE * facts.surfels > camera.pixels() as u64,
             kernel: if blends { options.kernel.shape() } else { KernelShape::Constant },
             low_pass: options.low_pass,
-            epsilon: if blends { EpsilonForm::of(options.epsilon, camera) } else { EpsilonForm::Depth },
+            epsilon: match oit {
+                Some(_) => EpsilonForm::All,
+                None if blends => EpsilonForm::of(options.epsilon, camera),
+                None => EpsilonForm::Depth,
+            },
             // Surfels of one colour differ once they are lit.
             color: match facts.colors {
                 ColorNeed::Constant if options.lights_splats() => ColorNeed::Linear,
@@ -258,7 +289,11 @@ impl SceneNeeds {
             Winner::Second if long_atomics => Winner::Once,
             other => other,
         });
-        let copies = facts.copies && options.draws_copies_once() && fixed && picture.color != ColorNeed::Textured;
+        let copies = facts.copies
+            && options.draws_copies_once()
+            && fixed
+            && picture.oit.is_none()
+            && picture.color != ColorNeed::Textured;
         // Of copies tiles would make long lists.
         let tiles = picture.tiles && !copies;
         Self {
@@ -331,6 +366,8 @@ impl SceneNeeds {
             (self.winner.is_some(), "nearest"),
             (self.lists == Some(Lists::Layers), "lists-layers"),
             (self.lists == Some(Lists::Sorted), "lists-sorted"),
+            (self.oit == Some(Oit::Weighted), "oit-weighted"),
+            (self.oit == Some(Oit::Moments), "oit-moments"),
             (self.peels.is_some(), "peels"),
             (self.veils, "veils"),
             (self.samples != Samples::ONE, "samples"),

@@ -123,9 +123,10 @@ impl RenderOptions {
         self.low_pass != LowPass::Ewa && self.raster.is_none() && self.facing.is_none()
     }
 
-    /// Light falls on splats, whose lit colours are blended, and not on pixels.
+    /// Light falls on splats, whose lit colours are blended, and not on pixels: there a mean of the normals of several surfaces is that of none.
     pub fn lights_splats(&self) -> bool {
-        self.shading != Shading::Unlit && self.shading_at == ShadingAt::Splat
+        let at_splats = self.shading_at == ShadingAt::Splat || self.composite.is_order_free();
+        self.shading != Shading::Unlit && at_splats
     }
 
     /// Whether a pixel of the image differs from 0 where nothing is.

@@ -14,6 +14,8 @@ pub struct PixelLayout {
     pub depth_channel: u32,
     /// The fragment count's channel.
     pub count_channel: u32,
+    /// The channel of what is held back, where that is summed ([`oit`](crate::passes::oit)).
+    pub held_back_channel: u32,
     /// The first of the four channels of places in a texture.
     pub place_channel: u32,
     /// Words of a pixel in the image; the colour's four come first.
@@ -36,7 +38,8 @@ impl PixelLayout {
         let normal_channel = (COLOR_CHANNEL + color_channels(needs)).next_multiple_of(2);
         let depth_channel = normal_channel + channels(needs.normal, 3);
         let count_channel = depth_channel + channels(needs.maps.has(Map::Depth), 1);
-        let place_channel = (count_channel + channels(needs.maps.has(Map::Count), 1)).next_multiple_of(2);
+        let held_back_channel = count_channel + channels(needs.maps.has(Map::Count), 1);
+        let place_channel = (held_back_channel + channels(needs.oit.is_some(), 1)).next_multiple_of(2);
         let mut image_words = COLOR_WORDS;
         let map_words = MAPS.each_ref().map(|row| {
             let first = image_words;
@@ -48,6 +51,7 @@ impl PixelLayout {
             normal_channel,
             depth_channel,
             count_channel,
+            held_back_channel,
             place_channel,
             image_words,
             map_words,

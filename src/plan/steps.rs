@@ -109,6 +109,8 @@ pub enum Twin {
     Visibility,
     /// [`accumulate`](mod@crate::passes::accumulate): sums.
     Accumulate,
+    /// [`oit`](crate::passes::oit): sums.
+    Oit,
     /// [`resolve`](crate::passes::resolve): the image.
     Resolve,
     /// [`layers`](crate::passes::layers): the image, of lists.
@@ -125,7 +127,7 @@ impl Twin {
         match self {
             Self::Project => "project",
             Self::Visibility => "visibility",
-            Self::Accumulate => "accumulate",
+            Self::Accumulate | Self::Oit => "accumulate",
             Self::Resolve | Self::Layers | Self::Sorted => "resolve",
             Self::Map(map) => map.row().name,
         }

@@ -43,9 +43,8 @@ const LARGEST_FRACTION: f64 = 1e9;
 impl View {
     /// The view by `camera` of the scene that `facts` are of.
     pub fn new(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Self {
-        let Facts { bounds, body, core, color, largest_radius, .. } = facts;
+        let Facts { bounds, body, core, color, .. } = facts;
         let [low, span] = mapped(lit_range([color.0, color.1], options), composited(facts, options));
-        let largest_radius = f64::from(*largest_radius);
         let eye_relative = camera.eye - facts.origin;
         let unit = device_unit(body, bounds, eye_relative);
         let (eye, eye_low) = split_all((eye_relative * unit).to_array());
@@ -65,9 +64,7 @@ impl View {
             None => ([0; 2], [0.0; 4]),
         };
         let (relative, absolute, of_radius) = options.epsilon.parts();
-        // Past every surfel, with room for the rounding of depths. An epsilon that accepts everything must not make the
-        // interval that depths are measured in infinite, nor coarser than the scene.
-        let farthest = (farthest_of(bounds, eye_relative, camera) + largest_radius) * 1.001;
+        let [first, farthest] = depths(facts, camera);
         Self {
             rotation,
             rotation_low,
@@ -96,10 +93,18 @@ impl View {
             texture_width,
             texture_height,
             epsilon_most: options.epsilon.most().min(LARGEST_FRACTION) as f32,
-            veil_first: ((nearest_of(body, eye_relative, camera) * unit).max(camera.near * unit) as f32).to_bits(),
+            first: (first * unit) as f32,
             place,
         }
     }
+}
+
+/// The depth at which the scene's body starts, and one past every surfel, with room for the rounding of depths: an epsilon that accepts
+/// everything must not make the interval that depths are measured in infinite, nor coarser than the scene. World units.
+pub fn depths(facts: &Facts, camera: &Camera) -> [f64; 2] {
+    let eye = camera.eye - facts.origin;
+    let farthest = (farthest_of(&facts.bounds, eye, camera) + f64::from(facts.largest_radius)) * 1.001;
+    [nearest_of(&facts.body, eye, camera).max(camera.near), farthest]
 }
 
 /// The largest depth of a corner of `bounds`, at least 0; world units.

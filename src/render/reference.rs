@@ -13,9 +13,9 @@ use crate::frame::Frame;
 use crate::passes::asks_for_order;
 use crate::passes::order::order;
 use crate::passes::splat::Splat;
-use crate::passes::{MAP_PASSES, Strip, accumulate, layers, project, resolve, sorted, visibility, winner};
+use crate::passes::{MAP_PASSES, Strip, accumulate, layers, oit, project, resolve, sorted, visibility, winner};
 use crate::plan::steps::{Step, Twin};
-use crate::plan::{Facts, Plan, RenderOptions, SceneNeeds};
+use crate::plan::{Facts, Plan, RenderOptions, SceneNeeds, depths};
 use crate::progress::Progress;
 use crate::scene::{Blend, Camera, Samples, Scene};
 
@@ -37,12 +37,13 @@ pub(super) fn frame(
     }
     let (starts, members) = bin(&splats, &plan);
     let ranks = asks_for_order(&plan.needs).then(|| ranks(scene, facts));
+    let depths = depths(facts, camera);
     progress.begin("rendering rows", camera.height.into());
     let one = |band: usize| {
         let (first_row, rows) = (plan.bands[band].first, plan.bands[band].rows);
         let splats: Vec<&Splat> =
             members[starts[band]..starts[band + 1]].iter().map(|&index| &splats[index as usize]).collect();
-        let strip = Strip { scene, camera, options, splats, ranks: ranks.as_deref(), first_row, rows };
+        let strip = Strip { scene, camera, options, splats, ranks: ranks.as_deref(), depths, first_row, rows };
         let frame = strip_by(&strip, &of_bands[band], &spent);
         let frame =
             if options.samples == Samples::ONE { frame } else { resolve::mean_of_samples(&frame, options.samples) };
@@ -93,6 +94,7 @@ fn strip_by(strip: &Strip<'_>, twins: &[Twin], spent: &Spent) -> Frame {
             Twin::Accumulate => {
                 sums = accumulate::reference(splats(), scene, camera, options, first_row, &nearest);
             }
+            Twin::Oit => sums = oit::reference(strip),
             Twin::Layers => layers::reference(strip, &mut frame),
             Twin::Sorted => sorted::reference(strip, &mut frame),
             Twin::Resolve => resolve::reference(&sums, scene, camera, options, first_row, &mut frame),

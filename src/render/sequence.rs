@@ -1,9 +1,11 @@
 //! A frame as a list of steps: the papers' passes in their order.
 
-use crate::passes::{accumulate, cull, fragments, of_maps, peel, project, raster, resolve, tiles, veils, visibility};
+use crate::passes::{
+    accumulate, cull, fragments, of_maps, oit, peel, project, raster, resolve, tiles, veils, visibility,
+};
 use crate::plan::known::Listed;
-use crate::plan::steps::{Look, Part, Stage, Step};
-use crate::plan::{Plan, Winner};
+use crate::plan::steps::{Look, Part, Stage, Step, Twin};
+use crate::plan::{Oit, Plan, Winner};
 
 /// The steps of a frame by `plan`.
 pub fn steps(plan: &Plan) -> Vec<Step> {
@@ -19,6 +21,7 @@ pub fn steps(plan: &Plan) -> Vec<Step> {
         match (plan.needs.raster, plan.needs.lists) {
             (Some(_), _) => {}
             (None, Some(_)) => lists(plan, band, &mut steps),
+            (None, None) if plan.needs.oit.is_some() => order_free(plan, band, &mut steps),
             (None, None) => {
                 nearest(plan, band, &mut steps);
                 sums(plan, band, &mut steps);
@@ -64,6 +67,19 @@ fn lists(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
     let count = count.into_iter().chain(veils::steps(plan, band)).chain([visibility::occlude(band, Part::All)]);
     steps.extend(count.map(Step::Stage).chain(fragments::starts(band)));
     steps.extend(fragments::steps(band).map(Step::Stage));
+}
+
+/// The sums of all fragments of each pixel of a band.
+fn order_free(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
+    if plan.projects_in(band) {
+        steps.push(Step::Stage(project::steps(plan, band, Part::All)));
+    }
+    let of_all = [visibility::steps(plan, band, Part::All).without_twin(), visibility::large(band)];
+    let before = of_all.into_iter().filter(|_| plan.needs.oit == Some(Oit::Moments));
+    let sums = [accumulate::steps(plan, band).as_twin(Twin::Oit), accumulate::large(band)];
+    let covered = oit::marks(&plan.needs).then(|| oit::mark(band)).into_iter();
+    let covered = covered.chain([visibility::occlude(band, Part::All)]);
+    steps.extend(before.chain(sums).chain(covered).map(Step::Stage));
 }
 
 /// The sums of each pixel of a band; by tiles that gather, its image too.

@@ -7,13 +7,14 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::{Buffer, Readback};
 use crate::gpu::layout::{BATCH, Band as BandUniform, LIST_START, QUEUE_START, View, WORKGROUP};
+use crate::passes::moments::MOMENT_WORDS;
 use crate::passes::peel::PEELED_WORDS;
 use crate::passes::tiles::{list_name, list_words};
 use crate::passes::upload::{self, Uploaded};
 use crate::passes::veils::VEIL_WORDS;
 use crate::passes::{asks_for_order, covered, fragments, visibility};
 use crate::plan::known::Listed;
-use crate::plan::{Band, FragmentLayout, KEY_WORDS, Known, Plan, Raster, SceneNeeds, SurfelLayout, splat_words};
+use crate::plan::{Band, FragmentLayout, KEY_WORDS, Known, Oit, Plan, Raster, SceneNeeds, SurfelLayout, splat_words};
 use crate::scene::Samples;
 
 /// Names in WGSL of buffers that have another one where kernels write them.
@@ -119,6 +120,7 @@ struct Made {
     image_words: u32,
     lists: bool,
     veils: bool,
+    moments: bool,
     peels: bool,
     raster: Option<(Raster, u32)>,
 }
@@ -202,8 +204,9 @@ impl Store {
         let (width, bands) = (plan.width, plan.bands.clone());
         let (sum_words, image_words) = (plan.sum_words, plan.pixel.image_words);
         let (samples, lists, veils) = (plan.needs.samples, plan.needs.lists.is_some(), plan.needs.veils);
+        let moments = plan.needs.oit == Some(Oit::Moments);
         let peels = plan.needs.peels.is_some();
-        let made = Made { width, samples, bands, sum_words, image_words, lists, veils, peels, raster };
+        let made = Made { width, samples, bands, sum_words, image_words, lists, veils, moments, peels, raster };
         let fresh = self.made.as_ref() != Some(&made);
         if fresh {
             // The old ones make room first.
@@ -252,6 +255,10 @@ impl Store {
         if plan.needs.veils {
             let words = pixels * u64::from(VEIL_WORDS);
             self.frame.insert("veils", Buffer::storage(gpu, "veils", words)?);
+        }
+        if plan.needs.oit == Some(Oit::Moments) {
+            let words = pixels * u64::from(MOMENT_WORDS);
+            self.frame.insert("moments", Buffer::storage(gpu, "moments", words)?);
         }
         if plan.needs.peels.is_some() {
             let words = pixels * u64::from(PEELED_WORDS);

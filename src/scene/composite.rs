@@ -17,6 +17,8 @@
 //!
 //! Either way, from front to back in linear light, `shown += T colour` and `T *= 1 - alpha`, from a transmittance T of 1; what is left of it
 //! shows the background.
+//!
+//! Two ways approximate what is sorted by sums in any order ([`oit`](crate::passes::oit)), to compare with.
 
 use std::str::FromStr;
 
@@ -34,6 +36,17 @@ pub enum Composite {
     Sorted,
     /// The same by the rules of Gaussian surfels ([`gaussian`](super::gaussian)).
     Gaussians,
+    /// About that, without an order: every fragment, by a weight that falls with its depth (McGuire and Bavoil 2013).
+    Weighted,
+    /// About that, without an order: every fragment, by what the moments of all say is let through before it (Münstermann et al. 2018).
+    Moments,
+}
+
+impl Composite {
+    /// Fragments are summed in any order, all of a pixel at once.
+    pub fn is_order_free(self) -> bool {
+        matches!(self, Self::Weighted | Self::Moments)
+    }
 }
 
 /// As many layers as there are surfaces.
@@ -49,12 +62,15 @@ impl FromStr for Composite {
             None if text == "layers" => Some(Self::Layers(ALL_LAYERS)),
             None if text == "sorted" => Some(Self::Sorted),
             None if text == "gaussians" => Some(Self::Gaussians),
+            None if text == "weighted" => Some(Self::Weighted),
+            None if text == "moments" => Some(Self::Moments),
             Some(("layers", number)) => layers(number),
             _ => None,
         };
         named.ok_or_else(|| {
             Error::Usage(format!(
-                "surfaces are composited opaque, layers (all of them), layers:L (the nearest L), sorted or gaussians, not {text:?}"
+                "surfaces are composited opaque, layers (all of them), layers:L (the nearest L), sorted, gaussians, weighted or moments, \
+                 not {text:?}"
             ))
         })
     }
@@ -98,6 +114,8 @@ mod tests {
             ("layers:3", Composite::Layers(3)),
             ("sorted", Composite::Sorted),
             ("gaussians", Composite::Gaussians),
+            ("weighted", Composite::Weighted),
+            ("moments", Composite::Moments),
         ] {
             assert_eq!(text.parse::<Composite>().unwrap(), composite);
         }

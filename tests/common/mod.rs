@@ -17,8 +17,8 @@ use epsplat::frame::Frame;
 use epsplat::gpu::Gpu;
 use epsplat::gpu::layout::{ONE, View};
 use epsplat::plan::{
-    ACCUMULATORS, Accumulator, AccumulatorRow, BlendFormat, ColorNeed, EpsilonForm, Facts, Lists, Raster, RasterDepth,
-    RenderOptions, SceneNeeds, Sides, Winner, check,
+    ACCUMULATORS, Accumulator, AccumulatorRow, BlendFormat, ColorNeed, EpsilonForm, Facts, Lists, Oit, Raster,
+    RasterDepth, RenderOptions, SceneNeeds, Sides, Winner, check,
 };
 use epsplat::scene::facing::POINT_SHAPES;
 use epsplat::scene::{KernelShape, LowPass, Map, Maps, Projection, Samples, Shading};
@@ -176,6 +176,7 @@ pub fn all_needs() -> Vec<SceneNeeds> {
         });
     }
     all.extend(listed(&all));
+    all.extend(order_free(&all));
     all.extend(peeled(&all));
     for needs in &mut all {
         needs.outline &= needs.low_pass == LowPass::None;
@@ -199,6 +200,35 @@ fn listed(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
             normal: lit && !needs.lit_splats,
             own_normals: needs.own_normals && lit,
             atomics_u64: false,
+            tiles: false,
+            gather: false,
+            subgroups: false,
+            cull: false,
+            ..*needs
+        }
+    };
+    all.iter().filter(fits).step_by(3).enumerate().map(of).collect()
+}
+
+/// Those of renders that sum all fragments of a pixel, a third of what they could be.
+fn order_free(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
+    let fits = |needs: &&SceneNeeds| {
+        let stored = needs.raster.is_none() && needs.winner.is_none() && needs.lists.is_none();
+        let of_words = matches!(needs.accumulator, Accumulator::Fixed32 | Accumulator::Packed64);
+        let textured = needs.color == ColorNeed::Textured;
+        // Splats are lit.
+        stored && !of_words && !needs.copies && !textured && (needs.lit_splats || needs.shading == Shading::Unlit)
+    };
+    let of = |(step, needs): (usize, &SceneNeeds)| {
+        let maps = [&[][..], &[Map::Transmittance], &[Map::Layers], &[Map::Transmittance, Map::Layers]];
+        SceneNeeds {
+            oit: Some([Oit::Weighted, Oit::Moments][step % 2]),
+            wide_sums: needs.accumulator == Accumulator::Fixed,
+            epsilon: EpsilonForm::All,
+            maps: if needs.samples == Samples::ONE { Maps::of(maps[step / 2 % 4]) } else { Maps::NONE },
+            normal: false,
+            own_normals: needs.own_normals && needs.lit_splats,
+            sides: if needs.sides == Sides::None { Sides::None } else { Sides::Both },
             tiles: false,
             gather: false,
             subgroups: false,

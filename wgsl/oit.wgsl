@@ -1,0 +1,29 @@
+// Order-independent transparency: what all fragments of a pixel hold back is summed beside their colours, as optical depth, -ln(1 - alpha).
+// Twin: src/passes/oit.rs.
+
+override HELD_BACK_CHANNEL: u32;
+
+// A term is at most 1.
+const HELD_BACK_UNITS: f32 = 32.0;
+// LEAST_LEFT in the twin, 2^-40.
+const LEAST_OIT_LEFT: f32 = 9.094947017729282379150390625e-13;
+
+fn held_back(alpha: f32) -> f32 {
+    return -log(max(1.0 - alpha, LEAST_OIT_LEFT));
+}
+
+fn accumulate_held_back(pixel: u32, weight: f32, color: vec4<f32>) {
+    let alpha = weight * OPACITY * (held.color_low.a + held.color_span.a * color.a);
+    add(pixel, HELD_BACK_CHANNEL, quantise(held_back(alpha) / HELD_BACK_UNITS));
+}
+
+// The colour with the alpha of all fragments in place of their mean; `weight` in the units of the sums.
+fn with_held_back(color: vec4<f32>, sums_of: u32, weight: f32) -> vec4<f32> {
+    let sum = sum_at(sums_of, HELD_BACK_CHANNEL) / weight * weight_at(sums_of);
+    return vec4<f32>(color.rgb, 1.0 - exp(-HELD_BACK_UNITS * sum));
+}
+
+// A fraction of the scene's depths, from where its body starts to past its last surfel.
+fn depth_fraction(depth: f32) -> f32 {
+    return clamp((depth - held.first) / max(held.farthest - held.first, 1e-30), 0.0, 1.0);
+}

@@ -24,7 +24,7 @@ use crate::plan::{Optimisation, RenderOptions, check};
 use crate::progress::Progress;
 use crate::scene::Camera;
 use kept::Kept;
-pub use report::{DeviceBytes, Report};
+pub use report::{DeviceBytes, Report, Tail};
 
 /// Who renders.
 pub enum Backend {
@@ -105,7 +105,8 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
             maps.push(one(part)?);
             kept.store = part.store.take();
         }
-        let (mut frame, report) = parts::joined(one(kept)?, maps);
+        let (mut frame, mut report) = parts::joined(one(kept)?, maps);
+        report.tail = Tail::of(&frame);
         if kept.facts.encoded {
             encoded::decode(&mut frame);
         }

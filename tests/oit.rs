@@ -47,7 +47,7 @@ fn planes_are_what_the_formulas_say() {
         opacity: 1.0,
         shading: Shading::Unlit,
         kernel: Kernel::Constant,
-        maps: Maps::COMPOSITED,
+        maps: Maps::of(&[Map::Transmittance]),
         ..options(composite)
     };
     let of = [(8.0, [0.9, 0.1, 0.3, 0.6]), (20.0, [0.2, 0.8, 0.3, 0.5])];

@@ -109,7 +109,7 @@ const ALTERNATIVES: [&[&str]; 8] = [
 ];
 
 /// Needs that no render has together (`src/plan/check.rs`, `src/plan/needs.rs`).
-const EXCLUSIVE: [(&str, &[&str]); 21] = [
+const EXCLUSIVE: [(&str, &[&str]); 26] = [
     (
         "veils",
         &["tiles", "gather", "copies", "cull", "atomics-u64", "raster-exact", "raster-offset", "nearest", "peels"],
@@ -117,7 +117,19 @@ const EXCLUSIVE: [(&str, &[&str]); 21] = [
     ("veils", &["color-textured", "count", "depth", "index", "normal-map", "weight-map", "lists-layers"]),
     (
         "peels",
-        &["wide-sums", "atomics-u64", "copies", "cull", "tiles", "gather", "index", "transmittance", "layers-map"],
+        &[
+            "wide-sums",
+            "atomics-u64",
+            "copies",
+            "cull",
+            "tiles",
+            "gather",
+            "index",
+            "transmittance",
+            "layers-map",
+            "tail-map",
+            "surfaces",
+        ],
     ),
     (
         "peels",
@@ -135,8 +147,16 @@ const EXCLUSIVE: [(&str, &[&str]); 21] = [
     ),
     ("oit", &["tiles", "gather", "copies", "cull", "raster-exact", "raster-offset", "nearest", "peels", "veils"]),
     ("oit", &["lists-layers", "lists-sorted", "color-textured", "epsilon-radius", "epsilon-ray", "sides"]),
+    ("oit", &["tail-map", "surfaces"]),
+    ("lists-sorted", &["tail-map"]),
+    ("surfaces", &["tiles", "gather", "copies", "cull", "atomics-u64", "nearest", "color-textured"]),
+    ("surfaces", &["count", "depth", "index", "normal-map", "weight-map"]),
+    ("veils", &["tail-map"]),
     ("oit", &["count", "depth", "index", "normal", "normal-map", "weight-map"]),
-    ("samples", &["count", "depth", "index", "normal-map", "weight-map", "transmittance", "layers-map"]),
+    (
+        "samples",
+        &["count", "depth", "index", "normal-map", "weight-map", "transmittance", "layers-map", "tail-map", "surfaces"],
+    ),
     ("lists", &["tiles", "gather", "copies", "cull", "atomics-u64", "raster-exact", "raster-offset", "nearest"]),
     ("lists", &["color-textured", "count", "depth", "index", "normal-map", "weight-map"]),
     ("color-textured", &["tiles", "gather", "copies", "raster-exact", "raster-offset"]),
@@ -183,7 +203,19 @@ const EXCLUSIVE: [(&str, &[&str]); 21] = [
     ),
     (
         "raster",
-        &["wide-sums", "atomics-u64", "copies", "cull", "tiles", "gather", "index", "transmittance", "layers-map"],
+        &[
+            "wide-sums",
+            "atomics-u64",
+            "copies",
+            "cull",
+            "tiles",
+            "gather",
+            "index",
+            "transmittance",
+            "layers-map",
+            "tail-map",
+            "surfaces",
+        ],
     ),
 ];
 
@@ -296,7 +328,7 @@ fn the_channels_of_a_pixel_do_not_overlap() {
             (0, 1),
             (COLOR_CHANNEL, color_channels(&needs)),
             (pixel.normal_channel, of(needs.normal, 3)),
-            (pixel.depth_channel, of(needs.maps.has(Map::Depth), 1)),
+            (pixel.depth_channel, of(needs.sums_depth(), 1)),
             (pixel.count_channel, of(needs.maps.has(Map::Count), 1)),
             (pixel.held_back_channel, of(needs.oit.is_some(), 1)),
             (pixel.place_channel, of(needs.color == ColorNeed::Textured, 4)),

@@ -19,6 +19,9 @@ use epsplat::scene::{
 };
 use glam::Vec3;
 
+/// What every way to composite has.
+const BOTH_MAPS: Maps = Maps::of(&[Map::Transmittance, Map::Layers]);
+
 const ALL: Composite = Composite::Layers(ALL_LAYERS);
 
 fn gpu() -> Option<Backend> {
@@ -30,7 +33,7 @@ fn options(composite: Composite) -> RenderOptions {
 }
 
 fn unlit(composite: Composite, opacity: f32) -> RenderOptions {
-    RenderOptions { opacity, shading: Shading::Unlit, maps: Maps::COMPOSITED, ..options(composite) }
+    RenderOptions { opacity, shading: Shading::Unlit, maps: BOTH_MAPS, ..options(composite) }
 }
 
 fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Backend) -> Frame {
@@ -133,7 +136,7 @@ fn kernels_and_twins_composite_alike() {
     let mut compared = 0;
     for (number, (scene, camera)) in all.iter().enumerate() {
         for composite in [ALL, Composite::Layers(2), Composite::Sorted] {
-            let own = RenderOptions { opacity: 0.7, maps: Maps::COMPOSITED, ..options(composite) };
+            let own = RenderOptions { opacity: 0.7, maps: BOTH_MAPS, ..options(composite) };
             let shading = if number % 2 == 0 { Shading::Lambert } else { Shading::Unlit };
             let own = RenderOptions { shading, ..own };
             let decided = decided(scene, camera, &own);
@@ -188,7 +191,7 @@ fn lists_do_not_show_how_they_came_to_be() {
     for (number, (scene, camera)) in all.iter().enumerate() {
         for composite in [ALL, Composite::Layers(2), Composite::Sorted] {
             for samples in [Samples::ONE, "4".parse().unwrap()] {
-                let own = RenderOptions { samples, opacity: 0.6, maps: Maps::COMPOSITED, ..options(composite) };
+                let own = RenderOptions { samples, opacity: 0.6, maps: BOTH_MAPS, ..options(composite) };
                 let first = all_bits(&frame(scene, camera, &own, &backend));
                 let name = format!("{number} {composite:?} {samples:?}");
                 for seed in [3, 4] {
@@ -409,4 +412,69 @@ fn the_rasteriser_peels_what_lists_part() {
     assert!(refused(options(ALL)).contains("1 to 64 layers"));
     assert!(refused(options(Composite::Layers(2))).contains("take --tail none"));
     assert!(refused(options(Composite::Sorted)).contains("sorts no fragments"));
+}
+
+/// Depth and alpha of each surface, and how much of a pixel a tail is: by hand, and as the twins have them.
+#[test]
+fn maps_tell_of_each_surface_and_of_the_tail() {
+    let Some(backend) = gpu() else { return };
+    let (mut scene, camera) = stack(3, 0.5);
+    scene.surfels.iter_mut().skip(3).for_each(|surfel| surfel.center[0] = 1000.0);
+    for (surfel, depth) in scene.surfels.iter_mut().zip([5.0, 7.0, 11.0]) {
+        surfel.center[2] = depth;
+    }
+    let of = |composite, maps: &[Map]| RenderOptions {
+        kernel: Kernel::Constant,
+        maps: Maps::of(maps),
+        ..unlit(composite, 0.25)
+    };
+    let near = |found: &[f32], expected: &[f32]| {
+        let same = |(a, b): (&f32, &f32)| a == b || (a - b).abs() < 1e-5;
+        found.len() == expected.len() && found.iter().zip(expected).all(same)
+    };
+    let none = [f32::INFINITY, 0.0];
+    for (composite, surfaces, tail) in [
+        (ALL, vec![[5.0, 0.25], [7.0, 0.25], [11.0, 0.25]], None),
+        (Composite::Sorted, vec![[5.0, 0.25], [7.0, 0.25], [11.0, 0.25]], None),
+        (Composite::Layers(1), vec![[5.0, 0.25], [7.0, 0.25]], Some(0.75 * 0.25)),
+        (Composite::Layers(3), vec![[5.0, 0.25], [7.0, 0.25], [11.0, 0.25]], Some(0.0)),
+    ] {
+        let maps = if tail.is_some() { &[Map::Surfaces, Map::Tail][..] } else { &[Map::Surfaces] };
+        for backend in [&backend, &Backend::Reference] {
+            let (shown, report) = render(&scene, &camera, &of(composite, maps), backend, &()).unwrap();
+            let expected: Vec<_> = surfaces.iter().copied().chain(std::iter::repeat(none)).take(8).flatten().collect();
+            for pixel in shown.map(Map::Surfaces).unwrap().chunks(16) {
+                assert!(near(pixel, &expected), "{composite:?}: {pixel:?}");
+            }
+            assert_eq!(report.tail.is_some(), tail.is_some());
+            if let (Some(expected), Some(found)) = (tail, report.tail) {
+                assert!(near(shown.map(Map::Tail).unwrap(), &[expected; 16]), "{composite:?}");
+                assert!((found.mean - f64::from(expected)).abs() < 1e-6 && found.largest - found.mean < 1e-6);
+            }
+        }
+    }
+    // What is opaque has surfaces too, if one asks for them, and where nothing is there is none.
+    let (scene, camera) = (sphere(4000, 2.0), sphere_camera(96, Projection::Pinhole));
+    let own = RenderOptions { opacity: 1.0, ..of(ALL, &[Map::Surfaces]) };
+    let [device, twin] = [&backend, &Backend::Reference].map(|backend| frame(&scene, &camera, &own, backend));
+    let decided = decided(&scene, &camera, &own);
+    let (mut seen, mut none_seen) = (0, 0);
+    let pixels = |frame: &Frame| frame.map(Map::Surfaces).unwrap().chunks(16).map(<[f32]>::to_vec).collect::<Vec<_>>();
+    for ((device, twin), decided) in pixels(&device).iter().zip(pixels(&twin)).zip(decided) {
+        assert!(!decided || near(device, &twin), "{device:?} {twin:?}");
+        seen += usize::from(device[1] == 1.0 && device[3] == 0.0);
+        none_seen += usize::from(device[..2] == none);
+    }
+    assert!(seen > 3000 && none_seen > 1000, "{seen} {none_seen}");
+    // A kernel that numbers surfaces wrongly is noticed.
+    let wrong = Sources::default().replace("surfaces_map.wgsl", "2u * number] = depth", "2u * number] = 1.001 * depth");
+    let wrong = Backend::Gpu { gpu: Box::new(common::gpu().unwrap()), sources: wrong.unwrap() };
+    assert!(pixels(&frame(&scene, &camera, &own, &wrong)) != pixels(&device));
+    let refused = |of: RenderOptions| match render(&scene, &camera, &of, &backend, &()) {
+        Err(error) => error.to_string(),
+        Ok(_) => panic!("{of:?} is not refused"),
+    };
+    assert!(refused(of(ALL, &[Map::Tail])).contains("layers:L"));
+    assert!(refused(of(Composite::Opaque, &[Map::Surfaces])).contains("told apart"));
+    assert!(refused(of(Composite::Moments, &[Map::Surfaces])).contains("told apart"));
 }

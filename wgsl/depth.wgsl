@@ -9,9 +9,14 @@ fn accumulate_depth(pixel: u32, weight: Term, depth: f32, front: f32) {
     add(pixel, DEPTH_CHANNEL, term(weight, (depth - front) / (deepest_accepted(front) - front)));
 }
 
-fn write_depth(out: u32, pixel: u32, weight: f32, front: f32) {
+// Device units.
+fn surface_depth(pixel: u32, weight: f32, front: f32) -> f32 {
     let mean = sum_at(pixel, DEPTH_CHANNEL) / weight;
-    image[out + DEPTH_IMAGE] = (front + mean * (deepest_accepted(front) - front)) * held.world;
+    return front + mean * (deepest_accepted(front) - front);
+}
+
+fn write_depth(out: u32, pixel: u32, weight: f32, front: f32) {
+    image[out + DEPTH_IMAGE] = surface_depth(pixel, weight, front) * held.world;
 }
 
 // +inf.

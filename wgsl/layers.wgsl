@@ -1,6 +1,6 @@
 // Stage 4: a pixel's fragments are parted into surfaces, each is blended as the nearest one always is, and they are composited.
 // Twin: src/passes/layers.rs.
-// All loops end, by 1, 6 of src/gpu/loops.rs: 0xbab9e02aa45f9ed9
+// All loops end, by 1, 6 of src/gpu/loops.rs: 0x76f4e978d250c893
 
 override MOST_LAYERS: u32;
 // What follows the last layer is one more.
@@ -63,7 +63,8 @@ fn sum_rest(first: u32, end: u32, told: vec2<f32>) {
     }
 }
 
-fn composite(pixel: u32, x: u32, y: u32) -> Shown {
+// The maps of the pixel are at `out`.
+fn composite(pixel: u32, out: u32, x: u32, y: u32) -> Shown {
     let list = list_of(pixel);
     let image = vec2<f32>(vec2<u32>(x, y)) + 0.5;
     var shown = shown_nothing();
@@ -84,7 +85,14 @@ fn composite(pixel: u32, x: u32, y: u32) -> Shown {
         }
         let weight = sum_at(0u, WEIGHT_CHANNEL);
         let normal = resolve_normal(0u, weight, front);
-        shown = with_behind(shown, shaded(resolve_color(0u, weight), normal, x, y));
+        let color = shaded(resolve_color(0u, weight), normal, x, y);
+        if (is_last) {
+            write_surface(out, shown.layers, front, color.a);
+            write_tail(out, shown.transmittance * color.a);
+        } else {
+            write_surface(out, shown.layers, surface_depth(0u, weight, front), color.a);
+        }
+        shown = with_behind(shown, color);
         while (first < list.y && !is_untold(first, told)) {
             first++;
         }

@@ -1,5 +1,5 @@
 // What the rasteriser's layers show so far: after each one, what it blended goes over what is behind it. Host side: src/passes/peel.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xc4c82ac464bb604b
+// All loops end, by 1 of src/gpu/loops.rs: 0x9ec9c3a0cf7762e6
 
 // Of each pixel: the premultiplied colour, the transmittance, the layers, and the nearest depths of raster_peeled.wgsl.
 @group(0) @binding(49) var<storage, read_write> peeled: array<u32>;
@@ -7,7 +7,7 @@
 const PEELED_WORDS: u32 = 8u;
 const PEELED_FRONTS: u32 = 6u;
 
-fn composite(pixel: u32, x: u32, y: u32) -> Shown {
+fn composite(pixel: u32, out: u32, x: u32, y: u32) -> Shown {
     let at = pixel * PEELED_WORDS;
     let color = bitcast<vec4<f32>>(vec4<u32>(peeled[at], peeled[at + 1u], peeled[at + 2u], peeled[at + 3u]));
     let layers = peeled[at + 5u];
@@ -41,7 +41,7 @@ fn peel(
     let x = pixel % held.width;
     let y = pixel / held.width;
     let normal = resolve_normal(pixel, weight, front);
-    let shown = with_behind(composite(pixel, x, y), shaded(resolve_color(pixel, weight), normal, x, y));
+    let shown = with_behind(composite(pixel, 0u, x, y), shaded(resolve_color(pixel, weight), normal, x, y));
     let color = bitcast<vec4<u32>>(shown.color);
     for (var k = 0u; k < 4u; k++) {
         peeled[at + k] = color[k];

@@ -36,12 +36,15 @@ fn over_background(shown: Shown) -> vec4<f32> {
 
 fn resolve_pixel(sums_of: u32, pixel: u32, x: u32, y: u32) {
     let out = pixel * IMAGE_WORDS;
-    let shown = composite(pixel, x, y);
+    write_tail(out, 0.0);
+    let shown = composite(pixel, out, x, y);
     write_color(out, over_background(shown));
     write_transmittance(out, shown.transmittance);
     write_layers(out, shown.layers);
+    write_no_surfaces(out, shown.layers);
 }
 
+// No maps are written beside samples.
 fn sample_color(sums_of: u32, sample: u32, x: u32, row: u32) -> vec4<f32> {
-    return premultiplied_sample(over_background(composite(sample, x, row + held_band.first_row)));
+    return premultiplied_sample(over_background(composite(sample, 0u, x, row + held_band.first_row)));
 }

@@ -29,6 +29,7 @@ fn resolve_pixel(sums_of: u32, pixel: u32, x: u32, y: u32) {
         write_count(out, sums_of);
         write_transmittance(out, 1.0);
         write_layers(out, 0u);
+        write_tail(out, 0.0);
         return;
     }
     let normal = resolve_normal(sums_of, weight, front);
@@ -40,6 +41,7 @@ fn resolve_pixel(sums_of: u32, pixel: u32, x: u32, y: u32) {
     write_count(out, sums_of);
     write_transmittance(out, 1.0 - color.a);
     write_layers(out, 1u);
+    write_tail(out, 0.0);
 }
 
 // The premultiplied colour of the sample in a column and row of the band, its `sample`th, from what `sums_of` names its sums.

@@ -121,6 +121,8 @@ pub struct PixelSums {
     pub back: bool,
     /// Of the depth.
     pub depth: f64,
+    /// The depth of the nearest fragment; of lists alone.
+    pub nearest: f64,
     /// Of [`Textured::terms`](crate::scene::Textured::terms), places in a texture.
     pub place: [f64; 4],
     /// What fragments hold back, as optical depth; where all of a pixel are summed ([`oit`](super::oit)).
@@ -139,6 +141,7 @@ impl PixelSums {
         normal: [0.0; 3],
         back: false,
         depth: 0.0,
+        nearest: f64::INFINITY,
         place: [0.0; 4],
         held_back: 0.0,
         count: 0,

@@ -17,7 +17,7 @@ pub const PASS: Pass = Pass {
             pick(needs.normal, pick(needs.curved, "normal_curved.wgsl", "normal_flat.wgsl"), "normal_absent.wgsl"),
             pick(needs.own_normals, "normal_own.wgsl", "normal_plane.wgsl"),
             pick(needs.maps.has(Map::Count), "count.wgsl", "count_absent.wgsl"),
-            match needs.maps.has(Map::Depth) {
+            match needs.sums_depth() {
                 false => "depth_absent.wgsl",
                 true if needs.winner.is_some() => "depth_nearest.wgsl",
                 true => pick(whole, "depth_whole.wgsl", "depth.wgsl"),

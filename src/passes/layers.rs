@@ -20,6 +20,7 @@ use crate::frame::Frame;
 use crate::plan::pass::Pass;
 use crate::plan::{Lists, RenderOptions};
 use crate::scene::composite::LEAST_TRANSMITTANCE;
+use crate::scene::maps::SURFACES;
 use crate::scene::{Composite, Map, Tail};
 
 /// How a pixel's fragments are parted into surfaces.
@@ -53,7 +54,7 @@ pub fn part(
         // Of a front and a back at one depth but for rounding either may be the nearer surface.
         let other = list[first..].iter().find(|f| f.back != front.back && untold(f, told));
         decision = other.map_or(decision, |other| decision.min(other.depth / front.depth - 1.0));
-        let mut sums = PixelSums { back: front.back && !last, ..PixelSums::ZERO };
+        let mut sums = PixelSums { back: front.back && !last, nearest: front.depth, ..PixelSums::ZERO };
         let mut end = farthest(front.depth, front.radius);
         for (number, f) in list.iter().enumerate().skip(first) {
             if !untold(f, told) || !last && f.back != front.back {
@@ -105,10 +106,15 @@ pub(super) struct Shown {
     color: [f64; 4],
     transmittance: f64,
     layers: u32,
+    /// Of the last one, if it is a tail.
+    tail: f64,
+    /// Depth and alpha.
+    nearest: [[f64; 2]; SURFACES],
 }
 
 impl Shown {
-    pub(super) const NOTHING: Self = Self { color: [0.0; 4], transmittance: 1.0, layers: 0 };
+    pub(super) const NOTHING: Self =
+        Self { color: [0.0; 4], transmittance: 1.0, layers: 0, tail: 0.0, nearest: [[f64::INFINITY, 0.0]; SURFACES] };
 
     /// Whether it lets `least` through, so that what lies behind still shows.
     pub(super) fn lets_through(&self, least: f64) -> bool {
@@ -120,9 +126,12 @@ impl Shown {
         (self.transmittance / least - 1.0).abs()
     }
 
-    /// With a straight colour behind.
-    pub(super) fn with(mut self, [r, g, b, alpha]: [f64; 4]) -> Self {
+    /// With a straight colour behind, at a depth.
+    pub(super) fn with(mut self, [r, g, b, alpha]: [f64; 4], depth: f64) -> Self {
         let shows = self.transmittance * alpha;
+        if let Some(surface) = self.nearest.get_mut(self.layers as usize) {
+            *surface = [depth, alpha];
+        }
         self.color.iter_mut().zip([r, g, b, 1.0]).for_each(|(sum, value)| *sum += shows * value);
         self.transmittance *= 1.0 - alpha;
         self.layers += 1;
@@ -137,6 +146,8 @@ impl Shown {
         frame.color[pixel] = color.map(|c| c as f32);
         set(frame, pixel, Map::Transmittance, &[self.transmittance]);
         set(frame, pixel, Map::Layers, &[self.layers.into()]);
+        set(frame, pixel, Map::Tail, &[self.tail]);
+        set(frame, pixel, Map::Surfaces, self.nearest.as_flattened());
         set(frame, pixel, Map::Decision, &[decision]);
     }
 }
@@ -152,9 +163,12 @@ pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
         let along = camera.along_axis(x, y);
         let (layers, mut decision) = part(&list.fragments, (most, options.tail), parting, (options, along));
         let mut shown = Shown::NOTHING;
-        for sums in layers {
+        for (number, sums) in layers.iter().enumerate() {
             if shown.lets_through(LEAST_TRANSMITTANCE) {
-                shown = shown.with(surface(&sums, scene, camera, options, (x, y)).0);
+                let color = surface(sums, scene, camera, options, (x, y)).0;
+                let is_tail = number >= most as usize;
+                shown.tail = if is_tail { shown.transmittance * color[3] } else { 0.0 };
+                shown = shown.with(color, if is_tail { sums.nearest } else { sums.depth / sums.weight });
                 decision = decision.min(shown.decision(LEAST_TRANSMITTANCE));
             }
         }

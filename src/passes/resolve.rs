@@ -9,6 +9,7 @@ use crate::frame::Frame;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Kernel, Over, Run, Stage, Twin};
 use crate::plan::{Lists, PixelLayout, Plan, RenderOptions};
+use crate::scene::maps::SURFACES;
 use crate::scene::options::HIGHLIGHT;
 use crate::scene::{Camera, Colors, Light, MAPS, Map, Samples, Scene, Shading};
 
@@ -177,6 +178,8 @@ pub const PASS: Pass = Pass {
             pick(needs.maps.has(Map::Weight), "weight_map.wgsl", "weight_map_absent.wgsl"),
             pick(needs.maps.has(Map::Transmittance), "transmittance_map.wgsl", "transmittance_map_absent.wgsl"),
             pick(needs.maps.has(Map::Layers), "layers_map.wgsl", "layers_map_absent.wgsl"),
+            pick(needs.maps.has(Map::Tail), "tail_map.wgsl", "tail_map_absent.wgsl"),
+            pick(needs.maps.has(Map::Surfaces), "surfaces_map.wgsl", "surfaces_map_absent.wgsl"),
             match needs.shading {
                 Shading::Unlit => "shade_unlit.wgsl",
                 Shading::Lambert => "shade_lambert.wgsl",
@@ -215,6 +218,9 @@ pub fn steps(plan: &Plan, band: usize) -> Stage {
     Stage::new("resolve", band, runs).after(covered::clears(plan, band)).as_twin(twin)
 }
 
+/// Words of a pixel of [`Map::Surfaces`].
+const WORDS_OF_SURFACES: usize = 2 * SURFACES;
+
 /// Puts `bytes` of resolved pixels into `frame`, from its pixel `first` on.
 pub fn unpack(layout: &PixelLayout, bytes: &[u8], first: usize, frame: &mut Frame) {
     let record = layout.image_words as usize * 4;
@@ -234,6 +240,7 @@ pub fn unpack(layout: &PixelLayout, bytes: &[u8], first: usize, frame: &mut Fram
         match width {
             1 => copy::<1>(bytemuck::cast_slice_mut(map), bytes, record, word),
             2 => copy::<2>(bytemuck::cast_slice_mut(map), bytes, record, word),
+            WORDS_OF_SURFACES => copy::<WORDS_OF_SURFACES>(bytemuck::cast_slice_mut(map), bytes, record, word),
             _ => copy::<3>(bytemuck::cast_slice_mut(map), bytes, record, word),
         }
     }

@@ -70,7 +70,7 @@ pub fn reference(strip: &Strip<'_>, frame: &mut Frame) {
                 decision = decision.min(1.0 - before.depth / f.depth);
             }
             before = Some(f);
-            let next = shown.with([r, g, b, alpha]);
+            let next = shown.with([r, g, b, alpha], f.depth);
             // So does what an alpha near 1 lets through; where what lies behind would hardly show that is of no matter.
             if rules.leaves_last {
                 sensitivity += alpha / (1.0 - alpha) * steepness;

@@ -7,6 +7,7 @@ use super::{RenderOptions, SceneNeeds};
 use crate::error::{Error, Result};
 use crate::gpu::adapter::AdapterDescription;
 use crate::passes::peel::MOST_LAYERS;
+use crate::scene::composite::ALL_LAYERS;
 use crate::scene::light::MAX_LIGHTS;
 use crate::scene::{
     Blend, Camera, Composite, Cull, KernelShape, LowPass, Map, Shading, Tail, options::SHININESS_RANGE,
@@ -45,6 +46,14 @@ pub fn options(options: &RenderOptions, reference: bool) -> Result<()> {
     }
     if options.composite != Composite::Opaque {
         composite(options, reference)?;
+    }
+    let cut = matches!(options.composite, Composite::Layers(most) if most < ALL_LAYERS);
+    if options.maps.has(Map::Tail) && !(cut && options.tail == Tail::Sum) {
+        return usage("a tail lies behind a last layer: take the map tail with --composite layers:L, and --tail sum");
+    }
+    if options.maps.has(Map::Surfaces) && (options.composite == Composite::Opaque || options.composite.is_order_free())
+    {
+        return usage("the map surfaces is of surfaces that are told apart: take --composite layers or sorted with it");
     }
     if reference {
         return Ok(());

@@ -312,6 +312,11 @@ impl SceneNeeds {
         self.raster.is_none() && self.winner.is_none() && self.lists.is_none()
     }
 
+    /// Depths are summed.
+    pub fn sums_depth(&self) -> bool {
+        self.maps.has(Map::Depth) || self.maps.has(Map::Surfaces)
+    }
+
     /// Fragments have weights: they are summed, or they are the rasteriser's, whose targets hold terms even of one fragment.
     pub fn weighs(&self) -> bool {
         matches!(self.winner, None | Some(Winner::Rasterised))

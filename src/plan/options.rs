@@ -131,7 +131,7 @@ impl RenderOptions {
 
     /// Whether a pixel of the image differs from 0 where nothing is.
     pub fn shows_where_nothing_is(&self) -> bool {
-        let maps = [Map::Depth, Map::Transmittance];
+        let maps = [Map::Depth, Map::Transmittance, Map::Surfaces];
         maps.iter().any(|map| self.maps.has(*map)) || self.background.iter().any(|value| value.to_bits() != 0)
     }
 

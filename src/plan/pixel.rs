@@ -37,7 +37,7 @@ impl PixelLayout {
         // The normal's x and y are a pair, and pairs start at even channels.
         let normal_channel = (COLOR_CHANNEL + color_channels(needs)).next_multiple_of(2);
         let depth_channel = normal_channel + channels(needs.normal, 3);
-        let count_channel = depth_channel + channels(needs.maps.has(Map::Depth), 1);
+        let count_channel = depth_channel + channels(needs.sums_depth(), 1);
         let held_back_channel = count_channel + channels(needs.maps.has(Map::Count), 1);
         let place_channel = (held_back_channel + channels(needs.oit.is_some(), 1)).next_multiple_of(2);
         let mut image_words = COLOR_WORDS;

@@ -154,6 +154,7 @@ impl Kept {
             clock,
             total_ms,
             needs: plan.needs.names(),
+            tail: None,
         }
     }
 }

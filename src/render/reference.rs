@@ -157,6 +157,7 @@ fn report(
         clock: "wall",
         total_ms,
         needs: needs.names(),
+        tail: None,
     }
 }
 

@@ -4,6 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use crate::frame::Frame;
+use crate::scene::Map;
+
 /// What a render did.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
@@ -33,6 +36,26 @@ pub struct Report {
     pub total_ms: f64,
     /// What the scene needed.
     pub needs: Vec<&'static str>,
+    /// Of the map [`Map::Tail`](crate::scene::Map::Tail), if it is made.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tail: Option<Tail>,
+}
+
+/// How much of a picture is what lies behind the last layer.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Tail {
+    /// The mean of its weights over all pixels: 1 would be a picture of nothing else.
+    pub mean: f64,
+    /// The largest weight at a pixel.
+    pub largest: f64,
+}
+
+impl Tail {
+    pub(super) fn of(frame: &Frame) -> Option<Self> {
+        let weights = frame.map(Map::Tail)?.iter().map(|weight| f64::from(*weight));
+        let mean = weights.clone().sum::<f64>() / frame.color.len().max(1) as f64;
+        Some(Self { mean, largest: weights.fold(0.0, f64::max) })
+    }
 }
 
 /// Device memory of a render, bytes: its buffers and textures, and what the host reads frames through.

@@ -29,7 +29,20 @@ pub enum Map {
     Transmittance,
     /// How many surfaces are composited at a pixel, of [`Composite::Sorted`](super::Composite::Sorted) fragments; 0 where nothing is.
     Layers,
+    /// How much what lies behind the last of [`Composite::Layers`](super::Composite::Layers) shows: its alpha times what the layers let
+    /// through to it; 0 where nothing does.
+    Tail,
+    /// Depth, camera-space z in world units, and alpha of the nearest [`SURFACES`] surfaces that are composited at a pixel, of
+    /// [`Composite::Sorted`](super::Composite::Sorted) fragments; of a tail the nearest depth. +inf and 0 where there are no more.
+    Surfaces,
 }
+
+/// Surfaces of a pixel of which [`Map::Surfaces`] tells.
+pub const SURFACES: usize = 8;
+
+/// Their channels; in an EXR each surface is a layer.
+const SURFACE_CHANNELS: [&str; 2 * SURFACES] =
+    ["1.Z", "1.A", "2.Z", "2.A", "3.Z", "3.A", "4.Z", "4.A", "5.Z", "5.A", "6.Z", "6.A", "7.Z", "7.A", "8.Z", "8.A"];
 
 /// How one map is named and kept.
 #[derive(Debug)]
@@ -55,7 +68,7 @@ pub struct MapRow {
 }
 
 /// The maps, in the order of [`Map`].
-pub const MAPS: [MapRow; 8] = [
+pub const MAPS: [MapRow; 10] = [
     row(Map::Depth, "depth", &["Z"], "depth", Some("DEPTH_IMAGE")),
     row(Map::Normal, "normal", &["X", "Y", "Z"], "normal-map", Some("NORMAL_IMAGE")),
     row(Map::Weight, "weight", &["Y"], "weight-map", Some("WEIGHT_IMAGE")),
@@ -76,6 +89,13 @@ pub const MAPS: [MapRow; 8] = [
         raster: false,
         composited: true,
         ..row(Map::Layers, "layers", &["Y"], "layers-map", Some("LAYERS_IMAGE"))
+    },
+    MapRow { raster: false, composited: true, ..row(Map::Tail, "tail", &["Y"], "tail-map", Some("TAIL_IMAGE")) },
+    MapRow {
+        raster: false,
+        composited: true,
+        compared: false,
+        ..row(Map::Surfaces, "surfaces", &SURFACE_CHANNELS, "surfaces", Some("SURFACES_IMAGE"))
     },
 ];
 
@@ -134,7 +154,7 @@ impl Maps {
     };
 
     /// Those that tell of all surfaces of a pixel.
-    pub const COMPOSITED: Self = Self::of(&[Map::Transmittance, Map::Layers]);
+    pub const COMPOSITED: Self = Self::of(&[Map::Transmittance, Map::Layers, Map::Tail, Map::Surfaces]);
 
     /// Those of `maps`.
     pub const fn of(maps: &[Map]) -> Self {

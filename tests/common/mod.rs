@@ -191,12 +191,21 @@ fn listed(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
         fixed && !needs.copies && needs.color != ColorNeed::Textured
     };
     let of = |(step, needs): (usize, &SceneNeeds)| {
-        let maps = [&[][..], &[Map::Transmittance], &[Map::Layers], &[Map::Transmittance, Map::Layers]];
+        let maps = [
+            &[][..],
+            &[Map::Transmittance, Map::Tail],
+            &[Map::Layers],
+            &[Map::Transmittance, Map::Layers, Map::Surfaces],
+            &[Map::Tail, Map::Surfaces, Map::Layers],
+        ];
         let lit = needs.shading != Shading::Unlit;
+        let lists = [Lists::Layers, Lists::Sorted][step % 2];
+        // Of sorted fragments there is no tail.
+        let others: &[Map] = if lists == Lists::Sorted { &[Map::Tail] } else { &[] };
         SceneNeeds {
-            lists: Some([Lists::Layers, Lists::Sorted][step % 2]),
+            lists: Some(lists),
             veils: step % 6 == 1,
-            maps: if needs.samples == Samples::ONE { Maps::of(maps[step / 2 % 4]) } else { Maps::NONE },
+            maps: if needs.samples == Samples::ONE { Maps::of(maps[step / 2 % 5]).but(others) } else { Maps::NONE },
             normal: lit && !needs.lit_splats,
             own_normals: needs.own_normals && lit,
             atomics_u64: false,
@@ -290,7 +299,8 @@ fn base_needs() -> Vec<SceneNeeds> {
             let wanted = wanted.chain((bits % 3 == 1).then_some(Map::Index));
             let some = bits & 0b1110_0010 != 0;
             let wanted = wanted.chain((some && bits % 5 == 1).then_some(Map::Transmittance));
-            let wanted: Vec<Map> = wanted.chain((some && bits % 7 == 1).then_some(Map::Layers)).collect();
+            let wanted = wanted.chain((some && bits % 7 == 1).then_some(Map::Layers));
+            let wanted: Vec<Map> = wanted.chain((some && mixed(22) && mixed(21)).then_some(Map::Tail)).collect();
             all.push(SceneNeeds {
                 projection,
                 accumulator: Accumulator::Fixed,

@@ -64,8 +64,15 @@ pub(super) fn summary(report: &Report, output: &Path) -> String {
         ("gpu", "wall") => ", wall time",
         _ => "",
     };
+    let tail = report.tail.map_or_else(String::new, |tail| {
+        format!(
+            "; the tail is {:.2} % of the picture, at most {:.1} % of a pixel",
+            100.0 * tail.mean,
+            100.0 * tail.largest
+        )
+    });
     format!(
-        "{}: {} of {} surfels drawn, {:.1} ms ({}{clock})",
+        "{}: {} of {} surfels drawn, {:.1} ms ({}{clock}){tail}",
         output.display(),
         report.splats_drawn,
         report.surfels,

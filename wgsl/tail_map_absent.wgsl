@@ -1,0 +1,1 @@
+fn write_tail(out: u32, weight: f32) {}

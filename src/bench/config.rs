@@ -78,6 +78,9 @@ pub struct Config {
     /// Maps that are rendered too.
     #[serde(default, deserialize_with = "all_parsed")]
     pub maps: Vec<Map>,
+    /// The configuration that it approximates, by name: what it errs by against that one's f64 twin is told as `apart_rmse` and
+    /// `apart_psnr_db`, on scenes that have both.
+    pub approximates: Option<String>,
     /// The largest RMSE against the f64 reference that is allowed.
     pub error_limit: Option<f64>,
     /// Whether a quick run has it.

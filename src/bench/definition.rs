@@ -8,6 +8,7 @@ use serde::{Deserialize, Deserializer};
 
 use super::config::Config;
 use crate::error::{Error, Result};
+use crate::io::ClassOpacities;
 use crate::plan::{BackendName, RenderOptions};
 use crate::scene::Shading;
 use crate::surfels::analytic::Shape;
@@ -79,7 +80,7 @@ pub struct SceneEntry {
     /// The image is looked up once a pixel; else surfels have its colours.
     #[serde(default)]
     pub lookup: bool,
-    /// A generated surface: sphere, torus, plane, checkerboard or text.
+    /// A generated surface: sphere, torus, plane, checkerboard, text, shells or crossing.
     #[serde(default, deserialize_with = "parsed")]
     pub shape: Option<Shape>,
     /// Surfels of the shape, or to be made of the mesh.
@@ -116,6 +117,11 @@ pub struct SceneEntry {
     pub truth: bool,
     /// The shading of configurations that choose none.
     pub shading: Option<Shading>,
+    /// The opacity of configurations that choose none.
+    pub opacity: Option<f32>,
+    /// Opacities of the classes of the file's points, as `epsplat render --class-opacity` takes them.
+    #[serde(default, deserialize_with = "parsed")]
+    pub classes: Option<ClassOpacities>,
     /// Surfels in a quick run.
     pub quick_count: Option<OneOrMany<u64>>,
     /// Splats' mean radius in a quick run, pixels.
@@ -244,7 +250,8 @@ impl Definition {
     /// The options of `config` on the scene of `entry`.
     pub fn options(&self, config: &Config, entry: &SceneEntry) -> RenderOptions {
         let options = config.options(entry.shading);
-        RenderOptions { background: self.background.unwrap_or(options.background), ..options }
+        let opacity = config.opacity.or(entry.opacity).unwrap_or(options.opacity);
+        RenderOptions { opacity, background: self.background.unwrap_or(options.background), ..options }
     }
 
     /// Whether a configuration renders on an adapter.

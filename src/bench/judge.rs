@@ -119,6 +119,30 @@ pub(super) fn against_truth(
     Ok(worst)
 }
 
+/// What each that approximates another is apart from that one's reference, the worst of all cameras: over the whole picture, as what is
+/// left out or added is part of it.
+pub(super) fn against_approximated(
+    case: &Case<'_>,
+    timed: &[Timed<'_>],
+    progress: &dyn Progress,
+) -> Result<Vec<BTreeMap<String, f64>>> {
+    let of = |timed: &Timed<'_>| timed.config.approximates.clone();
+    let mut apart = vec![BTreeMap::new(); timed.len()];
+    for (name, members) in grouped(timed.iter().map(of)) {
+        let Some(other) = timed.iter().find(|timed| Some(&timed.config.name) == name.as_ref()) else { continue };
+        for (view, camera) in case.staged.cameras.iter().enumerate() {
+            let (truth, _) = render(&case.staged.scene, camera, other.options, &Backend::Reference, progress)?;
+            for &member in &members {
+                let rmse = compare(&timed[member].frames[view], &truth)?.rmse;
+                let worst = apart[member].get("apart_rmse").copied().unwrap_or(0.0f64).max(rmse);
+                apart[member].insert("apart_rmse".to_owned(), worst);
+                apart[member].insert("apart_psnr_db".to_owned(), -20.0 * worst.log10());
+            }
+        }
+    }
+    Ok(apart)
+}
+
 /// Measures of which less is worse.
 const LESS_IS_WORSE: [&str; 3] = ["psnr_db", "ssim", "silhouette_iou"];
 

@@ -53,6 +53,9 @@ impl Definition {
         }
         for config in &self.configs {
             config.check().map_err(|what| format!("config {:?}: {what}", config.name))?;
+            if let Some(name) = config.approximates.as_ref().filter(|name| !configs.contains(name)) {
+                return Err(format!("config {:?}: approximates: there is no config {name:?}", config.name));
+            }
         }
         Ok(())
     }
@@ -152,6 +155,14 @@ impl SceneEntry {
         positive("noise", self.noise)?;
         positive("fill", self.fill)?;
         positive("fov", self.fov)?;
+        if self.opacity.is_some_and(|opacity| !(0.0..=1.0).contains(&opacity)) {
+            return Err("opacity: it is 0 to 1".into());
+        }
+        not_beside(
+            "classes",
+            self.classes.is_some() && (self.shape.is_some() || self.surfels != Making::File),
+            "a shape or surfels",
+        )?;
         positive("ortho", self.ortho)?;
         positive("most_fragments", self.most_fragments)
     }
@@ -269,6 +280,9 @@ mod tests {
             ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 1\nfill = -1\n", &["fill:", "-1"]),
             ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 1\nfootprint_px = []\n", &["footprint_px:"]),
             ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 1\nviews = 0\n", &["views:"]),
+            ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 1\nopacity = 2\n", &["opacity:"]),
+            ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 1\nclasses = \"1:0\"\n", &["classes:", "shape"]),
+            ("[[scene]]\nname = \"t\"\nfile = \"a.laz\"\nclasses = \"1\"\n", &["classes:", "3-5:0.3"]),
             ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 1\nup = [0, 0, 1]\n", &["eye:"]),
             ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 1\nfov = 9\northo = 1\n", &["ortho:", "fov"]),
             ("[[scene]]\nname = \"s\"\nshape = \"torus\"\ncount = 1\n", &["scene: two are called \"s\""]),
@@ -282,6 +296,7 @@ mod tests {
             ),
             ("[[config]]\nname = \"d\"\nbackend = \"raster\"\naccumulator = \"fixed\"\n", &["accumulator", "gpu"]),
             ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nerror_limit = -1\n", &["error_limit:"]),
+            ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\napproximates = \"x\"\n", &["approximates:", "\"x\""]),
             ("[[config]]\nname = \"d\"\nbackend = \"raster\"\norganisation = \"tile\"\n", &["organisation", "gpu"]),
             ("[[config]]\nname = \"d\"\nbackend = \"raster\"\nwithout = [\"order\"]\n", &["left out", "gpu"]),
             ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nwithout = [\"x\"]\n", &["line 6, without:", "culling"]),

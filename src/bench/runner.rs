@@ -107,7 +107,10 @@ impl<'a> Case<'a> {
             wanted.map(|config| (config, self.definition.options(config, self.entry))).collect();
         let timed = self.time(&plans, &mut outcome.notes, progress)?;
         let errors = judge::against_reference(self, &timed, progress)?;
-        let truths = judge::against_truth(self, &timed, progress)?;
+        let mut truths = judge::against_truth(self, &timed, progress)?;
+        for (measures, apart) in truths.iter_mut().zip(judge::against_approximated(self, &timed, progress)?) {
+            measures.extend(apart);
+        }
         let mut measurements = Vec::new();
         for ((timed, error), reconstruction) in timed.iter().zip(errors).zip(truths) {
             let config = timed.config;

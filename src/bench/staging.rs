@@ -8,7 +8,7 @@ use glam::{DMat3, DVec3};
 
 use super::definition::{Definition, Making, OneOrMany, Rims, SceneEntry};
 use crate::error::{Error, Result};
-use crate::io::{self, Points, Texture};
+use crate::io::{self, Points, ReadOptions, Texture};
 use crate::progress::Progress;
 use crate::random::Random;
 use crate::scene::camera::DEFAULT_FOV;
@@ -159,7 +159,10 @@ fn of_file(
     let stratified = Method::Stratified { priority: &priority, depth: None };
     let points = match entry.surfels {
         // Gaussians are made of shapes: reading a definition makes sure of it.
-        Making::File | Making::Gaussians => io::read(file, progress)?,
+        Making::File | Making::Gaussians => {
+            let classes = entry.classes.unwrap_or_default();
+            io::read_with(file, ReadOptions { classes, ..ReadOptions::default() }, progress)?
+        }
         Making::Points => bare()?,
         Making::Normals => normals()?,
         Making::Knn => sized(Size::Knn)?,

@@ -37,6 +37,9 @@ pub fn text(definition: &Definition, study: &Study) -> String {
         columns.push(("depth, %".into(), Box::new(move |m| percent(m, "depth_relative_mean"))));
         columns.push(("normal, °".into(), Box::new(move |m| optional(truth(m, "normal_degrees_mean"), 2))));
         columns.push(("holes, %".into(), Box::new(move |m| percent(m, "hole_rate"))));
+        if all.iter().any(|m| m.reconstruction.contains_key("apart_psnr_db")) {
+            columns.push(("apart, dB".into(), Box::new(move |m| optional(truth(m, "apart_psnr_db"), 2))));
+        }
         columns.push(("leaks, %".into(), Box::new(move |m| percent(m, "leak_rate"))));
     }
     if all.iter().any(|m| m.ratio_to_raster.is_some()) {

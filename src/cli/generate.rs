@@ -12,14 +12,15 @@ use super::{note, outputs};
 
 /// Write an analytic scene as PLY: surfels with exact normals, radii and colours.
 ///
-/// SHAPE is sphere (unit radius), torus (radii 1 and 0.4), plane (a square of side 2, one colour), checkerboard
+/// SHAPE is sphere (unit radius), shells (spheres of radii 1, 0.75, 0.5 and 0.25), torus (radii 1 and 0.4), crossing (two squares),
+/// plane (a square of side 2, one colour), checkerboard
 /// (the same with 32x32 squares) or text (the same with lines of text, each half as high as the one above). Radii are 1.5 times the spacing.
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat generate sphere --count 1000000 -o sphere.ply\n  \
     epsplat generate torus --count 20000 --texture -o torus.ply\n  \
     epsplat generate torus --count 100000 --gaussians -o gaussians.ply")]
 pub struct Arguments {
-    /// sphere, torus, plane, checkerboard or text
+    /// sphere, torus, plane, checkerboard, text, shells or crossing
     shape: Shape,
     /// Surfels
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..=4_000_000_000))]

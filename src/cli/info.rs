@@ -1,11 +1,12 @@
 //! `epsplat info`: what a file holds, and what a renderer would make of it.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
 use epsplat::Result;
-use epsplat::io::Points;
+use epsplat::io::{Points, class_name};
 use epsplat::scene::{Colors, Scene, gaussian};
 use epsplat::surfels::{self, Coverage, Preparation};
 use serde::Serialize;
@@ -38,6 +39,8 @@ struct Info {
     colors: &'static str,
     /// What it says of Gaussians, if they are some.
     gaussians: Option<Gaussians>,
+    /// Points of each class of a laser scan.
+    classes: BTreeMap<u8, u64>,
     /// Texture coordinates, by which `render --texture` paints.
     texture: bool,
     up: &'static str,
@@ -96,7 +99,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let bars = Bars::new();
     let points = arguments.reading.points(&arguments.input, &bars)?;
     let bounds = surfels::bounds(&points);
-    let texture = points.texture.is_some();
+    let (texture, classes) = (points.texture.is_some(), points.classes.clone());
     let held = (points.positions.len() as u64, points.normals.is_some(), points.radii.is_some(), colors(&points));
     let (scene, preparation) =
         surfels::build(vec![points], &bars).map_err(|error| named(error, std::slice::from_ref(&arguments.input)))?;
@@ -118,6 +121,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         radii: held.2,
         colors: held.3,
         gaussians,
+        classes,
         texture,
         up: scene.up.name(),
         min: bounds.min.to_array(),
@@ -173,6 +177,14 @@ fn table(input: &std::path::Path, info: &Info) -> String {
         let _ = writeln!(text, "  normals   {}", given(info.normals));
         let _ = writeln!(text, "  radii     {}", given(info.radii));
         let _ = writeln!(text, "  colours   {}", info.colors);
+    }
+    // One class says nothing.
+    if info.classes.len() > 1 {
+        let named = |(class, count): (&u8, &u64)| match class_name(*class) {
+            Some(name) => format!("{class} ({name}): {count}"),
+            None => format!("{class}: {count}"),
+        };
+        let _ = writeln!(text, "  classes   {}", info.classes.iter().map(named).collect::<Vec<_>>().join(", "));
     }
     if info.texture {
         let _ = writeln!(text, "  texture   coordinates given: `epsplat render --texture IMAGE.png` paints by them");

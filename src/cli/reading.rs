@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use epsplat::io::{self, Format, Mesh, Points, ReadOptions};
+use epsplat::io::{self, ClassOpacities, Format, Mesh, Points, ReadOptions};
 use epsplat::surfels::Limits;
 use epsplat::{Error, Result};
 
@@ -26,6 +26,10 @@ pub(super) struct Reading {
     /// Keep the points that a LAS file marks as withheld, which is deleted; else they are left out and counted
     #[arg(long)]
     keep_withheld: bool,
+    /// Opacities of a LAS file's points by their classes: CLASS:A or FIRST-LAST:A, with commas between them, such as 3-5:0.3,7:0 for thin
+    /// trees and no noise. A class of opacity 0 is left out and counted; others show through with render --composite
+    #[arg(long, value_name = "RULES")]
+    class_opacity: Option<ClassOpacities>,
     /// Draw the Gaussians of a 3DGS file as surfels, without their shortest axis, even if they are not flat
     #[arg(long)]
     flatten: bool,
@@ -87,8 +91,12 @@ impl InputFormat {
 impl Reading {
     /// The points of a file.
     pub(super) fn points(&self, path: &Path, bars: &Bars) -> Result<Points> {
-        let options =
-            ReadOptions { format: self.input.input_format, keep_withheld: self.keep_withheld, flatten: self.flatten };
+        let options = ReadOptions {
+            format: self.input.input_format,
+            keep_withheld: self.keep_withheld,
+            flatten: self.flatten,
+            classes: self.class_opacity.unwrap_or_default(),
+        };
         io::read_with(path, options, bars)
     }
 
@@ -105,6 +113,7 @@ impl Reading {
         let format = self.input.input_format.and_then(|format| Format::READ.iter().find(|(_, known)| *known == format));
         let format = format.map_or(String::new(), |(name, _)| format!(" --input-format {name}"));
         let withheld = if self.keep_withheld { " --keep-withheld" } else { "" };
-        format + withheld + if self.flatten { " --flatten" } else { "" }
+        let classes = self.class_opacity.map_or(String::new(), |opacities| format!(" --class-opacity {opacities}"));
+        format + withheld + if self.flatten { " --flatten" } else { "" } + &classes
     }
 }

@@ -3,6 +3,7 @@
 pub mod atomic;
 pub mod camera;
 pub mod cameras;
+mod classes;
 pub(crate) mod closed;
 mod companions;
 #[cfg(feature = "e57")]
@@ -27,6 +28,7 @@ pub(crate) mod triangles;
 mod values;
 pub mod write_behind;
 
+pub use classes::{ClassOpacities, class_name};
 pub use companions::companions;
 pub use format::Format;
 pub use input::Input;
@@ -38,7 +40,7 @@ use crate::{Error, Progress, Result};
 use std::path::Path;
 
 /// How files are read.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReadOptions {
     /// The format, whatever the file's name and first bytes say.
     pub format: Option<Format>,
@@ -46,6 +48,8 @@ pub struct ReadOptions {
     pub keep_withheld: bool,
     /// Gaussians that are ellipsoids become surfels without their shortest axis, however thick they are.
     pub flatten: bool,
+    /// Opacities by the classes of a laser scan's points, which only LAS files have.
+    pub classes: ClassOpacities,
 }
 
 /// Reads any supported file: PLY, LAS, LAZ (COPC too), OBJ, and with the features of those names E57 and PCD; see [`Input::open`].
@@ -67,9 +71,15 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
 /// As [`read`].
 pub fn read_with(path: &Path, options: ReadOptions, progress: &dyn Progress) -> Result<Points> {
     let input = Input::open(path, options.format)?;
+    if !options.classes.are_plain() && input.format != Format::Las {
+        return Err(Error::malformed(
+            path,
+            "its points have no classes, which only LAS files have: leave --class-opacity out",
+        ));
+    }
     match input.format {
         Format::Ply => ply::read(input, options.flatten, progress),
-        Format::Las => las::read(input, options.keep_withheld, progress),
+        Format::Las => las::read(input, &options, progress),
         Format::Obj => obj::read(input, progress),
         Format::E57 => read_e57(input, progress),
         Format::Pcd => read_pcd(input, progress),

@@ -1,5 +1,7 @@
 //! What one input file holds, before it becomes surfels.
 
+use std::collections::BTreeMap;
+
 pub use crate::scene::Up;
 use crate::scene::color::srgb_to_linear;
 use crate::scene::{Cap, Clip, Colors};
@@ -40,8 +42,12 @@ pub struct Points {
     /// They are the vertices of a mesh that is closed and faces outward, or surfels that cover one: nobody sees its back who is not
     /// inside.
     pub closed: bool,
+    /// How many points the file has of each class, without deleted ones; of a laser scan alone.
+    pub classes: BTreeMap<u8, u64>,
     /// Points that the file holds and that were left out, as it marks them as withheld, which is deleted.
     pub withheld: u64,
+    /// Points that the file holds and that were left out, as their class has the opacity 0.
+    pub unseen: u64,
     /// Vertices of a mesh that the file holds and that were left out, as no triangle with an area names them.
     pub loose: u64,
     /// The numbers, in order, of all points that the file holds and that were left out; they start at 0.

@@ -25,7 +25,7 @@ impl<'a> Column<'a> {
 const PASSES: [&str; 4] = ["project", "visibility", "accumulate", "resolve"];
 
 /// Measures against ground truth as a reader knows them; others have their own name.
-const TRUTHS: [(&str, &str); 14] = [
+const TRUTHS: [(&str, &str); 16] = [
     ("psnr_db", "PSNR, dB"),
     ("ssim", "SSIM"),
     ("max_abs", "largest"),
@@ -39,6 +39,8 @@ const TRUTHS: [(&str, &str); 14] = [
     ("leak_rate", "leaks"),
     ("silhouette_iou", "silhouette IoU"),
     ("outline_px", "outline, px"),
+    ("apart_psnr_db", "apart, dB"),
+    ("apart_rmse", "apart, RMSE"),
     ("rmse", "RMSE"),
 ];
 

@@ -34,6 +34,7 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
         let kept = keep.iter().filter(|&&keep| keep).count();
         preparation.points += keep.len() as u64;
         preparation.withheld += input.withheld;
+        preparation.unseen += input.unseen;
         preparation.loose += input.loose;
         preparation.flattened = Flattened::of_both(preparation.flattened, input.flattened);
         provenance.push(flags.len() as u64, std::mem::take(&mut input.left_out), input.numbers.take());
@@ -86,6 +87,10 @@ fn join(all: &mut Points, mut input: Points) {
 /// Why there is nothing to draw.
 fn nothing_to_draw(inputs: usize, preparation: &Preparation) -> String {
     match (inputs, preparation.points) {
+        (_, 0) if preparation.unseen > 0 => format!(
+            "the classes of all {} points read have the opacity 0, so there is nothing to draw",
+            preparation.unseen
+        ),
         (_, 0) if preparation.withheld > 0 => format!(
             "all of the {} points read are marked as withheld, which is deleted, so there is nothing to draw: \
              --keep-withheld keeps them",

@@ -13,6 +13,8 @@ pub struct Preparation {
     pub points: u64,
     /// Points that are in the files but not among `points`: they are marked as withheld, which is deleted.
     pub withheld: u64,
+    /// Points that are in the files but not among `points`: their class has the opacity 0.
+    pub unseen: u64,
     /// Vertices that are in the meshes but not among `points`: no triangle with an area names them.
     pub loose: u64,
     /// Gaussians left out because their scales, rotation, opacity or colour are no numbers, or span no surface.
@@ -72,6 +74,7 @@ impl Preparation {
                 self.withheld,
                 "were left out: they are marked as withheld, which is deleted (--keep-withheld keeps them)",
             ),
+            counted(self.unseen, "were left out: their class has the opacity 0"),
             (self.loose > 0).then(|| format!("{} vertices of no triangle were left out", self.loose)),
             (self.shapeless > 0).then(|| {
                 let what =

@@ -5,7 +5,7 @@ use super::{Folder, data};
 use epsplat::io::{self, ReadOptions, Up};
 use epsplat::scene::Colors;
 use epsplat::scene::color::srgb_to_linear;
-use las::point::Format;
+use las::point::{Classification, Format};
 use las::{Builder, Color, Point, Transform, Vector, Writer};
 use std::io::Cursor;
 
@@ -169,6 +169,45 @@ fn withheld_points_are_left_out_and_counted_and_all_others_are_kept() {
         epsplat::surfels::build(vec![folder.read("a.las", &whole_and_deleted()).unwrap()], &()).unwrap();
     assert_eq!((preparation.points, preparation.withheld, preparation.surfels), (10, 895, 10));
     assert!(preparation.notes()[0].starts_with("895 points were left out: they are marked as withheld"));
+}
+
+/// Every format keeps classes in its own place; those of opacity 0 are left out, beside what is deleted.
+#[test]
+fn classes_have_opacities() {
+    let folder = Folder::new();
+    let rules = ReadOptions { classes: "2-3:0.4,5:0".parse().unwrap(), ..ReadOptions::default() };
+    for (minor, format, compressed) in KINDS {
+        let classes = [1u8, 2, 3, 5, 30].map(|class| Classification::new(class).unwrap());
+        let points = (0..100u32).map(|i| Point {
+            classification: classes[i as usize % 5],
+            is_withheld: i % 10 == 3,
+            ..point(i, Some([i as u16, 0, 255]))
+        });
+        folder.read("a.las", &file(minor, format, compressed, points)).unwrap();
+        let points = io::read_with(&folder.path("a.las"), rules, &()).unwrap();
+        // Of twenty points of class 5 ten are deleted.
+        assert_eq!((points.positions.len(), points.withheld, points.unseen), (80, 10, 10), "{format}");
+        let counts = [(1, 20), (2, 20), (3, 20), (5, 10), (30, 20)];
+        assert_eq!(points.classes.iter().map(|(class, count)| (*class, *count)).collect::<Vec<_>>(), counts);
+        assert_positions(&points.positions, (0..100).filter(|i| i % 5 != 3));
+        assert_eq!(points.left_out, (0..100).filter(|i| i % 5 == 3).collect::<Vec<u64>>());
+        let alphas: Vec<f32> = match points.colors.unwrap() {
+            Colors::Srgb8(codes) => codes.iter().map(|code| f32::from(code[3]) / 255.0).collect(),
+            Colors::Linear(colors) => colors.iter().map(|color| color[3]).collect(),
+            other => panic!("{other:?}"),
+        };
+        assert!(alphas.iter().zip([1.0, 0.4, 0.4, 1.0].iter().cycle()).all(|(a, b)| (a - b).abs() < 1e-6), "{format}");
+    }
+    let (_, preparation) =
+        epsplat::surfels::build(vec![io::read_with(&folder.path("a.las"), rules, &()).unwrap()], &()).unwrap();
+    assert!(preparation.notes().iter().any(|note| note == "10 points were left out: their class has the opacity 0"));
+    let none = ReadOptions { classes: "0-255:0".parse().unwrap(), ..ReadOptions::default() };
+    let nothing = epsplat::surfels::build(vec![io::read_with(&folder.path("a.las"), none, &()).unwrap()], &());
+    assert!(nothing.unwrap_err().to_string().contains("90 points read have the opacity 0"));
+    // Of what has no classes nothing is guessed.
+    let other = folder.path("a.obj");
+    std::fs::write(&other, "v 0 0 0\n").unwrap();
+    assert!(io::read_with(&other, rules, &()).unwrap_err().to_string().contains("no classes"));
 }
 
 /// Ten points, and 895 that are deleted.

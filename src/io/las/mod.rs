@@ -8,18 +8,20 @@ mod shown;
 use crate::io::fault::{self, Fault, reserve, surviving};
 use crate::io::intensity;
 use crate::io::values::one_line;
-use crate::io::{Input, Points, Up};
+use crate::io::{Input, Points, ReadOptions, Up};
 use crate::{Progress, Result};
 use las::reader::{LazParallelism, ReaderOptions};
 use las::{PointData, PointDataBuilder, Reader, raw};
 use shown::Shown;
+use std::collections::BTreeMap;
 use std::io::{self, BufReader, Seek};
 
 /// Bytes of records that are decoded together.
 const BLOCK: u64 = 1 << 25;
 
 /// Reads the points of a LAS or LAZ file, COPC included: all but those marked as withheld, which are deleted points and are counted
-/// in [`Points::withheld`], or with `keep_withheld` these too. Synthetic, key and overlap points (legacy class 12 too) are points like
+/// in [`Points::withheld`], or with [`ReadOptions::keep_withheld`] these too, and those whose class has the opacity 0, which are counted in
+/// [`Points::unseen`]. Synthetic, key and overlap points (legacy class 12 too) are points like
 /// any other, as they are to PDAL.
 ///
 /// Coordinates are scaled and offset in f64, in the file's own system; up is z. Colours come from the format's RGB:
@@ -31,7 +33,7 @@ const BLOCK: u64 = 1 << 25;
 ///
 /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where
 /// the file is not LAS, ends early, or cannot be decoded.
-pub fn read(input: Input, keep_withheld: bool, progress: &dyn Progress) -> Result<Points> {
+pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
     let Input { file, length, path, .. } = input;
     let opened = surviving(|| {
         let mut file = BufReader::with_capacity(1 << 20, Shown::new(file)?);
@@ -45,7 +47,7 @@ pub fn read(input: Input, keep_withheld: bool, progress: &dyn Progress) -> Resul
         return Ok(Points { up: Some(Up::Z), ..Points::default() });
     }
     progress.begin(&format!("reading {}", fault::name(&path)), promised);
-    let points = deep(|| decode(file, decoding, promised.min(length), keep_withheld, progress));
+    let points = deep(|| decode(file, decoding, promised.min(length), options, progress));
     progress.end();
     points.map_err(|fault| fault.of(&path))
 }
@@ -90,7 +92,7 @@ fn decode(
     mut file: BufReader<Shown>,
     decoding: chunks::Decoding,
     capacity: u64,
-    keep_withheld: bool,
+    read_options: &ReadOptions,
     progress: &dyn Progress,
 ) -> Result<Points, Fault> {
     file.rewind()?;
@@ -105,11 +107,9 @@ fn decode(
     let format = *header.point_format();
     let mut block = PointDataBuilder::new().for_header(header).build();
     let block_points = (BLOCK / u64::from(format.len()).max(1)).max(1);
-    let mut positions = Vec::new();
-    reserve(&mut positions, capacity)?;
-    let mut codes: Vec<[u16; 3]> = Vec::new();
-    let mut intensities = Vec::new();
-    let (mut read, mut left_out) = (0, Vec::new());
+    let mut kept = Kept::default();
+    reserve(&mut kept.positions, capacity)?;
+    let mut read = 0;
     while read < promised {
         let count = reader.fill_points(block_points, &mut block).map_err(|error| match early(of_las(error)) {
             Fault::Malformed(what) => Fault::Malformed(format!(
@@ -120,30 +120,79 @@ fn decode(
         if count == 0 {
             return Err(Fault::Malformed(format!("the header promises {promised} points, the file ends after {read}")));
         }
-        let kept = || withheld(&block).map(|withheld| keep_withheld || !withheld);
-        left_out.extend(kept().zip(read..).filter(|(kept, _)| !kept).map(|(_, number)| number));
+        kept.take(&block, read, read_options);
         read += count;
-        let coordinates = block.x().zip(block.y()).zip(block.z()).map(|((x, y), z)| [x, y, z]);
-        positions.extend(coordinates.zip(kept()).filter_map(|(position, kept)| kept.then_some(position)));
-        if let Some(rgb) = block.rgb() {
-            codes.extend(rgb.zip(kept()).filter_map(|((r, g, b), kept)| kept.then_some([r, g, b])));
-        } else {
-            intensities.extend(block.intensity().zip(kept()).filter_map(|(value, kept)| kept.then_some(value)));
-        }
         progress.advance(count);
     }
+    let Kept { positions, codes, intensities, classes, counts, withheld, left_out } = kept;
     let colors = if format.has_color { color::from_rgb(codes) } else { intensity::grey(&intensities) };
-    Ok(Points { positions, colors, up: Some(Up::Z), withheld: left_out.len() as u64, left_out, ..Points::default() })
+    let colors = read_options.classes.fade(colors, &classes);
+    let unseen = left_out.len() as u64 - withheld;
+    let up = Some(Up::Z);
+    Ok(Points { positions, colors, up, classes: counts, withheld, unseen, left_out, ..Points::default() })
+}
+
+/// What is kept of the points so far.
+#[derive(Default)]
+struct Kept {
+    positions: Vec<[f64; 3]>,
+    codes: Vec<[u16; 3]>,
+    intensities: Vec<u16>,
+    /// Of each, where classes make a difference.
+    classes: Vec<u8>,
+    /// Points of each class that are not deleted.
+    counts: BTreeMap<u8, u64>,
+    withheld: u64,
+    left_out: Vec<u64>,
+}
+
+impl Kept {
+    /// Adds the points of a block, the first of which has the number `first`, but for those that are deleted or unseen.
+    fn take(&mut self, block: &PointData, first: u64, options: &ReadOptions) {
+        let mut keeps = Vec::with_capacity(block.len());
+        for ((withheld, class), number) in withheld(block).zip(classes(block)).zip(first..) {
+            let deleted = withheld && !options.keep_withheld;
+            let keep = !deleted && options.classes.of(class) > 0.0;
+            self.withheld += u64::from(deleted);
+            if !deleted {
+                *self.counts.entry(class).or_default() += 1;
+            }
+            if !keep {
+                self.left_out.push(number);
+            } else if !options.classes.are_plain() {
+                self.classes.push(class);
+            }
+            keeps.push(keep);
+        }
+        fn kept<T>(values: impl Iterator<Item = T>, keeps: &[bool]) -> impl Iterator<Item = T> {
+            values.zip(keeps).filter_map(|(value, keep)| keep.then_some(value))
+        }
+        let coordinates = block.x().zip(block.y()).zip(block.z()).map(|((x, y), z)| [x, y, z]);
+        self.positions.extend(kept(coordinates, &keeps));
+        if let Some(rgb) = block.rgb() {
+            self.codes.extend(kept(rgb.map(|(r, g, b)| [r, g, b]), &keeps));
+        } else {
+            self.intensities.extend(kept(block.intensity(), &keeps));
+        }
+    }
+}
+
+/// The records of a block.
+fn records(block: &PointData) -> impl Iterator<Item = &[u8]> {
+    block.raw_bytes().chunks_exact(block.record_len().max(1))
 }
 
 /// Whether each point of a block is marked as deleted: bit 7 of the classification byte, in the extended formats bit 2
 /// of the flags before it.
 fn withheld(block: &PointData) -> impl Iterator<Item = bool> {
     let mask = if block.format().is_extended { 1 << 2 } else { 1 << 7 };
-    block
-        .raw_bytes()
-        .chunks_exact(block.record_len().max(1))
-        .map(move |record| record.get(15).is_some_and(|b| b & mask != 0))
+    records(block).map(move |record| record.get(15).is_some_and(|b| b & mask != 0))
+}
+
+/// The class of each point: of byte 15 the lower five bits, in the extended formats byte 16.
+fn classes(block: &PointData) -> impl Iterator<Item = u8> {
+    let (byte, mask) = if block.format().is_extended { (16, 0xff) } else { (15, 0x1f) };
+    records(block).map(move |record| record.get(byte).map_or(0, |b| b & mask))
 }
 
 #[cfg(test)]
@@ -175,7 +224,7 @@ mod tests {
         bytes.extend([0xff; 4]);
         bytes.extend([0x7f; 64]);
         std::fs::write(&path, &bytes).unwrap();
-        let points = read(Input::open(&path, None).unwrap(), false, &()).unwrap();
+        let points = read(Input::open(&path, None).unwrap(), &ReadOptions::default(), &()).unwrap();
         assert_eq!((points.positions.len(), points.up), (0, Some(Up::Z)));
     }
 

@@ -5,9 +5,9 @@
 
 use std::f64::consts::TAU;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3Swizzles};
 
-use super::{TORUS_MAJOR, TORUS_MINOR};
+use super::{SHELLS, TORUS_MAJOR, TORUS_MINOR};
 
 /// 2^64 / phi. Products with an index modulo 2^64 are the golden fraction of that index: no digit is lost to its whole
 /// part, and an index of 1e9 is off by less than 1e-10 turns.
@@ -26,6 +26,32 @@ pub(super) fn sphere(index: u64, count: u64) -> DVec3 {
     let polar = (below_pole * (2.0 - below_pole)).sqrt();
     let (sin, cos) = (TAU * fraction(index.wrapping_mul(GOLDEN))).sin_cos();
     DVec3::new(polar * cos, polar * sin, 1.0 - below_pole)
+}
+
+/// Point `index` of `count` on the shells, of which each has a part of the points as it has of the area.
+pub(super) fn shells(index: u64, count: u64) -> DVec3 {
+    let area: f64 = SHELLS.iter().map(|radius| radius * radius).sum();
+    let (mut up_to, mut first) = (0.0, 0);
+    for radius in SHELLS {
+        up_to += radius * radius;
+        let end = (count as f64 * (up_to / area)).round() as u64;
+        if index < end {
+            return sphere(index - first, end - first) * radius;
+        }
+        first = end;
+    }
+    // The last shell ends with the last point.
+    DVec3::NAN
+}
+
+/// Point `index` of `count` on the crossing squares, a half of them each.
+pub(super) fn crossing(index: u64, count: u64) -> DVec3 {
+    let of_first = count.div_ceil(2);
+    match index.checked_sub(of_first) {
+        // The golden fractions, none of which is a half, go across the line in which they cross.
+        None => square(index, of_first).yxz(),
+        Some(index) => square(index, count - of_first).zxy(),
+    }
 }
 
 /// Point `index` of `count` on the torus.

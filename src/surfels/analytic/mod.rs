@@ -40,23 +40,32 @@ pub enum Shape {
     Checkerboard,
     /// The same square with lines of text, each half as high as the one above.
     Text,
+    /// Spheres of the radii [`SHELLS`] around the world origin.
+    Shells,
+    /// The square at z = 0, and one of the same edge at x = 0 that crosses it.
+    Crossing,
 }
+
+/// Radii of the shells, world units.
+pub const SHELLS: [f64; 4] = [1.0, 0.75, 0.5, 0.25];
 
 impl Shape {
     /// Every shape with its name and what it is, for a command line's help.
-    pub const ALL: [(Self, &'static str, &'static str); 5] = [
+    pub const ALL: [(Self, &'static str, &'static str); 7] = [
         (Self::Sphere, "sphere", "the unit sphere"),
         (Self::Torus, "torus", "a torus around the z axis, radii 1 and 0.4"),
         (Self::Plane, "plane", "a square of edge 2 at z = 0, in one colour"),
         (Self::Checkerboard, "checkerboard", "the same square with 32 x 32 black and white squares"),
         (Self::Text, "text", "the same square with lines of text, each half as high as the one above"),
+        (Self::Shells, "shells", "spheres of radii 1, 0.75, 0.5 and 0.25 around one another"),
+        (Self::Crossing, "crossing", "squares of edge 2 that cross, at z = 0 and x = 0"),
     ];
 
     /// Which way is up in the default view of it.
     pub fn up(self) -> Up {
         match self {
-            Self::Sphere => Up::Y,
-            Self::Torus | Self::Plane | Self::Checkerboard | Self::Text => Up::Z,
+            Self::Sphere | Self::Shells => Up::Y,
+            Self::Torus | Self::Plane | Self::Checkerboard | Self::Text | Self::Crossing => Up::Z,
         }
     }
 
@@ -66,6 +75,8 @@ impl Shape {
             Self::Sphere => 4.0 * PI,
             Self::Torus => 4.0 * PI * PI * TORUS_MAJOR * TORUS_MINOR,
             Self::Plane | Self::Checkerboard | Self::Text => 4.0,
+            Self::Shells => 4.0 * PI * SHELLS.iter().map(|radius| radius * radius).sum::<f64>(),
+            Self::Crossing => 8.0,
         }
     }
 
@@ -76,18 +87,36 @@ impl Shape {
             Self::Sphere => p.length() - 1.0,
             Self::Torus => (p.truncate().length() - TORUS_MAJOR).hypot(p.z) - TORUS_MINOR,
             Self::Plane | Self::Checkerboard | Self::Text => p.z,
+            Self::Shells => {
+                let from = SHELLS.map(|radius| p.length() - radius);
+                from.into_iter().min_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(f64::INFINITY)
+            }
+            Self::Crossing => {
+                if crosses_at_z(p) {
+                    p.z
+                } else {
+                    p.x
+                }
+            }
         }
     }
 
     /// The outward unit normal at a point of the surface, to about 1e-15: the gradient of [`distance`](Self::distance).
     pub fn normal(self, p: DVec3) -> DVec3 {
         match self {
-            Self::Sphere => p.normalize(),
+            Self::Sphere | Self::Shells => p.normalize(),
             Self::Torus => {
                 let from_axis = p.truncate().length();
                 (p.truncate() * ((from_axis - TORUS_MAJOR) / from_axis)).extend(p.z).normalize()
             }
             Self::Plane | Self::Checkerboard | Self::Text => DVec3::Z,
+            Self::Crossing => {
+                if crosses_at_z(p) {
+                    DVec3::Z
+                } else {
+                    DVec3::X
+                }
+            }
         }
     }
 
@@ -96,6 +125,8 @@ impl Shape {
         let code = |value: f64| (value * 255.0).round() as u8;
         match self {
             Self::Plane => [200, 160, 90],
+            Self::Crossing if crosses_at_z(p) => [200, 160, 90],
+            Self::Crossing => [60, 110, 190],
             Self::Checkerboard => {
                 let square = |c: f64| ((c + 1.0) * 0.5 * f64::from(CHECKER_SQUARES)) as u32;
                 if (square(p.x) + square(p.y)) % 2 == 0 { [255; 3] } else { [0; 3] }
@@ -108,7 +139,7 @@ impl Shape {
                 }
             }
             // Bands along x, y and z of different widths: smooth, but with detail at several scales and directions.
-            Self::Sphere | Self::Torus => {
+            Self::Sphere | Self::Torus | Self::Shells => {
                 let band = |c: f64, bands: f64, shift: f64| 0.5 + 0.5 * (PI * bands * c + shift).sin();
                 [
                     code(0.2 + 0.7 * band(p.z, 6.0, 0.0)),
@@ -124,12 +155,18 @@ impl Shape {
     pub fn texture_at(self, p: DVec3) -> [f32; 2] {
         let turns = |y: f64, x: f64| 0.5 + y.atan2(x) / TAU;
         let (u, v) = match self {
-            Self::Sphere => (turns(p.x, p.z), 0.5 + p.y.clamp(-1.0, 1.0).asin() / PI),
+            Self::Sphere | Self::Shells => (turns(p.x, p.z), 0.5 + (p.y / p.length()).clamp(-1.0, 1.0).asin() / PI),
             Self::Torus => (turns(p.y, p.x), turns(p.z, p.truncate().length() - TORUS_MAJOR)),
-            Self::Plane | Self::Checkerboard | Self::Text => (0.5 + 0.5 * p.x, 0.5 + 0.5 * p.y),
+            Self::Crossing if !crosses_at_z(p) => (0.5 + 0.5 * p.z, 0.5 + 0.5 * p.y),
+            Self::Plane | Self::Checkerboard | Self::Text | Self::Crossing => (0.5 + 0.5 * p.x, 0.5 + 0.5 * p.y),
         };
         [u as f32, v as f32]
     }
+}
+
+/// Whether a point is of the square at z = 0, as it lies nearer to it than to the one at x = 0.
+fn crosses_at_z(p: DVec3) -> bool {
+    p.z.abs() <= p.x.abs()
 }
 
 impl FromStr for Shape {
@@ -183,6 +220,8 @@ impl Iterator for Samples {
             Shape::Sphere => lattice::sphere(index, self.count),
             Shape::Torus => lattice::torus(index, self.count),
             Shape::Plane | Shape::Checkerboard | Shape::Text => lattice::square(index, self.count),
+            Shape::Shells => lattice::shells(index, self.count),
+            Shape::Crossing => lattice::crossing(index, self.count),
         };
         Some(Sample {
             position: position.to_array(),
@@ -238,7 +277,8 @@ mod tests {
 
     #[test]
     fn spacing_is_even() {
-        for (shape, _, _) in Shape::ALL {
+        // Where squares cross, samples of both lie near one another.
+        for (shape, _, _) in Shape::ALL.into_iter().filter(|(shape, _, _)| *shape != Shape::Crossing) {
             for count in [500, 1000, 4181, 12_345, 100_000] {
                 let points: Vec<_> = generate(shape, count).map(|s| s.position).collect();
                 let bounds = points.iter().fold(Bounds::EMPTY, |b, p| b.with_point(DVec3::from_array(*p)));

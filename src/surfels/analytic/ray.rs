@@ -1,8 +1,8 @@
 //! Where a ray first meets an analytic surface.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3Swizzles};
 
-use super::{Shape, TORUS_MAJOR, TORUS_MINOR};
+use super::{SHELLS, Shape, TORUS_MAJOR, TORUS_MINOR};
 
 /// The smallest t > 0 for which `origin + t * direction` lies on the surface, in units of the direction's length; None
 /// if there is none, or the direction has no length. Accurate to about 1e-12 relative to the distance from the scene,
@@ -23,13 +23,25 @@ pub fn depth_along_ray(shape: Shape, origin: DVec3, direction: DVec3) -> Option<
             [-half_chord, half_chord].into_iter().find(|&t| first(t))
         }
         Shape::Torus => torus_crossings(nearest, direction).into_iter().find(|&t| first(t)),
-        Shape::Plane | Shape::Checkerboard | Shape::Text => {
-            let t = -nearest.z / direction.z;
-            let hit = nearest + direction * t;
-            (t.is_finite() && hit.x.abs() <= 1.0 && hit.y.abs() <= 1.0 && first(t)).then_some(t)
+        Shape::Plane | Shape::Checkerboard | Shape::Text => square(nearest, direction).filter(|&t| first(t)),
+        Shape::Crossing => {
+            // With x and z exchanged the one at x = 0 is the other.
+            let both = [square(nearest, direction), square(nearest.zyx(), direction.zyx())];
+            both.into_iter().flatten().filter(|&t| first(t)).min_by(f64::total_cmp)
+        }
+        Shape::Shells => {
+            let half = SHELLS.map(|radius| (radius * radius - nearest.length_squared()).sqrt());
+            half.into_iter().flat_map(|half| [-half, half]).filter(|&t| first(t)).min_by(f64::total_cmp)
         }
     }?;
     Some((t + shift) / length)
+}
+
+/// The t at which the line crosses the square [-1, 1] x [-1, 1] at z = 0.
+fn square(start: DVec3, direction: DVec3) -> Option<f64> {
+    let t = -start.z / direction.z;
+    let hit = start + direction * t;
+    (t.is_finite() && hit.x.abs() <= 1.0 && hit.y.abs() <= 1.0).then_some(t)
 }
 
 /// All t at which the line `start + t * direction` crosses the torus, ascending. `start` is the line's point nearest to
@@ -169,6 +181,29 @@ mod tests {
             }
         }
         assert!(behind > 1000);
+    }
+
+    #[test]
+    fn rays_meet_each_shell_and_both_squares() {
+        // Again and again from just behind what was met.
+        let met = |shape: Shape, start: DVec3, direction: DVec3| {
+            let (mut all, mut at) = (Vec::new(), 0.0);
+            while let Some(t) = depth_along_ray(shape, start + direction * at, direction) {
+                at += t;
+                all.push(at);
+                at += 1e-9;
+            }
+            all
+        };
+        let near = |found: Vec<f64>, expected: &[f64]| {
+            assert_eq!(found.len(), expected.len(), "{found:?}");
+            assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-7), "{found:?}");
+        };
+        near(met(Shape::Shells, DVec3::X * 2.0, -DVec3::X), &[1.0, 1.25, 1.5, 1.75, 2.25, 2.5, 2.75, 3.0]);
+        near(met(Shape::Shells, DVec3::new(0.6, 0.0, 2.0), -DVec3::Z), &[1.2, 1.55, 2.45, 2.8]);
+        let slanted = DVec3::new(1.0, 0.0, -1.0);
+        near(met(Shape::Crossing, DVec3::new(-0.75, 0.2, 1.0), slanted), &[0.75, 1.0]);
+        near(met(Shape::Crossing, DVec3::new(0.5, 0.2, 2.0), -DVec3::Z), &[2.0]);
     }
 
     #[test]

@@ -1,0 +1,147 @@
+//! What the classes of a laser scan's points (LAS 1.4, table 17: 2 is ground, 3 to 5 are vegetation, 6 buildings, 7 noise) say of how they
+//! are drawn.
+
+use std::fmt;
+use std::str::FromStr;
+
+use crate::error::Error;
+use crate::scene::Colors;
+use crate::scene::color::DEFAULT_COLOR;
+
+/// The opacity of each class: the alpha of its points, which are left out if it is 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClassOpacities([f32; 256]);
+
+impl Default for ClassOpacities {
+    fn default() -> Self {
+        Self([1.0; 256])
+    }
+}
+
+impl ClassOpacities {
+    /// Whether all are 1.
+    pub fn are_plain(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// That of a class.
+    pub fn of(&self, class: u8) -> f32 {
+        self.0[usize::from(class)]
+    }
+
+    /// The colours, or the default ones, of points of these `classes`, with their opacities as alphas.
+    pub(super) fn fade(&self, colors: Option<Colors>, classes: &[u8]) -> Option<Colors> {
+        if classes.iter().all(|class| self.of(*class) == 1.0) {
+            return colors;
+        }
+        let alphas = classes.iter().map(|class| self.of(*class));
+        match colors {
+            Some(Colors::Linear(mut colors)) => {
+                colors.iter_mut().zip(alphas).for_each(|(color, alpha)| color[3] = alpha);
+                Some(Colors::Linear(colors))
+            }
+            Some(Colors::Srgb8(mut codes)) => {
+                codes.iter_mut().zip(alphas).for_each(|(code, alpha)| code[3] = (255.0 * alpha).round() as u8);
+                Some(Colors::Srgb8(codes))
+            }
+            None => {
+                let [r, g, b, _] = DEFAULT_COLOR;
+                Some(Colors::Linear(alphas.map(|alpha| [r, g, b, alpha]).collect()))
+            }
+            // A laser scan has no other colours.
+            other => other,
+        }
+    }
+}
+
+/// What the format calls a class.
+pub fn class_name(class: u8) -> Option<&'static str> {
+    Some(match class {
+        0 | 1 => "unclassified",
+        2 => "ground",
+        3 => "low vegetation",
+        4 => "medium vegetation",
+        5 => "high vegetation",
+        6 => "building",
+        7 => "noise",
+        9 => "water",
+        10 => "rail",
+        11 => "road",
+        17 => "bridge",
+        18 => "high noise",
+        _ => return None,
+    })
+}
+
+impl fmt::Display for ClassOpacities {
+    /// As they are read.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (mut first, mut comma) = (0, "");
+        for run in self.0.chunk_by(|a, b| a == b) {
+            let last = first + run.len() - 1;
+            match run[0] {
+                1.0 => {}
+                opacity if first == last => write!(f, "{comma}{first}:{opacity}")?,
+                opacity => write!(f, "{comma}{first}-{last}:{opacity}")?,
+            }
+            comma = if run[0] == 1.0 { comma } else { "," };
+            first = last + 1;
+        }
+        Ok(())
+    }
+}
+
+impl FromStr for ClassOpacities {
+    type Err = Error;
+
+    /// `CLASS:A` or `FIRST-LAST:A`, several with commas between them; of two that name one class the later holds.
+    fn from_str(text: &str) -> Result<Self, Error> {
+        let mut all = Self::default();
+        for rule in text.split(',') {
+            let read = || {
+                let (classes, opacity) = rule.split_once(':')?;
+                let (first, last) = classes.split_once('-').unwrap_or((classes, classes));
+                let (first, last): (u8, u8) = (first.trim().parse().ok()?, last.trim().parse().ok()?);
+                let opacity: f32 = opacity.trim().parse().ok()?;
+                (first <= last && (0.0..=1.0).contains(&opacity)).then_some((first, last, opacity))
+            };
+            let (first, last, opacity) = read().ok_or_else(|| {
+                Error::Usage(format!(
+                    "opacities of classes are CLASS:A or FIRST-LAST:A with classes 0 to 255 and A from 0 to 1, such as 3-5:0.3,7:0, not \
+                     {text:?}"
+                ))
+            })?;
+            all.0[usize::from(first)..=usize::from(last)].fill(opacity);
+        }
+        Ok(all)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn opacities_are_read_and_refused() {
+        let of: ClassOpacities = "3-5:0.25, 7:0,5:1".parse().unwrap();
+        assert_eq!([2, 3, 4, 5, 6, 7].map(|class| of.of(class)), [1.0, 0.25, 0.25, 1.0, 1.0, 0.0]);
+        assert!(!of.are_plain() && "0-255:1".parse::<ClassOpacities>().unwrap().are_plain());
+        assert_eq!(of.to_string(), "3-4:0.25,7:0");
+        for bad in ["", "3", "3:", ":1", "5-3:1", "3:2", "3:-1", "256:1", "3:nan", "3:1,", "a:1"] {
+            let said = bad.parse::<ClassOpacities>().unwrap_err().to_string();
+            assert!(said.contains("3-5:0.3,7:0"), "{bad}: {said}");
+        }
+    }
+
+    #[test]
+    fn points_get_the_alphas_of_their_classes() {
+        let of: ClassOpacities = "3:0.2".parse().unwrap();
+        let codes = of.fade(Some(Colors::Srgb8(vec![[1, 2, 3, 255]; 2])), &[2, 3]);
+        assert_eq!(codes, Some(Colors::Srgb8(vec![[1, 2, 3, 255], [1, 2, 3, 51]])));
+        let [r, g, b, _] = DEFAULT_COLOR;
+        assert_eq!(of.fade(None, &[3, 1]), Some(Colors::Linear(vec![[r, g, b, 0.2], [r, g, b, 1.0]])));
+        // Where no class of the file is meant, nothing changes.
+        assert_eq!(of.fade(None, &[2, 1]), None);
+    }
+}

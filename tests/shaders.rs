@@ -147,7 +147,7 @@ const EXCLUSIVE: [(&str, &[&str]); 26] = [
     ),
     ("oit", &["tiles", "gather", "copies", "cull", "raster-exact", "raster-offset", "nearest", "peels", "veils"]),
     ("oit", &["lists-layers", "lists-sorted", "color-textured", "epsilon-radius", "epsilon-ray", "sides"]),
-    ("oit", &["tail-map", "surfaces"]),
+    ("oit", &["tail-map", "surfaces", "layers-map"]),
     ("lists-sorted", &["tail-map"]),
     ("surfaces", &["tiles", "gather", "copies", "cull", "atomics-u64", "nearest", "color-textured"]),
     ("surfaces", &["count", "depth", "index", "normal-map", "weight-map"]),

@@ -44,8 +44,12 @@ struct View {
     texture_height: u32,
     // What an epsilon by the radius does not exceed, as a fraction of the nearest depth.
     epsilon_most: f32,
-    // The depth at which the scene's body starts, device units.
+    // The depths at which the scene's body starts and ends, device units.
     first: f32,
+    last: f32,
+    padding_0: u32,
+    padding_1: u32,
+    padding_2: u32,
     // The middle of the range of texture coordinates, its span, and the largest squared reach in units of the span.
     place: vec4<f32>,
 }

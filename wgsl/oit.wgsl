@@ -8,8 +8,10 @@ const HELD_BACK_UNITS: f32 = 32.0;
 // LEAST_LEFT in the twin, 2^-40.
 const LEAST_OIT_LEFT: f32 = 9.094947017729282379150390625e-13;
 
+// Of small alphas by the first terms of its series, as 1 - alpha has few of their digits.
 fn held_back(alpha: f32) -> f32 {
-    return -log(max(1.0 - alpha, LEAST_OIT_LEFT));
+    let series = alpha * (1.0 + alpha * (0.5 + alpha * (1.0 / 3.0 + alpha * 0.25)));
+    return select(-log(max(1.0 - alpha, LEAST_OIT_LEFT)), series, alpha < 0.015625);
 }
 
 fn accumulate_held_back(pixel: u32, weight: f32, color: vec4<f32>) {
@@ -23,7 +25,7 @@ fn with_held_back(color: vec4<f32>, sums_of: u32, weight: f32) -> vec4<f32> {
     return vec4<f32>(color.rgb, 1.0 - exp(-HELD_BACK_UNITS * sum));
 }
 
-// A fraction of the scene's depths, from where its body starts to past its last surfel.
+// A fraction of the depths of the scene's body, from where it starts to where it ends.
 fn depth_fraction(depth: f32) -> f32 {
-    return clamp((depth - held.first) / max(held.farthest - held.first, 1e-30), 0.0, 1.0);
+    return clamp((depth - held.first) / max(held.last - held.first, 1e-30), 0.0, 1.0);
 }

@@ -1,7 +1,7 @@
 // A fragment weighs what those before it let through, as far as the moments of all say (Muenstermann et al. 2018). The visibility pass sums
 // them; same interface as nearest_depth.wgsl and oit_weighted.wgsl.
 // Twin: src/passes/moments.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x4e606653ca8fee4e
+// All loops end, by 1 of src/gpu/loops.rs: 0x162af31a4e26f963
 
 // Of each pixel five sums of 64 bits, low word first; negative ones are complements.
 @group(0) @binding(51) var<storage, read_write> moments: array<atomic<u32>>;
@@ -12,6 +12,9 @@ const MOMENT_UNITS: f32 = 67108864.0;
 // MIXED and OF_OWN in the twin.
 const MIXED: f32 = 0.00006103515625;
 const OF_OWN: f32 = 0.25;
+// LEAST_SPREAD and LEAST_MASS there.
+const LEAST_SPREAD: f32 = 1e-6;
+const LEAST_MASS: f32 = 1.52587890625e-5;
 
 // In [-1, 1].
 fn moment_place(depth: f32) -> f32 {
@@ -40,12 +43,11 @@ fn keep_nearest(pixel: u32, fragment: Fragment, mark: u32) {
         add_moment(2u * (pixel * MOMENTS + k), term);
         term *= place;
     }
-    atomicStore(&nearest[pixel], 1u);
+    atomicMax(&nearest[pixel], kept_depth(bitcast<u32>(fragment.depth)));
 }
 
-// Of a pixel that has anything something that is not nothing, as there is no nearest depth.
 fn nearest_at(pixel: u32) -> u32 {
-    return select(NOTHING, 1u, atomicLoad(&nearest[pixel]) != 0u);
+    return kept_depth(atomicLoad(&nearest[pixel]));
 }
 
 fn moment_at(pixel: u32, moment: u32) -> f32 {
@@ -61,15 +63,16 @@ fn moment_at(pixel: u32, moment: u32) -> f32 {
     return select(value, -value, negative) / MOMENT_UNITS;
 }
 
-// What is let through to a place, of moments 1 to 4 of unit mass.
+// The part of the mass that counts as before a place, of moments 1 to 4 of unit mass.
 fn mass_before(b: vec4<f32>, place: f32) -> f32 {
     let mean = b.x;
-    let second = b.y - mean * mean;
+    let second = max(b.y - mean * mean, LEAST_SPREAD);
     let third = b.z - mean * (3.0 * b.y - 2.0 * mean * mean);
     let fourth = b.w - mean * (4.0 * b.z - mean * (6.0 * b.y - 3.0 * mean * mean));
     let x = place - mean;
     // The polynomial whose zeros are the other two places that have mass; at x it is one over the mass there.
-    let c2 = (x * x - second - third / second * x) / (fourth - second * second - third * third / second);
+    let rest = max(fourth - second * second - third * third / second, LEAST_SPREAD * second);
+    let c2 = (x * x - second - third / second * x) / rest;
     let c1 = (x - third * c2) / second;
     let c0 = 1.0 - second * c2;
     let own = 1.0 / (c0 + x * (c1 + x * c2));
@@ -90,9 +93,10 @@ fn mass_before(b: vec4<f32>, place: f32) -> f32 {
 fn weight_before(pixel: u32, depth: f32, weight: f32) -> f32 {
     let mass = moment_at(pixel, 0u);
     let sums = vec4<f32>(moment_at(pixel, 1u), moment_at(pixel, 2u), moment_at(pixel, 3u), moment_at(pixel, 4u));
-    if (mass <= 0.0) {
+    if (mass < LEAST_MASS) {
         return weight;
     }
     let b = sums / mass * (1.0 - MIXED) + vec4<f32>(0.0, 0.375, 0.0, 0.375) * MIXED;
-    return weight * exp(-mass * mass_before(b, moment_place(depth)));
+    let before = mass_before(b, moment_place(depth)) - mass_before(b, moment_place(front_at(pixel)));
+    return weight * exp(-mass * max(before, 0.0));
 }

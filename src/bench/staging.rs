@@ -161,7 +161,11 @@ fn of_file(
         // Gaussians are made of shapes: reading a definition makes sure of it.
         Making::File | Making::Gaussians => {
             let classes = entry.classes.unwrap_or_default();
-            io::read_with(file, ReadOptions { classes, ..ReadOptions::default() }, progress)?
+            let points = io::read_with(file, ReadOptions { classes, ..ReadOptions::default() }, progress)?;
+            if entry.classes.is_some() && points.classes.is_empty() {
+                return Err(Error::malformed(file, "its points have no classes, which LAS files have"));
+            }
+            points
         }
         Making::Points => bare()?,
         Making::Normals => normals()?,

@@ -91,6 +91,12 @@ impl InputFormat {
 impl Reading {
     /// The points of a file.
     pub(super) fn points(&self, path: &Path, bars: &Bars) -> Result<Points> {
+        let points = self.read(path, bars)?;
+        self.check_classes(std::slice::from_ref(&points))?;
+        Ok(points)
+    }
+
+    fn read(&self, path: &Path, bars: &Bars) -> Result<Points> {
         let options = ReadOptions {
             format: self.input.input_format,
             keep_withheld: self.keep_withheld,
@@ -100,12 +106,25 @@ impl Reading {
         io::read_with(path, options, bars)
     }
 
+    /// Fails for opacities of classes if none of the inputs has classes.
+    fn check_classes(&self, inputs: &[Points]) -> Result<()> {
+        let plain = self.class_opacity.is_none_or(|opacities| opacities.are_plain());
+        // Who has no points has no classes.
+        let none = inputs.iter().all(|input| input.classes.is_empty() && !input.positions.is_empty());
+        if plain || !none {
+            return Ok(());
+        }
+        Err(Error::Usage("no input has points with classes, which LAS files have: leave --class-opacity out".into()))
+    }
+
     /// The points of each of several files.
     pub(super) fn all(&self, paths: &[PathBuf], bars: &Bars) -> Result<Vec<Points>> {
         if paths.iter().filter(|path| *path == Path::new("-")).count() > 1 {
             return Err(Error::Usage("standard input can be read once only: name - once".into()));
         }
-        paths.iter().map(|path| self.points(path, bars)).collect()
+        let inputs = paths.iter().map(|path| self.read(path, bars)).collect::<Result<Vec<_>>>()?;
+        self.check_classes(&inputs)?;
+        Ok(inputs)
     }
 
     /// These options as arguments, for a command that reads the same file.
@@ -113,7 +132,8 @@ impl Reading {
         let format = self.input.input_format.and_then(|format| Format::READ.iter().find(|(_, known)| *known == format));
         let format = format.map_or(String::new(), |(name, _)| format!(" --input-format {name}"));
         let withheld = if self.keep_withheld { " --keep-withheld" } else { "" };
-        let classes = self.class_opacity.map_or(String::new(), |opacities| format!(" --class-opacity {opacities}"));
+        let classes = self.class_opacity.filter(|opacities| !opacities.are_plain());
+        let classes = classes.map_or(String::new(), |opacities| format!(" --class-opacity {opacities}"));
         format + withheld + if self.flatten { " --flatten" } else { "" } + &classes
     }
 }

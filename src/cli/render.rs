@@ -135,8 +135,8 @@ pub struct Arguments {
     blend: Option<Blend>,
     /// What shows of the surfaces behind a pixel's nearest one: opaque (nothing; its alpha shows the background), layers (all of
     /// them, from front to back, by the alpha of each), layers:L (the nearest L), sorted (every fragment, in the order of depths, by
-    /// its alpha times its weight) or gaussians (the same by the rules of 2D Gaussian splatting) [default: opaque, of Gaussians
-    /// gaussians]
+    /// its alpha times its weight) or gaussians (the same by the rules of 2D Gaussian splatting); to compare with, weighted or moments
+    /// (about sorted, by sums in any order; splats are lit) [default: opaque, of Gaussians gaussians]
     #[arg(long, value_name = "HOW", help_heading = "Transparency")]
     composite: Option<Composite>,
     /// What all alphas are multiplied with, 0 to 1
@@ -190,7 +190,8 @@ pub struct Arguments {
     #[arg(long, value_name = "R,G,B[,A]", value_parser = parse_color)]
     background: Option<[f32; 4]>,
     /// Maps beside the colour, in an EXR; index names the input and the point that show most, transmittance is what all surfaces of a pixel
-    /// let through and layers how many they are, decision is the reference's distance to the nearest yes-or-no
+    /// let through and layers how many they are, tail what is behind --composite layers:L, surfaces depth and alpha of the nearest eight,
+    /// decision is the reference's distance to the nearest yes-or-no
     #[arg(long, value_name = "MAPS", value_delimiter = ',', value_parser = map_parser())]
     aov: Vec<Map>,
     /// Times, counts and adapter as JSON, to a file or - for stdout

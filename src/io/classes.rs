@@ -40,9 +40,18 @@ impl ClassOpacities {
                 colors.iter_mut().zip(alphas).for_each(|(color, alpha)| color[3] = alpha);
                 Some(Colors::Linear(colors))
             }
-            Some(Colors::Srgb8(mut codes)) => {
+            Some(Colors::Srgb8(mut codes)) if self.0.iter().all(|opacity| is_code(*opacity)) => {
                 codes.iter_mut().zip(alphas).for_each(|(code, alpha)| code[3] = (255.0 * alpha).round() as u8);
                 Some(Colors::Srgb8(codes))
+            }
+            // What a byte has not.
+            Some(Colors::Srgb8(codes)) => {
+                let colors = Colors::Srgb8(codes);
+                let faded = alphas.enumerate().map(|(index, alpha)| {
+                    let [r, g, b, _] = colors.linear(index);
+                    [r, g, b, alpha]
+                });
+                Some(Colors::Linear(faded.collect()))
             }
             None => {
                 let [r, g, b, _] = DEFAULT_COLOR;
@@ -54,10 +63,11 @@ impl ClassOpacities {
     }
 }
 
-/// What the format calls a class.
+/// What the format calls a class; of most, which are cables, pylons and the like, nothing.
 pub fn class_name(class: u8) -> Option<&'static str> {
     Some(match class {
-        0 | 1 => "unclassified",
+        0 => "never classified",
+        1 => "unclassified",
         2 => "ground",
         3 => "low vegetation",
         4 => "medium vegetation",
@@ -89,6 +99,11 @@ impl fmt::Display for ClassOpacities {
         }
         Ok(())
     }
+}
+
+/// Whether an alpha is one of those that a byte has.
+fn is_code(alpha: f32) -> bool {
+    (255.0 * alpha).fract() == 0.0
 }
 
 impl FromStr for ClassOpacities {
@@ -137,6 +152,9 @@ mod tests {
     #[test]
     fn points_get_the_alphas_of_their_classes() {
         let of: ClassOpacities = "3:0.2".parse().unwrap();
+        assert!(is_code(0.2) && !is_code(0.3) && is_code(0.0) && is_code(1.0));
+        let third = "3:0.3".parse::<ClassOpacities>().unwrap().fade(Some(Colors::Srgb8(vec![[255; 4]; 2])), &[2, 3]);
+        assert_eq!(third, Some(Colors::Linear(vec![[1.0; 4], [1.0, 1.0, 1.0, 0.3]])));
         let codes = of.fade(Some(Colors::Srgb8(vec![[1, 2, 3, 255]; 2])), &[2, 3]);
         assert_eq!(codes, Some(Colors::Srgb8(vec![[1, 2, 3, 255], [1, 2, 3, 51]])));
         let [r, g, b, _] = DEFAULT_COLOR;

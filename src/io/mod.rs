@@ -48,7 +48,7 @@ pub struct ReadOptions {
     pub keep_withheld: bool,
     /// Gaussians that are ellipsoids become surfels without their shortest axis, however thick they are.
     pub flatten: bool,
-    /// Opacities by the classes of a laser scan's points, which only LAS files have.
+    /// Opacities by the classes of a laser scan's points; other files than LAS have none.
     pub classes: ClassOpacities,
 }
 
@@ -71,12 +71,6 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
 /// As [`read`].
 pub fn read_with(path: &Path, options: ReadOptions, progress: &dyn Progress) -> Result<Points> {
     let input = Input::open(path, options.format)?;
-    if !options.classes.are_plain() && input.format != Format::Las {
-        return Err(Error::malformed(
-            path,
-            "its points have no classes, which only LAS files have: leave --class-opacity out",
-        ));
-    }
     match input.format {
         Format::Ply => ply::read(input, options.flatten, progress),
         Format::Las => las::read(input, &options, progress),

@@ -20,7 +20,7 @@
 //!   weight, which is rarer than fragments (on a software adapter carries are a fifth of the pass); and the rim of the
 //!   paper's kernel, exp(-6), keeps 23 bits. Where weights may be smaller still, or alphas differ
 //!   ([`SceneNeeds::wide_sums`](crate::plan::SceneNeeds::wide_sums)), terms are those of `fixed64` in two words, which
-//!   takes two additions for most, of 40 bits or, where the kernel's tails need them, up to 56 ([`wide_bits`]). An adapter with 64-bit atomics makes the same sums in half the additions.
+//!   takes two additions for most, of 40 bits or, where the kernel's tails need them, or of order-free sums, far ones that weigh little, up to 56 ([`wide_bits`]). An adapter with 64-bit atomics makes the same sums in half the additions.
 //! - **fixed32**: the same in one word. B fraction bits, `32 - bits(min(surfels, 255))`, are at least 24 and let 255 full
 //!   weights (or all surfels there are) meet in a pixel; a sum that wraps is noticed and the frame rendered again with
 //!   `fixed`. A sum is read with one rounding: `n 2^-B / w + 5 u`.

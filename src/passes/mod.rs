@@ -11,8 +11,9 @@
 //! | [`accumulate`] | splats, nearest depths | [`accumulate::PixelSums`] |
 //! | [`winner`] | splats | the same of the nearest fragment alone |
 //! | [`fragments`] | splats | a list of each pixel's fragments |
-//! | [`tiles`] | large splats, or all | the same two, or the next |
-//! | [`moments`], [`oit`] | splats | [`accumulate::PixelSums`] of all of them |
+//! | [`tiles`] | large splats, or all | the same two, or the image |
+//! | [`moments`] | splats | what those of a pixel hold back, by depth |
+//! | [`oit`] | splats | [`accumulate::PixelSums`] of all of them |
 //! | [`covered`] | nearest depths | the tiles that have anything |
 //! | [`resolve`] | sums | [`Frame`] |
 //! | [`layers`], [`sorted`] | lists | [`Frame`] |
@@ -72,7 +73,7 @@ pub struct Strip<'a> {
     pub splats: Vec<&'a Splat>,
     /// The place of each surfel in the [`order`] in which a device stores them, where a map asks for it.
     pub ranks: Option<&'a [u32]>,
-    /// Where the scene's body starts and past its last surfel, camera-space z, world units.
+    /// Where the scene's body starts and ends ([`depths`](crate::plan::depths)), camera-space z, world units.
     pub depths: [f64; 2],
     /// Its first row.
     pub first_row: u32,

@@ -8,7 +8,7 @@
 //! So what the background shows is exact, and the order shows only by v_i. It should be what lies before the fragment lets through, and is
 //!
 //! - **weighted**: `max((1 - d)^3, 1 / 300,000)` (theirs, Eq. 10, over its greatest value), where d goes from 0 where the scene's body starts
-//!   to 1 past its last surfel. Theirs is between the clip planes, which a scene need not fill;
+//!   to 1 where it ends; what strays lies at the one or the other. Theirs is between the clip planes, which a scene need not fill;
 //! - **moments**: what the moments of all fragments say ([`moments`](super::moments)).
 //!
 //! The product is kept as the sum of `-ln(1 - a_i)`. By the accumulator `fixed` sums are integers, so here too the order of fragments shows
@@ -80,11 +80,15 @@ pub(super) fn visit(strip: &Strip<'_>, mut near: impl FnMut(usize, Intersection)
 /// The twin: the sums of the pixels of `strip`.
 pub fn reference(strip: &Strip<'_>) -> Vec<PixelSums> {
     let Strip { camera, options, rows, depths, .. } = *strip;
-    let [first, farthest] = depths;
-    let moments: Option<Vec<Moments>> = (options.composite == Composite::Moments).then(|| moments::reference(strip));
+    let [first, last] = depths;
+    let moments: Option<Vec<(Moments, f64)>> =
+        (options.composite == Composite::Moments).then(|| moments::reference(strip));
     let before = |f: &Fragment| match &moments {
-        Some(moments) => moments[f.pixel].let_through(moments::place(f.depth, depths)),
-        None => ((farthest - f.depth) / (farthest - first)).clamp(0.0, 1.0).powi(3).max(LEAST_OF_DEPTH),
+        Some(moments) => {
+            let (moments, first) = &moments[f.pixel];
+            moments.let_through(moments::place(f.depth, depths), *first)
+        }
+        None => ((last - f.depth) / (last - first)).clamp(0.0, 1.0).powi(3).max(LEAST_OF_DEPTH),
     };
     let mut decisions = vec![f64::INFINITY; camera.width as usize * rows as usize];
     let mut sums = vec![PixelSums::ZERO; decisions.len()];

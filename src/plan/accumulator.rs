@@ -169,11 +169,14 @@ impl AccumulatorRow {
     }
 }
 
-/// Fraction bits that `fixed64`, and `fixed` where terms may be small, keep of a term in a scene of `surfels` drawn by `kernel`: 40, and of
+/// Fraction bits that `fixed64`, and `fixed` where terms may be small, keep of a term in a scene of `surfels`: 40, and of
 /// kernels that fall below [`LEAST_AT_RIM`] as many as the sums of all surfels leave free of 64, up to 56, so that a pixel of which their
-/// tails alone tell keeps its digits. So does one of which far fragments alone tell, where those weigh less ([`Oit`](super::Oit)).
+/// tails alone tell keeps its digits. So does one of which far fragments alone tell, where those weigh less ([`Oit`](super::Oit)); and as all of a pixel are summed
+/// then, sums have room for every surfel there is.
 pub fn wide_bits(options: &RenderOptions, surfels: u64) -> u32 {
-    if options.kernel.floor() < LEAST_AT_RIM || options.composite.is_order_free() {
+    if options.composite.is_order_free() {
+        surfels.leading_zeros().min(56)
+    } else if options.kernel.floor() < LEAST_AT_RIM {
         surfels.leading_zeros().clamp(40, 56)
     } else {
         40
@@ -199,10 +202,14 @@ mod tests {
     fn wide_bits_leave_room_for_every_surfel_and_24_digits_to_the_least_weight_of_few() {
         let of = |a: f64| RenderOptions { kernel: Kernel::Ellipse { a, n: 3.0, smooth: false }, ..Default::default() };
         let far = RenderOptions { composite: Composite::Weighted, ..of(6.0) };
-        for (surfels, bits) in [(0, 56), (255, 56), (256, 55), (65_535, 48), (1_000_000, 44), (1 << 24, 40)] {
+        for (surfels, bits) in
+            [(0, 56), (255, 56), (256, 55), (65_535, 48), (1_000_000, 44), (1 << 24, 40), (u32::MAX.into(), 40)]
+        {
             assert_eq!(wide_bits(&of(20.0), surfels), bits, "{surfels}");
             assert!(u128::from(surfels) << bits < 1 << 64 || bits == 40);
-            assert_eq!((wide_bits(&far, surfels), wide_bits(&of(6.0), surfels)), (bits, 40));
+            assert_eq!(wide_bits(&of(6.0), surfels), 40);
+            let of_far = wide_bits(&far, surfels);
+            assert!(u128::from(surfels) << of_far < 1 << 64 && (of_far == bits || surfels >= 1 << 24));
         }
     }
 

@@ -51,10 +51,6 @@ pub fn options(options: &RenderOptions, reference: bool) -> Result<()> {
     if options.maps.has(Map::Tail) && !(cut && options.tail == Tail::Sum) {
         return usage("a tail lies behind a last layer: take the map tail with --composite layers:L, and --tail sum");
     }
-    if options.maps.has(Map::Surfaces) && (options.composite == Composite::Opaque || options.composite.is_order_free())
-    {
-        return usage("the map surfaces is of surfaces that are told apart: take --composite layers or sorted with it");
-    }
     if reference {
         return Ok(());
     }
@@ -95,14 +91,14 @@ fn facing(options: &RenderOptions) -> Result<()> {
     }
 }
 
-/// What shows through is drawn from lists of fragments.
+/// What shows through is drawn from lists of fragments, or of sums of all.
 fn composite(options: &RenderOptions, reference: bool) -> Result<()> {
     match options {
         _ if options.blend == Blend::Nearest => {
             usage("--blend nearest shows one fragment, behind which nothing shows: leave --composite out")
         }
+        _ if options.composite.is_order_free() => order_free(options, reference),
         _ if reference => Ok(()),
-        _ if options.composite.is_order_free() => order_free(options),
         RenderOptions { raster: Some(raster), .. } => peeled(options, raster.depth),
         _ if options.accumulator != Accumulator::Fixed => {
             usage("surfaces are composited of sums of the accumulator fixed: leave the accumulator out")
@@ -115,8 +111,12 @@ fn composite(options: &RenderOptions, reference: bool) -> Result<()> {
 }
 
 /// What is summed in any order is scattered, by weights that may be small.
-fn order_free(options: &RenderOptions) -> Result<()> {
+fn order_free(options: &RenderOptions, reference: bool) -> Result<()> {
     match options {
+        _ if options.maps.has(Map::Layers) => {
+            usage("of what is summed in any order no layers are told: leave the map layers out")
+        }
+        _ if reference => Ok(()),
         RenderOptions { raster: Some(_), .. } => {
             usage("the rasteriser sums one surface: take --composite layers:L, or render by compute")
         }
@@ -218,13 +218,13 @@ pub fn chosen(backend: Option<BackendName>, chosen: Chosen) -> Result<()> {
 /// # Errors
 /// [`Error::Usage`].
 pub fn textured(options: &RenderOptions, reference: bool) -> Result<()> {
+    if options.composite != Composite::Opaque {
+        return usage("textures are drawn on the nearest surface alone: leave --composite out");
+    }
     if options.lights_splats() {
         return usage(
             "a texture has many colours in a splat, which are lit pixel by pixel: leave --shading-at splat out",
         );
-    }
-    if options.composite != Composite::Opaque {
-        return usage("textures are drawn on the nearest surface alone: leave --composite out");
     }
     if options.raster.is_some() && !reference {
         return usage("the rasteriser blends no texture coordinates: leave the texture out, or render by compute");
@@ -247,6 +247,13 @@ pub fn scene(facts: &Facts, options: &RenderOptions, reference: bool) -> Result<
         return usage(
             "only surfels whose normals have a side face away, and not all of these do: leave --cull back out, or give \
              normals a side with epsplat surfels",
+        );
+    }
+    // A scene may say how it is composited, so that this is asked where both are known.
+    let told_apart = options.composite != Composite::Opaque && !options.composite.is_order_free();
+    if options.maps.has(Map::Surfaces) && !told_apart {
+        return usage(
+            "the map surfaces is of surfaces that are told apart: take --composite layers, sorted or gaussians with it",
         );
     }
     if facts.encoded && options.shading != Shading::Unlit {

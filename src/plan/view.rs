@@ -64,7 +64,10 @@ impl View {
             None => ([0; 2], [0.0; 4]),
         };
         let (relative, absolute, of_radius) = options.epsilon.parts();
-        let [first, farthest] = depths(facts, camera);
+        let [first, last] = depths(facts, camera);
+        // Past every surfel, with room for the rounding of depths: an epsilon that accepts everything must not make the interval that depths
+        // are measured in infinite, nor coarser than the scene.
+        let farthest = (farthest_of(&facts.bounds, eye_relative, camera) + f64::from(facts.largest_radius)) * 1.001;
         Self {
             rotation,
             rotation_low,
@@ -94,17 +97,24 @@ impl View {
             texture_height,
             epsilon_most: options.epsilon.most().min(LARGEST_FRACTION) as f32,
             first: (first * unit) as f32,
+            last: (last * unit) as f32,
+            padding_0: 0,
+            padding_1: 0,
+            padding_2: 0,
             place,
         }
     }
 }
 
-/// The depth at which the scene's body starts, and one past every surfel, with room for the rounding of depths: an epsilon that accepts
-/// everything must not make the interval that depths are measured in infinite, nor coarser than the scene. World units.
+/// The depths at which the scene's body starts and ends: of the box of its centres, and as far as the largest surfel reaches, but not by
+/// more than a quarter of the box. Its last is greater than its first, and neither depends on what strays. World units.
 pub fn depths(facts: &Facts, camera: &Camera) -> [f64; 2] {
     let eye = camera.eye - facts.origin;
-    let farthest = (farthest_of(&facts.bounds, eye, camera) + f64::from(facts.largest_radius)) * 1.001;
-    [nearest_of(&facts.body, eye, camera).max(camera.near), farthest]
+    let (first, last) = (nearest_of(&facts.body, eye, camera), farthest_of(&facts.body, eye, camera));
+    let reach = f64::from(facts.largest_radius).min(0.25 * facts.body.extent().length());
+    let first = (first - reach).max(camera.near);
+    // Of one depth all are the first.
+    [first, (last + reach).max(first * (1.0 + 1e-6)).max(first + f64::MIN_POSITIVE)]
 }
 
 /// The largest depth of a corner of `bounds`, at least 0; world units.

@@ -10,7 +10,15 @@ use crate::scene::{Composite, Map, Maps, Samples};
 
 /// The options of the renders that one with `options` takes: first that of its colour, then those of maps that it does not make too.
 pub(super) fn parts(facts: &Facts, options: &RenderOptions) -> Vec<RenderOptions> {
-    let opaque = composited(facts, options) == Composite::Opaque;
+    // A map of the surfaces of what is opaque is made apart, as backs are drawn for it that the colour leaves out.
+    let surfaces = options.maps.among(Maps::of(&[Map::Surfaces]));
+    let without = RenderOptions { maps: options.maps.beside(surfaces), ..options.clone() };
+    let opaque = composited(facts, &without) == Composite::Opaque;
+    if opaque && !surfaces.is_empty() {
+        let mut all = parts(facts, &without);
+        all.push(RenderOptions { maps: surfaces, samples: Samples::ONE, ..options.clone() });
+        return all;
+    }
     let decision = options.maps.among(Maps::of(&[Map::Decision]));
     // What a render for maps makes.
     let with = |maps: Maps| RenderOptions { maps: maps.and_all(decision), samples: Samples::ONE, ..options.clone() };

@@ -88,8 +88,8 @@ fn join(all: &mut Points, mut input: Points) {
 fn nothing_to_draw(inputs: usize, preparation: &Preparation) -> String {
     match (inputs, preparation.points) {
         (_, 0) if preparation.unseen > 0 => format!(
-            "the classes of all {} points read have the opacity 0, so there is nothing to draw",
-            preparation.unseen
+            "{} points are left out as their classes have the opacity 0, and {} as they are marked as withheld, so there is nothing to draw",
+            preparation.unseen, preparation.withheld
         ),
         (_, 0) if preparation.withheld > 0 => format!(
             "all of the {} points read are marked as withheld, which is deleted, so there is nothing to draw: \

@@ -229,12 +229,12 @@ fn order_free(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
         stored && !of_words && !needs.copies && !textured && (needs.lit_splats || needs.shading == Shading::Unlit)
     };
     let of = |(step, needs): (usize, &SceneNeeds)| {
-        let maps = [&[][..], &[Map::Transmittance], &[Map::Layers], &[Map::Transmittance, Map::Layers]];
+        let maps = [&[][..], &[Map::Transmittance]];
         SceneNeeds {
             oit: Some([Oit::Weighted, Oit::Moments][step % 2]),
             wide_sums: needs.accumulator == Accumulator::Fixed,
             epsilon: EpsilonForm::All,
-            maps: if needs.samples == Samples::ONE { Maps::of(maps[step / 2 % 4]) } else { Maps::NONE },
+            maps: if needs.samples == Samples::ONE { Maps::of(maps[step / 2 % 2]) } else { Maps::NONE },
             normal: false,
             own_normals: needs.own_normals && needs.lit_splats,
             sides: if needs.sides == Sides::None { Sides::None } else { Sides::Both },

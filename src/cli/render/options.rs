@@ -33,6 +33,11 @@ pub(super) fn options(arguments: &Arguments, format: Format) -> Result<RenderOpt
         let what = "--blend nearest has no tolerance and no weights: leave --epsilon and --kernel out";
         return Err(Error::Usage(what.into()));
     }
+    if arguments.epsilon.is_some() && arguments.composite.is_some_and(Composite::is_order_free) {
+        return Err(Error::Usage(
+            "all fragments are summed, near and far: leave --epsilon out with --composite weighted or moments".into(),
+        ));
+    }
     if arguments.tail.is_some() && !matches!(arguments.composite, Some(Composite::Layers(most)) if most < ALL_LAYERS) {
         return Err(Error::Usage("a tail lies behind a last layer: give --tail with --composite layers:L".into()));
     }

@@ -24,9 +24,9 @@ use super::{Arguments, backend, scene};
 /// Frames that wait for a writer or are in its hands take no more host memory than this, bytes, unless one frame does.
 const MOST_WAITING: u64 = 1 << 30;
 
-/// What a frame takes of host memory on its way to a file, bytes a pixel; each map takes [`MAP`] more.
+/// What a frame takes of host memory on its way to a file, bytes a pixel; each value of a map takes [`VALUE`] more.
 const PIXEL: u64 = 48;
-const MAP: u64 = 24;
+const VALUE: u64 = 8;
 
 /// A view's picture, and what rendering it did.
 #[derive(Serialize)]
@@ -182,7 +182,8 @@ fn check_folder(output: &Path, cameras: &Path) -> Result<()> {
 /// How many threads write frames of so many pixels.
 fn writers(pixels: u64, maps: Maps) -> NonZeroUsize {
     let threads = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
-    let frame = pixels * (PIXEL + MAP * maps.len() as u64);
+    let values: u64 = maps.iter().map(|map| map.width() as u64).sum();
+    let frame = pixels * (PIXEL + VALUE * values);
     let most = usize::try_from(MOST_WAITING / frame.max(1)).unwrap_or(usize::MAX);
     NonZeroUsize::new(threads.min(most)).unwrap_or(NonZeroUsize::MIN)
 }

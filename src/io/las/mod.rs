@@ -124,12 +124,14 @@ fn decode(
         read += count;
         progress.advance(count);
     }
-    let Kept { positions, codes, intensities, classes, counts, withheld, left_out } = kept;
+    let Kept { positions, codes, intensities, classes, counts, left_out } = kept;
     let colors = if format.has_color { color::from_rgb(codes) } else { intensity::grey(&intensities) };
     let colors = read_options.classes.fade(colors, &classes);
-    let unseen = left_out.len() as u64 - withheld;
+    let withheld = left_out.len() as u64;
     let up = Some(Up::Z);
-    Ok(Points { positions, colors, up, classes: counts, withheld, unseen, left_out, ..Points::default() })
+    let mut points = Points { positions, colors, up, classes: counts, withheld, left_out, ..Points::default() };
+    leave_out_unseen(&mut points, &classes, read_options, read);
+    Ok(points)
 }
 
 /// What is kept of the points so far.
@@ -142,25 +144,20 @@ struct Kept {
     classes: Vec<u8>,
     /// Points of each class that are not deleted.
     counts: BTreeMap<u8, u64>,
-    withheld: u64,
     left_out: Vec<u64>,
 }
 
 impl Kept {
-    /// Adds the points of a block, the first of which has the number `first`, but for those that are deleted or unseen.
+    /// Adds the points of a block, the first of which has the number `first`, but for those that are deleted.
     fn take(&mut self, block: &PointData, first: u64, options: &ReadOptions) {
         let mut keeps = Vec::with_capacity(block.len());
         for ((withheld, class), number) in withheld(block).zip(classes(block)).zip(first..) {
-            let deleted = withheld && !options.keep_withheld;
-            let keep = !deleted && options.classes.of(class) > 0.0;
-            self.withheld += u64::from(deleted);
-            if !deleted {
+            let keep = !withheld || options.keep_withheld;
+            if keep {
                 *self.counts.entry(class).or_default() += 1;
-            }
-            if !keep {
+                self.classes.extend((!options.classes.are_plain()).then_some(class));
+            } else {
                 self.left_out.push(number);
-            } else if !options.classes.are_plain() {
-                self.classes.push(class);
             }
             keeps.push(keep);
         }
@@ -175,6 +172,20 @@ impl Kept {
             self.intensities.extend(kept(block.intensity(), &keeps));
         }
     }
+}
+
+/// Leaves out the points of these `classes` whose opacity is 0, of a file of `all` points: what colours mean was decided by all of them.
+fn leave_out_unseen(points: &mut Points, classes: &[u8], options: &ReadOptions, all: u64) {
+    let keep: Vec<bool> = classes.iter().map(|class| options.classes.of(*class) > 0.0).collect();
+    points.unseen = keep.iter().filter(|keep| !**keep).count() as u64;
+    if points.unseen == 0 {
+        return;
+    }
+    let mut deleted = std::mem::take(&mut points.left_out).into_iter().peekable();
+    let mut kept = keep.iter();
+    let is_left_out = |number: &u64| deleted.next_if_eq(number).is_some() || kept.next() == Some(&false);
+    points.left_out = (0..all).filter(is_left_out).collect();
+    points.retain(&keep);
 }
 
 /// The records of a block.

@@ -258,6 +258,7 @@ fn unmapped(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu) 
             depth: weight * front + common::depth_span(&device.view, front) * sum(device.sums.pixel.depth_channel),
             count: device.sums.count(pixel).unwrap() as u32,
             decision: 0.0,
+            ..PixelSums::ZERO
         }
     };
     (0..camera.pixels()).map(of).collect()

@@ -9,7 +9,7 @@
 //!
 //! - **weighted**: `max((1 - d)^3, 1 / 300,000)` (theirs, Eq. 10, over its greatest value), where d goes from 0 where the scene's body starts
 //!   to 1 where it ends; what strays lies at the one or the other. Theirs is between the clip planes, which a scene need not fill;
-//! - **moments**: what the moments of all fragments say ([`moments`](super::moments)).
+//! - **moments**: what the moments of all fragments say ([`moments`]).
 //!
 //! The product is kept as the sum of `-ln(1 - a_i)`. By the accumulator `fixed` sums are integers, so here too the order of fragments shows
 //! nowhere; by `float` and `cas`, which are as others have it, it does.

@@ -1,6 +1,6 @@
 // Stage 4: a pixel's fragments are parted into surfaces, each is blended as the nearest one always is, and they are composited.
 // Twin: src/passes/layers.rs.
-// All loops end, by 1, 6 of src/gpu/loops.rs: 0x76f4e978d250c893
+// All loops end, by 1, 6 of src/gpu/loops.rs: 0x1f99a6bf56939312
 
 override MOST_LAYERS: u32;
 // What follows the last layer is one more.
@@ -86,11 +86,11 @@ fn composite(pixel: u32, out: u32, x: u32, y: u32) -> Shown {
         let weight = sum_at(0u, WEIGHT_CHANNEL);
         let normal = resolve_normal(0u, weight, front);
         let color = shaded(resolve_color(0u, weight), normal, x, y);
-        if (is_last) {
+        if (!is_last) {
+            write_surface(out, shown.layers, surface_depth(0u, weight, front), color.a);
+        } else {
             write_surface(out, shown.layers, front, color.a);
             write_tail(out, shown.transmittance * color.a);
-        } else {
-            write_surface(out, shown.layers, surface_depth(0u, weight, front), color.a);
         }
         shown = with_behind(shown, color);
         while (first < list.y && !is_untold(first, told)) {

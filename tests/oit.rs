@@ -169,9 +169,9 @@ fn the_order_shows_in_sums_of_floats_alone() {
     assert_eq!(shows, 3 * 2 * 2 * 2);
 }
 
-/// However much fragments hold back, what is opaque is opaque and its front shows.
+/// However much fragments hold back, and wherever strays are, what is opaque is opaque and its front shows.
 #[test]
-fn what_is_dense_leaves_no_holes() {
+fn what_is_dense_and_what_strays_leave_no_holes() {
     let Some(backend) = gpu() else { return };
     for composite in BOTH {
         let own = RenderOptions {
@@ -181,15 +181,25 @@ fn what_is_dense_leaves_no_holes() {
             maps: Maps::of(&[Map::Transmittance]),
             ..options(composite)
         };
-        // Two stacks of forty opaque planes, red in front of blue.
-        let of = |k: usize| if k < 40 { (8.0, [1.0, 0.0, 0.0, 1.0]) } else { (30.0, [0.0, 0.0, 1.0, 1.0]) };
-        let (scene, camera) = planes(&(0..80).map(of).collect::<Vec<_>>());
-        for backend in [&backend, &Backend::Reference] {
-            let shown = frame(&scene, &camera, &own, backend);
-            assert!(shown.map(Map::Transmittance).unwrap().iter().all(|left| *left < 1e-6), "{composite:?}");
-            // Of a weight by depth alone red is what nearer planes weigh.
-            let least = if composite == Composite::Moments { 0.99 } else { 0.6 };
-            assert!(shown.color.iter().all(|color| color[3] > 1.0 - 1e-6 && color[0] > least), "{:?}", shown.color[0]);
+        // Two stacks of forty opaque planes, red in front of blue, at as many places, as of few places none strays.
+        let of = |k: usize| {
+            let (depth, color) = if k < 40 { (8.0, [1.0, 0.0, 0.0, 1.0]) } else { (30.0, [0.0, 0.0, 1.0, 1.0]) };
+            (depth + 0.01 * (k % 40) as f32, color)
+        };
+        let (mut scene, camera) = planes(&(0..80).map(of).collect::<Vec<_>>());
+        for stray in [false, true] {
+            if stray {
+                scene.surfels[80].center = [0.0, 5000.0, 1e6];
+                assert_eq!(scene.body().1, 1);
+            }
+            for backend in [&backend, &Backend::Reference] {
+                let shown = frame(&scene, &camera, &own, backend);
+                assert!(shown.map(Map::Transmittance).unwrap().iter().all(|left| *left < 1e-6), "{composite:?}");
+                // Of a weight by depth alone red is what nearer planes weigh.
+                let least = if composite == Composite::Moments { 0.99 } else { 0.6 };
+                let red = |color: &[f32; 4]| color[3] > 1.0 - 1e-6 && color[0] > least;
+                assert!(shown.color.iter().all(red), "{composite:?} {stray}: {:?}", shown.color[0]);
+            }
         }
     }
 }

@@ -90,6 +90,41 @@ fn not_beside(key: &str, given: bool, other: &str) -> Result<(), String> {
 
 impl SceneEntry {
     fn check(&self) -> Result<(), String> {
+        self.check_source()?;
+        self.check_sweeps()?;
+        if self.lookup && (self.texture.is_none() || !self.surfels.samples()) {
+            return Err("lookup: it needs a texture, and surfels that are sampled with texture coordinates".into());
+        }
+        if self.texture.is_some() && !self.surfels.samples() && !self.truth {
+            return Err("texture: it is of a mesh that is sampled, or that rays meet".into());
+        }
+        not_beside("radius", self.radius.is_some() && self.footprint_px.is_some(), "footprint_px")?;
+        not_beside("ortho", self.ortho.is_some() && self.fov.is_some(), "fov")?;
+        if self.eye.is_none() && (self.target.is_some() || self.up.is_some()) {
+            return Err("eye: target and up need it".into());
+        }
+        if self.views == 0 {
+            return Err("views: at least one is needed".into());
+        }
+        sized("size", self.size)?;
+        positive("radius", self.radius)?;
+        positive("noise", self.noise)?;
+        positive("fill", self.fill)?;
+        positive("fov", self.fov)?;
+        if self.opacity.is_some_and(|opacity| !(0.0..=1.0).contains(&opacity)) {
+            return Err("opacity: it is 0 to 1".into());
+        }
+        not_beside(
+            "classes",
+            self.classes.is_some() && (self.shape.is_some() || self.surfels != Making::File),
+            "a shape or surfels",
+        )?;
+        positive("ortho", self.ortho)?;
+        positive("most_fragments", self.most_fragments)
+    }
+
+    /// What surfels are made of, and what is said of that.
+    fn check_source(&self) -> Result<(), String> {
         match (&self.file, &self.shape) {
             (Some(_), Some(_)) => return Err("shape: a scene has either a file or a shape".into()),
             (None, None) => return Err("shape: a scene needs a file or a shape".into()),
@@ -123,12 +158,11 @@ impl SceneEntry {
             (None, Some(_)) if self.count.is_none() => return Err("count: a shape needs its number of surfels".into()),
             (None, Some(_)) => {}
         }
-        if self.lookup && (self.texture.is_none() || !self.surfels.samples()) {
-            return Err("lookup: it needs a texture, and surfels that are sampled with texture coordinates".into());
-        }
-        if self.texture.is_some() && !self.surfels.samples() && !self.truth {
-            return Err("texture: it is of a mesh that is sampled, or that rays meet".into());
-        }
+        Ok(())
+    }
+
+    /// Numbers and sizes that a scene is rendered with, one after the other.
+    fn check_sweeps(&self) -> Result<(), String> {
         for (key, counts) in [("count", &self.count), ("quick_count", &self.quick_count)] {
             let counts = counts.as_ref().map(OneOrMany::values);
             if counts.is_some_and(|c| c.is_empty() || c.iter().any(|c| !(1..=u64::from(u32::MAX)).contains(c))) {
@@ -142,29 +176,7 @@ impl SceneEntry {
             }
             all.into_iter().flatten().try_for_each(|value| positive(key, Some(value)))?;
         }
-        not_beside("radius", self.radius.is_some() && self.footprint_px.is_some(), "footprint_px")?;
-        not_beside("ortho", self.ortho.is_some() && self.fov.is_some(), "fov")?;
-        if self.eye.is_none() && (self.target.is_some() || self.up.is_some()) {
-            return Err("eye: target and up need it".into());
-        }
-        if self.views == 0 {
-            return Err("views: at least one is needed".into());
-        }
-        sized("size", self.size)?;
-        positive("radius", self.radius)?;
-        positive("noise", self.noise)?;
-        positive("fill", self.fill)?;
-        positive("fov", self.fov)?;
-        if self.opacity.is_some_and(|opacity| !(0.0..=1.0).contains(&opacity)) {
-            return Err("opacity: it is 0 to 1".into());
-        }
-        not_beside(
-            "classes",
-            self.classes.is_some() && (self.shape.is_some() || self.surfels != Making::File),
-            "a shape or surfels",
-        )?;
-        positive("ortho", self.ortho)?;
-        positive("most_fragments", self.most_fragments)
+        Ok(())
     }
 }
 

@@ -17,7 +17,8 @@ pub struct SceneNeeds {
     /// How sums are kept on the device.
     pub accumulator: Accumulator,
     /// The accumulator is `fixed` and terms may be small: alphas differ, so that means are divided by a small mean alpha;
-    /// or a fragment's weight may be less than [`SMALL_WEIGHT`]. Then terms keep 40 bits.
+    /// or a fragment's weight may be less than [`SMALL_WEIGHT`], as that of a far one among all of a pixel is. Then terms keep 40 bits or
+    /// more ([`wide_bits`](super::wide_bits)).
     pub wide_sums: bool,
     /// The accumulator is `fixed` and the adapter has 64-bit atomics, which make the same sums in half the additions.
     pub atomics_u64: bool,

@@ -184,6 +184,11 @@ pub fn all_needs() -> Vec<SceneNeeds> {
     all
 }
 
+/// Those of a render that keeps all its splats and draws each by itself.
+fn scattered(needs: &SceneNeeds) -> SceneNeeds {
+    SceneNeeds { tiles: false, gather: false, subgroups: false, cull: false, ..*needs }
+}
+
 /// Those of renders in which surfaces show through each other, a third of what they could be.
 fn listed(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
     let fits = |needs: &&SceneNeeds| {
@@ -209,11 +214,7 @@ fn listed(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
             normal: lit && !needs.lit_splats,
             own_normals: needs.own_normals && lit,
             atomics_u64: false,
-            tiles: false,
-            gather: false,
-            subgroups: false,
-            cull: false,
-            ..*needs
+            ..scattered(needs)
         }
     };
     all.iter().filter(fits).step_by(3).enumerate().map(of).collect()
@@ -238,11 +239,7 @@ fn order_free(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
             normal: false,
             own_normals: needs.own_normals && needs.lit_splats,
             sides: if needs.sides == Sides::None { Sides::None } else { Sides::Both },
-            tiles: false,
-            gather: false,
-            subgroups: false,
-            cull: false,
-            ..*needs
+            ..scattered(needs)
         }
     };
     all.iter().filter(fits).step_by(3).enumerate().map(of).collect()

@@ -8,15 +8,17 @@ use common::bits;
 use common::scenes::{cases, crowded, front, shuffled, sphere, sphere_camera, stack};
 use epsplat::frame::Frame;
 use epsplat::gpu::{Gpu, Sources};
-use epsplat::metrics::DECISION_MARGIN;
+use epsplat::io;
+use epsplat::metrics::{DECISION_MARGIN, compare};
 use epsplat::passes::layers::{Parting, part};
 use epsplat::passes::{Strip, fragments, project};
 use epsplat::plan::{BlendFormat, Facts, Organisation, Raster, RasterDepth, RenderOptions, depths};
 use epsplat::render::{Backend, Renderer, Report, render};
 use epsplat::scene::composite::ALL_LAYERS;
 use epsplat::scene::{
-    Camera, Colors, Composite, Epsilon, Kernel, Map, Maps, Projection, Samples, Scene, Shading, Surfel, Tail,
+    Camera, Colors, Composite, Epsilon, Kernel, Lens, Map, Maps, Projection, Samples, Scene, Shading, Surfel, Tail,
 };
+use epsplat::surfels::build;
 use glam::Vec3;
 
 /// What every way to composite has.
@@ -362,6 +364,37 @@ fn parted(scene: &Scene, camera: &Camera, options: &RenderOptions, parting: Part
 }
 
 /// Depth peeling by the rasteriser shows the layers that lists do, but where a run of fragments is longer than a window; a rasteriser that peels
+/// Where epsilon is of surfels of many sizes, each fragment's own says what a layer that is peeled has: layers have a twin there too.
+#[test]
+fn layers_of_surfels_of_many_sizes_are_peeled_as_their_twin_has_them() {
+    let Some(gpu) = common::gpu().filter(|gpu| gpu.adapter.vertex_storage) else { return };
+    let backend = Backend::gpu(gpu);
+    let path = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/data/bunny.obj"));
+    let scene = build(vec![io::read(path, &()).unwrap()], &()).unwrap().0;
+    let lens = Lens::Fov(45.0);
+    let camera = Camera::framing((160, 160), lens, &scene, Camera::default_near(&scene)).unwrap();
+    let raster = Some(Raster { format: BlendFormat::Rgba32Float, depth: RasterDepth::Exact });
+    for layers in [2, 4] {
+        let of = RenderOptions {
+            composite: Composite::Layers(layers),
+            opacity: 0.5,
+            tail: Tail::None,
+            raster,
+            ..RenderOptions::default()
+        };
+        let peeled = frame(&scene, &camera, &of, &backend);
+        let told = RenderOptions { maps: Maps::of(&[Map::Decision]), ..of.clone() };
+        let error = |of: &RenderOptions| {
+            let twin = frame(&scene, &camera, of, &Backend::Reference);
+            compare(&peeled, &twin).unwrap().rmse_decided.unwrap()
+        };
+        assert!(error(&told) < 1e-6, "{layers}: {}", error(&told));
+        // Lists part by runs.
+        let by_runs = error(&RenderOptions { raster: None, ..told });
+        assert!(by_runs > 1e-5, "{layers}: {by_runs}");
+    }
+}
+
 /// nothing, or too much, does not.
 #[test]
 fn the_rasteriser_peels_what_lists_part() {

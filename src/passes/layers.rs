@@ -42,9 +42,12 @@ pub fn part(
 ) -> (Vec<PixelSums>, f64) {
     let farthest = |depth: f64, radius: f64| options.epsilon.farthest(depth, radius, along);
     let (mut layers, mut decision) = (Vec::new(), f64::INFINITY);
-    // How far each side is told.
+    // How far each side is told: to where its run ends, or as far as the window of each fragment's own epsilon behind the last front reaches.
     let mut told = [f64::NEG_INFINITY; 2];
-    let untold = |f: &Fragment, told: [f64; 2]| f.depth > told[usize::from(f.back)];
+    let untold = |f: &Fragment, told: [f64; 2]| {
+        let told = told[usize::from(f.back)];
+        f.depth > if parting == Parting::Runs { told } else { farthest(told, f.radius) }
+    };
     while let Some(first) = list.iter().position(|f| untold(f, told)) {
         let last = layers.len() >= most as usize;
         if last && tail == Tail::None {
@@ -66,20 +69,21 @@ pub fn part(
             }
             let window = farthest(front.depth, f.radius);
             if number > first {
-                let margins = [end, window].map(|limit| (limit / f.depth - 1.0).abs());
+                let ends = if parting == Parting::Runs { [end, window] } else { [window; 2] };
+                let margins = ends.map(|limit| (limit / f.depth - 1.0).abs());
                 decision = margins.into_iter().fold(decision, f64::min);
             }
-            if f.depth > end {
-                break;
-            }
             if parting == Parting::Runs {
+                if f.depth > end {
+                    break;
+                }
                 end = end.max(farthest(f.depth, f.radius));
             }
             if f.depth <= window {
                 sums.add(f);
             }
         }
-        told[usize::from(front.back)] = end;
+        told[usize::from(front.back)] = if parting == Parting::Runs { end } else { front.depth };
         if last {
             told = [f64::INFINITY; 2];
         }

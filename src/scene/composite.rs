@@ -10,6 +10,8 @@
 //!   `alpha = A sum(w_i a_i) / sum(w_i)`, `colour = A sum(w_i c_i) / sum(w_i)`.
 //!
 //!   Both are divided by the summed weight, so a cloud of alpha 0.5 has the opacity 0.5 however densely it is sampled.
+//!   The summed weight itself is no part of it: it is small between the centres of disks that just meet, and surfaces would have holes there
+//!   (README, "What shows through").
 //! - **sorted** the opacity of one *fragment* at the surfel's centre, which falls off with the kernel: `alpha_i = A w_i a_i`. So a denser
 //!   cloud is more opaque.
 //!

@@ -94,7 +94,7 @@ fn parted(scene: &Scene, camera: &Camera, options: &RenderOptions, parting: Part
     let splats = project::reference_all(scene, camera, options);
     let (splats, rows) = (splats.iter().collect(), camera.height);
     let depths = depths(&Facts::of(scene), camera);
-    let strip = Strip { scene, camera, options, splats, ranks: None, depths, first_row: 0, rows };
+    let strip = Strip { scene, camera, options, splats, corners: &[], ranks: None, depths, first_row: 0, rows };
     let lists = fragments::reference(&strip);
     let count = |list: &fragments::List| {
         part(&list.fragments, (ALL_LAYERS, Tail::None), parting, (options, 1.0)).0.len() as u32

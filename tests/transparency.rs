@@ -355,7 +355,7 @@ fn parted(scene: &Scene, camera: &Camera, options: &RenderOptions, parting: Part
     let splats = project::reference_all(scene, camera, options);
     let (splats, rows) = (splats.iter().collect(), camera.height);
     let depths = depths(&Facts::of(scene), camera);
-    let strip = Strip { scene, camera, options, splats, ranks: None, depths, first_row: 0, rows };
+    let strip = Strip { scene, camera, options, splats, corners: &[], ranks: None, depths, first_row: 0, rows };
     let count = |(pixel, list): (usize, &fragments::List)| {
         let along = camera.along_axis(pixel as u32 % camera.width, pixel as u32 / camera.width);
         part(&list.fragments, (ALL_LAYERS, Tail::None), parting, (options, along)).0.len()

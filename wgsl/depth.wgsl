@@ -3,7 +3,6 @@
 // Twin: src/passes/accumulate.rs, src/passes/resolve.rs.
 
 override DEPTH_CHANNEL: u32;
-override DEPTH_IMAGE: u32;
 
 fn accumulate_depth(pixel: u32, weight: Term, depth: f32, front: f32) {
     add(pixel, DEPTH_CHANNEL, term(weight, (depth - front) / (deepest_accepted(front) - front)));
@@ -13,13 +12,4 @@ fn accumulate_depth(pixel: u32, weight: Term, depth: f32, front: f32) {
 fn surface_depth(pixel: u32, weight: f32, front: f32) -> f32 {
     let mean = sum_at(pixel, DEPTH_CHANNEL) / weight;
     return front + mean * (deepest_accepted(front) - front);
-}
-
-fn write_depth(out: u32, pixel: u32, weight: f32, front: f32) {
-    image[out + DEPTH_IMAGE] = surface_depth(pixel, weight, front) * held.world;
-}
-
-// +inf.
-fn write_no_depth(out: u32) {
-    image[out + DEPTH_IMAGE] = bitcast<f32>(NOTHING ^ held.zero);
 }

@@ -2,17 +2,11 @@
 // that of the scene's depth, not of epsilon. Twin: src/passes/accumulate.rs, src/passes/resolve.rs.
 
 override DEPTH_CHANNEL: u32;
-override DEPTH_IMAGE: u32;
 
 fn accumulate_depth(pixel: u32, weight: Term, depth: f32, front: f32) {
     add(pixel, DEPTH_CHANNEL, term(weight, depth / held.farthest));
 }
 
-fn write_depth(out: u32, pixel: u32, weight: f32, front: f32) {
-    image[out + DEPTH_IMAGE] = sum_at(pixel, DEPTH_CHANNEL) / weight * held.farthest * held.world;
-}
-
-// +inf.
-fn write_no_depth(out: u32) {
-    image[out + DEPTH_IMAGE] = bitcast<f32>(NOTHING ^ held.zero);
+fn surface_depth(pixel: u32, weight: f32, front: f32) -> f32 {
+    return sum_at(pixel, DEPTH_CHANNEL) / weight * held.farthest;
 }

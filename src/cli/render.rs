@@ -10,15 +10,15 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use epsplat::gpu::Gpu;
-use epsplat::io::Texture;
+use epsplat::io::{self, Texture};
 use epsplat::passes::unseen::{Unseen, is_empty};
 use epsplat::plan::{Accumulator, BackendName, BlendFormat, Organisation, RasterDepth};
 use epsplat::render::{Backend, Report, render};
 use epsplat::scene::{
-    Blend, Camera, Composite, Cull, Epsilon, Kernel, Light, MAPS, Map, Outline, PointShape, PointSize, Samples, Scene,
-    Tail,
+    Blend, Camera, Composite, Cull, Epsilon, Join, Kernel, Light, MAPS, Map, Outline, PointShape, PointSize, Samples,
+    Scene, Tail,
 };
-use epsplat::surfels::Preparation;
+use epsplat::surfels::{Preparation, with_triangles};
 use epsplat::{Error, Result, surfels};
 use glam::DVec3;
 use serde::Serialize;
@@ -44,12 +44,20 @@ use super::{note, outputs, write_json};
     epsplat render bunny.obj -o bunny.png --shading phong --light 1,1,1 --light headlight:0.3\n  \
     epsplat render surfels.ply -o painted.png --texture image.png\n  \
     epsplat render bunny.obj -o glass.png --composite layers --opacity 0.5\n  \
+    epsplat render statue.ply -o hall.png --triangles hall.obj\n  \
     epsplat render scan.laz -o top.png --eye 0,0,500 --target 0,0,0 --ortho 300\n  \
     epsplat render scan.laz -o views --cameras transforms.json"
 )]
 pub struct Arguments {
-    #[arg(required = true, help = help_of("Point clouds or meshes"))]
+    #[arg(required_unless_present = "triangles", help = help_of("Point clouds or meshes, which become surfels"))]
     inputs: Vec<PathBuf>,
+    /// Meshes whose triangles are drawn as they are, beside the surfels or alone: .obj or .ply
+    #[arg(long, value_name = "MESH", num_args = 1.., help_heading = "Triangles")]
+    triangles: Vec<PathBuf>,
+    /// What shows where surfels meet triangles: corrected (the nearer one, surfels by the depth that they blend to), nearest (the nearer
+    /// one, surfels by their nearest fragment, as a depth buffer has it) or blended (both, within epsilon) [default: corrected]
+    #[arg(long, value_name = "HOW", requires = "triangles", help_heading = "Triangles")]
+    join: Option<Join>,
     #[command(flatten)]
     reading: Reading,
     #[command(flatten)]
@@ -249,7 +257,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 impl Arguments {
     /// The files that are read, but those of `--cameras`.
     fn files(&self) -> impl Iterator<Item = &PathBuf> {
-        self.inputs.iter().chain(&self.camera).chain(&self.texture)
+        self.inputs.iter().chain(&self.triangles).chain(&self.camera).chain(&self.texture)
     }
 }
 
@@ -294,6 +302,21 @@ struct Outcome<'a> {
 
 /// What all inputs hold, as one scene.
 fn scene(arguments: &Arguments, bars: &Bars) -> Result<(Scene, Preparation)> {
+    let of_surfels = if arguments.inputs.is_empty() { None } else { Some(surfels_of(arguments, bars)?) };
+    if arguments.triangles.is_empty() {
+        return of_surfels.ok_or_else(|| Error::Usage("there is nothing to render: name a file".into()));
+    }
+    let meshes = arguments.triangles.iter().map(|path| io::read_mesh(path, bars)).collect::<Result<Vec<_>>>()?;
+    meshes.iter().flat_map(|mesh| &mesh.notes).for_each(|line| note(line));
+    let (scene, preparation) = of_surfels.unzip();
+    let (scene, of_triangles) = with_triangles(scene, &meshes).map_err(|error| named(error, &arguments.triangles))?;
+    of_triangles.notes().iter().for_each(|line| note(line));
+    let guessed_up = of_triangles.guessed_up;
+    Ok((scene, preparation.unwrap_or_else(|| Preparation { guessed_up, ..Preparation::default() })))
+}
+
+/// The surfels of all inputs.
+fn surfels_of(arguments: &Arguments, bars: &Bars) -> Result<(Scene, Preparation)> {
     let texture = arguments.texture.as_deref().map(Texture::read).transpose()?;
     let inputs = arguments.reading.all(&arguments.inputs, bars)?;
     let mut read = arguments.inputs.iter().zip(&inputs);

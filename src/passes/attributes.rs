@@ -17,11 +17,12 @@ pub const PASS: Pass = Pass {
             pick(needs.normal, pick(needs.curved, "normal_curved.wgsl", "normal_flat.wgsl"), "normal_absent.wgsl"),
             pick(needs.own_normals, "normal_own.wgsl", "normal_plane.wgsl"),
             pick(needs.maps.has(Map::Count), "count.wgsl", "count_absent.wgsl"),
-            match needs.sums_depth() {
+            // Of one fragment nothing is summed.
+            match needs.sums_depth() && needs.winner.is_none() {
                 false => "depth_absent.wgsl",
-                true if needs.winner.is_some() => "depth_nearest.wgsl",
                 true => pick(whole, "depth_whole.wgsl", "depth.wgsl"),
             },
+            pick(needs.maps.has(Map::Depth), "depth_map.wgsl", "depth_map_absent.wgsl"),
             pick(needs.color == ColorNeed::Textured, "texture.wgsl", "texture_absent.wgsl"),
         ];
         files.extend(needs.normal.then_some("normal.wgsl"));

@@ -14,7 +14,8 @@ pub const PASS: Pass = Pass {
     kernels: |_| vec![LIST, ARRANGE],
     constants: |making| {
         // Of peeled layers the last one may be empty.
-        let list_empty = making.options.shows_where_nothing_is() || making.needs.peels.is_some();
+        let needs = making.needs;
+        let list_empty = making.options.shows_where_nothing_is() || needs.peels.is_some() || needs.mesh.is_some();
         vec![("LIST_EMPTY", u32::from(list_empty).into()), ("TILE_ROWS", super::tiles::rows(making.needs).into())]
     },
 };

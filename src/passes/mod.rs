@@ -14,8 +14,9 @@
 //! | [`tiles`] | large splats, or all | the same two, or the image |
 //! | [`moments`] | splats | what those of a pixel hold back, by depth |
 //! | [`oit`] | splats | [`accumulate::PixelSums`] of all of them |
+//! | [`triangles`] | triangles | what the nearest shows of each pixel |
 //! | [`covered`] | nearest depths | the tiles that have anything |
-//! | [`resolve`] | sums | [`Frame`] |
+//! | [`resolve`], [`join`] | sums, what triangles show | [`Frame`] |
 //! | [`layers`], [`sorted`] | lists | [`Frame`] |
 //!
 //! [`index`] makes a map of its own. [`unseen`] says why none of them shows where none does.
@@ -33,6 +34,7 @@ pub mod footprint;
 pub mod fragments;
 pub mod homography;
 pub mod index;
+pub mod join;
 pub mod layers;
 pub mod lit;
 pub mod lowpass;
@@ -48,6 +50,7 @@ pub mod sorted;
 pub mod source;
 pub mod splat;
 pub mod tiles;
+pub mod triangles;
 pub mod unseen;
 pub mod upload;
 pub mod veils;
@@ -60,6 +63,7 @@ use crate::plan::steps::{Stage, Twin};
 use crate::plan::{Lists, Plan, RenderOptions, SceneNeeds};
 use crate::scene::{Camera, Map, Provenance, Scene};
 use splat::Splat;
+use triangles::Corner;
 
 /// What a strip of the reference has for the twin of a pass.
 pub struct Strip<'a> {
@@ -71,6 +75,8 @@ pub struct Strip<'a> {
     pub options: &'a RenderOptions,
     /// Those that may touch its rows.
     pub splats: Vec<&'a Splat>,
+    /// The scene's triangles' corners, as the camera sees them.
+    pub corners: &'a [Corner],
     /// The place of each surfel in the [`order`] in which a device stores them, where a map asks for it.
     pub ranks: Option<&'a [u32]>,
     /// Where the scene's body starts and ends ([`depths`](crate::plan::depths)), camera-space z, world units.
@@ -124,7 +130,7 @@ pub fn finish(frame: &mut Frame, needs: &SceneNeeds, provenance: &Provenance, or
 }
 
 /// The passes whose files every module has.
-const PASSES: [&Pass; 20] = [
+const PASSES: [&Pass; 22] = [
     &shared::PASS,
     &project::PASS,
     &facing::PASS,
@@ -140,7 +146,9 @@ const PASSES: [&Pass; 20] = [
     &attributes::PASS,
     &lit::PASS,
     &covered::PASS,
+    &triangles::PASS,
     &resolve::PASS,
+    &join::PASS,
     &layers::PASS,
     &sorted::PASS,
     &peel::PASS,

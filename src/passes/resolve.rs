@@ -4,7 +4,9 @@ use glam::{DVec3, DVec4};
 use rayon::prelude::*;
 
 use super::accumulate::PixelSums;
-use super::covered;
+use super::triangles::Shown;
+use super::visibility::Nearest;
+use super::{covered, join};
 use crate::frame::Frame;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Kernel, Over, Run, Stage, Twin};
@@ -13,35 +15,77 @@ use crate::scene::maps::SURFACES;
 use crate::scene::options::HIGHLIGHT;
 use crate::scene::{Camera, Colors, Light, MAPS, Map, Samples, Scene, Shading};
 
-/// The twin: resolves `sums`, which start at row `first_row` of the image, into `frame`, which holds just their rows.
+/// The twin: resolves `sums`, which start at row `first_row` of the image, into `frame`, which holds just their rows. Triangles show
+/// beside them if there are any, and then what is nearest of the splats is known too.
 pub fn reference(
     sums: &[PixelSums],
+    (nearest, triangles): (&[Nearest], &[Shown]),
     scene: &Scene,
     camera: &Camera,
     options: &RenderOptions,
     first_row: u32,
     frame: &mut Frame,
 ) {
+    let radius = f64::from(scene.largest_shorter());
     for (pixel, sum) in sums.iter().enumerate() {
         let (x, y) = (pixel as u32 % camera.width, pixel as u32 / camera.width + first_row);
+        let of_splats = (sum.weight > 0.0).then(|| {
+            let (color, normal) = surface(sum, scene, camera, options, (x, y));
+            let (weight, count) = (sum.weight, sum.count);
+            Surface { color, normal, depth: sum.depth / weight, weight, count, decision: sum.decision }
+        });
+        let surface = match triangles.get(pixel) {
+            None => of_splats,
+            Some(triangle) => {
+                let nearest = nearest.get(pixel).map_or(f64::INFINITY, |nearest| nearest.depth);
+                join::joined((sum, of_splats), triangle, (nearest, camera.along_axis(x, y), radius), options)
+            }
+        };
         let background = options.background.map(f64::from);
-        let (mut color, mut depth, mut normal, mut transmittance) = (background, f64::INFINITY, DVec3::ZERO, 1.0);
-        if sum.weight > 0.0 {
-            let of_surface;
-            (of_surface, normal) = surface(sum, scene, camera, options, (x, y));
-            color = over(of_surface, background);
-            transmittance = 1.0 - of_surface[3];
-            depth = sum.depth / sum.weight;
-        }
-        frame.color[pixel] = color.map(|c| c as f32);
+        let nothing = Surface {
+            decision: sum.decision.min(triangles.get(pixel).map_or(f64::INFINITY, |t| t.decision)),
+            ..Surface::NOTHING
+        };
+        let Surface { color, normal, depth, weight, count, decision } = surface.unwrap_or(nothing);
+        let shown = if surface.is_some() { over(color, background) } else { background };
+        frame.color[pixel] = shown.map(|c| c as f32);
         set(frame, pixel, Map::Depth, &[depth]);
         set(frame, pixel, Map::Normal, &normal.to_array());
-        set(frame, pixel, Map::Weight, &[sum.weight]);
-        set(frame, pixel, Map::Count, &[f64::from(sum.count)]);
-        set(frame, pixel, Map::Decision, &[sum.decision]);
-        set(frame, pixel, Map::Transmittance, &[transmittance]);
-        set(frame, pixel, Map::Layers, &[f64::from(u8::from(sum.weight > 0.0))]);
+        set(frame, pixel, Map::Weight, &[weight]);
+        set(frame, pixel, Map::Count, &[f64::from(count)]);
+        set(frame, pixel, Map::Decision, &[decision]);
+        set(frame, pixel, Map::Transmittance, &[1.0 - color[3]]);
+        set(frame, pixel, Map::Layers, &[f64::from(u8::from(surface.is_some()))]);
     }
+}
+
+/// What a pixel shows of one surface.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Surface {
+    /// Straight, lit.
+    pub color: [f64; 4],
+    /// World space, unit.
+    pub normal: DVec3,
+    /// Camera-space z, world units.
+    pub depth: f64,
+    /// Summed; 1 of a triangle.
+    pub weight: f64,
+    /// Fragments; 1 of a triangle.
+    pub count: u32,
+    /// See [`Map::Decision`].
+    pub decision: f64,
+}
+
+impl Surface {
+    /// None.
+    pub const NOTHING: Self = Self {
+        color: [0.0; 4],
+        normal: DVec3::ZERO,
+        depth: f64::INFINITY,
+        weight: 0.0,
+        count: 0,
+        decision: f64::INFINITY,
+    };
 }
 
 /// Sets a pixel of a map, if the frame has that.

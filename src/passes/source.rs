@@ -11,7 +11,7 @@ use super::cull::ball;
 use super::order::order;
 use crate::gpu::layout::BATCH;
 use crate::plan::{ColorNeed, Facts, SceneNeeds, SurfelLayout};
-use crate::scene::{Cap, Colors, Provenance, Scene, Surfel, Texture, copies};
+use crate::scene::{Cap, Colors, Provenance, Scene, Surfel, Texture, Triangles, copies};
 
 /// Surfels, page by page.
 pub trait Source: Send + Sync {
@@ -24,6 +24,11 @@ pub trait Source: Send + Sync {
 
     /// What paints them.
     fn texture(&self) -> Option<&Texture>;
+
+    /// The triangles beside them.
+    fn triangles(&self) -> Option<&Triangles> {
+        None
+    }
 
     /// Which points of which inputs they are, by the numbers that pages give.
     fn provenance(&self) -> Cow<'_, Provenance>;
@@ -66,6 +71,10 @@ macro_rules! leads_to_source {
                 (**self).texture()
             }
 
+            fn triangles(&self) -> Option<&Triangles> {
+                (**self).triangles()
+            }
+
             fn provenance(&self) -> Cow<'_, Provenance> {
                 (**self).provenance()
             }
@@ -106,6 +115,10 @@ impl Source for Scene {
             Colors::Textured(textured) => Some(textured.texture()),
             _ => None,
         }
+    }
+
+    fn triangles(&self) -> Option<&Triangles> {
+        Some(&self.triangles).filter(|triangles| !triangles.is_empty())
     }
 
     fn provenance(&self) -> Cow<'_, Provenance> {

@@ -3,11 +3,14 @@
 use std::ops::Range;
 
 use super::source::{self, Source};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
-use crate::plan::{ColorNeed, Facts, SceneNeeds, SurfelLayout, page_surfels};
+use crate::gpu::layout::QUEUE_START;
+use crate::passes::triangles::CORNER_WORDS;
+use crate::plan::{ColorNeed, Facts, MeshNeeds, SceneNeeds, SurfelLayout, page_surfels};
 use crate::progress::Progress;
+use crate::scene::Triangles;
 use crate::scene::color::SRGB8_TO_LINEAR;
 
 /// Buffers by their names in WGSL.
@@ -85,5 +88,27 @@ pub fn shared(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds) -> Result<Name
         buffer.write(gpu, texels.len(), |range| texels[range].into(), &())?;
         shared.push(("texels", buffer.words()));
     }
+    if let (Some(triangles), Some(mesh)) = (source.triangles(), needs.mesh) {
+        shared.extend(of_triangles(gpu, triangles, &mesh)?);
+    }
     Ok(shared)
+}
+
+/// The buffers of triangles: what they are, and room for their corners and for the large ones.
+fn of_triangles(gpu: &Gpu, triangles: &Triangles, mesh: &MeshNeeds) -> Result<Named> {
+    let filled = |what: &str, words: &[u32]| {
+        let buffer = Buffer::storage(gpu, what, words.len() as u64)?;
+        buffer.write(gpu, words.len(), |range| words[range].into(), &())?;
+        Ok::<_, Error>(buffer)
+    };
+    let (vertices, corners) = (triangles.vertices(), triangles.corners());
+    let queue = corners.len() as u64 + u64::from(QUEUE_START);
+    let seen = vertices.len() as u64 * u64::from(CORNER_WORDS);
+    Ok(vec![
+        ("vertices", filled("vertices of triangles", bytemuck::cast_slice(vertices))?),
+        ("triangles", filled("triangles", bytemuck::cast_slice(corners))?),
+        ("triangle_attributes", filled("attributes of triangles", bytemuck::cast_slice(&mesh.records(triangles)))?),
+        ("corners", Buffer::storage(gpu, "corners of triangles", seen)?),
+        ("large_triangles", Buffer::indirect(gpu, "queue of large triangles", queue)?),
+    ])
 }

@@ -256,6 +256,9 @@ pub fn scene(facts: &Facts, options: &RenderOptions, reference: bool) -> Result<
             "the map surfaces is of surfaces that are told apart: take --composite layers, sorted or gaussians with it",
         );
     }
+    if facts.mesh.triangles > 0 {
+        triangles(options, reference)?;
+    }
     if facts.encoded && options.shading != Shading::Unlit {
         return usage("Gaussians have the colours that pictures of them show, light and all: take --shading unlit");
     }
@@ -272,6 +275,21 @@ pub fn scene(facts: &Facts, options: &RenderOptions, reference: bool) -> Result<
         _ => {}
     }
     if facts.colors == ColorNeed::Textured { textured(options, reference) } else { Ok(()) }
+}
+
+/// Fails for options that triangles do not go with.
+fn triangles(options: &RenderOptions, reference: bool) -> Result<()> {
+    match options {
+        _ if options.composite != Composite::Opaque => {
+            usage("triangles are drawn on the nearest surface alone: leave --composite out, or the triangles")
+        }
+        _ if options.maps.has(Map::Index) => usage("triangles have no points to name: leave the map index out"),
+        _ if reference => Ok(()),
+        RenderOptions { raster: Some(_), .. } => {
+            usage("the rasteriser draws splats alone: leave the triangles out, or render by compute")
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Fails if `adapter` lacks what `needs` ask for.

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::MeshFacts;
 use crate::scene::texture::PlaceRange;
 use crate::scene::{Bounds, Colors, Scene, Surfel, has_copies};
 
@@ -30,6 +31,8 @@ pub struct Facts {
     pub origin: DVec3,
     /// Its surfels.
     pub surfels: u64,
+    /// Its triangles.
+    pub mesh: MeshFacts,
     /// [`Scene::bounds`].
     pub bounds: Bounds,
     /// The box of [`Scene::body`].
@@ -74,6 +77,7 @@ impl Facts {
         Self {
             origin: scene.origin,
             surfels: scene.surfels.len() as u64,
+            mesh: MeshFacts::of(&scene.triangles),
             bounds: scene.bounds(),
             body: scene.body().0,
             core: scene.core(),

@@ -8,6 +8,7 @@ mod cuts;
 mod facts;
 mod fragment;
 pub mod known;
+mod mesh;
 mod needs;
 mod optimisation;
 mod options;
@@ -25,6 +26,7 @@ pub use cuts::{Band, bands, page_surfels};
 pub use facts::{ColorNeed, Facts};
 pub use fragment::{FragmentLayout, KEY_WORDS};
 pub use known::Known;
+pub use mesh::{MeshFacts, MeshNeeds};
 pub use needs::{EpsilonForm, Lists, Oit, SMALL_WEIGHT, SceneNeeds, Sides, Winner, culls_back};
 pub use optimisation::Optimisation;
 pub use options::{BackendName, Organisation, RenderOptions};
@@ -38,6 +40,7 @@ use crate::gpu::adapter::AdapterDescription;
 use crate::gpu::layout::{BATCH, ONE};
 use crate::passes::moments::MOMENT_WORDS;
 use crate::passes::peel::PEELED_WORDS;
+use crate::passes::triangles::TRIANGLE_PIXEL_WORDS;
 use crate::passes::veils::VEIL_WORDS;
 use crate::scene::Camera;
 use known::Listed;
@@ -58,6 +61,8 @@ pub struct Plan {
     pub width: u32,
     /// The rows of samples that buffers hold at a time.
     pub bands: Vec<Band>,
+    /// The scene's triangles.
+    pub mesh: MeshFacts,
     /// Pages that the surfels fill, where each is drawn by itself.
     pub pages: usize,
     /// Pixels that nothing covers differ from 0.
@@ -116,7 +121,8 @@ impl Plan {
         let peeled = if needs.peels.is_some() { PEELED_WORDS } else { 0 };
         let veils = if needs.veils { VEIL_WORDS } else { 0 };
         let moments = if needs.oit == Some(Oit::Moments) { MOMENT_WORDS } else { 0 };
-        let words = sum_words.max(pixel.image_words).max(peeled).max(veils).max(moments);
+        let of_triangles = if needs.mesh.is_some() { TRIANGLE_PIXEL_WORDS } else { 0 };
+        let words = sum_words.max(pixel.image_words).max(peeled).max(veils).max(moments).max(of_triangles);
         let whole = || bands(adapter, camera, needs.samples.down, words, head);
         let bands = known.cuts.clone().map_or_else(whole, Ok)?;
         let several = bands.len() > 1;
@@ -139,8 +145,9 @@ impl Plan {
             one: if needs.wide_sums { 1 << wide_bits(options, facts.surfels) } else { ONE.into() },
             width: camera.width,
             bands,
+            mesh: facts.mesh,
             pages: facts.surfels.div_ceil(page) as usize,
-            lists_empty: options.shows_where_nothing_is() || needs.peels.is_some(),
+            lists_empty: options.shows_where_nothing_is() || needs.peels.is_some() || needs.mesh.is_some(),
             projects_each_band: several && (cull || gather),
             looks_for_slots: cull && (several || !known.slots),
             large_by_tiles: needs.tiles && (looks[0] || known.entries_of(Listed::Large).is_some()),
@@ -159,6 +166,7 @@ impl Plan {
             one: 1,
             width: camera.width,
             bands: cuts::strips(camera, tuning::REFERENCE_ROWS),
+            mesh: facts.mesh,
             pages: 1,
             lists_empty: options.shows_where_nothing_is(),
             projects_each_band: false,

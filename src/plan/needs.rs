@@ -1,12 +1,14 @@
 //! What a scene and its options need, computed once: the only variant key of the kernels.
 
 use super::{
-    Accumulator, ColorNeed, Facts, Optimisation, Organisation, Raster, RasterDepth, RenderOptions, composited, tuning,
+    Accumulator, ColorNeed, Facts, MeshNeeds, Optimisation, Organisation, Raster, RasterDepth, RenderOptions,
+    composited, tuning,
 };
 use crate::gpu::adapter::AdapterDescription;
 use crate::passes::peel;
 use crate::scene::{
-    Blend, Camera, Composite, Cull, Epsilon, KernelShape, LowPass, Map, Maps, PointShape, Projection, Samples, Shading,
+    Blend, Camera, Composite, Cull, Epsilon, Join, KernelShape, LowPass, Map, Maps, PointShape, Projection, Samples,
+    Shading,
 };
 
 /// What exists in this render: it chooses the WGSL files that are joined, and so the bindings, buffers and sums.
@@ -42,6 +44,8 @@ pub struct SceneNeeds {
     pub raster: Option<Raster>,
     /// The nearest fragment alone shows, and how it is found.
     pub winner: Option<Winner>,
+    /// There are triangles beside the splats.
+    pub mesh: Option<MeshNeeds>,
     /// Pixels have lists of their fragments, and what becomes of these.
     pub lists: Option<Lists>,
     /// Every fragment is summed, by what is before it as far as sums in any order tell.
@@ -163,6 +167,13 @@ impl Lists {
     }
 }
 
+/// What the triangles of a scene need, if there are any. Without splats nothing is joined.
+fn mesh(facts: &Facts, options: &RenderOptions) -> Option<MeshNeeds> {
+    let of = facts.mesh;
+    let join = if facts.surfels > 0 { options.join } else { Join::Nearest };
+    (of.triangles > 0).then_some(MeshNeeds { join, normals: of.normals, colored: of.colored, once: false })
+}
+
 /// Terms of at least this weight keep 23 of the 32 bits that `fixed` has, as f32 would.
 pub const SMALL_WEIGHT: f64 = 1.0 / 512.0;
 
@@ -244,6 +255,7 @@ impl SceneNeeds {
             subgroups: false,
             raster: options.raster,
             winner: (!blends).then_some(unblended),
+            mesh: mesh(facts, options),
             lists: if options.raster.is_some() { None } else { lists },
             oit,
             peels,
@@ -301,6 +313,7 @@ impl SceneNeeds {
             copies,
             tiles,
             winner,
+            mesh: picture.mesh.map(|mesh| MeshNeeds { once: long_atomics, ..mesh }),
             atomics_u64: long_atomics && fixed && !copies,
             long_words: adapter.integers_u64 && options.has(Optimisation::LongWords),
             subgroups: tiles && tuning::shares(adapter) && options.has(Optimisation::Sharing),
@@ -315,7 +328,8 @@ impl SceneNeeds {
 
     /// Depths are summed.
     pub fn sums_depth(&self) -> bool {
-        self.maps.has(Map::Depth) || self.maps.has(Map::Surfaces)
+        let compared = self.mesh.is_some_and(|mesh| mesh.join != Join::Nearest);
+        compared || self.maps.has(Map::Depth) || self.maps.has(Map::Surfaces)
     }
 
     /// Fragments have weights: they are summed, or they are the rasteriser's, whose targets hold terms even of one fragment.
@@ -346,6 +360,7 @@ impl SceneNeeds {
             RasterDepth::Exact => "raster-exact",
             RasterDepth::Offset => "raster-offset",
         });
+        let joins = |join| self.mesh.is_some_and(|mesh| mesh.join == join);
         let flags = [
             (self.low_pass == LowPass::Max, "lowpass-max"),
             (self.low_pass == LowPass::Ewa, "lowpass-ewa"),
@@ -375,6 +390,9 @@ impl SceneNeeds {
             (self.oit == Some(Oit::Weighted), "oit-weighted"),
             (self.oit == Some(Oit::Moments), "oit-moments"),
             (self.peels.is_some(), "peels"),
+            (self.mesh.is_some(), "triangles"),
+            (joins(Join::Corrected), "join-corrected"),
+            (joins(Join::Blended), "join-blended"),
             (self.veils, "veils"),
             (self.samples != Samples::ONE, "samples"),
             (self.shading == Shading::Lambert, "lambert"),

@@ -5,8 +5,8 @@ use std::str::FromStr;
 use super::{Accumulator, Optimisation, Raster};
 use crate::error::Error;
 use crate::scene::{
-    Blend, Composite, Cull, Epsilon, Facing, Kernel, Light, LowPass, Map, Maps, Outline, Samples, Shading, ShadingAt,
-    Tail,
+    Blend, Composite, Cull, Epsilon, Facing, Join, Kernel, Light, LowPass, Map, Maps, Outline, Samples, Shading,
+    ShadingAt, Tail,
 };
 
 /// Who renders.
@@ -86,6 +86,8 @@ pub struct RenderOptions {
     pub opacity: f32,
     /// What becomes of the surfaces behind the last layer.
     pub tail: Tail,
+    /// What shows where splats and triangles meet.
+    pub join: Join,
     /// Blending kernel.
     pub kernel: Kernel,
     /// Low-pass filter.
@@ -153,6 +155,7 @@ impl Default for RenderOptions {
             composite: Composite::Opaque,
             opacity: 1.0,
             tail: Tail::Sum,
+            join: Join::Corrected,
             kernel: Kernel::Ellipse { a: 6.0, n: 3.0, smooth: false },
             low_pass: LowPass::None,
             accumulator: Accumulator::Fixed,

@@ -55,6 +55,12 @@ pub enum Over {
     Rare,
     /// A workgroup for each large splat.
     Large,
+    /// An invocation for each vertex of the triangles.
+    Vertices,
+    /// An invocation for each triangle.
+    Triangles,
+    /// A workgroup for each large triangle, as the device counted them.
+    LargeTriangles,
     /// An invocation for each large splat, to list it.
     Listing,
     /// An invocation for each row of the band.
@@ -111,6 +117,8 @@ pub enum Twin {
     Accumulate,
     /// [`oit`](crate::passes::oit): sums.
     Oit,
+    /// [`triangles`](crate::passes::triangles): what they show.
+    Triangles,
     /// [`resolve`](crate::passes::resolve): the image.
     Resolve,
     /// [`layers`](crate::passes::layers): the image, of lists.
@@ -127,6 +135,7 @@ impl Twin {
         match self {
             Self::Project => "project",
             Self::Visibility => "visibility",
+            Self::Triangles => "triangles",
             Self::Accumulate | Self::Oit => "accumulate",
             Self::Resolve | Self::Layers | Self::Sorted => "resolve",
             Self::Map(map) => map.row().name,

@@ -13,7 +13,9 @@ use crate::frame::Frame;
 use crate::passes::asks_for_order;
 use crate::passes::order::order;
 use crate::passes::splat::Splat;
-use crate::passes::{MAP_PASSES, Strip, accumulate, layers, oit, project, resolve, sorted, visibility, winner};
+use crate::passes::{
+    MAP_PASSES, Strip, accumulate, layers, oit, project, resolve, sorted, triangles, visibility, winner,
+};
 use crate::plan::steps::{Step, Twin};
 use crate::plan::{Facts, Plan, RenderOptions, SceneNeeds, depths};
 use crate::progress::Progress;
@@ -38,12 +40,14 @@ pub(super) fn frame(
     let (starts, members) = bin(&splats, &plan);
     let ranks = asks_for_order(&plan.needs).then(|| ranks(scene, facts));
     let depths = depths(facts, camera);
+    let corners = triangles::corners(scene, camera);
     progress.begin("rendering rows", camera.height.into());
     let one = |band: usize| {
         let (first_row, rows) = (plan.bands[band].first, plan.bands[band].rows);
         let splats: Vec<&Splat> =
             members[starts[band]..starts[band + 1]].iter().map(|&index| &splats[index as usize]).collect();
-        let strip = Strip { scene, camera, options, splats, ranks: ranks.as_deref(), depths, first_row, rows };
+        let ranks = ranks.as_deref();
+        let strip = Strip { scene, camera, options, splats, corners: &corners, ranks, depths, first_row, rows };
         let frame = strip_by(&strip, &of_bands[band], &spent);
         let frame =
             if options.samples == Samples::ONE { frame } else { resolve::mean_of_samples(&frame, options.samples) };
@@ -82,7 +86,7 @@ fn twins(plan: &Plan) -> (Vec<Twin>, Vec<Vec<Twin>>) {
 fn strip_by(strip: &Strip<'_>, twins: &[Twin], spent: &Spent) -> Frame {
     let Strip { scene, camera, options, first_row, rows, .. } = *strip;
     let splats = || strip.splats.iter().copied();
-    let (mut nearest, mut sums) = (Vec::new(), Vec::new());
+    let (mut nearest, mut sums, mut shown) = (Vec::new(), Vec::new(), Vec::new());
     let mut frame = Frame::new(&Camera { height: rows, ..camera.clone() }, options.maps);
     for twin in twins {
         spent.timed(twin.pass(), rayon::current_num_threads(), || match twin {
@@ -97,7 +101,10 @@ fn strip_by(strip: &Strip<'_>, twins: &[Twin], spent: &Spent) -> Frame {
             Twin::Oit => sums = oit::reference(strip),
             Twin::Layers => layers::reference(strip, &mut frame),
             Twin::Sorted => sorted::reference(strip, &mut frame),
-            Twin::Resolve => resolve::reference(&sums, scene, camera, options, first_row, &mut frame),
+            Twin::Triangles => shown = triangles::reference(strip),
+            Twin::Resolve => {
+                resolve::reference(&sums, (&nearest, &shown), scene, camera, options, first_row, &mut frame);
+            }
             Twin::Map(map) => {
                 let own = MAP_PASSES.iter().filter(|own| own.map == *map);
                 own.for_each(|own| (own.reference)(strip, &nearest, &mut frame));

@@ -283,6 +283,7 @@ fn over<'a>(gpu: &Gpu, plan: &Plan, store: &'a Store, (band, page): (usize, usiz
         }
         Over::Rare => return counted(of_page.and_then(|page| page.buffer("rare")), QUEUE_GRID.into()),
         Over::Large => return counted(queue(), QUEUE_GRID.into()),
+        Over::LargeTriangles => return counted(store.buffer("large_triangles"), QUEUE_GRID.into()),
         Over::Listing => return counted(queue(), QUEUE_LISTING.into()),
         Over::Covered => return covered(COVERED_GRID),
         Over::CoveredEights => return covered(COVERED_GRID_OF_EIGHTS),
@@ -290,6 +291,8 @@ fn over<'a>(gpu: &Gpu, plan: &Plan, store: &'a Store, (band, page): (usize, usiz
         Over::Slots(_) => of_page.map_or(0, |page| page.slots),
         Over::Batches => of_page.map_or(0, |page| page.batches()),
         Over::Occlusion => plan.bands[band].tiles,
+        Over::Vertices => plan.mesh.vertices,
+        Over::Triangles => plan.mesh.triangles,
         Over::Rows => plan.bands[band].rows.into(),
         Over::Pixels => plan.bands[band].pixels,
         Over::Tiles => {

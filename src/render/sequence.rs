@@ -1,7 +1,7 @@
 //! A frame as a list of steps: the papers' passes in their order.
 
 use crate::passes::{
-    accumulate, cull, fragments, of_maps, oit, peel, project, raster, resolve, tiles, veils, visibility,
+    accumulate, cull, fragments, of_maps, oit, peel, project, raster, resolve, tiles, triangles, veils, visibility,
 };
 use crate::plan::known::Listed;
 use crate::plan::steps::{Look, Part, Stage, Step, Twin};
@@ -18,6 +18,9 @@ pub fn steps(plan: &Plan) -> Vec<Step> {
         }
     }
     for band in 0..plan.bands.len() {
+        if plan.needs.mesh.is_some() {
+            steps.extend(triangles::steps(plan, band).into_iter().map(Step::Stage));
+        }
         match (plan.needs.raster, plan.needs.lists) {
             (Some(_), _) => {}
             (None, Some(_)) => lists(plan, band, &mut steps),

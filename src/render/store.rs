@@ -10,6 +10,7 @@ use crate::gpu::layout::{BATCH, Band as BandUniform, LIST_START, QUEUE_START, Vi
 use crate::passes::moments::MOMENT_WORDS;
 use crate::passes::peel::PEELED_WORDS;
 use crate::passes::tiles::{list_name, list_words};
+use crate::passes::triangles::{NEAREST_TRIANGLE_WORDS, TRIANGLE_PIXEL_WORDS};
 use crate::passes::upload::{self, Uploaded};
 use crate::passes::veils::VEIL_WORDS;
 use crate::passes::{asks_for_order, covered, fragments, visibility};
@@ -18,7 +19,7 @@ use crate::plan::{Band, FragmentLayout, KEY_WORDS, Known, Oit, Plan, Raster, Sce
 use crate::scene::Samples;
 
 /// Names in WGSL of buffers that have another one where kernels write them.
-const ALIASES: [(&str, &str); 10] = [
+const ALIASES: [(&str, &str); 14] = [
     ("projected", "splats"),
     ("queued", "queue"),
     ("listed", "rare"),
@@ -29,6 +30,10 @@ const ALIASES: [(&str, &str); 10] = [
     ("indexed", "image"),
     ("list_starts", "starts"),
     ("told", "peeled"),
+    ("corners_seen", "corners"),
+    ("queued_triangles", "large_triangles"),
+    ("named_triangles", "nearest_triangles"),
+    ("beside", "triangle_pixels"),
 ];
 
 /// Names of buffers that each page has.
@@ -122,6 +127,7 @@ struct Made {
     veils: bool,
     moments: bool,
     peels: bool,
+    mesh: bool,
     raster: Option<(Raster, u32)>,
 }
 
@@ -206,7 +212,8 @@ impl Store {
         let (samples, lists, veils) = (plan.needs.samples, plan.needs.lists.is_some(), plan.needs.veils);
         let moments = plan.needs.oit == Some(Oit::Moments);
         let peels = plan.needs.peels.is_some();
-        let made = Made { width, samples, bands, sum_words, image_words, lists, veils, moments, peels, raster };
+        let mesh = plan.needs.mesh.is_some();
+        let made = Made { width, samples, bands, sum_words, image_words, lists, veils, moments, peels, mesh, raster };
         let fresh = self.made.as_ref() != Some(&made);
         if fresh {
             // The old ones make room first.
@@ -263,6 +270,14 @@ impl Store {
         if plan.needs.peels.is_some() {
             let words = pixels * u64::from(PEELED_WORDS);
             self.frame.insert("peeled", Buffer::storage(gpu, "peeled layers", words)?);
+        }
+        if plan.needs.mesh.is_some() {
+            for (name, what, words) in [
+                ("nearest_triangles", "nearest triangles", NEAREST_TRIANGLE_WORDS),
+                ("triangle_pixels", "pixels of triangles", TRIANGLE_PIXEL_WORDS),
+            ] {
+                self.frame.insert(name, Buffer::storage(gpu, what, pixels * u64::from(words))?);
+            }
         }
         if plan.sum_words > 0 {
             let words = plan.needs.accumulator.row().head_words() + pixels * u64::from(plan.sum_words);

@@ -156,9 +156,10 @@ impl<'a> Framing<'a> {
     /// the scene, as one of a stray point may be, counts by its centre.
     fn largest<const N: usize>(&self, of: Of, f: impl Fn(Disk) -> [f64; N] + Sync) -> [f64; N] {
         let local = |v: DVec3| DVec3::from_array(self.axes.map(|axis| v.dot(axis)));
-        let value = |(index, surfel): (usize, &Surfel)| {
-            let [s, t] = [surfel.s, surfel.t].map(|v| DVec3::from_array(v.map(f64::from)));
-            let p = self.scene.center(index);
+        let value = |index: usize| {
+            let axes = self.scene.surfels.get(index).map_or([[0.0; 3]; 2], |surfel| [surfel.s, surfel.t]);
+            let [s, t] = axes.map(|v| DVec3::from_array(v.map(f64::from)));
+            let p = self.scene.place(index).0;
             let inside = p.cmpge(self.body.min).all() && p.cmple(self.body.max).all();
             let whole = of == Of::Disks && s.length().max(t.length()) <= 2.0 * self.radius;
             let [s, t] = if whole { [local(s), local(t)] } else { [DVec3::ZERO; 2] };
@@ -166,7 +167,7 @@ impl<'a> Framing<'a> {
         };
         let join = |a: [f64; N], b: [f64; N]| std::array::from_fn(|k| a[k].max(b[k]));
         let none = || [f64::NEG_INFINITY; N];
-        self.scene.surfels.par_iter().enumerate().map(|surfel| value(surfel).unwrap_or_else(none)).reduce(none, join)
+        (0..self.scene.places()).into_par_iter().map(|index| value(index).unwrap_or_else(none)).reduce(none, join)
     }
 
     /// Where what is framed ends toward the right, left, bottom and top, as X/Z or X, seen from `eye`.

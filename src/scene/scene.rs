@@ -3,7 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{Cap, Clip, Colors, Provenance, Surfel};
+use super::{Cap, Clip, Colors, Provenance, Surfel, Triangles};
 
 /// The world axis that points up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -69,6 +69,8 @@ pub struct Scene {
     pub oriented: bool,
     /// The surfels close their surfaces and face outward, so that their backs are seen from inside alone.
     pub closed: bool,
+    /// Triangles beside the surfels.
+    pub triangles: Triangles,
     /// The axis a camera without instructions takes as up.
     pub up: Up,
     /// Which points of which inputs the surfels are.
@@ -132,26 +134,39 @@ impl Scene {
         DVec3::from_array(self.surfels[index].center.map(f64::from)) + low
     }
 
-    /// The box of the surfel centres without those few that stray, world units relative to [`Scene::origin`], and how many
-    /// do: a point strays that lies farther from the box of nearly all than sixteen times its longest edge.
-    pub fn body(&self) -> (Bounds, u64) {
-        super::body(self.surfels.len(), |index| self.center(index))
+    /// The surfels and the corners of triangles: how many places the scene has.
+    pub(crate) fn places(&self) -> usize {
+        self.surfels.len() + self.triangles.vertices().len()
     }
 
-    /// The box of the centres that the default view shows, world units relative to [`Scene::origin`], and how many it leaves out: those
+    /// A surfel's centre and radius, or past them a triangle's corner, whose radius is 0; world units relative to [`Scene::origin`].
+    pub(crate) fn place(&self, index: usize) -> (DVec3, f64) {
+        match self.surfels.get(index) {
+            Some(surfel) => (self.center(index), surfel.radius().into()),
+            None => (self.triangles.place(index - self.surfels.len()), 0.0),
+        }
+    }
+
+    /// The box of the surfel centres and the triangles' corners without those few that stray, world units relative to [`Scene::origin`], and how many
+    /// do: a point strays that lies farther from the box of nearly all than sixteen times its longest edge.
+    pub fn body(&self) -> (Bounds, u64) {
+        super::body(self.places(), |index| self.place(index).0)
+    }
+
+    /// The box of the centres and corners that the default view shows, world units relative to [`Scene::origin`], and how many it leaves out: those
     /// that [stray](Self::body), and groups of at most 16 points, and a thousandth of all, that lie farther than a quarter of the
     /// longest edge of the box of nearly all from that box and from all others.
     pub fn framed(&self) -> (Bounds, u64) {
-        super::framed(self.surfels.len(), |index| (self.center(index), self.surfels[index].radius().into()))
+        super::framed(self.places(), |index| self.place(index))
     }
 
-    /// The box of the finite surfel centres, world units relative to [`Scene::origin`]; disks reach past it by up to
+    /// The box of the finite surfel centres and of the triangles' corners, world units relative to [`Scene::origin`]; disks reach past it by up to
     /// [`Scene::largest_radius`].
     pub fn bounds(&self) -> Bounds {
-        Bounds::of((0..self.surfels.len()).into_par_iter().with_min_len(4096).map(|index| self.center(index)))
+        Bounds::of((0..self.places()).into_par_iter().with_min_len(4096).map(|index| self.place(index).0))
     }
 
-    /// A box of nearly all finite surfel centres, in the same space: those few that lie far from all others, as scanners' stray
+    /// A box of nearly all finite surfel centres, or of all corners where there are only triangles, in the same space: those few that lie far from all others, as scanners' stray
     /// points do, do not widen it. Of a sample, the same each time.
     pub fn core(&self) -> Bounds {
         let step = self.surfels.len().div_ceil(CORE_SAMPLE).max(1);

@@ -31,6 +31,7 @@ mod spacing;
 #[cfg(test)]
 mod tests;
 mod texture;
+mod triangles;
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -43,6 +44,7 @@ pub use self::limits::Limits;
 pub use self::orient::Orientation;
 pub use self::preparation::Preparation;
 pub use self::sizes::{Size, Triangle};
+pub use self::triangles::{MeshPreparation, with_triangles};
 
 use self::estimate::RADIUS_RANGE;
 use self::positions::{exponent, power_of_two};

@@ -56,6 +56,7 @@ pub(super) fn options(arguments: &Arguments, format: Format) -> Result<RenderOpt
         composite: arguments.composite.unwrap_or_default(),
         opacity: arguments.opacity,
         tail: arguments.tail.unwrap_or_default(),
+        join: arguments.join.unwrap_or_default(),
         cull: arguments.cull,
         samples: arguments.samples.unwrap_or(SAMPLES),
         facing: facing(arguments),

@@ -1,0 +1,274 @@
+//! Triangles beside splats: corners, the nearest triangle of each pixel, and what it shows there.
+//!
+//! # A triangle at a pixel
+//!
+//! Seen from the image point p, a vertex is the spoke `q = (x, y) - p w`: of one before the near depth (x, y) is its image and w = 1; of
+//! another one (x, y) is `(fx X + cx Z, fy Y + cy Z)` and w = Z, which has no quotient (Olano and Greer 1997). Of each pair of corners
+//! the area `E_k = q_i x q_j` says on which side of their edge p lies, and p is in the triangle if all three say the same. With shares
+//! s_k (1 / Z of what has an image in perspective, else 1) the corners' parts are `E_k s_k / sum E s`, which are the perspective-correct
+//! barycentric coordinates, and the depth is the mean of the corners' by them. Nothing is clipped: what is nearer than the near depth is
+//! so at its pixels.
+//!
+//! **Each pixel belongs to one of two triangles at an edge.** A vertex is seen once, whichever triangles it is of, in doubled f32
+//! arithmetic, and both triangles compute E from its two ends in the same order, so they get the same number, and opposite signs. Where
+//! E is 0, p is taken to lie a little to the right, and then a little below: `dE/dx`, or else `dE/dy`, decides. So the sides of an edge
+//! are told apart whatever is rounded, no crack shows, and nothing is drawn twice. An area of plain f32 serves where it exceeds its
+//! rounding by far, whose sign is that of the doubled one.
+//!
+//! **The nearest** one is an atomic maximum of its depth, as what its bits lack to those of +inf, and of its number: the order of
+//! [`Triangles`](crate::scene::Triangles) depends on no order in files, so neither does any bit of the image.
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use super::Strip;
+use super::resolve::shaded;
+use crate::gpu::layout::{QUEUE_START, TILE};
+use crate::plan::Plan;
+use crate::plan::pass::Pass;
+use crate::plan::steps::{Clear, Kernel, Over, Run, Stage, Twin};
+use crate::scene::{Camera, Projection, Scene};
+
+/// A vertex as the camera sees it. Relative to the point p of the image it is `place - p w`.
+#[derive(Clone, Copy, Debug)]
+pub struct Corner {
+    /// Pixels, times w.
+    pub place: DVec2,
+    /// 1 of what has an image, else the depth.
+    pub w: f64,
+    /// Camera-space z, world units.
+    pub depth: f64,
+    /// What weighs its part of a triangle's pixel beside the part's area.
+    pub share: f64,
+}
+
+impl Corner {
+    /// Whether it has an image.
+    fn is_before(&self, camera: &Camera) -> bool {
+        camera.projection == Projection::Orthographic || self.depth >= camera.near
+    }
+}
+
+/// The twin of the first stage: all corners, in the order of the scene's vertices.
+pub fn corners(scene: &Scene, camera: &Camera) -> Vec<Corner> {
+    let eye = camera.eye - scene.origin;
+    let focal = DVec2::new(camera.fx, camera.fy);
+    let principal = DVec2::new(camera.cx, camera.cy);
+    let corner = |vertex: usize| {
+        let p = camera.rotation * (scene.triangles.place(vertex) - eye);
+        let plane = focal * p.truncate();
+        match camera.projection {
+            Projection::Orthographic => Corner { place: plane + principal, w: 1.0, depth: p.z, share: 1.0 },
+            Projection::Pinhole if p.z >= camera.near => {
+                Corner { place: plane / p.z + principal, w: 1.0, depth: p.z, share: 1.0 / p.z }
+            }
+            Projection::Pinhole => Corner { place: plane + principal * p.z, w: p.z, depth: p.z, share: 1.0 },
+        }
+    };
+    (0..scene.triangles.vertices().len()).into_par_iter().map(corner).collect()
+}
+
+/// What of a triangle is at a point of the image.
+#[derive(Clone, Copy, Debug)]
+pub struct Crossing {
+    /// Camera-space z, world units.
+    pub depth: f64,
+    /// The corners' parts, whose sum is 1.
+    pub parts: [f64; 3],
+    /// It is in the triangle, and not nearer than the near depth.
+    pub hit: bool,
+    /// How far the point is from the nearest edge's line, pixels, negative outside, or relatively from the near depth.
+    pub decision: f64,
+}
+
+/// A triangle, by its corners and their numbers, at the point `p`; `None` where it has no side.
+pub fn crossing(camera: &Camera, of: [Corner; 3], numbers: [u32; 3], p: DVec2) -> Option<Crossing> {
+    let edge = |from: usize, to: usize| {
+        let (from, to, turned) = if numbers[from] < numbers[to] { (from, to, 1.0) } else { (to, from, -1.0) };
+        let [a, b] = [of[from], of[to]].map(|corner| corner.place - p * corner.w);
+        let right = of[to].w * a.y - of[from].w * b.y;
+        let below = of[from].w * b.x - of[to].w * a.x;
+        let area = a.perp_dot(b);
+        let decided = [area, right, below].into_iter().find(|value| *value != 0.0).unwrap_or(0.0);
+        let side = if decided == 0.0 || decided.is_nan() { 0.0 } else { decided.signum() };
+        (turned * area, turned * side, area.abs() / right.hypot(below))
+    };
+    let edges = [edge(1, 2), edge(2, 0), edge(0, 1)];
+    let sides = edges.map(|(_, side, _)| side);
+    let weighed: [f64; 3] = std::array::from_fn(|k| edges[k].0 * of[k].share);
+    let sum: f64 = weighed.iter().sum();
+    if sum == 0.0 || sides.contains(&0.0) {
+        return None;
+    }
+    let parts = weighed.map(|part| part / sum);
+    let depth: f64 = (0..3).map(|k| parts[k] * of[k].depth).sum();
+    let inside = sides.iter().all(|side| *side == sides[0]);
+    // An edge is on the wrong side if it is not on that of the most.
+    let most = sides.iter().sum::<f64>().signum();
+    let distance = edges.map(|(_, side, distance)| side * most * distance).into_iter().fold(f64::INFINITY, f64::min);
+    let beyond = depth / camera.near - 1.0;
+    Some(Crossing { depth, parts, hit: inside && depth >= camera.near, decision: distance.min(beyond) })
+}
+
+/// What triangles show at a pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shown {
+    /// The triangle, by its number.
+    pub triangle: u32,
+    /// Its corners' parts.
+    pub parts: [f64; 3],
+    /// Straight, lit.
+    pub color: [f64; 4],
+    /// World space, unit.
+    pub normal: DVec3,
+    /// Camera-space z, world units; +inf where nothing is.
+    pub depth: f64,
+    /// The smallest distance to a decision: to an edge, pixels, to another depth, relative.
+    pub decision: f64,
+}
+
+impl Shown {
+    /// No triangle.
+    pub const NOTHING: Self = Self {
+        triangle: u32::MAX,
+        parts: [0.0; 3],
+        color: [0.0; 4],
+        normal: DVec3::ZERO,
+        depth: f64::INFINITY,
+        decision: f64::INFINITY,
+    };
+
+    /// With a crossing of another triangle: of one depth the greater number is nearest.
+    fn with(self, triangle: u32, crossing: Crossing) -> Self {
+        let decision = self.decision.min(crossing.decision.abs());
+        if !crossing.hit {
+            return Self { decision, ..self };
+        }
+        let apart = (self.depth.max(crossing.depth) / self.depth.min(crossing.depth) - 1.0).min(f64::MAX);
+        let decision = if self.depth.is_finite() { decision.min(apart) } else { decision };
+        let nearer = crossing.depth < self.depth || (crossing.depth == self.depth && triangle > self.triangle);
+        match nearer {
+            true => Self { triangle, parts: crossing.parts, depth: crossing.depth, decision, ..self },
+            false => Self { decision, ..self },
+        }
+    }
+}
+
+/// How far outside a triangle a point is still looked at to record its distance, pixels.
+const NEARBY: f64 = 1e-3;
+
+/// The twin: what triangles show at the pixels of `strip`.
+pub fn reference(strip: &Strip<'_>) -> Vec<Shown> {
+    let Strip { scene, camera, options, first_row, rows, .. } = *strip;
+    let mut shown = vec![Shown::NOTHING; camera.width as usize * rows as usize];
+    for (number, numbers) in scene.triangles.corners().iter().enumerate() {
+        let of = numbers.map(|vertex| strip.corners[vertex as usize]);
+        let Some([first, last]) = reach(camera, &of, (first_row, rows)) else { continue };
+        for y in first[1]..=last[1] {
+            for x in first[0]..=last[0] {
+                let p = DVec2::new(x.into(), y.into()) + 0.5;
+                let Some(crossing) = crossing(camera, of, *numbers, p) else { continue };
+                if crossing.decision > -NEARBY || crossing.hit {
+                    let pixel = &mut shown[((y - first_row) * camera.width + x) as usize];
+                    *pixel = pixel.with(number as u32, crossing);
+                }
+            }
+        }
+    }
+    for (pixel, shown) in shown.iter_mut().enumerate().filter(|(_, shown)| shown.depth.is_finite()) {
+        let at = (pixel as u32 % camera.width, pixel as u32 / camera.width + first_row);
+        let triangle = shown.triangle as usize;
+        let mean = |values: [f64; 3]| (0..3).map(|k| shown.parts[k] * values[k]).sum::<f64>();
+        let (normals, colors) = (scene.triangles.normals_of(triangle), scene.triangles.colors_of(triangle));
+        let normal = DVec3::from_array(std::array::from_fn(|axis| mean(normals.map(|normal| normal[axis]))));
+        shown.normal = normal.normalize_or_zero();
+        let color = std::array::from_fn(|channel| mean(colors.map(|color| color[channel])));
+        shown.color = shaded(color, shown.normal, camera, options, at);
+    }
+    shown
+}
+
+/// First and last pixel of the rows that a triangle may reach. One that is cut at the near depth may reach all.
+fn reach(camera: &Camera, of: &[Corner; 3], (first_row, rows): (u32, u32)) -> Option<[[u32; 2]; 2]> {
+    let before = of.map(|corner| corner.is_before(camera));
+    let places = of.map(|corner| corner.place);
+    let (low, high) = match before {
+        [true, true, true] => {
+            (places[0].min(places[1]).min(places[2]) - 0.51, places[0].max(places[1]).max(places[2]) - 0.49)
+        }
+        [false, false, false] => return None,
+        _ => (DVec2::NEG_INFINITY, DVec2::INFINITY),
+    };
+    let (top, bottom) = (f64::from(first_row), f64::from(first_row + rows) - 1.0);
+    let first = DVec2::new(low.x.ceil().max(0.0), low.y.ceil().max(top));
+    let last = DVec2::new(high.x.floor().min(f64::from(camera.width) - 1.0), high.y.floor().min(bottom));
+    let pixels = |at: DVec2| at.to_array().map(|value| value as u32);
+    first.cmple(last).all().then(|| [pixels(first), pixels(last)])
+}
+
+/// Words of a pixel's nearest triangle.
+pub const NEAREST_TRIANGLE_WORDS: u32 = 2;
+
+/// Words of what triangles show at a pixel.
+pub const TRIANGLE_PIXEL_WORDS: u32 = 8;
+
+/// Words of a corner.
+pub const CORNER_WORDS: u32 = 8;
+
+/// The pass's kernels, files and constants.
+pub const PASS: Pass = Pass {
+    name: "triangles",
+    files: |needs| {
+        let Some(mesh) = needs.mesh else { return Vec::new() };
+        let corner = match needs.projection {
+            Projection::Pinhole => "corner_pinhole.wgsl",
+            Projection::Orthographic => "corner_orthographic.wgsl",
+        };
+        let nearest = if mesh.once { "triangles_once.wgsl" } else { "triangles_twice.wgsl" };
+        let all = ["corners.wgsl", "triangles.wgsl", "triangles_visibility.wgsl", "triangles_attributes.wgsl"];
+        all.into_iter().chain([corner, nearest]).collect()
+    },
+    kernels: |needs| match needs.mesh {
+        None => Vec::new(),
+        Some(mesh) => {
+            let all = [SEE_CORNERS, DRAW, ARRANGE, DRAW_LARGE, SHADE];
+            all.into_iter().chain([NAME, NAME_LARGE].into_iter().filter(|_| !mesh.once)).collect()
+        }
+    },
+    constants: |making| {
+        let Some(mesh) = making.needs.mesh else { return Vec::new() };
+        vec![
+            ("TRIANGLE_WORDS", mesh.words().into()),
+            ("TRIANGLE_COLORS", mesh.normal_words().into()),
+            ("TRIANGLE_RECORDS", if mesh.colored { 0.0 } else { 12.0 }),
+            ("TRIANGLE_NORMALS", u32::from(mesh.normals).into()),
+            ("TRIANGLE_COLORED", u32::from(mesh.colored).into()),
+        ]
+    },
+};
+
+const SEE_CORNERS: Kernel = Kernel::new("see_corners");
+const DRAW: Kernel = Kernel::new("draw_triangles");
+const ARRANGE: Kernel = Kernel::of("arrange_triangles", [1; 3]);
+const DRAW_LARGE: Kernel = Kernel::of("draw_large_triangles", [TILE, TILE, 1]);
+const NAME: Kernel = Kernel::new("name_triangles");
+const NAME_LARGE: Kernel = Kernel::of("name_large_triangles", [TILE, TILE, 1]);
+const SHADE: Kernel = Kernel::new("shade_triangles");
+
+/// The stages of a band: corners once, the nearest triangle of each pixel, and what it shows.
+pub fn steps(plan: &Plan, band: usize) -> Vec<Stage> {
+    let run = |kernel, over| Run { kernel, over };
+    let once = plan.needs.mesh.is_some_and(|mesh| mesh.once);
+    let mut runs = Vec::new();
+    if band == 0 {
+        runs.push(run(SEE_CORNERS, Over::Vertices));
+    }
+    runs.extend([run(DRAW, Over::Triangles), run(ARRANGE, Over::Once), run(DRAW_LARGE, Over::LargeTriangles)]);
+    if !once {
+        runs.extend([run(NAME, Over::Triangles), run(NAME_LARGE, Over::LargeTriangles)]);
+    }
+    runs.push(run(SHADE, Over::Pixels));
+    let words = plan.bands[band].pixels * u64::from(NEAREST_TRIANGLE_WORDS);
+    let clears = vec![Clear::of("large_triangles", 0, QUEUE_START.into()), Clear::of("nearest_triangles", 0, words)];
+    vec![Stage::new("triangles", band, runs).after(clears).as_twin(Twin::Triangles)]
+}

@@ -1,0 +1,204 @@
+//! Triangles beside a scene's surfels: a second source of what a pixel shows.
+
+use std::cmp::Ordering;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::Bounds;
+use crate::morton;
+
+/// A triangle before it is among others: what its corners have.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Triangle {
+    /// World units relative to the scene's origin, counter-clockwise seen from the front.
+    pub corners: [[f32; 3]; 3],
+    /// Unit normals of the corners; none for those of the triangle's plane.
+    pub normals: Option<[[f32; 3]; 3]>,
+    /// Premultiplied linear colours of the corners.
+    pub colors: [[f32; 4]; 3],
+}
+
+/// Triangles, in an order that depends on what they are alone: by where they are, then by all bits that they have. So the place of one is
+/// its rank wherever two lie at one depth.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Triangles {
+    vertices: Vec<[f32; 3]>,
+    corners: Vec<[u32; 3]>,
+    normals: Vec<[[f32; 3]; 3]>,
+    colors: Vec<[[f32; 4]; 3]>,
+}
+
+/// Cells of the Morton code along an axis.
+const CELLS: f64 = ((1u32 << 21) - 1) as f64;
+
+impl Triangles {
+    /// Those of `triangles` that have three different corners, all finite.
+    ///
+    /// Vertices at one place are one, whichever triangles they are of: what is computed of a vertex is the same number for all of them.
+    /// Normals are kept if any has some; who has none takes those of its plane.
+    pub fn new(triangles: &[Triangle]) -> Self {
+        // Adding +0 makes the two zeros one.
+        let placed = |triangle: &Triangle| triangle.corners.map(|corner| corner.map(|x| x + 0.0));
+        let places = triangles.par_iter().flat_map_iter(placed);
+        let bounds = Bounds::of(places.clone().map(|place| DVec3::from_array(place.map(f64::from))));
+        let mut keyed: Vec<(u64, [u32; 3])> = places
+            .filter(|place| place.iter().all(|x| x.is_finite()))
+            .map(|place| (cell(place, &bounds), place.map(f32::to_bits)))
+            .collect();
+        keyed.par_sort_unstable();
+        keyed.dedup();
+        let number = |place: [f32; 3]| {
+            let found = keyed.binary_search(&(cell(place, &bounds), place.map(f32::to_bits)));
+            found.ok().and_then(|number| u32::try_from(number).ok())
+        };
+        let has_normals = triangles.par_iter().any(|triangle| triangle.normals.is_some());
+        let mut all: Vec<Record> = triangles
+            .par_iter()
+            .filter_map(|triangle| {
+                let [Some(a), Some(b), Some(c)] = placed(triangle).map(number) else { return None };
+                let normals =
+                    if has_normals { triangle.normals.unwrap_or_else(|| facet(triangle)) } else { [[0.0; 3]; 3] };
+                let record = Record { corners: [a, b, c], normals, colors: triangle.colors };
+                (a != b && b != c && c != a).then(|| record.turned())
+            })
+            .collect();
+        all.par_sort_unstable_by(Record::order);
+        let colored = all.par_iter().any(|record| record.colors.iter().any(|color| *color != all[0].colors[0]));
+        Self {
+            vertices: keyed.iter().map(|(_, bits)| bits.map(f32::from_bits)).collect(),
+            corners: all.iter().map(|record| record.corners).collect(),
+            normals: if has_normals { all.iter().map(|record| record.normals).collect() } else { Vec::new() },
+            colors: all.iter().take(if colored { all.len() } else { 1 }).map(|record| record.colors).collect(),
+        }
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.corners.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.corners.is_empty()
+    }
+
+    /// The different places of corners, world units relative to the scene's origin.
+    pub fn vertices(&self) -> &[[f32; 3]] {
+        &self.vertices
+    }
+
+    /// The vertices of each triangle, of which the first has the lowest number.
+    pub fn corners(&self) -> &[[u32; 3]] {
+        &self.corners
+    }
+
+    /// The unit normals of each triangle's corners; empty where all have those of their planes.
+    pub fn normals(&self) -> &[[[f32; 3]; 3]] {
+        &self.normals
+    }
+
+    /// The premultiplied linear colours of each triangle's corners; or of all, if there is one record.
+    pub fn colors(&self) -> &[[[f32; 4]; 3]] {
+        &self.colors
+    }
+
+    /// The place of a vertex, world units relative to the scene's origin.
+    pub fn place(&self, vertex: usize) -> DVec3 {
+        DVec3::from_array(self.vertices[vertex].map(f64::from))
+    }
+
+    /// The unit normals at the corners of a triangle.
+    pub fn normals_of(&self, triangle: usize) -> [DVec3; 3] {
+        match self.normals.get(triangle) {
+            Some(normals) => normals.map(|normal| DVec3::from_array(normal.map(f64::from))),
+            None => {
+                let [a, b, c] = self.corners[triangle].map(|vertex| self.place(vertex as usize));
+                [(b - a).cross(c - a).normalize_or_zero(); 3]
+            }
+        }
+    }
+
+    /// The premultiplied linear colours at the corners of a triangle.
+    pub fn colors_of(&self, triangle: usize) -> [[f64; 4]; 3] {
+        let of = if self.colors.len() == self.corners.len() { triangle } else { 0 };
+        self.colors[of].map(|color| color.map(f64::from))
+    }
+}
+
+/// The Morton code of where `place` lies in `bounds`.
+fn cell(place: [f32; 3], bounds: &Bounds) -> u64 {
+    let extent = bounds.extent().max_element();
+    let scale = if extent > 0.0 { CELLS / extent } else { 0.0 };
+    let at = (DVec3::from_array(place.map(f64::from)) - bounds.min) * scale;
+    morton::code(at.to_array().map(|x| x as u64))
+}
+
+/// The normal of the triangle's plane at all its corners.
+fn facet(triangle: &Triangle) -> [[f32; 3]; 3] {
+    let [a, b, c] = triangle.corners.map(|corner| DVec3::from_array(corner.map(f64::from)));
+    [(b - a).cross(c - a).normalize_or_zero().as_vec3().to_array(); 3]
+}
+
+/// A triangle by the numbers of its vertices.
+struct Record {
+    corners: [u32; 3],
+    normals: [[f32; 3]; 3],
+    colors: [[f32; 4]; 3],
+}
+
+impl Record {
+    /// The same triangle from its lowest vertex on.
+    fn turned(self) -> Self {
+        let lowest = (0..3).min_by_key(|&k| self.corners[k]).unwrap_or(0);
+        let turn = |k: usize| (lowest + k) % 3;
+        Self {
+            corners: std::array::from_fn(|k| self.corners[turn(k)]),
+            normals: std::array::from_fn(|k| self.normals[turn(k)]),
+            colors: std::array::from_fn(|k| self.colors[turn(k)]),
+        }
+    }
+
+    fn order(&self, other: &Self) -> Ordering {
+        let normals = |record: &Self| record.normals.map(|normal| normal.map(f32::to_bits));
+        let colors = |record: &Self| record.colors.map(|color| color.map(f32::to_bits));
+        (self.corners.cmp(&other.corners))
+            .then_with(|| normals(self).cmp(&normals(other)))
+            .then_with(|| colors(self).cmp(&colors(other)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn triangle(k: usize) -> Triangle {
+        let at = |n: usize| [n % 5, n / 5 % 5, n % 3].map(|x| x as f32);
+        Triangle { corners: [at(k), at(k + 1), at(k + 7)], normals: None, colors: [[k as f32, 0.0, 0.0, 1.0]; 3] }
+    }
+
+    #[test]
+    fn order_and_turn_show_nowhere() {
+        let given: Vec<_> = (0..100).map(triangle).collect();
+        let mut other: Vec<_> = given.iter().rev().copied().collect();
+        other.iter_mut().for_each(|triangle| triangle.corners.rotate_left(1));
+        let made = Triangles::new(&given);
+        assert_eq!(made, Triangles::new(&other));
+        assert!(made.len() > 50 && made.vertices().len() <= 75);
+        // Turned over it is another triangle.
+        other[7].corners.swap(0, 1);
+        assert_ne!(made, Triangles::new(&other));
+    }
+
+    #[test]
+    fn what_is_no_triangle_is_left_out() {
+        let corners = [[0.0, -0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let of = |corners| Triangle { corners, ..triangle(0) };
+        let [a, b, c] = corners;
+        let made =
+            Triangles::new(&[of(corners), of([a, b, a]), of([a, [0.0; 3], c]), of([a, b, [f32::NAN, 0.0, 0.0]])]);
+        assert_eq!((made.len(), made.vertices().len()), (1, 3));
+        assert_eq!(made.normals_of(0), [DVec3::Z; 3]);
+        assert!(Triangles::new(&[]).is_empty());
+    }
+}

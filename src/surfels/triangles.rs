@@ -1,0 +1,114 @@
+//! From meshes to the triangles of a scene, as they are.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::{LARGEST_COORDINATE, guess_up, origin_for, unit};
+use crate::io::Mesh;
+use crate::scene::color::DEFAULT_COLOR;
+use crate::scene::{Bounds, SMALLEST_SCENE, Scene, Triangle, Triangles};
+use crate::{Error, Result};
+
+/// What was done to meshes on the way to a scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct MeshPreparation {
+    /// Triangles of all meshes.
+    pub given: u64,
+    /// Those in the scene.
+    pub triangles: u64,
+    /// Left out because a coordinate is not finite or exceeds [`LARGEST_COORDINATE`].
+    pub dropped_non_finite: u64,
+    /// Left out because two corners are at one place, as f32 coordinates have it.
+    pub dropped_degenerate: u64,
+    /// Those with a colour that was not finite, which became [`DEFAULT_COLOR`], or an alpha that was not from 0 to 1, which became the
+    /// nearer of the two.
+    pub replaced_colors: u64,
+    /// Nobody says which way is up, so it was guessed.
+    pub guessed_up: bool,
+}
+
+impl MeshPreparation {
+    /// What a user should hear of: a sentence for everything that was lost or replaced.
+    pub fn notes(&self) -> Vec<String> {
+        let counted = |count: u64, what: &str| (count > 0).then(|| format!("{count} triangles {what}"));
+        [
+            counted(self.dropped_non_finite, "left out: a coordinate is not finite or too large"),
+            counted(self.dropped_degenerate, "left out: two of their corners are at one place"),
+            counted(self.replaced_colors, "had a colour that is none, or an alpha beyond 0 to 1, which was replaced"),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
+    }
+}
+
+/// `scene` with the triangles of `meshes` beside its surfels, or a scene of them alone. Triangles have the colours of their corners, and
+/// their normals, or those of their planes where there are none.
+///
+/// # Errors
+///
+/// [`Error::EmptyScene`] if no mesh has a usable triangle, [`Error::Usage`] for a mesh whose parts do not fit each other.
+pub fn with_triangles(scene: Option<Scene>, meshes: &[Mesh]) -> Result<(Scene, MeshPreparation)> {
+    meshes.iter().try_for_each(Mesh::check)?;
+    let place = |mesh: &Mesh, vertex: u32| DVec3::from_array(mesh.positions[vertex as usize]);
+    let usable = |mesh: &Mesh, corners: &[u32; 3]| {
+        corners.iter().all(|&vertex| place(mesh, vertex).abs().cmple(DVec3::splat(LARGEST_COORDINATE)).all())
+    };
+    let places = |mesh: &Mesh| {
+        let of = mesh.triangles.par_iter().filter(|corners| usable(mesh, corners));
+        Bounds::of(of.flat_map_iter(|corners| corners.map(|vertex| place(mesh, vertex))))
+    };
+    let bounds = meshes.iter().map(places).fold(Bounds::EMPTY, Bounds::union);
+    let mut preparation = MeshPreparation::default();
+    let mut scene = scene.unwrap_or_else(|| {
+        let given = meshes.iter().find_map(|mesh| mesh.up);
+        preparation.guessed_up = given.is_none();
+        let up = given.unwrap_or_else(|| guess_up(&bounds));
+        Scene { origin: origin_for(&bounds), oriented: true, up, ..Scene::default() }
+    });
+    let mut all = Vec::new();
+    for mesh in meshes {
+        preparation.given += mesh.triangles.len() as u64;
+        let of = mesh.triangles.par_iter().enumerate().filter(|(_, corners)| usable(mesh, corners));
+        let made: Vec<(Triangle, bool)> = of.map(|(index, _)| triangle(mesh, index, scene.origin)).collect();
+        preparation.dropped_non_finite += (mesh.triangles.len() - made.len()) as u64;
+        preparation.replaced_colors += made.iter().filter(|(_, replaced)| *replaced).count() as u64;
+        all.extend(made.into_iter().map(|(triangle, _)| triangle));
+    }
+    scene.triangles = Triangles::new(&all);
+    preparation.triangles = scene.triangles.len() as u64;
+    preparation.dropped_degenerate = all.len() as u64 - preparation.triangles;
+    if scene.triangles.is_empty() {
+        return Err(Error::EmptyScene(format!(
+            "there are no triangles that have an area and finite corners, of {} in the mesh",
+            preparation.given
+        )));
+    }
+    let size = scene.bounds().extent().max_element();
+    if size < SMALLEST_SCENE {
+        return Err(Error::EmptyScene(format!(
+            "the scene is {size:.1e} world units wide, and scenes of {SMALLEST_SCENE:e} to {LARGEST_COORDINATE:e} are drawn: scale it"
+        )));
+    }
+    Ok((scene, preparation))
+}
+
+/// A triangle relative to `origin`, and whether a colour of it was replaced.
+fn triangle(mesh: &Mesh, index: usize, origin: DVec3) -> (Triangle, bool) {
+    let corners = mesh.triangles[index].map(|vertex| DVec3::from_array(mesh.positions[vertex as usize]) - origin);
+    let facet = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero().as_vec3();
+    let normals =
+        mesh.normals.as_ref().map(|normals| normals[index].map(|normal| unit(normal).unwrap_or(facet).to_array()));
+    let mut replaced = false;
+    let mut color = |weights: DVec3| {
+        let given = mesh.color_at(index, weights);
+        let sound = given.iter().all(|value| value.is_finite());
+        let [r, g, b, alpha] = if sound { given } else { DEFAULT_COLOR };
+        let within = alpha.clamp(0.0, 1.0);
+        replaced |= !sound || within != alpha;
+        // Adding +0 makes the two zeros one.
+        [r * within, g * within, b * within, within].map(|value| value + 0.0)
+    };
+    let colors = [DVec3::X, DVec3::Y, DVec3::Z].map(&mut color);
+    (Triangle { corners: corners.map(|corner| corner.as_vec3().to_array()), normals, colors }, replaced)
+}

@@ -1,0 +1,27 @@
+// A corner of triangles as the pinhole camera sees it. Same interface as corner_orthographic.wgsl. Twin: src/passes/triangles.rs.
+
+// Before the near depth a corner is its image, and what it shares of a depth is one over its own; else it is its homogeneous image, which
+// has no quotient, and shares as it is.
+fn corner_of(p: array<Double, 3>) -> Corner {
+    let depth = p[2].high;
+    if (depth >= held.near) {
+        return Corner(image_of(p[0], p[2], 0u), image_of(p[1], p[2], 1u), single(1.0), depth, 1.0 / depth);
+    }
+    return Corner(homogeneous_of(p[0], p[2], 0u), homogeneous_of(p[1], p[2], 1u), p[2], depth, 1.0);
+}
+
+fn homogeneous_of(position: Double, depth: Double, axis: u32) -> Double {
+    let focal = Double(held.intrinsics[axis], held.intrinsics_low[axis]);
+    let principal = Double(held.intrinsics[axis + 2u], held.intrinsics_low[axis + 2u]);
+    return sum(product(focal, position), product(principal, depth));
+}
+
+// Whether the corner has an image.
+fn is_before(corner: Corner) -> bool {
+    return corner.depth >= held.near;
+}
+
+// What times the corner's place gives its homogeneous image.
+fn homogeneous_depth(corner: Corner) -> f32 {
+    return select(1.0, corner.depth, is_before(corner));
+}

@@ -1,0 +1,37 @@
+// Triangles, their first stage: every vertex becomes a corner, once, whichever triangles it is of. One invocation a vertex.
+// Twin: src/passes/triangles.rs.
+// All loops end, by 1 of src/gpu/loops.rs: 0xcdeb0cd2d7a6dd5f
+
+// Three words a vertex, world units relative to the scene's origin.
+@group(0) @binding(52) var<storage, read> vertices: array<f32>;
+@group(0) @binding(53) var<storage, read_write> corners_seen: array<Corner>;
+
+// A vertex in the image. Relative to the point p of the image it is (x, y) - p w, and that is what its triangles' edges are made of.
+struct Corner {
+    x: Double,
+    y: Double,
+    w: Double,
+    // Camera-space z, device units.
+    depth: f32,
+    // What weighs its part of a triangle's pixel beside the part's area.
+    share: f32,
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn see_corners(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    hold_view();
+    let vertex = linear_index(workgroup, workgroups, local);
+    if (vertex >= arrayLength(&corners_seen)) {
+        return;
+    }
+    var relative: array<Double, 3>;
+    for (var i = 0u; i < 3u; i++) {
+        let d = two_sum(vertices[3u * vertex + i] * held.unit, -held.eye[i]);
+        relative[i] = quick_two_sum(d.high, d.low - held.eye_low[i]);
+    }
+    corners_seen[vertex] = corner_of(rotate(relative));
+}

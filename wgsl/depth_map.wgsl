@@ -1,0 +1,10 @@
+override DEPTH_IMAGE: u32;
+
+fn write_depth(out: u32, depth: f32) {
+    image[out + DEPTH_IMAGE] = depth * held.world;
+}
+
+// +inf.
+fn write_no_depth(out: u32) {
+    image[out + DEPTH_IMAGE] = bitcast<f32>(NOTHING ^ held.zero);
+}

@@ -1,0 +1,3 @@
+fn write_depth(out: u32, depth: f32) {}
+
+fn write_no_depth(out: u32) {}

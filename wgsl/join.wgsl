@@ -1,0 +1,32 @@
+// What shows of a pixel's splats and its triangles (Tien 2008, section 5.3). Twin: src/passes/join.rs.
+
+// As triangles_attributes.wgsl left them.
+@group(0) @binding(62) var<storage, read> beside: array<TrianglePixel>;
+
+// The nearer of the two, or of one depth the triangle.
+fn joined(splats: Surface, pixel: u32, front: f32) -> Surface {
+    let triangle = beside[pixel];
+    let share = share_of_splats(splats, triangle.depth, front);
+    if (triangle.depth == 0.0 || share == 1.0) {
+        return splats;
+    }
+    let of_triangle = Surface(triangle.color, triangle.normal, triangle.depth, 1.0, true, true);
+    if (share == 0.0) {
+        return of_triangle;
+    }
+    return mean_of(splats, of_triangle, share);
+}
+
+fn mean_of(splats: Surface, triangle: Surface, share: f32) -> Surface {
+    let alpha = mix(triangle.color.a, splats.color.a, share);
+    let color = mix(triangle.color.rgb * triangle.color.a, splats.color.rgb * splats.color.a, share);
+    let normal = mix(triangle.normal, splats.normal, share);
+    return Surface(
+        vec4<f32>(select(vec3<f32>(0.0), color / alpha, alpha > 0.0), alpha),
+        normal * inverseSqrt(max(dot(normal, normal), 1e-12)),
+        mix(triangle.depth, splats.depth, share),
+        splats.weight,
+        true,
+        false,
+    );
+}

@@ -1,0 +1,83 @@
+// Triangles, their attribute pass: what the nearest one of each pixel shows there. One invocation a pixel. Twin: src/passes/triangles.rs.
+// All loops end, by 1 of src/gpu/loops.rs: 0xd4eb3f2cd29984a2
+
+// Two words a pixel: the nearest triangle's number, and its depth.
+@group(0) @binding(59) var<storage, read> named_triangles: array<u32>;
+// A record a triangle: its corners' normals, if it has some, then their premultiplied colours. If all have one colour, that is before the
+// records, and in none.
+@group(0) @binding(60) var<storage, read> triangle_attributes: array<f32>;
+@group(0) @binding(61) var<storage, read_write> triangle_pixels: array<TrianglePixel>;
+
+// What triangles show at a pixel, shaded.
+struct TrianglePixel {
+    // Straight.
+    color: vec4<f32>,
+    // World space, unit.
+    normal: vec3<f32>,
+    // Camera-space z, device units; 0 where nothing is.
+    depth: f32,
+}
+
+// Words of a record; of its normals; and before the first one.
+override TRIANGLE_WORDS: u32;
+override TRIANGLE_COLORS: u32;
+override TRIANGLE_RECORDS: u32;
+override TRIANGLE_NORMALS: bool;
+override TRIANGLE_COLORED: bool;
+
+fn vertex_at(number: u32) -> vec3<f32> {
+    return vec3<f32>(vertices[3u * number], vertices[3u * number + 1u], vertices[3u * number + 2u]);
+}
+
+fn triangle_vector(word: u32) -> vec3<f32> {
+    return vec3<f32>(triangle_attributes[word], triangle_attributes[word + 1u], triangle_attributes[word + 2u]);
+}
+
+// World space, as long as it comes.
+fn normal_of_triangle(number: u32, triangle: Triangle, parts: vec3<f32>) -> vec3<f32> {
+    if (!TRIANGLE_NORMALS) {
+        let a = vertex_at(triangle.numbers.x);
+        return cross((vertex_at(triangle.numbers.y) - a) * held.unit, (vertex_at(triangle.numbers.z) - a) * held.unit);
+    }
+    let first = TRIANGLE_RECORDS + number * TRIANGLE_WORDS;
+    let mean = parts.x * triangle_vector(first) + parts.y * triangle_vector(first + 3u);
+    return mean + parts.z * triangle_vector(first + 6u);
+}
+
+fn color_of_triangle(number: u32, parts: vec3<f32>) -> vec4<f32> {
+    let first = select(0u, number * TRIANGLE_WORDS + TRIANGLE_COLORS, TRIANGLE_COLORED);
+    var mean = vec4<f32>(0.0);
+    for (var corner = 0u; corner < 3u; corner++) {
+        let word = first + 4u * corner;
+        mean += parts[corner] * vec4<f32>(triangle_vector(word), triangle_attributes[word + 3u]);
+    }
+    return mean;
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn shade_triangles(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    hold();
+    let pixel = linear_index(workgroup, workgroups, local);
+    if (pixel >= band_pixels()) {
+        return;
+    }
+    if (named_triangles[2u * pixel + 1u] == 0u) {
+        triangle_pixels[pixel] = TrianglePixel(vec4<f32>(0.0), vec3<f32>(0.0), 0.0);
+        return;
+    }
+    let number = named_triangles[2u * pixel];
+    let x = pixel % held.width;
+    let y = pixel / held.width + held_band.first_row;
+    let triangle = triangle_at(number);
+    let crossed = cross_precisely(triangle, vec2<f32>(f32(x), f32(y)) + 0.5);
+    // Lengths of facets are squares of small ones.
+    let long = normal_of_triangle(number, triangle, crossed.parts);
+    let scaled = long / max(max(abs(long.x), abs(long.y)), max(abs(long.z), 1e-38));
+    let normal = scaled * inverseSqrt(max(dot(scaled, scaled), 1e-12));
+    let color = shaded(color_of_triangle(number, crossed.parts), normal, x, y);
+    triangle_pixels[pixel] = TrianglePixel(color, normal, crossed.depth);
+}

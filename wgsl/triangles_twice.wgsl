@@ -1,0 +1,40 @@
+// The nearest triangle of a pixel, its depth first and, in a second pass over the fragments, its number. Both passes evaluate the same
+// crossing, so a nearest fragment has the very bits of the depth that it left. Same interface as triangles_once.wgsl.
+
+// Cleared: nothing anywhere. A number, then a depth.
+@group(0) @binding(58) var<storage, read_write> nearest_triangles: array<atomic<u32>>;
+
+// The pass that keeps numbers.
+var<private> names: bool;
+
+fn keep_triangle(pixel: u32, kept: u32, number: u32) {
+    if (names) {
+        if (kept == atomicLoad(&nearest_triangles[2u * pixel + 1u])) {
+            atomicMax(&nearest_triangles[2u * pixel], number);
+        }
+    } else if (kept > atomicLoad(&nearest_triangles[2u * pixel + 1u])) {
+        atomicMax(&nearest_triangles[2u * pixel + 1u], kept);
+    }
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn name_triangles(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    hold();
+    names = true;
+    draw_small(linear_index(workgroup, workgroups, local), false);
+}
+
+@compute @workgroup_size(TILE, TILE)
+fn name_large_triangles(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_id) local: vec3<u32>,
+) {
+    hold();
+    names = true;
+    draw_large(workgroup.y * workgroups.x + workgroup.x, local.xy);
+}

@@ -1,0 +1,134 @@
+// Triangles, their visibility pass: the nearest one at every pixel, of those at one depth the one of the greatest number. One invocation a
+// triangle, one workgroup a large one. Twin: src/passes/triangles.rs.
+// All loops end, by 1, 2 of src/gpu/loops.rs: 0xd922f37958950717
+
+// In the form of the queue of large splats (project.wgsl): how many there are, a grid with a workgroup for each, and their numbers.
+@group(0) @binding(56) var<storage, read_write> large_triangles: array<atomic<u32>>;
+@group(0) @binding(57) var<storage, read> queued_triangles: array<u32>;
+
+// Those with more pixels get a workgroup.
+const LARGE_TRIANGLE: u32 = 256u;
+
+// The part of an image axis that the triangle reaches, in pixels; of one that is cut at the near depth, the ends of the cut too.
+fn reach_along(triangle: Triangle, axis: u32) -> vec2<f32> {
+    let a = place_along(triangle.a, axis);
+    let b = place_along(triangle.b, axis);
+    let c = place_along(triangle.c, axis);
+    if (triangle.before) {
+        let reach = vec2<f32>(min(min(a, b), c), max(max(a, b), c));
+        return reach + vec2<f32>(-1.0, 1.0) * (1e-4 + 2.5e-7 * max(abs(reach.x), abs(reach.y)));
+    }
+    var reach = vec2<f32>(3e38, -3e38);
+    reach = with_edge(reach, triangle.a, triangle.b, vec2<f32>(a, b));
+    reach = with_edge(reach, triangle.b, triangle.c, vec2<f32>(b, c));
+    return with_edge(reach, triangle.c, triangle.a, vec2<f32>(c, a));
+}
+
+fn place_along(corner: Corner, axis: u32) -> f32 {
+    return select(corner.y.high, corner.x.high, axis == 0u);
+}
+
+// With the part of an edge before the near depth. Where it is cut, the blur is that of a sum of these magnitudes.
+fn with_edge(reach: vec2<f32>, from_: Corner, to: Corner, places: vec2<f32>) -> vec2<f32> {
+    var wider = reach;
+    if (is_before(from_)) {
+        wider = vec2<f32>(min(wider.x, places.x - 1.0), max(wider.y, places.x + 1.0));
+    }
+    if (is_before(from_) != is_before(to)) {
+        let images = places * vec2<f32>(homogeneous_depth(from_), homogeneous_depth(to));
+        let t = clamp((held.near - from_.depth) / (to.depth - from_.depth), 0.0, 1.0);
+        let cut = (images.x + t * (images.y - images.x)) / held.near;
+        let blur = 1.0 + 4e-6 * (abs(images.x) + abs(images.y)) / held.near;
+        wider = vec2<f32>(min(wider.x, cut - blur), max(wider.y, cut + blur));
+    }
+    return wider;
+}
+
+// The pixels of the band that the triangle can reach; empty if a first lies past a last.
+fn reach_of(triangle: Triangle) -> Rectangle {
+    let across = reach_along(triangle, 0u);
+    let down = reach_along(triangle, 1u);
+    let low = vec2<f32>(0.0, f32(held_band.first_row));
+    let high = vec2<f32>(f32(held.width), f32(held_band.first_row + held_band.rows)) - 1.0;
+    let first = clamp(ceil(vec2<f32>(across.x, down.x) - 0.5), low, high + 1.0);
+    let last = clamp(floor(vec2<f32>(across.y, down.y) - 0.5), low - 1.0, high);
+    // Not of what is no number.
+    if (!all(first <= last)) {
+        return Rectangle(vec2<u32>(1u), vec2<u32>(0u));
+    }
+    return Rectangle(vec2<u32>(first), vec2<u32>(last));
+}
+
+fn cover_with(triangle: Triangle, number: u32, x: u32, y: u32) {
+    let crossed = cross_at(triangle, x, y);
+    if (crossed.hit) {
+        keep_triangle(pixel_index(x, y), kept_depth(bitcast<u32>(crossed.depth)), number);
+    }
+}
+
+fn draw_small(number: u32, queues: bool) {
+    if (number >= triangles_held()) {
+        return;
+    }
+    let triangle = triangle_at(number);
+    let pixels = reach_of(triangle);
+    if (any(pixels.first > pixels.last)) {
+        return;
+    }
+    let size = pixels.last - pixels.first + 1u;
+    if (size.x * size.y > LARGE_TRIANGLE) {
+        if (queues) {
+            // Places depend on the schedule, but nothing later depends on places.
+            atomicStore(&large_triangles[QUEUE_START + atomicAdd(&large_triangles[0], 1u)], number);
+        }
+        return;
+    }
+    var at = pixels.first;
+    while (at.y <= pixels.last.y) {
+        cover_with(triangle, number, at.x, at.y);
+        at.x++;
+        at = select(at, vec2<u32>(pixels.first.x, at.y + 1u), at.x > pixels.last.x);
+    }
+}
+
+fn draw_large(place: u32, local: vec2<u32>) {
+    if (place >= queued_triangles[0]) {
+        return;
+    }
+    let number = queued_triangles[QUEUE_START + place];
+    let triangle = triangle_at(number);
+    let pixels = reach_of(triangle);
+    for (var y = pixels.first.y + local.y; y <= pixels.last.y; y += TILE) {
+        for (var x = pixels.first.x + local.x; x <= pixels.last.x; x += TILE) {
+            cover_with(triangle, number, x, y);
+        }
+    }
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn draw_triangles(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    hold();
+    draw_small(linear_index(workgroup, workgroups, local), true);
+}
+
+@compute @workgroup_size(1)
+fn arrange_triangles() {
+    let grid = rows_of(atomicLoad(&large_triangles[0]));
+    for (var k = 0u; k < 3u; k++) {
+        atomicStore(&large_triangles[QUEUE_GRID + k], grid[k]);
+    }
+}
+
+@compute @workgroup_size(TILE, TILE)
+fn draw_large_triangles(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_id) local: vec3<u32>,
+) {
+    hold();
+    draw_large(workgroup.y * workgroups.x + workgroup.x, local.xy);
+}

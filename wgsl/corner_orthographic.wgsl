@@ -2,13 +2,17 @@
 // Twin: src/passes/triangles.rs.
 
 fn corner_of(p: array<Double, 3>) -> Corner {
-    return Corner(image_of(p[0], 0u), image_of(p[1], 1u), single(1.0), p[2].high, 1.0);
+    return Corner(image_of(p[0], 0u), image_of(p[1], 1u), single(1.0), p[2], 1.0);
 }
 
 fn is_before(corner: Corner) -> bool {
     return true;
 }
 
-fn homogeneous_depth(corner: Corner) -> f32 {
-    return 1.0;
+fn homogeneous_depth(corner: Corner) -> Double {
+    return single(1.0);
+}
+
+fn shared_depth(corner: Corner) -> Double {
+    return corner.depth;
 }

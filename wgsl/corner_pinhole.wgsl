@@ -3,11 +3,10 @@
 // Before the near depth a corner is its image, and what it shares of a depth is one over its own; else it is its homogeneous image, which
 // has no quotient, and shares as it is.
 fn corner_of(p: array<Double, 3>) -> Corner {
-    let depth = p[2].high;
-    if (depth >= held.near) {
-        return Corner(image_of(p[0], p[2], 0u), image_of(p[1], p[2], 1u), single(1.0), depth, 1.0 / depth);
+    if (p[2].high >= held.near) {
+        return Corner(image_of(p[0], p[2], 0u), image_of(p[1], p[2], 1u), single(1.0), p[2], 1.0 / p[2].high);
     }
-    return Corner(homogeneous_of(p[0], p[2], 0u), homogeneous_of(p[1], p[2], 1u), p[2], depth, 1.0);
+    return Corner(homogeneous_of(p[0], p[2], 0u), homogeneous_of(p[1], p[2], 1u), p[2], p[2], 1.0);
 }
 
 fn homogeneous_of(position: Double, depth: Double, axis: u32) -> Double {
@@ -18,10 +17,21 @@ fn homogeneous_of(position: Double, depth: Double, axis: u32) -> Double {
 
 // Whether the corner has an image.
 fn is_before(corner: Corner) -> bool {
-    return corner.depth >= held.near;
+    return corner.depth.high >= held.near;
 }
 
-// What times the corner's place gives its homogeneous image.
-fn homogeneous_depth(corner: Corner) -> f32 {
-    return select(1.0, corner.depth, is_before(corner));
+// What times the corner's place gives its homogeneous image: one over its share.
+fn homogeneous_depth(corner: Corner) -> Double {
+    if (is_before(corner)) {
+        return corner.depth;
+    }
+    return single(1.0);
+}
+
+// Its depth times its share.
+fn shared_depth(corner: Corner) -> Double {
+    if (is_before(corner)) {
+        return single(1.0);
+    }
+    return corner.depth;
 }

@@ -1,6 +1,6 @@
 // Triangles, their first stage: every vertex becomes a corner, once, whichever triangles it is of. One invocation a vertex.
 // Twin: src/passes/triangles.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xcdeb0cd2d7a6dd5f
+// All loops end, by 1 of src/gpu/loops.rs: 0x6318830f70463fed
 
 // Three words a vertex, world units relative to the scene's origin.
 @group(0) @binding(52) var<storage, read> vertices: array<f32>;
@@ -12,7 +12,7 @@ struct Corner {
     y: Double,
     w: Double,
     // Camera-space z, device units.
-    depth: f32,
+    depth: Double,
     // What weighs its part of a triangle's pixel beside the part's area.
     share: f32,
 }

@@ -9,53 +9,47 @@ struct Triangle {
     a: Corner,
     b: Corner,
     c: Corner,
-    // All corners have images.
-    before: bool,
 }
 
 fn triangles_held() -> u32 {
     return arrayLength(&triangles) / 3u;
 }
 
-fn triangle_at(index: u32) -> Triangle {
-    let numbers = vec3<u32>(triangles[3u * index], triangles[3u * index + 1u], triangles[3u * index + 2u]);
-    let a = corners[numbers.x];
-    let b = corners[numbers.y];
-    let c = corners[numbers.z];
-    return Triangle(numbers, a, b, c, is_before(a) && is_before(b) && is_before(c));
+fn triangle_at(number: u32) -> Triangle {
+    let numbers = vec3<u32>(triangles[3u * number], triangles[3u * number + 1u], triangles[3u * number + 2u]);
+    return Triangle(numbers, corners[numbers.x], corners[numbers.y], corners[numbers.z]);
 }
 
-// An edge seen from a point of the image: the doubled area between the two, and on which side of the edge the point lies, 0 if it has none.
-struct Edge {
-    area: f32,
-    side: i32,
+// The farthest image coordinate of a corner whose edges are told by f32.
+const PLAIN_REACH: f32 = 65536.0;
+
+// Whether the corner's edges to others that are plain too are told by f32, whichever triangle looks at them.
+fn is_plain(corner: Corner) -> bool {
+    return is_before(corner) && max(abs(corner.x.high), abs(corner.y.high)) < PLAIN_REACH;
 }
 
-// A corner relative to the point p.
-fn spoke(corner: Corner, p: f32, image: Double) -> Double {
-    return sum(image, product(corner.w, single(-p)));
+// A corner relative to the point p: of its difference all digits are right.
+fn plain_spoke(corner: Corner, p: vec2<f32>) -> vec2<f32> {
+    return vec2<f32>(
+        keep(corner.x.high - p.x) + corner.x.low,
+        keep(corner.y.high - p.y) + corner.y.low,
+    );
 }
 
-// The edge from one corner to another. Its two triangles go along it in opposite directions, and see it by the same numbers: from the corner
-// of the lower number, and turned. A point on it lies where the one right of it does, or of a level edge the one below.
-fn edge_of(from_: Corner, to: Corner, p: vec2<f32>, turned: bool) -> Edge {
-    let a_x = spoke(from_, p.x, from_.x);
-    let a_y = spoke(from_, p.y, from_.y);
-    let b_x = spoke(to, p.x, to.x);
-    let b_y = spoke(to, p.y, to.y);
-    let area = minor(a_x, b_y, a_y, b_x).high;
-    let right = to.w.high * a_y.high - from_.w.high * b_y.high;
-    let below = from_.w.high * b_x.high - to.w.high * a_x.high;
-    let decided = select(select(below, right, right != 0.0), area, area != 0.0);
-    let side = i32(sign(decided));
-    return Edge(select(area, -area, turned), select(side, -side, turned));
+// The doubled area between two corners and the point that they are seen from. Rounded alike in each kernel: the other way round the same
+// number with the other sign.
+fn plain_area(from_: vec2<f32>, to: vec2<f32>) -> f32 {
+    return keep(from_.x * to.y) - keep(from_.y * to.x);
 }
 
-fn edge(from_: Corner, to: Corner, numbers: vec2<u32>, p: vec2<f32>) -> Edge {
-    if (numbers.x < numbers.y) {
-        return edge_of(from_, to, p, false);
-    }
-    return edge_of(to, from_, p, true);
+// On which side of the edge the point lies: 1, -1, or 0 of an edge without a length. On it a point lies where the one right of it does, or
+// of a level edge the one below.
+fn side_by(area: f32, right: f32, below: f32) -> f32 {
+    return sign(select(select(below, right, right != 0.0), area, area != 0.0));
+}
+
+fn plain_side(area: f32, from_: vec2<f32>, to: vec2<f32>) -> f32 {
+    return side_by(area, from_.y - to.y, to.x - from_.x);
 }
 
 // What of a triangle is at a pixel.
@@ -67,56 +61,79 @@ struct Crossing {
     parts: vec3<f32>,
 }
 
-// Of the areas beside each corner's opposite edge.
-fn crossing(triangle: Triangle, areas: vec3<f32>) -> Crossing {
+// Whether the point is in the triangle, by the sides of its edges, and the depth is one that shows; not of what is no number.
+fn is_hit(sides: vec3<f32>, depth: f32) -> bool {
+    return sides.x != 0.0 && sides.x == sides.y && sides.x == sides.z && depth >= held.near;
+}
+
+// Of a triangle all of whose corners are plain, and that is not is_ill_formed.
+fn cross_plainly(triangle: Triangle, p: vec2<f32>) -> Crossing {
+    let a = plain_spoke(triangle.a, p);
+    let b = plain_spoke(triangle.b, p);
+    let c = plain_spoke(triangle.c, p);
+    let areas = vec3<f32>(plain_area(b, c), plain_area(c, a), plain_area(a, b));
+    let sides = vec3<f32>(plain_side(areas.x, b, c), plain_side(areas.y, c, a), plain_side(areas.z, a, b));
     let weighed = areas * vec3<f32>(triangle.a.share, triangle.b.share, triangle.c.share);
     let parts = weighed / (weighed.x + weighed.y + weighed.z);
-    let depth = dot(parts, vec3<f32>(triangle.a.depth, triangle.b.depth, triangle.c.depth));
-    // Not of what is no number.
-    return Crossing(depth >= held.near, depth, parts);
+    let depths = vec3<f32>(triangle.a.depth.high, triangle.b.depth.high, triangle.c.depth.high);
+    let depth = dot(parts, depths);
+    return Crossing(is_hit(sides, depth), depth, parts);
 }
 
-// In doubled arithmetic.
+// An edge seen from a point of the image.
+struct Edge {
+    // Without a sign: 0 if it has another one than the side.
+    area: Double,
+    side: f32,
+}
+
+fn spoke(corner: Corner, p: f32, image: Double) -> Double {
+    return sum(image, product(corner.w, single(-p)));
+}
+
+// In doubled arithmetic, by the numbers that both triangles have of it: from the corner of the lower number, and turned.
+fn doubled_edge(from_: Corner, to: Corner, p: vec2<f32>, turned: f32) -> Edge {
+    let a_x = spoke(from_, p.x, from_.x);
+    let a_y = spoke(from_, p.y, from_.y);
+    let b_x = spoke(to, p.x, to.x);
+    let b_y = spoke(to, p.y, to.y);
+    let area = minor(a_x, b_y, a_y, b_x);
+    let right = to.w.high * a_y.high - from_.w.high * b_y.high;
+    let below = from_.w.high * b_x.high - to.w.high * a_x.high;
+    return Edge(Double(turned * area.high, turned * area.low), turned * side_by(area.high, right, below));
+}
+
+fn precise_edge(from_: Corner, to: Corner, numbers: vec2<u32>, p: vec2<f32>) -> Edge {
+    var edge: Edge;
+    if (numbers.x < numbers.y) {
+        edge = doubled_edge(from_, to, p, 1.0);
+    } else {
+        edge = doubled_edge(to, from_, p, -1.0);
+    }
+    if (is_plain(from_) && is_plain(to)) {
+        let a = plain_spoke(from_, p);
+        let b = plain_spoke(to, p);
+        edge.side = plain_side(plain_area(a, b), a, b);
+    }
+    let agrees = edge.area.high * edge.side > 0.0;
+    edge.area = Double(select(0.0, edge.side * edge.area.high, agrees), select(0.0, edge.side * edge.area.low, agrees));
+    return edge;
+}
+
+// Of any triangle: parts and depth in doubled arithmetic, and sides where f32 does not tell them.
 fn cross_precisely(triangle: Triangle, p: vec2<f32>) -> Crossing {
-    let a = edge(triangle.b, triangle.c, triangle.numbers.yz, p);
-    let b = edge(triangle.c, triangle.a, triangle.numbers.zx, p);
-    let c = edge(triangle.a, triangle.b, triangle.numbers.xy, p);
-    if (a.side == 0 || a.side != b.side || a.side != c.side) {
-        return Crossing(false, 0.0, vec3<f32>(0.0));
-    }
-    return crossing(triangle, vec3<f32>(a.area, b.area, c.area));
-}
-
-// The sign of an area of f32 is sure where it is more than this part of the products that it is a difference of.
-const SURE: f32 = 5e-7;
-// Parts and depths of f32 are exact enough where these products exceed the areas no more than so many times.
-const WELL_FORMED: f32 = 4.0;
-
-fn plain_spoke(corner: Corner, p: vec2<f32>) -> vec2<f32> {
-    return (vec2<f32>(corner.x.high, corner.y.high) - p) + vec2<f32>(corner.x.low, corner.y.low);
-}
-
-// In f32 where that is as good.
-fn cross_at(triangle: Triangle, x: u32, y: u32) -> Crossing {
-    let p = vec2<f32>(f32(x), f32(y)) + 0.5;
-    if (triangle.before) {
-        let a = plain_spoke(triangle.a, p);
-        let b = plain_spoke(triangle.b, p);
-        let c = plain_spoke(triangle.c, p);
-        let plus = vec3<f32>(b.x * c.y, c.x * a.y, a.x * b.y);
-        let minus = vec3<f32>(b.y * c.x, c.y * a.x, a.y * b.x);
-        let areas = plus - minus;
-        let terms = abs(plus) + abs(minus);
-        let out_left = areas < -SURE * terms;
-        let out_right = areas > SURE * terms;
-        if (any(out_left) && any(out_right)) {
-            return Crossing(false, 0.0, vec3<f32>(0.0));
-        }
-        let shares = vec3<f32>(triangle.a.share, triangle.b.share, triangle.c.share);
-        let is_sure = all(out_left) || all(out_right);
-        if (is_sure && dot(terms, shares) <= WELL_FORMED * abs(dot(areas, shares))) {
-            return crossing(triangle, areas);
-        }
-    }
-    return cross_precisely(triangle, p);
+    let a = precise_edge(triangle.b, triangle.c, triangle.numbers.yz, p);
+    let b = precise_edge(triangle.c, triangle.a, triangle.numbers.zx, p);
+    let c = precise_edge(triangle.a, triangle.b, triangle.numbers.xy, p);
+    let weighed_a = quotient(a.area, homogeneous_depth(triangle.a));
+    let weighed_b = quotient(b.area, homogeneous_depth(triangle.b));
+    let weighed_c = quotient(c.area, homogeneous_depth(triangle.c));
+    let whole = sum(sum(weighed_a, weighed_b), weighed_c);
+    let of_depth = sum(
+        sum(product(a.area, shared_depth(triangle.a)), product(b.area, shared_depth(triangle.b))),
+        product(c.area, shared_depth(triangle.c)),
+    );
+    let depth = quotient(of_depth, whole).high;
+    let parts = vec3<f32>(weighed_a.high, weighed_b.high, weighed_c.high) / whole.high;
+    return Crossing(is_hit(vec3<f32>(a.side, b.side, c.side), depth), depth, parts);
 }

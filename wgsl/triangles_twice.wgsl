@@ -38,3 +38,14 @@ fn name_large_triangles(
     names = true;
     draw_large(workgroup.y * workgroups.x + workgroup.x, local.xy);
 }
+
+@compute @workgroup_size(TILE, TILE)
+fn name_rare_triangles(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_id) local: vec3<u32>,
+) {
+    hold();
+    names = true;
+    draw_rare(workgroup.y * workgroups.x + workgroup.x, local.xy);
+}

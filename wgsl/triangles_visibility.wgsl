@@ -1,20 +1,22 @@
 // Triangles, their visibility pass: the nearest one at every pixel, of those at one depth the one of the greatest number. One invocation a
-// triangle, one workgroup a large one. Twin: src/passes/triangles.rs.
-// All loops end, by 1, 2 of src/gpu/loops.rs: 0xd922f37958950717
+// triangle, one workgroup a large one, or a rare one that f32 does not tell. Twin: src/passes/triangles.rs.
+// All loops end, by 1, 2 of src/gpu/loops.rs: 0xd4cd95d04776c816
 
 // In the form of the queue of large splats (project.wgsl): how many there are, a grid with a workgroup for each, and their numbers.
 @group(0) @binding(56) var<storage, read_write> large_triangles: array<atomic<u32>>;
 @group(0) @binding(57) var<storage, read> queued_triangles: array<u32>;
+@group(0) @binding(63) var<storage, read_write> rare_triangles: array<atomic<u32>>;
+@group(0) @binding(64) var<storage, read> listed_triangles: array<u32>;
 
 // Those with more pixels get a workgroup.
-const LARGE_TRIANGLE: u32 = 256u;
+const LARGE_TRIANGLE: u32 = 1024u;
 
 // The part of an image axis that the triangle reaches, in pixels; of one that is cut at the near depth, the ends of the cut too.
 fn reach_along(triangle: Triangle, axis: u32) -> vec2<f32> {
     let a = place_along(triangle.a, axis);
     let b = place_along(triangle.b, axis);
     let c = place_along(triangle.c, axis);
-    if (triangle.before) {
+    if (is_before(triangle.a) && is_before(triangle.b) && is_before(triangle.c)) {
         let reach = vec2<f32>(min(min(a, b), c), max(max(a, b), c));
         return reach + vec2<f32>(-1.0, 1.0) * (1e-4 + 2.5e-7 * max(abs(reach.x), abs(reach.y)));
     }
@@ -35,8 +37,8 @@ fn with_edge(reach: vec2<f32>, from_: Corner, to: Corner, places: vec2<f32>) -> 
         wider = vec2<f32>(min(wider.x, places.x - 1.0), max(wider.y, places.x + 1.0));
     }
     if (is_before(from_) != is_before(to)) {
-        let images = places * vec2<f32>(homogeneous_depth(from_), homogeneous_depth(to));
-        let t = clamp((held.near - from_.depth) / (to.depth - from_.depth), 0.0, 1.0);
+        let images = places * vec2<f32>(homogeneous_depth(from_).high, homogeneous_depth(to).high);
+        let t = clamp((held.near - from_.depth.high) / (to.depth.high - from_.depth.high), 0.0, 1.0);
         let cut = (images.x + t * (images.y - images.x)) / held.near;
         let blur = 1.0 + 4e-6 * (abs(images.x) + abs(images.y)) / held.near;
         wider = vec2<f32>(min(wider.x, cut - blur), max(wider.y, cut + blur));
@@ -59,13 +61,28 @@ fn reach_of(triangle: Triangle) -> Rectangle {
     return Rectangle(vec2<u32>(first), vec2<u32>(last));
 }
 
-fn cover_with(triangle: Triangle, number: u32, x: u32, y: u32) {
-    let crossed = cross_at(triangle, x, y);
+// Whether the parts of f32, which err by 2^-23 of the square of its length over its area, make depths that err by more than f32 may.
+fn is_ill_formed(triangle: Triangle) -> bool {
+    let a = vec2<f32>(triangle.a.x.high, triangle.a.y.high);
+    let b = vec2<f32>(triangle.b.x.high, triangle.b.y.high) - a;
+    let c = vec2<f32>(triangle.c.x.high, triangle.c.y.high) - a;
+    let depths = vec3<f32>(triangle.a.depth.high, triangle.b.depth.high, triangle.c.depth.high);
+    let nearest_depth = min(min(depths.x, depths.y), depths.z);
+    let span = max(max(depths.x, depths.y), depths.z) - nearest_depth;
+    return !(max(dot(b, b), dot(c, c)) * span <= 4.0 * abs(b.x * c.y - b.y * c.x) * nearest_depth);
+}
+
+fn is_rare(triangle: Triangle) -> bool {
+    return !(is_plain(triangle.a) && is_plain(triangle.b) && is_plain(triangle.c)) || is_ill_formed(triangle);
+}
+
+fn keep_crossing(crossed: Crossing, number: u32, x: u32, y: u32) {
     if (crossed.hit) {
         keep_triangle(pixel_index(x, y), kept_depth(bitcast<u32>(crossed.depth)), number);
     }
 }
 
+// Places in a queue depend on the schedule, but nothing later depends on places.
 fn draw_small(number: u32, queues: bool) {
     if (number >= triangles_held()) {
         return;
@@ -75,17 +92,22 @@ fn draw_small(number: u32, queues: bool) {
     if (any(pixels.first > pixels.last)) {
         return;
     }
+    if (is_rare(triangle)) {
+        if (queues) {
+            atomicStore(&rare_triangles[QUEUE_START + atomicAdd(&rare_triangles[0], 1u)], number);
+        }
+        return;
+    }
     let size = pixels.last - pixels.first + 1u;
     if (size.x * size.y > LARGE_TRIANGLE) {
         if (queues) {
-            // Places depend on the schedule, but nothing later depends on places.
             atomicStore(&large_triangles[QUEUE_START + atomicAdd(&large_triangles[0], 1u)], number);
         }
         return;
     }
     var at = pixels.first;
     while (at.y <= pixels.last.y) {
-        cover_with(triangle, number, at.x, at.y);
+        keep_crossing(cross_plainly(triangle, vec2<f32>(at) + 0.5), number, at.x, at.y);
         at.x++;
         at = select(at, vec2<u32>(pixels.first.x, at.y + 1u), at.x > pixels.last.x);
     }
@@ -100,7 +122,21 @@ fn draw_large(place: u32, local: vec2<u32>) {
     let pixels = reach_of(triangle);
     for (var y = pixels.first.y + local.y; y <= pixels.last.y; y += TILE) {
         for (var x = pixels.first.x + local.x; x <= pixels.last.x; x += TILE) {
-            cover_with(triangle, number, x, y);
+            keep_crossing(cross_plainly(triangle, vec2<f32>(f32(x), f32(y)) + 0.5), number, x, y);
+        }
+    }
+}
+
+fn draw_rare(place: u32, local: vec2<u32>) {
+    if (place >= listed_triangles[0]) {
+        return;
+    }
+    let number = listed_triangles[QUEUE_START + place];
+    let triangle = triangle_at(number);
+    let pixels = reach_of(triangle);
+    for (var y = pixels.first.y + local.y; y <= pixels.last.y; y += TILE) {
+        for (var x = pixels.first.x + local.x; x <= pixels.last.x; x += TILE) {
+            keep_crossing(cross_precisely(triangle, vec2<f32>(f32(x), f32(y)) + 0.5), number, x, y);
         }
     }
 }
@@ -117,9 +153,11 @@ fn draw_triangles(
 
 @compute @workgroup_size(1)
 fn arrange_triangles() {
-    let grid = rows_of(atomicLoad(&large_triangles[0]));
+    let large = rows_of(atomicLoad(&large_triangles[0]));
+    let rare_ = rows_of(atomicLoad(&rare_triangles[0]));
     for (var k = 0u; k < 3u; k++) {
-        atomicStore(&large_triangles[QUEUE_GRID + k], grid[k]);
+        atomicStore(&large_triangles[QUEUE_GRID + k], large[k]);
+        atomicStore(&rare_triangles[QUEUE_GRID + k], rare_[k]);
     }
 }
 
@@ -131,4 +169,14 @@ fn draw_large_triangles(
 ) {
     hold();
     draw_large(workgroup.y * workgroups.x + workgroup.x, local.xy);
+}
+
+@compute @workgroup_size(TILE, TILE)
+fn draw_rare_triangles(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_id) local: vec3<u32>,
+) {
+    hold();
+    draw_rare(workgroup.y * workgroups.x + workgroup.x, local.xy);
 }

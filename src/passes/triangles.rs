@@ -10,10 +10,18 @@
 //! so at its pixels.
 //!
 //! **Each pixel belongs to one of two triangles at an edge.** A vertex is seen once, whichever triangles it is of, in doubled f32
-//! arithmetic, and both triangles compute E from its two ends in the same order, so they get the same number, and opposite signs. Where
-//! E is 0, p is taken to lie a little to the right, and then a little below: `dE/dx`, or else `dE/dy`, decides. So the sides of an edge
-//! are told apart whatever is rounded, no crack shows, and nothing is drawn twice. An area of plain f32 serves where it exceeds its
-//! rounding by far, whose sign is that of the doubled one.
+//! arithmetic, and relative to a pixel it is the same spoke for all of them. How E is rounded follows from the edge's two ends alone: in
+//! f32, as `x1 y2 - y1 x2`, whose sign turns with the edge's direction and nothing else does, or, if an end has no image or one beyond 2^16
+//! pixels, in doubled arithmetic from the end of the lower number on. So the two triangles at an edge get opposite signs whatever is
+//! rounded. Where E is 0, p is taken to lie a little to the right, and then a little below: `dE/dx`, or else `dE/dy`, decides.
+//!
+//! *No crack shows*: around a vertex that p is near to, signs of edges go from one to the other at least once, and where they do a triangle
+//! has p; near an edge's middle its sign alone is unsure, and one of its two triangles has p. Signs err where E is less than 2^-22 of its
+//! products, so that p may belong to the neighbour, or to both, of which the nearest shows.
+//!
+//! **Rare triangles**, whose parts f32 would blur, are drawn by a kernel of their own, which takes areas in doubled arithmetic: those with
+//! other ends than above, and those that are long for their area and their depths, `L^2 / 2A (z_max - z_min) / z_min > 4`, as parts err
+//! by `2^-23 L^2 / 2A`. So do those of the attribute pass, which is as exact for all.
 //!
 //! **The nearest** one is an atomic maximum of its depth, as what its bits lack to those of +inf, and of its number: the order of
 //! [`Triangles`](crate::scene::Triangles) depends on no order in files, so neither does any bit of the image.
@@ -77,7 +85,8 @@ pub struct Crossing {
     pub parts: [f64; 3],
     /// It is in the triangle, and not nearer than the near depth.
     pub hit: bool,
-    /// How far the point is from the nearest edge's line, pixels, negative outside, or relatively from the near depth.
+    /// The least distance to a decision: an area's by an edge, as a part of the products that it is a difference of, negative outside, or
+    /// the depth's from the near depth, relative.
     pub decision: f64,
 }
 
@@ -91,13 +100,13 @@ pub fn crossing(camera: &Camera, of: [Corner; 3], numbers: [u32; 3], p: DVec2) -
         let area = a.perp_dot(b);
         let decided = [area, right, below].into_iter().find(|value| *value != 0.0).unwrap_or(0.0);
         let side = if decided == 0.0 || decided.is_nan() { 0.0 } else { decided.signum() };
-        (turned * area, turned * side, area.abs() / right.hypot(below))
+        (turned * area, turned * side, area.abs() / ((a.x * b.y).abs() + (a.y * b.x).abs()).max(f64::MIN_POSITIVE))
     };
     let edges = [edge(1, 2), edge(2, 0), edge(0, 1)];
     let sides = edges.map(|(_, side, _)| side);
     let weighed: [f64; 3] = std::array::from_fn(|k| edges[k].0 * of[k].share);
     let sum: f64 = weighed.iter().sum();
-    if sum == 0.0 || sides.contains(&0.0) {
+    if sum == 0.0 || !sum.is_finite() || sides.contains(&0.0) {
         return None;
     }
     let parts = weighed.map(|part| part / sum);
@@ -123,7 +132,7 @@ pub struct Shown {
     pub normal: DVec3,
     /// Camera-space z, world units; +inf where nothing is.
     pub depth: f64,
-    /// The smallest distance to a decision: to an edge, pixels, to another depth, relative.
+    /// The smallest distance to a decision: to an edge, to another depth, relative.
     pub decision: f64,
 }
 
@@ -154,7 +163,7 @@ impl Shown {
     }
 }
 
-/// How far outside a triangle a point is still looked at to record its distance, pixels.
+/// How far outside a triangle a point is still looked at to record its distance.
 const NEARBY: f64 = 1e-3;
 
 /// The twin: what triangles show at the pixels of `strip`.
@@ -213,7 +222,7 @@ pub const NEAREST_TRIANGLE_WORDS: u32 = 2;
 pub const TRIANGLE_PIXEL_WORDS: u32 = 8;
 
 /// Words of a corner.
-pub const CORNER_WORDS: u32 = 8;
+pub const CORNER_WORDS: u32 = 9;
 
 /// The pass's kernels, files and constants.
 pub const PASS: Pass = Pass {
@@ -231,8 +240,8 @@ pub const PASS: Pass = Pass {
     kernels: |needs| match needs.mesh {
         None => Vec::new(),
         Some(mesh) => {
-            let all = [SEE_CORNERS, DRAW, ARRANGE, DRAW_LARGE, SHADE];
-            all.into_iter().chain([NAME, NAME_LARGE].into_iter().filter(|_| !mesh.once)).collect()
+            let all = [SEE_CORNERS, DRAW, ARRANGE, DRAW_LARGE, DRAW_RARE, SHADE];
+            all.into_iter().chain([NAME, NAME_LARGE, NAME_RARE].into_iter().filter(|_| !mesh.once)).collect()
         }
     },
     constants: |making| {
@@ -251,8 +260,10 @@ const SEE_CORNERS: Kernel = Kernel::new("see_corners");
 const DRAW: Kernel = Kernel::new("draw_triangles");
 const ARRANGE: Kernel = Kernel::of("arrange_triangles", [1; 3]);
 const DRAW_LARGE: Kernel = Kernel::of("draw_large_triangles", [TILE, TILE, 1]);
+const DRAW_RARE: Kernel = Kernel::of("draw_rare_triangles", [TILE, TILE, 1]);
 const NAME: Kernel = Kernel::new("name_triangles");
 const NAME_LARGE: Kernel = Kernel::of("name_large_triangles", [TILE, TILE, 1]);
+const NAME_RARE: Kernel = Kernel::of("name_rare_triangles", [TILE, TILE, 1]);
 const SHADE: Kernel = Kernel::new("shade_triangles");
 
 /// The stages of a band: corners once, the nearest triangle of each pixel, and what it shows.
@@ -263,12 +274,14 @@ pub fn steps(plan: &Plan, band: usize) -> Vec<Stage> {
     if band == 0 {
         runs.push(run(SEE_CORNERS, Over::Vertices));
     }
-    runs.extend([run(DRAW, Over::Triangles), run(ARRANGE, Over::Once), run(DRAW_LARGE, Over::LargeTriangles)]);
+    let over = [Over::Triangles, Over::LargeTriangles, Over::RareTriangles];
+    runs.extend([run(DRAW, over[0]), run(ARRANGE, Over::Once), run(DRAW_LARGE, over[1]), run(DRAW_RARE, over[2])]);
     if !once {
-        runs.extend([run(NAME, Over::Triangles), run(NAME_LARGE, Over::LargeTriangles)]);
+        runs.extend([NAME, NAME_LARGE, NAME_RARE].into_iter().zip(over).map(|(kernel, over)| run(kernel, over)));
     }
     runs.push(run(SHADE, Over::Pixels));
     let words = plan.bands[band].pixels * u64::from(NEAREST_TRIANGLE_WORDS);
-    let clears = vec![Clear::of("large_triangles", 0, QUEUE_START.into()), Clear::of("nearest_triangles", 0, words)];
+    let start = |queue| Clear::of(queue, 0, QUEUE_START.into());
+    let clears = vec![start("large_triangles"), start("rare_triangles"), Clear::of("nearest_triangles", 0, words)];
     vec![Stage::new("triangles", band, runs).after(clears).as_twin(Twin::Triangles)]
 }

@@ -94,7 +94,7 @@ pub fn shared(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds) -> Result<Name
     Ok(shared)
 }
 
-/// The buffers of triangles: what they are, and room for their corners and for the large ones.
+/// The buffers of triangles: what they are, and room for their corners and for the large and the rare ones.
 fn of_triangles(gpu: &Gpu, triangles: &Triangles, mesh: &MeshNeeds) -> Result<Named> {
     let filled = |what: &str, words: &[u32]| {
         let buffer = Buffer::storage(gpu, what, words.len() as u64)?;
@@ -110,5 +110,6 @@ fn of_triangles(gpu: &Gpu, triangles: &Triangles, mesh: &MeshNeeds) -> Result<Na
         ("triangle_attributes", filled("attributes of triangles", bytemuck::cast_slice(&mesh.records(triangles)))?),
         ("corners", Buffer::storage(gpu, "corners of triangles", seen)?),
         ("large_triangles", Buffer::indirect(gpu, "queue of large triangles", queue)?),
+        ("rare_triangles", Buffer::indirect(gpu, "list of rare triangles", queue)?),
     ])
 }

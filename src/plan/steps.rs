@@ -61,6 +61,8 @@ pub enum Over {
     Triangles,
     /// A workgroup for each large triangle, as the device counted them.
     LargeTriangles,
+    /// A workgroup for each triangle that f32 does not tell.
+    RareTriangles,
     /// An invocation for each large splat, to list it.
     Listing,
     /// An invocation for each row of the band.

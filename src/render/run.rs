@@ -284,6 +284,7 @@ fn over<'a>(gpu: &Gpu, plan: &Plan, store: &'a Store, (band, page): (usize, usiz
         Over::Rare => return counted(of_page.and_then(|page| page.buffer("rare")), QUEUE_GRID.into()),
         Over::Large => return counted(queue(), QUEUE_GRID.into()),
         Over::LargeTriangles => return counted(store.buffer("large_triangles"), QUEUE_GRID.into()),
+        Over::RareTriangles => return counted(store.buffer("rare_triangles"), QUEUE_GRID.into()),
         Over::Listing => return counted(queue(), QUEUE_LISTING.into()),
         Over::Covered => return covered(COVERED_GRID),
         Over::CoveredEights => return covered(COVERED_GRID_OF_EIGHTS),

@@ -19,7 +19,7 @@ use crate::plan::{Band, FragmentLayout, KEY_WORDS, Known, Oit, Plan, Raster, Sce
 use crate::scene::Samples;
 
 /// Names in WGSL of buffers that have another one where kernels write them.
-const ALIASES: [(&str, &str); 14] = [
+const ALIASES: [(&str, &str); 15] = [
     ("projected", "splats"),
     ("queued", "queue"),
     ("listed", "rare"),
@@ -32,6 +32,7 @@ const ALIASES: [(&str, &str); 14] = [
     ("told", "peeled"),
     ("corners_seen", "corners"),
     ("queued_triangles", "large_triangles"),
+    ("listed_triangles", "rare_triangles"),
     ("named_triangles", "nearest_triangles"),
     ("beside", "triangle_pixels"),
 ];

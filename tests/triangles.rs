@@ -1,0 +1,331 @@
+//! Triangles beside splats: coverage without cracks, rays and twins as judges, hard triangles, and the same bits however they are drawn.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use common::scenes::{front, sphere, sphere_camera};
+use common::{Random, bits, meshes};
+use epsplat::frame::Frame;
+use epsplat::gpu::{Gpu, Sources};
+use epsplat::io::Mesh;
+use epsplat::metrics::DECISION_MARGIN;
+use epsplat::plan::{Organisation, RenderOptions};
+use epsplat::render::{Backend, Renderer, render};
+use epsplat::scene::{Camera, Join, Lens, Map, Maps, Projection, Samples, Scene, Shading, Triangle, Triangles, Up};
+use epsplat::surfels::with_triangles;
+use epsplat::truth::Surface;
+use glam::{DVec3, Vec3};
+
+fn gpu() -> Option<Backend> {
+    common::gpu().map(Backend::gpu)
+}
+
+fn broken(file: &str, from: &str, to: &str) -> Backend {
+    let sources = Sources::default().replace(file, from, to).unwrap();
+    Backend::Gpu { gpu: Box::new(common::gpu().unwrap()), sources }
+}
+
+fn unlit() -> RenderOptions {
+    RenderOptions { shading: Shading::Unlit, maps: Maps::of(&[Map::Depth]), ..RenderOptions::default() }
+}
+
+fn frame(scene: &Scene, camera: &Camera, options: &RenderOptions, backend: &Backend) -> Frame {
+    render(scene, camera, options, backend, &()).unwrap().0
+}
+
+/// A closed surface with bumps and dents, whose coordinates f32 has.
+fn rough() -> Mesh {
+    let mut mesh = meshes::sphere(4, false);
+    let mut random = Random(7);
+    for position in &mut mesh.positions {
+        let scale = random.between(0.75, 1.0);
+        *position = position.map(|x| f64::from((x * scale) as f32));
+    }
+    mesh
+}
+
+fn scene_of(mesh: &Mesh) -> Scene {
+    with_triangles(None, std::slice::from_ref(mesh)).unwrap().0
+}
+
+/// A pose around `rough`, or within it.
+fn pose(random: &mut Random, size: u32) -> Camera {
+    let direction = |random: &mut Random| {
+        DVec3::new(random.between(-1.0, 1.0), random.between(-1.0, 1.0), random.between(-1.0, 1.0)).normalize()
+    };
+    let eye = direction(random) * random.scale(0.02, 30.0);
+    let target = direction(random) * random.between(0.0, 0.5);
+    let lens = Lens::Fov(random.between(5.0, 100.0) / (1.0 + 0.2 * eye.length()));
+    Camera::look_at((size, size), lens, eye, target, Some(direction(random)), Up::Y, 1e-4).unwrap()
+}
+
+/// Pixels whose depth is not that at which the ray through their centre meets the surface, though rays a thousandth of a pixel beside it
+/// meet the same one.
+fn cracks(shown: &Frame, camera: &Camera, surface: &Surface) -> usize {
+    let depths = shown.map(Map::Depth).unwrap();
+    let ray = |pixel: usize, dx: f64, dy: f64| {
+        let (x, y) = (pixel as u32 % camera.width, pixel as u32 / camera.width);
+        let (x, y) = (f64::from(x) + 0.5 + dx, f64::from(y) + 0.5 + dy);
+        // Its direction has a depth of 1.
+        let hit = surface.first_hit(camera.ray_start(x, y), camera.ray(x, y), camera.near);
+        hit.map_or(f64::INFINITY, |hit| hit.distance)
+    };
+    let same = |a: f64, b: f64, within: f64| a == b || (a / b - 1.0).abs() < within;
+    let is_wrong = |&pixel: &usize| {
+        let truth = ray(pixel, 0.0, 0.0);
+        let beside = [(-1e-3, 0.0), (1e-3, 0.0), (0.0, -1e-3), (0.0, 1e-3)];
+        !same(depths[pixel].into(), truth, 1e-5) && beside.iter().all(|&(x, y)| same(ray(pixel, x, y), truth, 1e-2))
+    };
+    (0..depths.len()).filter(is_wrong).count()
+}
+
+/// A closed mesh at a thousand poses: no ray sees anything else than the picture does; where an edge belongs to nobody, or lies elsewhere
+/// for one of its triangles, some do.
+#[test]
+fn no_crack_shows_at_any_pose() {
+    let Some(backend) = gpu() else { return };
+    let mesh = rough();
+    let (scene, surface) = (scene_of(&mesh), Surface::mesh(&mesh).unwrap());
+    let of = |backend: &Backend, poses: u64| {
+        let mut renderer = Renderer::new(&scene, &unlit(), backend).unwrap();
+        let camera = |seed| pose(&mut Random(seed), 64);
+        let wrong = |seed| cracks(&renderer.frame(&camera(seed), &()).unwrap().0, &camera(seed), &surface);
+        (0..poses).map(wrong).sum::<usize>()
+    };
+    assert_eq!(of(&backend, 1000), 0);
+    let inset =
+        broken("triangles.wgsl", "return side_by(area, from_.y", "return side_by(area - 0.05 * sign(area), from_.y");
+    let skewed =
+        broken("triangles.wgsl", "keep(corner.x.high - p.x) + corner.x.low", "corner.x.high - p.x + 2e-2 * p.y");
+    for control in [inset, skewed] {
+        assert!(of(&control, 20) > 100);
+    }
+}
+
+/// Pixel centres on edges and corners, in numbers that f32 has: each belongs to one triangle.
+#[test]
+fn what_lies_on_an_edge_belongs_to_one_triangle() {
+    let Some(backend) = gpu() else { return };
+    // A plane of squares, halved either way, whose corners are centres of pixels.
+    let mut all = Vec::new();
+    let corner = |i: i32, j: i32| [i as f32 * 4.0 - 15.5, j as f32 * 4.0 - 15.5, 8.0];
+    for (i, j) in (0..7).flat_map(|i| (0..7).map(move |j| (i, j))) {
+        let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+        let halves = if (i + j) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] };
+        for corners in halves {
+            let shade = (all.len() + 1) as f32 / 128.0;
+            all.push(Triangle { corners, normals: None, colors: [[shade, shade, shade, 1.0]; 3] });
+        }
+    }
+    let scene = Scene { triangles: Triangles::new(&all), ..Scene::default() };
+    let camera = front(32);
+    let shown = frame(&scene, &camera, &unlit(), &backend);
+    assert_eq!(bits(&shown), bits(&frame(&scene, &camera, &unlit(), &Backend::Reference)));
+    // The left and upper ends are the plane's, and the right and lower ones are not.
+    let covered = shown.color.iter().filter(|color| color[3] > 0.0).count();
+    assert_eq!(covered, 28 * 28);
+    // Each triangle has as many as its area; of half a square's sixteen the diagonal is one's or the other's.
+    for triangle in &all {
+        let of = shown.color.iter().filter(|color| color[3] > 0.0 && color[0] == triangle.colors[0][0]).count();
+        assert!((6..=10).contains(&of), "{of}");
+    }
+    let without = broken("triangles.wgsl", "select(below, right, right != 0.0)", "0.0");
+    let left = frame(&scene, &camera, &unlit(), &without).color.iter().filter(|color| color[3] > 0.0).count();
+    assert!(left < 28 * 28 / 2, "{left}");
+}
+
+/// A triangle whose corners are red, green and blue: a pixel's colour is what parts of them it has.
+fn painted(corners: [[f64; 3]; 3]) -> Triangle {
+    let colors = [[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0], [0.0, 0.0, 1.0, 1.0]];
+    Triangle { corners: corners.map(|corner| corner.map(|x| x as f32)), normals: None, colors }
+}
+
+/// What is hard to draw, by name; the camera looks along +z from the origin, down y.
+fn hard() -> Vec<(&'static str, Vec<Triangle>)> {
+    let mut random = Random(11);
+    let mut at = |z: [f64; 2]| [random.between(-1.0, 1.0), random.between(-1.0, 1.0), random.between(z[0], z[1])];
+    let mut many =
+        |z: [f64; 2], count: usize| -> Vec<Triangle> { (0..count).map(|_| painted([at(z), at(z), at(z)])).collect() };
+    let mut all = vec![
+        ("any", many([1.0, 3.0], 60)),
+        ("through the camera's plane", many([-2.0, 2.0], 30)),
+        ("behind", many([-3.0, -1.0], 30)),
+        ("at the near depth", many([0.009, 0.011], 30)),
+    ];
+    all.push(("a plane through the eye", vec![painted([[-9.0, 0.0, -9.0], [9.0, 0.0, -9.0], [0.0, 0.0, 30.0]])]));
+    all.push(("a floor", vec![painted([[-900.0, 0.3, -900.0], [900.0, 0.3, -900.0], [0.0, 0.3, 3000.0]])]));
+    all.push(("a million pixels", vec![painted([[-5e3, -4e3, 2.0], [7e3, -3e3, 2.5], [1e3, 8e3, 3.0]])]));
+    all.push(("a million pixels long", vec![painted([[-5e3, -0.2, 2.0], [7e3, 0.1, 3.0], [7e3, 0.4, 3.0]])]));
+    let slivers = |width: f64| {
+        let sliver = |k: usize| {
+            let (s, c) = (0.7 * k as f64).sin_cos();
+            painted([[-c, -s, 1.5], [c, s, 2.5], [c - width * s, s + width * c, 2.5]])
+        };
+        (0..40).map(sliver).collect::<Vec<_>>()
+    };
+    all.push(("slivers", slivers(0.01)));
+    all.push(("slivers of 1e-7 pixels", slivers(2e-9)));
+    all.push((
+        "a corner each",
+        (0..9).map(|k| painted([[0.1 * k as f64; 3], [0.1 * k as f64; 3], [1.0; 3]])).collect(),
+    ));
+    let small: Vec<Triangle> = many([2.0, 2.1], 1000)
+        .iter()
+        .map(|large| {
+            let [a, b, c] = large.corners.map(Vec3::from_array);
+            Triangle { corners: [a, a + (b - a) * 4e-3, a + (c - a) * 4e-3].map(Vec3::into), ..*large }
+        })
+        .collect();
+    all.push(("a part of a pixel", small));
+    all
+}
+
+/// Device and twin alike at pixels that no rounding decides: colours, which are the corners' parts, to 1e-6, depths to 1e-6 of themselves.
+/// What has none, or lies behind, is left out.
+#[test]
+fn kernels_and_twins_see_hard_triangles_alike() {
+    let Some(backend) = gpu() else { return };
+    let looking = |projection| {
+        let lens = match projection {
+            Projection::Pinhole => Lens::Fov(60.0),
+            Projection::Orthographic => Lens::OrthographicHeight(2.4),
+        };
+        Camera::look_at((160, 120), lens, DVec3::ZERO, DVec3::Z, Some(DVec3::NEG_Y), Up::Y, 0.01).unwrap()
+    };
+    for projection in [Projection::Pinhole, Projection::Orthographic] {
+        let camera = looking(projection);
+        for (name, triangles) in hard() {
+            let scene = Scene { triangles: Triangles::new(&triangles), ..Scene::default() };
+            let with_decision = RenderOptions { maps: Maps::of(&[Map::Depth, Map::Decision]), ..unlit() };
+            let truth = frame(&scene, &camera, &with_decision, &Backend::Reference);
+            let shown = frame(&scene, &camera, &unlit(), &backend);
+            let [depth, true_depth] = [&shown, &truth].map(|frame| frame.map(Map::Depth).unwrap());
+            let decided = truth.map(Map::Decision).unwrap();
+            let mut compared = 0;
+            for pixel in (0..depth.len()).filter(|pixel| decided[*pixel] > DECISION_MARGIN) {
+                let [a, b] = [&shown, &truth].map(|frame| frame.color[pixel].map(f64::from));
+                let apart = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                let [z, true_z] = [depth[pixel], true_depth[pixel]].map(f64::from);
+                let of_depth = if z == true_z { 0.0 } else { (z / true_z - 1.0).abs() };
+                assert!(apart <= 1e-6 && of_depth <= 1e-6, "{projection:?} {name} {pixel}: {a:?} {b:?}, {z} {true_z}");
+                compared += usize::from(z.is_finite());
+            }
+            let least = match name {
+                "behind" | "a corner each" | "a plane through the eye" | "slivers of 1e-7 pixels" => 0,
+                "a part of a pixel" => 5,
+                // Beside the camera's plane little is seen in parallel.
+                _ if projection == Projection::Orthographic => 0,
+                _ => 100,
+            };
+            assert!(compared >= least, "{projection:?} {name}: {compared}");
+            assert!(name != "behind" || compared == 0);
+        }
+    }
+}
+
+/// A sphere of splats that a plane and a rough body of triangles cut.
+fn joined() -> (Scene, Camera) {
+    let mut all: Vec<Triangle> = Vec::new();
+    let plane = [[-1.3, 0.2, -1.3], [1.3, 0.3, -1.3], [1.3, -0.2, 1.3], [-1.3, -0.3, 1.3]];
+    all.extend([[0, 1, 2], [0, 2, 3]].map(|of| painted(of.map(|k| plane[k]))));
+    let mesh = rough();
+    let at = |vertex: u32| mesh.positions[vertex as usize].map(|x| 0.9 * x + 0.35);
+    all.extend(mesh.triangles.iter().map(|triangle| painted(triangle.map(at))));
+    let scene = Scene { triangles: Triangles::new(&all), ..sphere(3000, 2.0) };
+    (scene, sphere_camera(96, Projection::Pinhole))
+}
+
+/// Each join alike by kernels and twins; joins and kernels that are others do not.
+#[test]
+fn kernels_and_twins_join_alike() {
+    let Some(backend) = gpu() else { return };
+    let (scene, camera) = joined();
+    let maps = Maps::of(&[Map::Depth, Map::Normal, Map::Weight, Map::Count, Map::Transmittance]);
+    let of = |join| RenderOptions { join, maps, ..RenderOptions::default() };
+    let differ = |join, shown: &Frame| {
+        let with_decision = RenderOptions { maps: maps.and(&[Map::Decision]), ..of(join) };
+        let truth = frame(&scene, &camera, &with_decision, &Backend::Reference);
+        let decided = truth.map(Map::Decision).unwrap();
+        let near =
+            |a: &[f32], b: &[f32]| a.iter().zip(b).all(|(a, b)| a == b || (a - b).abs() <= 2e-5 * (1.0 + b.abs()));
+        let alike = |pixel: usize| {
+            maps.iter().all(|map| {
+                let of =
+                    |frame: &Frame| frame.map(map).unwrap()[pixel * map.width()..(pixel + 1) * map.width()].to_vec();
+                near(&of(shown), &of(&truth))
+            }) && near(&shown.color[pixel], &truth.color[pixel])
+        };
+        (0..decided.len()).filter(|pixel| decided[*pixel] > 1e-5 && !alike(*pixel)).count()
+    };
+    let joins = [Join::Corrected, Join::Nearest, Join::Blended];
+    for join in joins {
+        let shown = frame(&scene, &camera, &of(join), &backend);
+        assert_eq!(differ(join, &shown), 0, "{join:?}");
+        // Both show.
+        let weights = shown.map(Map::Weight).unwrap();
+        let ones = weights.iter().filter(|weight| **weight == 1.0).count();
+        assert!(ones > 500 && weights.iter().filter(|weight| **weight > 0.0).count() > ones + 500);
+        for other in joins.into_iter().filter(|other| *other != join) {
+            assert!(differ(other, &shown) > 10, "{join:?} {other:?}");
+        }
+    }
+    for (join, file, from, to) in [
+        (Join::Corrected, "join_corrected.wgsl", "splats.depth < triangle", "splats.depth * 1.01 < triangle"),
+        (Join::Nearest, "join_nearest.wgsl", "front < triangle", "front > triangle"),
+        (Join::Blended, "join_blended.wgsl", "2.0 * epsilon", "epsilon"),
+        (Join::Blended, "join.wgsl", "mix(triangle.normal, splats.normal, share)", "triangle.normal"),
+        (Join::Corrected, "triangles_once.wgsl", "atomicMax", "atomicMin"),
+        (Join::Corrected, "triangles_attributes.wgsl", "parts[corner] *", "0.3333333 *"),
+        (Join::Corrected, "triangles.wgsl", "quotient(a.area, homogeneous_depth(triangle.a))", "a.area"),
+    ] {
+        let shown = frame(&scene, &camera, &of(join), &broken(file, from, to));
+        assert!(differ(join, &shown) > 10, "{file}");
+    }
+}
+
+/// The order of triangles and surfels, bands, organisations and features do not show, nor how many numbers an atomic has.
+#[test]
+fn the_same_bits_however_it_is_drawn() {
+    let Some(backend) = gpu() else { return };
+    let small = Backend::gpu(Gpu::with_buffer_limit(common::gpu().unwrap(), 200_000));
+    let core = common::core_gpu().map(Backend::gpu).unwrap();
+    let gl = common::opengl().map(Backend::gpu);
+    let (scene, camera) = joined();
+    let mut shuffled = common::scenes::shuffled(&scene, 5);
+    let mut all: Vec<Triangle> = (0..scene.triangles.len())
+        .map(|number| {
+            let corners = scene.triangles.corners()[number].map(|vertex| scene.triangles.vertices()[vertex as usize]);
+            Triangle { corners, normals: None, colors: scene.triangles.colors()[number] }
+        })
+        .collect();
+    Random(3).shuffle(&mut all);
+    shuffled.triangles = Triangles::new(&all);
+    // Two at one place that differ in colour alone.
+    all.extend(all.clone().iter().map(|given| Triangle { colors: [[0.5, 0.5, 0.5, 1.0]; 3], ..*given }));
+    let doubled = Scene { triangles: Triangles::new(&all), ..scene.clone() };
+    all.reverse();
+    let other = Scene { triangles: Triangles::new(&all), ..scene.clone() };
+    for join in [Join::Corrected, Join::Nearest, Join::Blended] {
+        for samples in [Samples::ONE, "4".parse().unwrap()] {
+            let own = RenderOptions { join, samples, maps: Maps::of(&[Map::Depth]), ..RenderOptions::default() };
+            let first = bits(&frame(&scene, &camera, &own, &backend));
+            for organisation in [Organisation::Scatter, Organisation::Tile] {
+                let by = RenderOptions { organisation, ..own.clone() };
+                assert!(bits(&frame(&scene, &camera, &by, &backend)) == first, "{join:?} {organisation:?}");
+            }
+            for other in [&small, &core] {
+                assert!(bits(&frame(&scene, &camera, &own, other)) == first, "{join:?}");
+            }
+            assert!(bits(&frame(&shuffled, &camera, &own, &backend)) == first, "{join:?}");
+            assert!(bits(&frame(&doubled, &camera, &own, &backend)) == bits(&frame(&other, &camera, &own, &core)));
+        }
+    }
+    // OpenGL's own compiler rounds elsewhere.
+    if let Some(gl) = gl {
+        let plain = RenderOptions { maps: Maps::of(&[Map::Depth]), ..RenderOptions::default() };
+        let shown = frame(&scene, &camera, &plain, &gl);
+        let rmse = epsplat::metrics::compare(&shown, &frame(&scene, &camera, &plain, &backend)).unwrap().rmse;
+        assert!(rmse < 1e-6, "{rmse}");
+    }
+}

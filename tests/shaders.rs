@@ -53,6 +53,9 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
         };
         let features = if made.of_tiles() { Features::None } else { features };
         let mut needed = capabilities(features);
+        let by_triangles = if needs.mesh.is_some_and(|mesh| mesh.once) { Features::AtomicsU64 } else { Features::None };
+        let by_triangles: Vec<_> = capabilities(by_triangles).into_iter().filter(|one| !needed.contains(one)).collect();
+        needed.extend(&by_triangles);
         needed.extend(files.contains(&"splat_shared.wgsl").then_some(Capabilities::SUBGROUP));
         let long = files.contains(&"words_long.wgsl") && !needed.contains(&Capabilities::SHADER_INT64);
         needed.extend(long.then_some(Capabilities::SHADER_INT64));
@@ -86,18 +89,19 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
         assert!(!made.text().lines().any(|line| line.starts_with("enable") || line.starts_with("requires")));
         needed.into_iter().map(move |of| match of {
             Capabilities::SUBGROUP => "tiles",
+            of if by_triangles.contains(&of) => "triangles",
             Capabilities::SHADER_INT64 if long => "records",
             _ => needs.accumulator.name(),
         })
     });
     let without: BTreeSet<&str> = without.collect();
-    assert_eq!(without, BTreeSet::from(["fixed", "fixed64", "float", "packed64", "records", "tiles"]));
+    assert_eq!(without, BTreeSet::from(["fixed", "fixed64", "float", "packed64", "records", "tiles", "triangles"]));
     // The default runs anywhere.
     assert_eq!(Accumulator::Fixed.row().features, Features::None);
 }
 
 /// Names of needs of which a render has one at most.
-const ALTERNATIVES: [&[&str]; 8] = [
+const ALTERNATIVES: [&[&str]; 9] = [
     &["pinhole", "orthographic"],
     &["kernel-gaussian", "kernel-ellipse", "kernel-cone", "kernel-constant"],
     &["color-constant", "color-srgb8", "color-linear", "color-textured", "color-harmonics"],
@@ -106,10 +110,27 @@ const ALTERNATIVES: [&[&str]; 8] = [
     &["lowpass-max", "lowpass-ewa", "lowpass-gaussians"],
     &["lambert", "phong"],
     &["lists-layers", "lists-sorted"],
+    &["join-corrected", "join-blended"],
+];
+
+/// Needs of renders without triangles.
+const MESHLESS: &[&str] = &[
+    "raster-exact",
+    "raster-offset",
+    "lists-layers",
+    "lists-sorted",
+    "oit-weighted",
+    "oit-moments",
+    "peels",
+    "veils",
+    "index",
+    "surfaces",
 ];
 
 /// Needs that no render has together (`src/plan/check.rs`, `src/plan/needs.rs`).
-const EXCLUSIVE: [(&str, &[&str]); 26] = [
+const EXCLUSIVE: [(&str, &[&str]); 28] = [
+    ("triangles", MESHLESS),
+    ("join", MESHLESS),
     (
         "veils",
         &["tiles", "gather", "copies", "cull", "atomics-u64", "raster-exact", "raster-offset", "nearest", "peels"],

@@ -1,10 +1,11 @@
 // Triangles, their first stage: every vertex becomes a corner, once, whichever triangles it is of. One invocation a vertex.
 // Twin: src/passes/triangles.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x6318830f70463fed
+// All loops end, by 1 of src/gpu/loops.rs: 0x38f1bf0a5f9b4d6d
 
 // Three words a vertex, world units relative to the scene's origin.
 @group(0) @binding(52) var<storage, read> vertices: array<f32>;
-@group(0) @binding(53) var<storage, read_write> corners_seen: array<Corner>;
+// The numbers of a Corner, in their order.
+@group(0) @binding(53) var<storage, read_write> corners_seen: array<array<f32, 9>>;
 
 // A vertex in the image. Relative to the point p of the image it is (x, y) - p w, and that is what its triangles' edges are made of.
 struct Corner {
@@ -33,5 +34,7 @@ fn see_corners(
         let d = two_sum(vertices[3u * vertex + i] * held.unit, -held.eye[i]);
         relative[i] = quick_two_sum(d.high, d.low - held.eye_low[i]);
     }
-    corners_seen[vertex] = corner_of(rotate(relative));
+    let c = corner_of(rotate(relative));
+    corners_seen[vertex] =
+        array<f32, 9>(c.x.high, c.x.low, c.y.high, c.y.low, c.w.high, c.w.low, c.depth.high, c.depth.low, c.share);
 }

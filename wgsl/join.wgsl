@@ -1,16 +1,16 @@
 // What shows of a pixel's splats and its triangles (Tien 2008, section 5.3). Twin: src/passes/join.rs.
 
 // As triangles_attributes.wgsl left them.
-@group(0) @binding(62) var<storage, read> beside: array<TrianglePixel>;
+@group(0) @binding(62) var<storage, read> beside: array<vec4<f32>>;
 
 // The nearer of the two, or of one depth the triangle.
 fn joined(splats: Surface, pixel: u32, front: f32) -> Surface {
-    let triangle = beside[pixel];
-    let share = share_of_splats(splats, triangle.depth, front);
-    if (triangle.depth == 0.0 || share == 1.0) {
+    let placed = beside[2u * pixel + 1u];
+    let share = share_of_splats(splats, placed.w, front);
+    if (placed.w == 0.0 || share == 1.0) {
         return splats;
     }
-    let of_triangle = Surface(triangle.color, triangle.normal, triangle.depth, 1.0, true, true);
+    let of_triangle = Surface(beside[2u * pixel], placed.xyz, placed.w, 1.0, true, true);
     if (share == 0.0) {
         return of_triangle;
     }

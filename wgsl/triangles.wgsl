@@ -2,7 +2,7 @@
 
 // Three words a triangle: its corners.
 @group(0) @binding(54) var<storage, read> triangles: array<u32>;
-@group(0) @binding(55) var<storage, read> corners: array<Corner>;
+@group(0) @binding(55) var<storage, read> corners: array<array<f32, 9>>;
 
 struct Triangle {
     numbers: vec3<u32>,
@@ -15,9 +15,14 @@ fn triangles_held() -> u32 {
     return arrayLength(&triangles) / 3u;
 }
 
+fn corner_at(number: u32) -> Corner {
+    let c = corners[number];
+    return Corner(Double(c[0], c[1]), Double(c[2], c[3]), Double(c[4], c[5]), Double(c[6], c[7]), c[8]);
+}
+
 fn triangle_at(number: u32) -> Triangle {
     let numbers = vec3<u32>(triangles[3u * number], triangles[3u * number + 1u], triangles[3u * number + 2u]);
-    return Triangle(numbers, corners[numbers.x], corners[numbers.y], corners[numbers.z]);
+    return Triangle(numbers, corner_at(numbers.x), corner_at(numbers.y), corner_at(numbers.z));
 }
 
 // The farthest image coordinate of a corner whose edges are told by f32.

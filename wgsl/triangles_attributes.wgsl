@@ -1,22 +1,14 @@
 // Triangles, their attribute pass: what the nearest one of each pixel shows there. One invocation a pixel. Twin: src/passes/triangles.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xd4eb3f2cd29984a2
+// All loops end, by 1 of src/gpu/loops.rs: 0x45a8e7ff7892f936
 
 // Two words a pixel: the nearest triangle's number, and its depth.
 @group(0) @binding(59) var<storage, read> named_triangles: array<u32>;
 // A record a triangle: its corners' normals, if it has some, then their premultiplied colours. If all have one colour, that is before the
 // records, and in none.
 @group(0) @binding(60) var<storage, read> triangle_attributes: array<f32>;
-@group(0) @binding(61) var<storage, read_write> triangle_pixels: array<TrianglePixel>;
-
-// What triangles show at a pixel, shaded.
-struct TrianglePixel {
-    // Straight.
-    color: vec4<f32>,
-    // World space, unit.
-    normal: vec3<f32>,
-    // Camera-space z, device units; 0 where nothing is.
-    depth: f32,
-}
+// What triangles show at a pixel: the straight colour, shaded; then the normal, world space, unit, and the depth, camera-space z in device
+// units, 0 where nothing is.
+@group(0) @binding(61) var<storage, read_write> triangle_pixels: array<vec4<f32>>;
 
 // Words of a record; of its normals; and before the first one.
 override TRIANGLE_WORDS: u32;
@@ -66,7 +58,7 @@ fn shade_triangles(
         return;
     }
     if (named_triangles[2u * pixel + 1u] == 0u) {
-        triangle_pixels[pixel] = TrianglePixel(vec4<f32>(0.0), vec3<f32>(0.0), 0.0);
+        triangle_pixels[2u * pixel + 1u] = vec4<f32>(0.0);
         return;
     }
     let number = named_triangles[2u * pixel];
@@ -78,6 +70,6 @@ fn shade_triangles(
     let long = normal_of_triangle(number, triangle, crossed.parts);
     let scaled = long / max(max(abs(long.x), abs(long.y)), max(abs(long.z), 1e-38));
     let normal = scaled * inverseSqrt(max(dot(scaled, scaled), 1e-12));
-    let color = shaded(color_of_triangle(number, crossed.parts), normal, x, y);
-    triangle_pixels[pixel] = TrianglePixel(color, normal, crossed.depth);
+    triangle_pixels[2u * pixel] = shaded(color_of_triangle(number, crossed.parts), normal, x, y);
+    triangle_pixels[2u * pixel + 1u] = vec4<f32>(normal, crossed.depth);
 }

@@ -17,11 +17,11 @@ use epsplat::frame::Frame;
 use epsplat::gpu::Gpu;
 use epsplat::gpu::layout::{ONE, View};
 use epsplat::plan::{
-    ACCUMULATORS, Accumulator, AccumulatorRow, BlendFormat, ColorNeed, EpsilonForm, Facts, Lists, Oit, Raster,
-    RasterDepth, RenderOptions, SceneNeeds, Sides, Winner, check,
+    ACCUMULATORS, Accumulator, AccumulatorRow, BlendFormat, ColorNeed, EpsilonForm, Facts, Lists, MeshNeeds, Oit,
+    Raster, RasterDepth, RenderOptions, SceneNeeds, Sides, Winner, check,
 };
 use epsplat::scene::facing::POINT_SHAPES;
-use epsplat::scene::{KernelShape, LowPass, Map, Maps, Projection, Samples, Shading};
+use epsplat::scene::{Join, KernelShape, LowPass, Map, Maps, Projection, Samples, Shading};
 
 /// What one unit in a sum of the accumulator `fixed` is of a full weight.
 pub const UNIT: f64 = 1.0 / ONE as f64;
@@ -178,6 +178,7 @@ pub fn all_needs() -> Vec<SceneNeeds> {
     all.extend(listed(&all));
     all.extend(order_free(&all));
     all.extend(peeled(&all));
+    all.extend(beside_triangles(&all));
     for needs in &mut all {
         needs.outline &= needs.low_pass == LowPass::None;
     }
@@ -243,6 +244,21 @@ fn order_free(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
         }
     };
     all.iter().filter(fits).step_by(3).enumerate().map(of).collect()
+}
+
+/// Those of renders of triangles beside splats, a third of what they could be.
+fn beside_triangles(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
+    let opaque = |needs: &&SceneNeeds| needs.raster.is_none() && needs.lists.is_none() && needs.oit.is_none();
+    let of = |(step, needs): (usize, &SceneNeeds)| {
+        let join = [Join::Corrected, Join::Nearest, Join::Blended][step % 3];
+        let [normals, colored, once] = [1, 2, 4].map(|bit| step / 3 & bit != 0);
+        SceneNeeds {
+            mesh: Some(MeshNeeds { join, normals, colored, once }),
+            maps: needs.maps.but(&[Map::Index]),
+            ..*needs
+        }
+    };
+    all.iter().filter(opaque).step_by(3).enumerate().map(of).collect()
 }
 
 /// Those of the rasteriser that peels layers.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::mem::{offset_of, size_of};
 
 use epsplat::gpu::layout::{Band, Filter, Splat, View};
+use epsplat::passes::triangles::CORNER_WORDS;
 use epsplat::plan::SceneNeeds;
 use epsplat::scene::Surfel;
 use naga::{AddressSpace, ArraySize, Module, ScalarKind, TypeInner};
@@ -168,6 +169,20 @@ pub fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         ("keys", Element::Plain(&[<[u32; 2]>::SHAPE])),
         ("fragments", Element::Plain(&[<[u32; 4]>::SHAPE, <[u64; 2]>::SHAPE])),
         ("image", Element::Plain(&[f32::SHAPE, <[f32; 4]>::SHAPE])),
+        ("vertices", Element::Plain(&[f32::SHAPE])),
+        ("corners_seen", Element::Plain(&[<[f32; CORNER_WORDS as usize]>::SHAPE])),
+        ("corners", Element::Plain(&[<[f32; CORNER_WORDS as usize]>::SHAPE])),
+        ("triangles", Element::Plain(WORD)),
+        ("large_triangles", Element::Plain(WORD)),
+        ("queued_triangles", Element::Plain(WORD)),
+        ("rare_triangles", Element::Plain(WORD)),
+        ("listed_triangles", Element::Plain(WORD)),
+        // A number and a depth, or both in one.
+        ("nearest_triangles", Element::Plain(&[u32::SHAPE, u64::SHAPE])),
+        ("named_triangles", Element::Plain(WORD)),
+        ("triangle_attributes", Element::Plain(&[f32::SHAPE])),
+        ("triangle_pixels", Element::Plain(&[<[f32; 4]>::SHAPE])),
+        ("beside", Element::Plain(&[<[f32; 4]>::SHAPE])),
         ("texels", Element::Plain(WORD)),
         ("srgb_to_linear", Element::Plain(&[<[f32; 256]>::SHAPE])),
     ])

@@ -128,7 +128,8 @@ const MESHLESS: &[&str] = &[
 ];
 
 /// Needs that no render has together (`src/plan/check.rs`, `src/plan/needs.rs`).
-const EXCLUSIVE: [(&str, &[&str]); 28] = [
+const EXCLUSIVE: [(&str, &[&str]); 29] = [
+    ("painted-triangles", MESHLESS),
     ("triangles", MESHLESS),
     ("join", MESHLESS),
     (

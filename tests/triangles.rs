@@ -115,7 +115,7 @@ fn what_lies_on_an_edge_belongs_to_one_triangle() {
         let halves = if (i + j) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] };
         for corners in halves {
             let shade = (all.len() + 1) as f32 / 128.0;
-            all.push(Triangle { corners, normals: None, colors: [[shade, shade, shade, 1.0]; 3] });
+            all.push(Triangle { corners, normals: None, colors: [[shade, shade, shade, 1.0]; 3], texture: None });
         }
     }
     let scene = Scene { triangles: Triangles::new(&all), ..Scene::default() };
@@ -138,7 +138,7 @@ fn what_lies_on_an_edge_belongs_to_one_triangle() {
 /// A triangle whose corners are red, green and blue: a pixel's colour is what parts of them it has.
 fn painted(corners: [[f64; 3]; 3]) -> Triangle {
     let colors = [[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0], [0.0, 0.0, 1.0, 1.0]];
-    Triangle { corners: corners.map(|corner| corner.map(|x| x as f32)), normals: None, colors }
+    Triangle { corners: corners.map(|corner| corner.map(|x| x as f32)), normals: None, colors, texture: None }
 }
 
 /// What is hard to draw, by name; the camera looks along +z from the origin, down y.
@@ -296,7 +296,7 @@ fn the_same_bits_however_it_is_drawn() {
     let mut all: Vec<Triangle> = (0..scene.triangles.len())
         .map(|number| {
             let corners = scene.triangles.corners()[number].map(|vertex| scene.triangles.vertices()[vertex as usize]);
-            Triangle { corners, normals: None, colors: scene.triangles.colors()[number] }
+            Triangle { corners, normals: None, colors: scene.triangles.colors()[number], texture: None }
         })
         .collect();
     Random(3).shuffle(&mut all);

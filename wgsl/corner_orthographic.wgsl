@@ -13,6 +13,10 @@ fn homogeneous_depth(corner: Corner) -> Double {
     return single(1.0);
 }
 
+fn spread_of_parts(triangle: Triangle, depth: f32, of_depth: f32) -> f32 {
+    return depth / of_depth;
+}
+
 fn shared_depth(corner: Corner) -> Double {
     return corner.depth;
 }

@@ -28,6 +28,15 @@ fn homogeneous_depth(corner: Corner) -> Double {
     return single(1.0);
 }
 
+// How much of a triangle's parts a pixel has at `depth`, where the mean of the corners' shared depths by areas is `of_depth`: the determinant of
+// the parts by columns and rows.
+fn spread_of_parts(triangle: Triangle, depth: f32, of_depth: f32) -> f32 {
+    let a = depth / homogeneous_depth(triangle.a).high;
+    let b = depth / homogeneous_depth(triangle.b).high;
+    let c = depth / homogeneous_depth(triangle.c).high;
+    return a * b * c / of_depth;
+}
+
 // Its depth times its share.
 fn shared_depth(corner: Corner) -> Double {
     if (is_before(corner)) {

@@ -64,6 +64,8 @@ struct Crossing {
     depth: f32,
     // The corners' parts, whose sum is 1.
     parts: vec3<f32>,
+    // How much of them a pixel has.
+    spread: f32,
 }
 
 // Whether the point is in the triangle, by the sides of its edges, and the depth is one that shows; not of what is no number.
@@ -82,7 +84,7 @@ fn cross_plainly(triangle: Triangle, p: vec2<f32>) -> Crossing {
     let parts = weighed / (weighed.x + weighed.y + weighed.z);
     let depths = vec3<f32>(triangle.a.depth.high, triangle.b.depth.high, triangle.c.depth.high);
     let depth = dot(parts, depths);
-    return Crossing(is_hit(sides, depth), depth, parts);
+    return Crossing(is_hit(sides, depth), depth, parts, 0.0);
 }
 
 // An edge seen from a point of the image.
@@ -140,5 +142,6 @@ fn cross_precisely(triangle: Triangle, p: vec2<f32>) -> Crossing {
     );
     let depth = quotient(of_depth, whole).high;
     let parts = vec3<f32>(weighed_a.high, weighed_b.high, weighed_c.high) / whole.high;
-    return Crossing(is_hit(vec3<f32>(a.side, b.side, c.side), depth), depth, parts);
+    let spread = abs(spread_of_parts(triangle, depth, of_depth.high));
+    return Crossing(is_hit(vec3<f32>(a.side, b.side, c.side), depth), depth, parts, spread);
 }

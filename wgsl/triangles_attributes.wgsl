@@ -1,9 +1,10 @@
 // Triangles, their attribute pass: what the nearest one of each pixel shows there. One invocation a pixel. Twin: src/passes/triangles.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x45a8e7ff7892f936
+// All loops end, by 1 of src/gpu/loops.rs: 0x7bbaf1ccf52e8bad
 
 // Two words a pixel: the nearest triangle's number, and its depth.
 @group(0) @binding(59) var<storage, read> named_triangles: array<u32>;
-// A record a triangle: its corners' normals, if it has some, then their premultiplied colours. If all have one colour, that is before the
+// A record a triangle: its corners' normals, if it has some, then their premultiplied colours, then their places in a texture and its number. If all
+// have one colour, that is before the
 // records, and in none.
 @group(0) @binding(60) var<storage, read> triangle_attributes: array<f32>;
 // What triangles show at a pixel: the straight colour, shaded; then the normal, world space, unit, and the depth, camera-space z in device
@@ -70,6 +71,8 @@ fn shade_triangles(
     let long = normal_of_triangle(number, triangle, crossed.parts);
     let scaled = long / max(max(abs(long.x), abs(long.y)), max(abs(long.z), 1e-38));
     let normal = scaled * inverseSqrt(max(dot(scaled, scaled), 1e-12));
-    triangle_pixels[2u * pixel] = shaded(color_of_triangle(number, crossed.parts), normal, x, y);
+    let record = TRIANGLE_RECORDS + number * TRIANGLE_WORDS;
+    let painted = color_of_triangle(number, crossed.parts) * triangle_texture(record, crossed.parts, crossed.spread);
+    triangle_pixels[2u * pixel] = shaded(painted, normal, x, y);
     triangle_pixels[2u * pixel + 1u] = vec4<f32>(normal, crossed.depth);
 }

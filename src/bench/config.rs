@@ -9,7 +9,7 @@ use crate::plan::{
     Accumulator, BackendName, BlendFormat, Optimisation, Organisation, Raster, RasterDepth, RenderOptions,
 };
 use crate::scene::{
-    Blend, Composite, Cull, Epsilon, Facing, Kernel, LowPass, Map, Maps, Outline, PointShape, Samples, Shading,
+    Blend, Composite, Cull, Epsilon, Facing, Join, Kernel, LowPass, Map, Maps, Outline, PointShape, Samples, Shading,
     ShadingAt, Tail,
 };
 
@@ -64,6 +64,9 @@ pub struct Config {
     /// What becomes of the surfaces behind the last layer.
     #[serde(default, deserialize_with = "parsed")]
     pub tail: Option<Tail>,
+    /// What shows where splats and triangles meet.
+    #[serde(default, deserialize_with = "parsed")]
+    pub join: Option<Join>,
     /// The rasteriser's targets.
     #[serde(default, deserialize_with = "parsed")]
     pub blend_format: Option<BlendFormat>,
@@ -108,6 +111,7 @@ impl Config {
             composite: self.composite.unwrap_or_default(),
             opacity: self.opacity.unwrap_or(default.opacity),
             tail: self.tail.unwrap_or_default(),
+            join: self.join.unwrap_or_default(),
             kernel: self.kernel.unwrap_or(default.kernel),
             low_pass: self.lowpass.unwrap_or(default.low_pass),
             accumulator: self.accumulator().unwrap_or_default(),

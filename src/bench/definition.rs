@@ -83,6 +83,10 @@ pub struct SceneEntry {
     /// A generated surface: sphere, torus, plane, checkerboard, text, shells or crossing.
     #[serde(default, deserialize_with = "parsed")]
     pub shape: Option<Shape>,
+    /// Triangles beside the surfels: a shape, with a number of them after a colon if it is to be another than 200,000, or a mesh, relative to
+    /// the definition's folder. Where rays tell the truth, what shows beside the curve at which they meet is measured too.
+    #[serde(default, deserialize_with = "parsed")]
+    pub triangles: Option<Beside>,
     /// Surfels of the shape, or to be made of the mesh.
     pub count: Option<OneOrMany<u64>>,
     /// Disk radius of a shape's surfels in units of their mean spacing; the generator's by default.
@@ -163,6 +167,37 @@ pub enum Making {
     Uniform,
     /// Of a shape Gaussians, as `epsplat generate --gaussians` makes them.
     Gaussians,
+}
+
+/// Triangles beside surfels.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Beside {
+    /// About so many that stand for a shape.
+    Shape(Shape, u64),
+    /// A mesh.
+    File(PathBuf),
+}
+
+/// Triangles of a shape whose number nobody says: in most images their edges are too short to see.
+const TRIANGLES: u64 = 200_000;
+
+impl FromStr for Beside {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        if Path::new(text).extension().is_some() {
+            return Ok(Self::File(text.into()));
+        }
+        let (name, count) = match text.split_once(':') {
+            None => (text, TRIANGLES),
+            Some((name, count)) => {
+                let wrong = || Error::Usage(format!("a number of triangles is 1 to 2^32 - 1, not {count:?}"));
+                let count = count.parse::<u32>().ok().filter(|count| *count > 0).ok_or_else(wrong)?;
+                (name, count.into())
+            }
+        };
+        Ok(Self::Shape(name.parse()?, count))
+    }
 }
 
 /// How surfels end and curve.
@@ -261,8 +296,13 @@ impl Definition {
 
     /// The files of all scenes.
     pub fn files(&self) -> Vec<PathBuf> {
-        let files = self.scenes.iter().flat_map(|scene| scene.file.iter().chain(&scene.texture));
-        files.map(|file| self.path_of(file)).collect()
+        let beside = |scene: &'_ SceneEntry| match &scene.triangles {
+            Some(Beside::File(file)) => Some(file.clone()),
+            _ => None,
+        };
+        let files =
+            self.scenes.iter().flat_map(|scene| scene.file.iter().chain(&scene.texture).cloned().chain(beside(scene)));
+        files.map(|file| self.path_of(&file)).collect()
     }
 
     /// Where a scene's file is.

@@ -5,14 +5,14 @@ use std::collections::BTreeMap;
 use super::case::{Case, Timed};
 use crate::error::Result;
 use crate::frame::Frame;
-use crate::metrics::{Reconstruction, compare, reconstruction};
+use crate::metrics::{Reconstruction, compare, joint, reconstruction};
 use crate::passes::peel;
 use crate::plan::RenderOptions;
 use crate::progress::Progress;
 use crate::render::{Backend, Renderer, render};
 use crate::report::{ImageSet, Measurement, Numeric};
-use crate::scene::{Blend, Composite, Map, Maps};
-use crate::truth::Truth;
+use crate::scene::{Blend, Colors, Composite, Map, Maps, Scene, Shading, ShadingAt};
+use crate::truth::{Surface, Truth};
 
 /// The side that pictures for the page are kept at, pixels.
 const PICTURE_SIDE: usize = 512;
@@ -114,9 +114,46 @@ pub(super) fn against_truth(
                 let (frame, _) = renderer.frame(camera, &())?;
                 join_worst(&mut worst[member], &reconstruction(&frame, truth)?);
             }
+            if let Surface::Both(both) = surface {
+                beside_joint(case, timed, both, &mut worst[member])?;
+            }
         }
     }
     Ok(worst)
+}
+
+/// What of the surfels and the triangles shows beside the curve at which they meet, the worst of all cameras.
+fn beside_joint(
+    case: &Case<'_>,
+    timed: &Timed<'_>,
+    both: &[Surface; 2],
+    worst: &mut BTreeMap<String, f64>,
+) -> Result<()> {
+    // Told apart by colour.
+    let Scene { triangles, .. } = &case.staged.scene;
+    let scene = Scene {
+        colors: Colors::Constant([1.0, 0.0, 0.0, 1.0]),
+        triangles: triangles.painted([0.0, 1.0, 0.0, 1.0]),
+        ..case.staged.scene.clone()
+    };
+    let options = RenderOptions {
+        shading: Shading::Unlit,
+        shading_at: ShadingAt::Pixel,
+        maps: Maps::NONE,
+        opacity: 1.0,
+        ..timed.options.clone()
+    };
+    let mut renderer = Renderer::new(&scene, &options, case.backend(timed.config))?;
+    for camera in &case.staged.cameras {
+        let (frame, _) = renderer.frame(camera, &())?;
+        let shows: Vec<bool> = frame.color.iter().map(|[r, g, ..]| r > g).collect();
+        let Some(joint) = joint(&shows, camera, both.each_ref()) else { continue };
+        for (name, value) in [("wrong_winner_rate", joint.wrong_rate), ("curve_offset_px", joint.offset_px)] {
+            let known = worst.entry(name.to_owned()).or_insert(value);
+            *known = known.max(value);
+        }
+    }
+    Ok(())
 }
 
 /// What each that approximates another is apart from that one's reference, the worst of all cameras: over the whole picture, as what is

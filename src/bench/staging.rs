@@ -6,17 +6,17 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3};
 
-use super::definition::{Definition, Making, OneOrMany, Rims, SceneEntry};
+use super::definition::{Beside, Definition, Making, OneOrMany, Rims, SceneEntry};
 use crate::error::{Error, Result};
-use crate::io::{self, Points, ReadOptions, Texture};
+use crate::io::{self, Mesh, Points, ReadOptions, Texture};
 use crate::progress::Progress;
 use crate::random::Random;
 use crate::scene::camera::DEFAULT_FOV;
 use crate::scene::{Camera, Colors, Lens, Projection, Scene, Surfel};
-use crate::surfels::analytic::{RADIUS_IN_SPACINGS, Shape, gaussians, generate};
+use crate::surfels::analytic::{RADIUS_IN_SPACINGS, Shape, gaussians, generate, mesh};
 use crate::surfels::sampling::voxels::Voxel;
 use crate::surfels::sampling::{MeshSurface, Method, Priority, sample};
-use crate::surfels::{FromPoints, Size, Triangle, build, build_textured, curve, from_points};
+use crate::surfels::{FromPoints, Size, Triangle, build, build_textured, curve, from_points, with_triangles};
 use crate::truth::Surface;
 
 /// One point of a scene's sweep: how many surfels, and their mean radius in pixels.
@@ -34,7 +34,7 @@ pub(super) struct Staged {
     pub scene: Scene,
     /// At least one.
     pub cameras: Vec<Camera>,
-    /// What the surfels stand for, if the study asks for ground truth.
+    /// What the surfels stand for, and the triangles beside them, if the study asks for ground truth.
     pub surface: Option<Surface>,
     /// Mean radius of the splats, pixels, as [`SceneEntry::footprint_px`] counts it.
     pub footprint_px: f64,
@@ -101,6 +101,12 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
     if entry.rims == Rims::Flat {
         scene.clips.clear();
     }
+    let mut surface = surface;
+    if let Some(triangles) = &entry.triangles {
+        let (mesh, of_triangles) = beside(definition, entry, triangles, progress)?;
+        (scene, _) = with_triangles(Some(scene), &[mesh])?;
+        surface = surface.zip(of_triangles).map(|(first, second)| Surface::Both(Box::new([first, second])));
+    }
     let cameras = cameras(entry.size.unwrap_or(definition.size), entry, &scene)?;
     let mut footprint_px = footprint(&scene, &cameras);
     if let Some(wanted) = point.footprint_px.filter(|_| footprint_px > 0.0) {
@@ -112,6 +118,23 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
         footprint_px = wanted;
     }
     Ok(Staged { scene, cameras, surface, footprint_px })
+}
+
+/// The triangles beside surfels, and the surface that they stand for if rays are to meet it.
+fn beside(
+    definition: &Definition,
+    entry: &SceneEntry,
+    triangles: &Beside,
+    progress: &dyn Progress,
+) -> Result<(Mesh, Option<Surface>)> {
+    match triangles {
+        Beside::Shape(shape, count) => Ok((mesh(*shape, *count), entry.truth.then_some(Surface::Analytic(*shape)))),
+        Beside::File(file) => {
+            let mesh = io::read_mesh(&present(definition, entry, file)?, progress)?;
+            let surface = entry.truth.then(|| Surface::mesh(&mesh)).transpose()?;
+            Ok((mesh, surface))
+        }
+    }
 }
 
 /// The path of one of a scene's files.

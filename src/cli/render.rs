@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use epsplat::gpu::Gpu;
-use epsplat::io::{self, Texture};
+use epsplat::io::{self, Mesh, Texture};
 use epsplat::passes::unseen::{Unseen, is_empty};
 use epsplat::plan::{Accumulator, BackendName, BlendFormat, Organisation, RasterDepth};
 use epsplat::render::{Backend, Report, render};
@@ -54,6 +54,9 @@ pub struct Arguments {
     /// Meshes whose triangles are drawn as they are, beside the surfels or alone: .obj or .ply
     #[arg(long, value_name = "MESH", num_args = 1.., help_heading = "Triangles")]
     triangles: Vec<PathBuf>,
+    /// An image to paint the triangles with that no material paints, by their texture coordinates: .png or .jpg
+    #[arg(long, value_name = "IMAGE", requires = "triangles", help_heading = "Triangles")]
+    triangle_texture: Option<PathBuf>,
     /// What shows where surfels meet triangles: corrected (the nearer one, surfels by the depth that they blend to), nearest (the nearer
     /// one, surfels by their nearest fragment, as a depth buffer has it) or blended (both, within epsilon) [default: corrected]
     #[arg(long, value_name = "HOW", requires = "triangles", help_heading = "Triangles")]
@@ -257,7 +260,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 impl Arguments {
     /// The files that are read, but those of `--cameras`.
     fn files(&self) -> impl Iterator<Item = &PathBuf> {
-        self.inputs.iter().chain(&self.triangles).chain(&self.camera).chain(&self.texture)
+        self.inputs.iter().chain(&self.triangles).chain(&self.triangle_texture).chain(&self.camera).chain(&self.texture)
     }
 }
 
@@ -307,12 +310,27 @@ fn scene(arguments: &Arguments, bars: &Bars) -> Result<(Scene, Preparation)> {
         return of_surfels.ok_or_else(|| Error::Usage("there is nothing to render: name a file".into()));
     }
     let meshes = arguments.triangles.iter().map(|path| io::read_mesh(path, bars)).collect::<Result<Vec<_>>>()?;
+    let meshes = painted(meshes, arguments)?;
     meshes.iter().flat_map(|mesh| &mesh.notes).for_each(|line| note(line));
     let (scene, preparation) = of_surfels.unzip();
     let (scene, of_triangles) = with_triangles(scene, &meshes).map_err(|error| named(error, &arguments.triangles))?;
     of_triangles.notes().iter().for_each(|line| note(line));
     let guessed_up = of_triangles.guessed_up;
     Ok((scene, preparation.unwrap_or_else(|| Preparation { guessed_up, ..Preparation::default() })))
+}
+
+/// The meshes, those that no material paints with the image for triangles.
+fn painted(mut meshes: Vec<Mesh>, arguments: &Arguments) -> Result<Vec<Mesh>> {
+    let Some(image) = &arguments.triangle_texture else { return Ok(meshes) };
+    let texture = Texture::read(image)?;
+    let bare = |mesh: &&mut Mesh| mesh.materials.iter().all(|material| material.texture.is_none());
+    for (mesh, path) in meshes.iter_mut().zip(&arguments.triangles).filter(|(mesh, _)| bare(mesh)) {
+        if mesh.texture.is_none() {
+            return Err(Error::malformed(path, "its triangles have no texture coordinates, so they cannot be painted"));
+        }
+        mesh.paint(texture.clone());
+    }
+    Ok(meshes)
 }
 
 /// The surfels of all inputs.

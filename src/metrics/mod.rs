@@ -4,6 +4,7 @@
 
 pub mod coverage;
 pub mod distance;
+pub mod joint;
 pub mod numeric;
 pub mod reconstruction;
 mod ssim;
@@ -12,6 +13,7 @@ use rayon::prelude::*;
 
 pub use coverage::{Coverage, coverage};
 pub use distance::{Distances, SurfaceDistances};
+pub use joint::{Joint, joint};
 pub use numeric::{BYTES_PER_PIXEL, Comparison, DECISION_MARGIN, MapError, compare};
 pub use reconstruction::{DepthError, NormalError, Reconstruction, reconstruction};
 

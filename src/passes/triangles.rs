@@ -32,9 +32,9 @@ use rayon::prelude::*;
 use super::Strip;
 use super::resolve::shaded;
 use crate::gpu::layout::{QUEUE_START, TILE};
-use crate::plan::Plan;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Run, Stage, Twin};
+use crate::plan::{ColorNeed, Plan};
 use crate::scene::{Camera, Projection, Scene};
 
 /// A vertex as the camera sees it. Relative to the point p of the image it is `place - p w`.
@@ -83,6 +83,8 @@ pub struct Crossing {
     pub depth: f64,
     /// The corners' parts, whose sum is 1.
     pub parts: [f64; 3],
+    /// How much of them a pixel has: the determinant of the parts by columns and rows.
+    pub spread: f64,
     /// It is in the triangle, and not nearer than the near depth.
     pub hit: bool,
     /// The least distance to a decision: an area's by an edge, as a part of the products that it is a difference of, negative outside, or
@@ -116,7 +118,25 @@ pub fn crossing(camera: &Camera, of: [Corner; 3], numbers: [u32; 3], p: DVec2) -
     let most = sides.iter().sum::<f64>().signum();
     let distance = edges.map(|(_, side, distance)| side * most * distance).into_iter().fold(f64::INFINITY, f64::min);
     let beyond = depth / camera.near - 1.0;
-    Some(Crossing { depth, parts, hit: inside && depth >= camera.near, decision: distance.min(beyond) })
+    // Of the homogeneous areas, whose sum is det / z, by Cramer's rule z^3 / det; of an orthographic image one over the doubled area.
+    let units =
+        of.map(
+            |corner| {
+                if camera.projection == Projection::Pinhole && corner.is_before(camera) { corner.depth } else { 1.0 }
+            },
+        );
+    let shared: f64 = (0..3).map(|k| edges[k].0 * of[k].depth / units[k]).sum();
+    let spread = match camera.projection {
+        Projection::Pinhole => depth.powi(3) / (units.iter().product::<f64>() * shared),
+        Projection::Orthographic => depth / shared,
+    };
+    Some(Crossing {
+        depth,
+        parts,
+        spread: spread.abs(),
+        hit: inside && depth >= camera.near,
+        decision: distance.min(beyond),
+    })
 }
 
 /// What triangles show at a pixel.
@@ -126,6 +146,8 @@ pub struct Shown {
     pub triangle: u32,
     /// Its corners' parts.
     pub parts: [f64; 3],
+    /// How much of them the pixel has.
+    pub spread: f64,
     /// Straight, lit.
     pub color: [f64; 4],
     /// World space, unit.
@@ -141,6 +163,7 @@ impl Shown {
     pub const NOTHING: Self = Self {
         triangle: u32::MAX,
         parts: [0.0; 3],
+        spread: 0.0,
         color: [0.0; 4],
         normal: DVec3::ZERO,
         depth: f64::INFINITY,
@@ -157,7 +180,10 @@ impl Shown {
         let decision = if self.depth.is_finite() { decision.min(apart) } else { decision };
         let nearer = crossing.depth < self.depth || (crossing.depth == self.depth && triangle > self.triangle);
         match nearer {
-            true => Self { triangle, parts: crossing.parts, depth: crossing.depth, decision, ..self },
+            true => {
+                let Crossing { parts, spread, depth, .. } = crossing;
+                Self { triangle, parts, spread, depth, decision, ..self }
+            }
             false => Self { decision, ..self },
         }
     }
@@ -191,7 +217,8 @@ pub fn reference(strip: &Strip<'_>) -> Vec<Shown> {
         let (normals, colors) = (scene.triangles.normals_of(triangle), scene.triangles.colors_of(triangle));
         let normal = DVec3::from_array(std::array::from_fn(|axis| mean(normals.map(|normal| normal[axis]))));
         shown.normal = normal.normalize_or_zero();
-        let color = std::array::from_fn(|channel| mean(colors.map(|color| color[channel])));
+        let texture = scene.triangles.texture_at(triangle, shown.parts, shown.spread);
+        let color = std::array::from_fn(|channel| texture[channel] * mean(colors.map(|color| color[channel])));
         shown.color = shaded(color, shown.normal, camera, options, at);
     }
     shown
@@ -234,8 +261,11 @@ pub const PASS: Pass = Pass {
             Projection::Orthographic => "corner_orthographic.wgsl",
         };
         let nearest = if mesh.once { "triangles_once.wgsl" } else { "triangles_twice.wgsl" };
+        let texture = if mesh.textured { "triangles_texture.wgsl" } else { "triangles_texture_absent.wgsl" };
+        // Else surfels' colours need it.
+        let decodes = mesh.textured && !matches!(needs.color, ColorNeed::Srgb8 | ColorNeed::Textured);
         let all = ["corners.wgsl", "triangles.wgsl", "triangles_visibility.wgsl", "triangles_attributes.wgsl"];
-        all.into_iter().chain([corner, nearest]).collect()
+        all.into_iter().chain([corner, nearest, texture]).chain(decodes.then_some("srgb.wgsl")).collect()
     },
     kernels: |needs| match needs.mesh {
         None => Vec::new(),
@@ -250,6 +280,7 @@ pub const PASS: Pass = Pass {
             ("TRIANGLE_WORDS", mesh.words().into()),
             ("TRIANGLE_COLORS", mesh.normal_words().into()),
             ("TRIANGLE_RECORDS", if mesh.colored { 0.0 } else { 12.0 }),
+            ("TRIANGLE_PLACES", mesh.places_at().into()),
             ("TRIANGLE_NORMALS", u32::from(mesh.normals).into()),
             ("TRIANGLE_COLORED", u32::from(mesh.colored).into()),
         ]

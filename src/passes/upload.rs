@@ -8,7 +8,7 @@ use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::layout::QUEUE_START;
 use crate::passes::triangles::CORNER_WORDS;
-use crate::plan::{ColorNeed, Facts, MeshNeeds, SceneNeeds, SurfelLayout, page_surfels};
+use crate::plan::{ColorNeed, Facts, MeshNeeds, SceneNeeds, SurfelLayout, page_surfels, texture_words};
 use crate::progress::Progress;
 use crate::scene::Triangles;
 use crate::scene::color::SRGB8_TO_LINEAR;
@@ -78,7 +78,8 @@ fn page(gpu: &Gpu, of: &dyn source::Page, needs: &SceneNeeds, progress: &dyn Pro
 /// The table that decodes 8-bit sRGB, where it is needed, and the texture.
 pub fn shared(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds) -> Result<Named> {
     let mut shared = Vec::new();
-    if let ColorNeed::Srgb8 | ColorNeed::Textured = needs.color {
+    let textured = needs.mesh.is_some_and(|mesh| mesh.textured);
+    if textured || matches!(needs.color, ColorNeed::Srgb8 | ColorNeed::Textured) {
         let table: [[f32; 4]; 64] = std::array::from_fn(|row| std::array::from_fn(|k| SRGB8_TO_LINEAR[4 * row + k]));
         shared.push(("srgb_to_linear", Buffer::uniform(gpu, "sRGB table", &table)?.words()));
     }
@@ -104,12 +105,16 @@ fn of_triangles(gpu: &Gpu, triangles: &Triangles, mesh: &MeshNeeds) -> Result<Na
     let (vertices, corners) = (triangles.vertices(), triangles.corners());
     let queue = corners.len() as u64 + u64::from(QUEUE_START);
     let seen = vertices.len() as u64 * u64::from(CORNER_WORDS);
-    Ok(vec![
+    let mut buffers = vec![
         ("vertices", filled("vertices of triangles", bytemuck::cast_slice(vertices))?),
         ("triangles", filled("triangles", bytemuck::cast_slice(corners))?),
         ("triangle_attributes", filled("attributes of triangles", bytemuck::cast_slice(&mesh.records(triangles)))?),
         ("corners", Buffer::storage(gpu, "corners of triangles", seen)?),
         ("large_triangles", Buffer::indirect(gpu, "queue of large triangles", queue)?),
         ("rare_triangles", Buffer::indirect(gpu, "list of rare triangles", queue)?),
-    ])
+    ];
+    if mesh.textured {
+        buffers.push(("triangle_textures", filled("textures of triangles", &texture_words(triangles.textures()))?));
+    }
+    Ok(buffers)
 }

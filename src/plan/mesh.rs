@@ -1,6 +1,6 @@
 //! What a renderer must know of the triangles of a scene, and what they need.
 
-use crate::scene::{Join, Triangles};
+use crate::scene::{Join, Mipmap, Triangles};
 
 /// The counts of a scene's triangles, and what they have.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -13,6 +13,8 @@ pub struct MeshFacts {
     pub normals: bool,
     /// Corners differ in colour.
     pub colored: bool,
+    /// Triangles are painted with textures.
+    pub textured: bool,
 }
 
 impl MeshFacts {
@@ -23,6 +25,7 @@ impl MeshFacts {
             triangles: triangles.len() as u64,
             normals: !triangles.normals().is_empty(),
             colored: triangles.colors().len() > 1,
+            textured: !triangles.paint().is_empty(),
         }
     }
 }
@@ -36,6 +39,8 @@ pub struct MeshNeeds {
     pub normals: bool,
     /// Corners differ in colour.
     pub colored: bool,
+    /// Triangles are painted with textures.
+    pub textured: bool,
     /// The nearest one is found in one pass, by 64-bit atomics.
     pub once: bool,
 }
@@ -46,9 +51,14 @@ impl MeshNeeds {
         if self.normals { 9 } else { 0 }
     }
 
-    /// Words of a triangle's attributes: normals, then colours.
-    pub fn words(&self) -> u32 {
+    /// Where the places in a texture start in a triangle's attributes.
+    pub fn places_at(&self) -> u32 {
         self.normal_words() + if self.colored { 12 } else { 0 }
+    }
+
+    /// Words of a triangle's attributes: normals, then colours, then places in a texture and its number.
+    pub fn words(&self) -> u32 {
+        self.places_at() + if self.textured { 7 } else { 0 }
     }
 
     /// The attributes of `triangles`, a record each; before them, if all have one colour, the twelve words of that.
@@ -58,7 +68,30 @@ impl MeshNeeds {
         for triangle in 0..if self.words() > 0 { triangles.len() } else { 0 } {
             words.extend(triangles.normals().get(triangle).into_iter().flatten().flatten());
             words.extend(triangles.colors().get(triangle).filter(|_| self.colored).into_iter().flatten().flatten());
+            if let Some(painted) = triangles.paint().get(triangle) {
+                words.extend(painted.places.as_flattened());
+                words.push(f32::from_bits(painted.texture));
+            }
         }
         words
     }
+}
+
+/// The words of textures on a device: where each one's head is, then the heads, the number of levels and of each its width, its height and where
+/// its texels are, then the texels.
+pub fn texture_words(textures: &[Mipmap]) -> Vec<u32> {
+    let mut words = vec![0; textures.len()];
+    for (number, mipmap) in textures.iter().enumerate() {
+        words[number] = words.len() as u32;
+        let levels = mipmap.levels();
+        words.push(levels.len() as u32);
+        let mut texels = words.len() + 3 * levels.len();
+        for level in levels {
+            words.extend(level.size());
+            words.push(texels as u32);
+            texels += level.texels().len();
+        }
+        words.extend(levels.iter().flat_map(|level| level.texels()).map(|code| u32::from_le_bytes(*code)));
+    }
+    words
 }

@@ -26,7 +26,7 @@ pub use cuts::{Band, bands, page_surfels};
 pub use facts::{ColorNeed, Facts};
 pub use fragment::{FragmentLayout, KEY_WORDS};
 pub use known::Known;
-pub use mesh::{MeshFacts, MeshNeeds};
+pub use mesh::{MeshFacts, MeshNeeds, texture_words};
 pub use needs::{EpsilonForm, Lists, Oit, SMALL_WEIGHT, SceneNeeds, Sides, Winner, culls_back};
 pub use optimisation::Optimisation;
 pub use options::{BackendName, Organisation, RenderOptions};

@@ -171,7 +171,13 @@ impl Lists {
 fn mesh(facts: &Facts, options: &RenderOptions) -> Option<MeshNeeds> {
     let of = facts.mesh;
     let join = if facts.surfels > 0 { options.join } else { Join::Nearest };
-    (of.triangles > 0).then_some(MeshNeeds { join, normals: of.normals, colored: of.colored, once: false })
+    (of.triangles > 0).then_some(MeshNeeds {
+        join,
+        normals: of.normals,
+        colored: of.colored,
+        textured: of.textured,
+        once: false,
+    })
 }
 
 /// Terms of at least this weight keep 23 of the 32 bits that `fixed` has, as f32 would.
@@ -391,6 +397,7 @@ impl SceneNeeds {
             (self.oit == Some(Oit::Moments), "oit-moments"),
             (self.peels.is_some(), "peels"),
             (self.mesh.is_some(), "triangles"),
+            (self.mesh.is_some_and(|mesh| mesh.textured), "painted-triangles"),
             (joins(Join::Corrected), "join-corrected"),
             (joins(Join::Blended), "join-blended"),
             (self.veils, "veils"),

@@ -148,6 +148,7 @@ impl Kept {
             overflows: self.known.overflows,
             surfels: self.facts.surfels,
             splats_drawn: splats_drawn.min(self.facts.surfels),
+            triangles: self.facts.mesh.triangles,
             width: camera.width,
             height: camera.height,
             passes: passes.into_iter().map(|(stage, ms)| (format!("{stage}_ms"), ms)).collect(),

@@ -65,7 +65,16 @@ pub(super) fn frame(
     }
     progress.end();
     let drawn = splats.iter().map(|splat| u64::from(splat.copies)).sum();
-    (frame, report(&image, plan.needs, (facts.surfels, drawn), spent.passes(), start.elapsed().as_secs_f64() * 1e3))
+    (
+        frame,
+        report(
+            &image,
+            plan.needs,
+            (facts.surfels, drawn, facts.mesh.triangles),
+            spent.passes(),
+            start.elapsed().as_secs_f64() * 1e3,
+        ),
+    )
 }
 
 /// What the steps of `plan` have twins for: before there are bands, and in each of them.
@@ -147,7 +156,7 @@ impl Spent {
 fn report(
     camera: &Camera,
     needs: SceneNeeds,
-    (surfels, splats_drawn): (u64, u64),
+    (surfels, splats_drawn, triangles): (u64, u64, u64),
     passes: BTreeMap<String, f64>,
     total_ms: f64,
 ) -> Report {
@@ -158,6 +167,7 @@ fn report(
         overflows: 0,
         surfels,
         splats_drawn,
+        triangles,
         width: camera.width,
         height: camera.height,
         passes,

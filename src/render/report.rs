@@ -24,6 +24,9 @@ pub struct Report {
     /// Splats that may touch a pixel; of an image that is drawn in bands a splat counts in each that it touches, up to as many as there
     /// are surfels. Those that were left out because they are hidden are not counted.
     pub splats_drawn: u64,
+    /// Triangles in the scene.
+    #[serde(skip_serializing_if = "is_none")]
+    pub triangles: u64,
     /// Image width.
     pub width: u32,
     /// Image height.
@@ -39,6 +42,10 @@ pub struct Report {
     /// Of the map [`Map::Tail`](crate::scene::Map::Tail), if it is made.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tail: Option<Tail>,
+}
+
+fn is_none(count: &u64) -> bool {
+    *count == 0
 }
 
 /// How much of a picture is what lies behind the last layer.

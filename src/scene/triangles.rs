@@ -1,11 +1,12 @@
 //! Triangles beside a scene's surfels: a second source of what a pixel shows.
 
 use std::cmp::Ordering;
+use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::Bounds;
+use super::{Bounds, Mipmap, Texture};
 use crate::morton;
 
 /// A triangle before it is among others: what its corners have.
@@ -17,6 +18,8 @@ pub struct Triangle {
     pub normals: Option<[[f32; 3]; 3]>,
     /// Premultiplied linear colours of the corners.
     pub colors: [[f32; 4]; 3],
+    /// The texture that the colours are multiplied with, by its number, and the corners' places in it, (u, v) with the origin bottom left.
+    pub texture: Option<(u32, [[f32; 2]; 3])>,
 }
 
 /// Triangles, in an order that depends on what they are alone: by where they are, then by all bits that they have. So the place of one is
@@ -27,7 +30,21 @@ pub struct Triangles {
     corners: Vec<[u32; 3]>,
     normals: Vec<[[f32; 3]; 3]>,
     colors: Vec<[[f32; 4]; 3]>,
+    painted: Vec<Painted>,
+    textures: Vec<Mipmap>,
 }
+
+/// A triangle's texture and the places of its corners in it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Painted {
+    /// The texture's number, or [`UNPAINTED`].
+    pub texture: u32,
+    /// (u, v) of the corners.
+    pub places: [[f32; 2]; 3],
+}
+
+/// The number of no texture.
+pub const UNPAINTED: u32 = u32::MAX;
 
 /// Cells of the Morton code along an axis.
 const CELLS: f64 = ((1u32 << 21) - 1) as f64;
@@ -38,6 +55,11 @@ impl Triangles {
     /// Vertices at one place are one, whichever triangles they are of: what is computed of a vertex is the same number for all of them.
     /// Normals are kept if any has some; who has none takes those of its plane.
     pub fn new(triangles: &[Triangle]) -> Self {
+        Self::textured(triangles, &[])
+    }
+
+    /// The same with textures, by whose places triangles have their numbers.
+    pub fn textured(triangles: &[Triangle], textures: &[Arc<Texture>]) -> Self {
         // Adding +0 makes the two zeros one.
         let placed = |triangle: &Triangle| triangle.corners.map(|corner| corner.map(|x| x + 0.0));
         let places = triangles.par_iter().flat_map_iter(placed);
@@ -59,18 +81,32 @@ impl Triangles {
                 let [Some(a), Some(b), Some(c)] = placed(triangle).map(number) else { return None };
                 let normals =
                     if has_normals { triangle.normals.unwrap_or_else(|| facet(triangle)) } else { [[0.0; 3]; 3] };
-                let record = Record { corners: [a, b, c], normals, colors: triangle.colors };
+                let (texture, places) = triangle
+                    .texture
+                    .filter(|(of, _)| textures.len() > *of as usize)
+                    .unwrap_or((UNPAINTED, [[0.0; 2]; 3]));
+                let painted = Painted { texture, places };
+                let record = Record { corners: [a, b, c], normals, colors: triangle.colors, painted };
                 (a != b && b != c && c != a).then(|| record.turned())
             })
             .collect();
         all.par_sort_unstable_by(Record::order);
         let colored = all.par_iter().any(|record| record.colors.iter().any(|color| *color != all[0].colors[0]));
+        let is_painted = all.par_iter().any(|record| record.painted.texture != UNPAINTED);
         Self {
             vertices: keyed.iter().map(|(_, bits)| bits.map(f32::from_bits)).collect(),
             corners: all.iter().map(|record| record.corners).collect(),
             normals: if has_normals { all.iter().map(|record| record.normals).collect() } else { Vec::new() },
             colors: all.iter().take(if colored { all.len() } else { 1 }).map(|record| record.colors).collect(),
+            painted: if is_painted { all.iter().map(|record| record.painted).collect() } else { Vec::new() },
+            textures: textures.iter().filter(|_| is_painted).map(|texture| Mipmap::new(texture.clone())).collect(),
         }
+    }
+
+    /// The same triangles in one colour, linear and premultiplied.
+    pub fn painted(&self, color: [f32; 4]) -> Self {
+        let colors = self.colors.first().map(|_| [color; 3]).into_iter().collect();
+        Self { colors, painted: Vec::new(), textures: Vec::new(), ..self.clone() }
     }
 
     /// How many there are.
@@ -101,6 +137,27 @@ impl Triangles {
     /// The premultiplied linear colours of each triangle's corners; or of all, if there is one record.
     pub fn colors(&self) -> &[[[f32; 4]; 3]] {
         &self.colors
+    }
+
+    /// What each triangle is painted with; empty if none is.
+    pub fn paint(&self) -> &[Painted] {
+        &self.painted
+    }
+
+    /// What they are painted with.
+    pub fn textures(&self) -> &[Mipmap] {
+        &self.textures
+    }
+
+    /// The texture's premultiplied colour at a point of a triangle by its corners' `parts`, of which a pixel has so much as `spread`; white
+    /// without one.
+    pub fn texture_at(&self, triangle: usize, parts: [f64; 3], spread: f64) -> [f64; 4] {
+        let painted = self.painted.get(triangle).and_then(|of| Some((of, self.textures.get(of.texture as usize)?)));
+        let Some((painted, mipmap)) = painted else { return [1.0; 4] };
+        let [a, b, c] = painted.places.map(|place| DVec2::from_array(place.map(f64::from)));
+        let place = a + parts[1] * (b - a) + parts[2] * (c - a);
+        let [width, height] = mipmap.levels()[0].size().map(f64::from);
+        mipmap.seen_at(place.to_array(), spread * (b - a).perp_dot(c - a).abs() * width * height)
     }
 
     /// The place of a vertex, world units relative to the scene's origin.
@@ -145,6 +202,7 @@ struct Record {
     corners: [u32; 3],
     normals: [[f32; 3]; 3],
     colors: [[f32; 4]; 3],
+    painted: Painted,
 }
 
 impl Record {
@@ -156,15 +214,19 @@ impl Record {
             corners: std::array::from_fn(|k| self.corners[turn(k)]),
             normals: std::array::from_fn(|k| self.normals[turn(k)]),
             colors: std::array::from_fn(|k| self.colors[turn(k)]),
+            painted: Painted { places: std::array::from_fn(|k| self.painted.places[turn(k)]), ..self.painted },
         }
     }
 
     fn order(&self, other: &Self) -> Ordering {
         let normals = |record: &Self| record.normals.map(|normal| normal.map(f32::to_bits));
         let colors = |record: &Self| record.colors.map(|color| color.map(f32::to_bits));
+        let painted =
+            |record: &Self| (record.painted.texture, record.painted.places.map(|place| place.map(f32::to_bits)));
         (self.corners.cmp(&other.corners))
             .then_with(|| normals(self).cmp(&normals(other)))
             .then_with(|| colors(self).cmp(&colors(other)))
+            .then_with(|| painted(self).cmp(&painted(other)))
     }
 }
 
@@ -174,7 +236,12 @@ mod tests {
 
     fn triangle(k: usize) -> Triangle {
         let at = |n: usize| [n % 5, n / 5 % 5, n % 3].map(|x| x as f32);
-        Triangle { corners: [at(k), at(k + 1), at(k + 7)], normals: None, colors: [[k as f32, 0.0, 0.0, 1.0]; 3] }
+        Triangle {
+            corners: [at(k), at(k + 1), at(k + 7)],
+            normals: None,
+            colors: [[k as f32, 0.0, 0.0, 1.0]; 3],
+            texture: None,
+        }
     }
 
     #[test]

@@ -1,10 +1,12 @@
 //! From meshes to the triangles of a scene, as they are.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{LARGEST_COORDINATE, guess_up, origin_for, unit};
-use crate::io::Mesh;
+use crate::io::{Material, Mesh, Texture};
 use crate::scene::color::DEFAULT_COLOR;
 use crate::scene::{Bounds, SMALLEST_SCENE, Scene, Triangle, Triangles};
 use crate::{Error, Result};
@@ -66,16 +68,18 @@ pub fn with_triangles(scene: Option<Scene>, meshes: &[Mesh]) -> Result<(Scene, M
         let up = given.unwrap_or_else(|| guess_up(&bounds));
         Scene { origin: origin_for(&bounds), oriented: true, up, ..Scene::default() }
     });
-    let mut all = Vec::new();
+    let (mut all, mut textures) = (Vec::new(), Vec::new());
     for mesh in meshes {
         preparation.given += mesh.triangles.len() as u64;
+        // The number of each material's texture, whatever meshes share it.
+        let numbers: Vec<Option<u32>> = mesh.materials.iter().map(|of| numbered(&mut textures, of)).collect();
         let of = mesh.triangles.par_iter().enumerate().filter(|(_, corners)| usable(mesh, corners));
-        let made: Vec<(Triangle, bool)> = of.map(|(index, _)| triangle(mesh, index, scene.origin)).collect();
+        let made: Vec<(Triangle, bool)> = of.map(|(index, _)| triangle(mesh, index, scene.origin, &numbers)).collect();
         preparation.dropped_non_finite += (mesh.triangles.len() - made.len()) as u64;
         preparation.replaced_colors += made.iter().filter(|(_, replaced)| *replaced).count() as u64;
         all.extend(made.into_iter().map(|(triangle, _)| triangle));
     }
-    scene.triangles = Triangles::new(&all);
+    scene.triangles = Triangles::textured(&all, &textures);
     preparation.triangles = scene.triangles.len() as u64;
     preparation.dropped_degenerate = all.len() as u64 - preparation.triangles;
     if scene.triangles.is_empty() {
@@ -93,15 +97,33 @@ pub fn with_triangles(scene: Option<Scene>, meshes: &[Mesh]) -> Result<(Scene, M
     Ok((scene, preparation))
 }
 
-/// A triangle relative to `origin`, and whether a colour of it was replaced.
-fn triangle(mesh: &Mesh, index: usize, origin: DVec3) -> (Triangle, bool) {
+/// The number of a material's texture among `textures`, where it is put if it is not there.
+fn numbered(textures: &mut Vec<Arc<Texture>>, of: &Material) -> Option<u32> {
+    let texture = of.texture.as_ref()?;
+    let known = textures.iter().position(|known| Arc::ptr_eq(known, texture) || known == texture);
+    let number = known.unwrap_or(textures.len());
+    if known.is_none() {
+        textures.push(texture.clone());
+    }
+    u32::try_from(number).ok()
+}
+
+/// A triangle relative to `origin`, and whether a colour of it was replaced; the textures of materials have these `numbers`.
+fn triangle(mesh: &Mesh, index: usize, origin: DVec3, numbers: &[Option<u32>]) -> (Triangle, bool) {
     let corners = mesh.triangles[index].map(|vertex| DVec3::from_array(mesh.positions[vertex as usize]) - origin);
     let facet = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero().as_vec3();
     let normals =
         mesh.normals.as_ref().map(|normals| normals[index].map(|normal| unit(normal).unwrap_or(facet).to_array()));
+    let material = mesh.material.as_ref().and_then(|of| of.get(index)).map(|of| *of as usize);
+    let number = material.and_then(|of| *numbers.get(of)?);
+    let places = mesh.texture.as_ref().and_then(|places| places.get(index));
+    let texture =
+        number.zip(places.copied().filter(|places| places.as_flattened().iter().all(|turns| turns.is_finite())));
     let mut replaced = false;
     let mut color = |weights: DVec3| {
-        let given = mesh.color_at(index, weights);
+        // What a texture is multiplied with.
+        let diffuse = texture.and(mesh.material_of(index)).map(|material| material.diffuse);
+        let given = diffuse.unwrap_or_else(|| mesh.color_at(index, weights));
         let sound = given.iter().all(|value| value.is_finite());
         let [r, g, b, alpha] = if sound { given } else { DEFAULT_COLOR };
         let within = alpha.clamp(0.0, 1.0);
@@ -110,5 +132,5 @@ fn triangle(mesh: &Mesh, index: usize, origin: DVec3) -> (Triangle, bool) {
         [r * within, g * within, b * within, within].map(|value| value + 0.0)
     };
     let colors = [DVec3::X, DVec3::Y, DVec3::Z].map(&mut color);
-    (Triangle { corners: corners.map(|corner| corner.as_vec3().to_array()), normals, colors }, replaced)
+    (Triangle { corners: corners.map(|corner| corner.as_vec3().to_array()), normals, colors, texture }, replaced)
 }

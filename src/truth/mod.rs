@@ -34,6 +34,8 @@ pub enum Surface {
     Analytic(Shape),
     /// Triangles.
     Mesh(TriangleTree),
+    /// Two, of which the nearer is met.
+    Both(Box<[Surface; 2]>),
 }
 
 /// Where a ray meets a surface.
@@ -87,6 +89,10 @@ impl Surface {
                 Some(Hit { distance: beyond + further, normal, facet: normal, color: [r, g, b, 1.0] })
             }
             Self::Mesh(triangles) => triangles.first_hit(start, direction, beyond),
+            Self::Both(both) => {
+                let hits = both.each_ref().map(|surface| surface.first_hit(start, direction, beyond));
+                hits.into_iter().flatten().min_by(|a, b| a.distance.total_cmp(&b.distance))
+            }
         }
     }
 
@@ -95,6 +101,7 @@ impl Surface {
         match self {
             Self::Analytic(_) => 1.0,
             Self::Mesh(triangles) => triangles.radius(),
+            Self::Both(both) => both[0].size().max(both[1].size()),
         }
     }
 }

@@ -181,6 +181,7 @@ pub fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         ("nearest_triangles", Element::Plain(&[u32::SHAPE, u64::SHAPE])),
         ("named_triangles", Element::Plain(WORD)),
         ("triangle_attributes", Element::Plain(&[f32::SHAPE])),
+        ("triangle_textures", Element::Plain(WORD)),
         ("triangle_pixels", Element::Plain(&[<[f32; 4]>::SHAPE])),
         ("beside", Element::Plain(&[<[f32; 4]>::SHAPE])),
         ("texels", Element::Plain(WORD)),

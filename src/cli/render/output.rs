@@ -56,7 +56,7 @@ pub(super) fn note_overflows(report: &Report) {
 
 /// One line: what was drawn, and how long each pass took.
 pub(super) fn summary(report: &Report, output: &Path) -> String {
-    let order = ["project_ms", "visibility_ms", "accumulate_ms", "sort_ms", "resolve_ms"];
+    let order = ["project_ms", "visibility_ms", "triangles_ms", "accumulate_ms", "sort_ms", "resolve_ms"];
     let passes = order
         .iter()
         .filter_map(|name| report.passes.get(*name).map(|ms| format!("{} {ms:.1}", name.trim_end_matches("_ms"))));
@@ -71,11 +71,16 @@ pub(super) fn summary(report: &Report, output: &Path) -> String {
             100.0 * tail.largest
         )
     });
+    let surfels = match (report.surfels, report.triangles) {
+        (0, triangles) if triangles > 0 => String::new(),
+        (surfels, _) => format!("{} of {surfels} surfels", report.splats_drawn),
+    };
+    let triangles = (report.triangles > 0).then(|| format!("{} triangles", report.triangles));
+    let drawn: Vec<_> = Some(surfels).filter(|text| !text.is_empty()).into_iter().chain(triangles).collect();
     format!(
-        "{}: {} of {} surfels drawn, {:.1} ms ({}{clock}){tail}",
+        "{}: {} drawn, {:.1} ms ({}{clock}){tail}",
         output.display(),
-        report.splats_drawn,
-        report.surfels,
+        drawn.join(" and "),
         report.total_ms,
         passes.collect::<Vec<_>>().join(", "),
     )

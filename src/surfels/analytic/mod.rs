@@ -2,6 +2,7 @@
 
 mod gaussians;
 mod lattice;
+mod mesh;
 mod ray;
 mod text;
 
@@ -11,6 +12,7 @@ use std::str::FromStr;
 use glam::DVec3;
 
 pub use self::gaussians::gaussians;
+pub use self::mesh::mesh;
 pub use self::ray::depth_along_ray;
 use crate::scene::Up;
 use crate::{Error, Result};

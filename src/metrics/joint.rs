@@ -1,0 +1,118 @@
+//! Where two surfaces meet in an image: which of them shows on either side of the curve, and how far off that is.
+
+use rayon::prelude::*;
+
+use crate::scene::Camera;
+use crate::truth::Surface;
+
+/// How near to the curve pixels are asked for the share of wrong ones, pixels.
+pub const BESIDE: f64 = 3.0;
+
+/// How near to the curve pixels count for its offset, pixels: a surface that ends elsewhere is not displaced, but another one.
+const FARTHEST: f64 = 32.0;
+
+/// What shows of two surfaces beside the curve at which they meet.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Joint {
+    /// Share of the pixels within [`BESIDE`] of the curve that show the surface that is farther.
+    pub wrong_rate: f64,
+    /// Root of the mean squared distance of the curve that shows from the one that rays see, pixels.
+    pub offset_px: f64,
+}
+
+/// Measures `first_shows`, pixel by pixel, against the rays of `camera` that meet the first and the second surface. None if they meet nowhere
+/// in the image.
+///
+/// The curve goes between neighbours of which rays meet both surfaces in another order each, at the place where the difference of the two
+/// depths is 0 if it is linear between them. A curve of length L that shows d(s) off leaves pixels wrong over an area whose integral of
+/// their distance from it is that of `d^2 / 2` over s, so `rms^2 = 2 / L sum of distances`, and L is the area of the pixels within
+/// [`BESIDE`] over its width.
+pub fn joint(first_shows: &[bool], camera: &Camera, surfaces: [&Surface; 2]) -> Option<Joint> {
+    let difference = |pixel: usize| {
+        let (x, y) = (pixel as u32 % camera.width, pixel as u32 / camera.width);
+        let (x, y) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
+        let (start, ray) = (camera.ray_start(x, y), camera.ray(x, y));
+        let [first, second] = surfaces.map(|surface| surface.first_hit(start, ray, camera.near));
+        Some(first?.distance - second?.distance)
+    };
+    let differences: Vec<Option<f64>> = (0..first_shows.len()).into_par_iter().map(difference).collect();
+    let distances = distances(&differences, camera.width as usize);
+    let (mut beside, mut wrong, mut moment) = (0.0, 0.0, 0.0);
+    for (pixel, distance) in distances.into_iter().enumerate() {
+        let Some(difference) = differences[pixel].filter(|_| distance <= FARTHEST) else { continue };
+        let is_wrong = (difference < 0.0) != first_shows[pixel];
+        if distance <= BESIDE {
+            beside += 1.0;
+            wrong += f64::from(u8::from(is_wrong));
+        }
+        moment += if is_wrong { distance } else { 0.0 };
+    }
+    let length = beside / (2.0 * BESIDE);
+    (beside > 0.0).then(|| Joint { wrong_rate: wrong / beside, offset_px: (2.0 * moment / length).sqrt() })
+}
+
+/// The distance of each pixel of rows of `width` from the nearest place where `differences` are 0, pixels; more than [`FARTHEST`] if that
+/// is farther.
+fn distances(differences: &[Option<f64>], width: usize) -> Vec<f64> {
+    let mut distances = vec![f64::INFINITY; differences.len()];
+    let height = differences.len() / width.max(1);
+    let reach = FARTHEST.ceil() as usize + 1;
+    let mut mark = |x: f64, y: f64| {
+        for row in (y as usize).saturating_sub(reach)..(y as usize + reach + 1).min(height) {
+            for column in (x as usize).saturating_sub(reach)..(x as usize + reach + 1).min(width) {
+                let distance = (column as f64 - x).hypot(row as f64 - y);
+                let known = &mut distances[row * width + column];
+                *known = known.min(distance);
+            }
+        }
+    };
+    for (pixel, here) in differences.iter().enumerate() {
+        let (x, y) = (pixel % width, pixel / width);
+        for (dx, dy) in [(1, 0), (0, 1)] {
+            let there = if x + dx < width && y + dy < height { differences[pixel + dx + dy * width] } else { None };
+            if let (Some(a), Some(b)) = (*here, there)
+                && (a < 0.0) != (b < 0.0)
+            {
+                let t = a / (a - b);
+                mark(x as f64 + t * dx as f64, y as f64 + t * dy as f64);
+            }
+        }
+    }
+    distances
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use glam::DVec3;
+
+    use super::*;
+    use crate::scene::{Lens, Up};
+    use crate::surfels::analytic::Shape;
+
+    /// Two squares cross in a line down the image; one that shows some pixels off is measured to be so.
+    #[test]
+    fn an_offset_is_measured_in_pixels() {
+        let (size, lens) = ((200, 200), Lens::OrthographicHeight(2.4));
+        let eye = DVec3::new(-3.0, 0.0, 4.0);
+        let camera = Camera::look_at(size, lens, eye, DVec3::ZERO, Some(DVec3::Y), Up::Y, 0.1).unwrap();
+        // A sphere through the square z = 0: where the ray meets the square in its circle, the sphere is nearer.
+        let surfaces = [Surface::Analytic(Shape::Sphere), Surface::Analytic(Shape::Plane)];
+        let of = |shift: u32| {
+            let nearer = |pixel: u32| {
+                let (x, y) = (f64::from((pixel % 200).saturating_sub(shift)) + 0.5, f64::from(pixel / 200) + 0.5);
+                let (start, ray) = (camera.ray_start(x, y), camera.ray(x, y));
+                let [a, b] = surfaces.each_ref().map(|surface| surface.first_hit(start, ray, 0.1));
+                a.is_some_and(|a| b.is_none_or(|b| a.distance < b.distance))
+            };
+            joint(&(0..40_000).map(nearer).collect::<Vec<_>>(), &camera, [&surfaces[0], &surfaces[1]]).unwrap()
+        };
+        let exact = of(0);
+        assert_eq!((exact.wrong_rate, exact.offset_px), (0.0, 0.0));
+        // The curve is half an ellipse, whose ends go along with the shift: rms of the shift times the cosine.
+        for (shift, rms) in [(2, 1.35), (6, 4.1)] {
+            let off = of(shift);
+            assert!((off.offset_px / rms - 1.0).abs() < 0.15 && off.wrong_rate > 0.1, "{shift}: {off:?}");
+        }
+    }
+}

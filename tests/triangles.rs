@@ -6,9 +6,11 @@ mod common;
 
 use common::scenes::{front, sphere, sphere_camera};
 use common::{Random, bits, meshes};
+use std::sync::Arc;
+
 use epsplat::frame::Frame;
 use epsplat::gpu::{Gpu, Sources};
-use epsplat::io::Mesh;
+use epsplat::io::{Mesh, Texture};
 use epsplat::metrics::DECISION_MARGIN;
 use epsplat::plan::{Organisation, RenderOptions};
 use epsplat::render::{Backend, Renderer, render};
@@ -327,5 +329,61 @@ fn the_same_bits_however_it_is_drawn() {
         let shown = frame(&scene, &camera, &plain, &gl);
         let rmse = epsplat::metrics::compare(&shown, &frame(&scene, &camera, &plain, &backend)).unwrap().rmse;
         assert!(rmse < 1e-6, "{rmse}");
+    }
+}
+
+/// Painted triangles alike by kernels and twins, near and far; wrong lookups do not, and from afar a checkerboard is grey and not a pattern.
+#[test]
+fn kernels_and_twins_paint_alike() {
+    let Some(backend) = gpu() else { return };
+    let checker =
+        (0..64 * 48).map(|k| if (k % 64 + k / 64) % 2 == 0 { [255, 240, 20, 255] } else { [0, 10, 200, 255] });
+    let texture = Arc::new(Texture::new(64, 48, checker.collect()).unwrap());
+    let other = Arc::new(Texture::new(1, 1, vec![[255, 0, 0, 128]]).unwrap());
+    let corners = [[-9.0, 0.4, 0.2], [9.0, 0.5, 0.2], [0.0, 0.3, 60.0]];
+    let painted = |corners, texture| Triangle { corners, normals: None, colors: [[1.0; 4]; 3], texture };
+    let places = [[-2.0, 0.0], [2.0, 0.0], [0.5, 7.0]];
+    let all = [
+        painted(corners, Some((0, places))),
+        painted([[-1.0, -0.8, 2.0], [0.1, -0.9, 2.5], [-0.2, 0.0, 2.2]], Some((1, places))),
+        painted([[0.0, -0.8, 2.0], [1.1, -0.9, 2.5], [0.8, 0.0, 2.2]], None),
+        // Cut at the near depth.
+        painted([[0.9, -0.9, -1.0], [1.0, 0.2, 3.0], [1.4, -0.5, 3.0]], Some((0, places))),
+    ];
+    let scene = Scene { triangles: Triangles::textured(&all, &[texture, other]), ..Scene::default() };
+    let differ = |camera: &Camera, backend: &Backend| {
+        let with_decision = RenderOptions { maps: Maps::of(&[Map::Decision]), ..unlit() };
+        let truth = frame(&scene, camera, &with_decision, &Backend::Reference);
+        let shown = frame(&scene, camera, &unlit(), backend);
+        let decided = truth.map(Map::Decision).unwrap();
+        let far = |pixel: &usize| {
+            let pairs = shown.color[*pixel].iter().zip(truth.color[*pixel]);
+            pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) > 2e-4
+        };
+        let wrong = (0..decided.len()).filter(|pixel| decided[*pixel] > DECISION_MARGIN).filter(far).count();
+        (wrong, shown)
+    };
+    let wrong = [
+        broken("triangles_texture.wgsl", "0.5 * log2(max(texels, 1.0))", "0.6 * log2(max(texels, 1.0))"),
+        broken("triangles_texture.wgsl", "1.0 - place.y", "place.y"),
+        broken("triangles_texture.wgsl", "number == NO_TEXTURE);\n}", "false);\n}"),
+        broken("corner_pinhole.wgsl", "a * b * c / of_depth", "a * b / of_depth"),
+    ];
+    for (number, lens) in [Lens::Fov(60.0), Lens::OrthographicHeight(2.4)].into_iter().enumerate() {
+        let camera = Camera::look_at((160, 120), lens, DVec3::ZERO, DVec3::Z, Some(DVec3::NEG_Y), Up::Y, 0.01).unwrap();
+        assert_eq!(differ(&camera, &backend).0, 0, "{lens:?}");
+        if number == 0 {
+            for (which, wrong) in wrong.iter().enumerate() {
+                assert!(differ(&camera, wrong).0 > 50, "{which}");
+            }
+            // Beside the horizon neighbours differ by less than the checkerboard's colours.
+            let shown = differ(&camera, &backend).1;
+            let row =
+                |y: usize| shown.color[y * 160 + 70..y * 160 + 90].iter().map(|color| color[0]).collect::<Vec<_>>();
+            let spread =
+                |row: Vec<f32>| row.iter().copied().fold(0.0, f32::max) - row.iter().copied().fold(1.0, f32::min);
+            let horizon = (0..120).find(|y| row(*y).iter().all(|red| *red > 0.0)).unwrap();
+            assert!(spread(row(horizon + 1)) < 0.2, "{}", spread(row(horizon + 1)));
+        }
     }
 }

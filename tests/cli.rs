@@ -436,3 +436,43 @@ fn simplify_keeps_the_picture_with_fewer_surfels() {
     fails(&["simplify", "x.ply", "-o", "y.ply", "--tolerance", "0.1"], 2, &["rel:E", "abs:E"]);
     fails(&["simplify", "no.ply", "-o", "y.ply"], 1, &["no.ply"]);
 }
+
+/// A mesh's triangles are drawn alone and beside surfels, and what does not go with them is told in a sentence.
+#[test]
+fn triangles_are_drawn_alone_and_beside_surfels() {
+    let folder = Folder::new();
+    let (bunny, cube) = (format!("{DATA}/bunny.obj"), format!("{DATA}/cube.obj"));
+    let painted = format!("{DATA}/cube.png");
+    let image = folder.path("t.png");
+    let with = |more: &[&'static str]| {
+        let mut all = vec!["render", "--backend", "reference", "--size", "32x32", "-o"];
+        all.extend(more);
+        all
+    };
+    let image = text(&image);
+    let alone = succeeds(&["render", "--triangles", &bunny, "-o", image, "--size", "32x32", "--backend", "reference"]);
+    let told = String::from_utf8(alone.stderr).unwrap();
+    assert!(told.contains("3674 triangles drawn") && !told.contains("surfels"), "{told}");
+    let beside =
+        ["render", &bunny, "--triangles", &cube, "--triangle-texture", &painted, "-o", image, "--size", "32x32"];
+    let told = String::from_utf8(succeeds(&[&beside[..], &["--backend", "reference"]].concat()).stderr).unwrap();
+    assert!(told.contains("surfels and 12 triangles drawn"), "{told}");
+    let info = String::from_utf8(succeeds(&["info", &bunny]).stdout).unwrap();
+    assert!(info.contains("--triangles"), "{info}");
+    let points = folder.file("p.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
+    let flat = folder.file("f.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 1 2\n");
+    let scan = format!("{DATA}/autzen.laz");
+    let by = |file: &str, more: &[&str], code: i32, words: &[&str]| {
+        let all = [&["render", "--triangles", file, "-o", image, "--backend", "reference"][..], more].concat();
+        fails(&all, code, words);
+    };
+    by(text(&points), &[], 1, &["p.obj", "no triangle"]);
+    by(text(&flat), &[], 1, &["f.obj", "area"]);
+    by(&scan, &[], 1, &["autzen.laz", "OBJ and PLY"]);
+    by("absent.obj", &[], 1, &["absent.obj"]);
+    by(&bunny, &["--triangle-texture", &painted], 1, &["bunny.obj", "texture coordinates"]);
+    by(&cube, &["--composite", "layers"], 2, &["--composite"]);
+    by(&cube, &["--join", "glued"], 2, &["corrected, nearest or blended"]);
+    fails(&[&with(&[])[..], &[image, "--join", "nearest", &bunny]].concat(), 2, &["--triangles"]);
+    fails(&with(&["t.png"]), 2, &["INPUTS"]);
+}

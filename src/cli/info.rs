@@ -43,6 +43,9 @@ struct Info {
     classes: BTreeMap<u8, u64>,
     /// Texture coordinates, by which `render --texture` paints.
     texture: bool,
+    /// It has triangles.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    is_mesh: bool,
     up: &'static str,
     /// World coordinates of the smallest box.
     min: [f64; 3],
@@ -99,6 +102,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let bars = Bars::new();
     let points = arguments.reading.points(&arguments.input, &bars)?;
     let bounds = surfels::bounds(&points);
+    let is_mesh = points.faces.is_some();
     let (texture, classes) = (points.texture.is_some(), points.classes.clone());
     let held = (points.positions.len() as u64, points.normals.is_some(), points.radii.is_some(), colors(&points));
     let (scene, preparation) =
@@ -123,6 +127,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         gaussians,
         classes,
         texture,
+        is_mesh,
         up: scene.up.name(),
         min: bounds.min.to_array(),
         max: bounds.max.to_array(),
@@ -210,6 +215,9 @@ fn table(input: &std::path::Path, info: &Info) -> String {
     if let Some(command) = &info.supplied_by {
         let colors = if info.colors == "none" { " (but colours)" } else { "" };
         let _ = writeln!(text, "What it lacks{colors} is estimated each time it is read; {command} keeps it.");
+    }
+    if info.is_mesh {
+        let _ = writeln!(text, "Its triangles are drawn as they are by epsplat render --triangles FILE.");
     }
     for note in info.preparation.notes() {
         let _ = writeln!(text, "{note}");

@@ -57,6 +57,7 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
     without.extend([Optimisation::Culling, Optimisation::Copies]);
     let options = &RenderOptions { organisation: Organisation::Scatter, raster: None, without, ..options.clone() };
     let facts = Facts::of(scene);
+    super::sums::of_surfels_alone(&facts)?;
     let mut known = Known::default();
     let plan = Plan::of(&facts, &gpu.adapter, camera, options, &known)?;
     if plan.bands.len() > 1 {

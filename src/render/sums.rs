@@ -14,7 +14,7 @@ use crate::passes::upload::{Uploaded, shared, upload};
 use crate::passes::{MAP_PASSES, accumulate, resolve as resolve_pass, visibility};
 use crate::plan::known::MOST_TRIES;
 use crate::plan::steps::{Part, Stage, Step, Twin};
-use crate::plan::{Accumulator, Known, Optimisation, PixelLayout, Plan, RenderOptions, check};
+use crate::plan::{Accumulator, Facts, Known, Optimisation, PixelLayout, Plan, RenderOptions, check};
 use crate::scene::{Blend, Camera, Composite};
 
 /// What the attribute pass leaves of an image, by the accumulator `fixed`.
@@ -93,6 +93,14 @@ impl Sums {
     }
 }
 
+/// Fails for triangles, of which no sums are kept.
+pub(super) fn of_surfels_alone(facts: &Facts) -> Result<()> {
+    match facts.mesh.triangles {
+        0 => Ok(()),
+        _ => Err(Error::Usage("triangles leave no sums: leave them out, or render".into())),
+    }
+}
+
 /// How sums are made that leave the device.
 fn stored(options: &RenderOptions) -> Result<RenderOptions> {
     super::parts::one_alone(options)?;
@@ -131,6 +139,7 @@ pub fn sums(
 ) -> Result<Sums> {
     let options = &stored(options)?;
     let facts = source.facts();
+    of_surfels_alone(&facts)?;
     let mut known = Known::default();
     let plan = Plan::of(&facts, &gpu.adapter, camera, options, &known)?;
     let mut store = Store::new(gpu, upload(gpu, source, &plan.needs, (&facts, true), &())?, &plan.needs)?;
@@ -174,6 +183,7 @@ pub fn resolve(
 ) -> Result<Frame> {
     let options = &stored(options)?;
     let facts = source.facts();
+    of_surfels_alone(&facts)?;
     let mut known = Known::default();
     let plan = Plan::of(&facts, &gpu.adapter, camera, options, &known)?;
     let view = View::new(&facts, camera, options);

@@ -251,7 +251,7 @@ fn beside_triangles(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
     let opaque = |needs: &&SceneNeeds| needs.raster.is_none() && needs.lists.is_none() && needs.oit.is_none();
     let of = |(step, needs): (usize, &SceneNeeds)| {
         let join = [Join::Corrected, Join::Nearest, Join::Blended][step % 3];
-        let [normals, colored, once, textured] = [1, 2, 4, 8].map(|bit| step / 3 & bit != 0);
+        let [normals, colored, once, textured] = [1, 2, 4, 8].map(|bit| (step / 3) & bit != 0);
         SceneNeeds {
             mesh: Some(MeshNeeds { join, normals, colored, textured, once }),
             maps: needs.maps.but(&[Map::Index]),

@@ -88,31 +88,29 @@ mod tests {
 
     use super::*;
     use crate::scene::{Lens, Up};
-    use crate::surfels::analytic::Shape;
+    use crate::surfels::analytic::{Shape, mesh};
 
-    /// Two squares cross in a line down the image; one that shows some pixels off is measured to be so.
+    /// Two planes cross in a line down the image; one that shows some pixels off is measured to be so.
     #[test]
     fn an_offset_is_measured_in_pixels() {
-        let (size, lens) = ((200, 200), Lens::OrthographicHeight(2.4));
-        let eye = DVec3::new(-3.0, 0.0, 4.0);
-        let camera = Camera::look_at(size, lens, eye, DVec3::ZERO, Some(DVec3::Y), Up::Y, 0.1).unwrap();
-        // A sphere through the square z = 0: where the ray meets the square in its circle, the sphere is nearer.
-        let surfaces = [Surface::Analytic(Shape::Sphere), Surface::Analytic(Shape::Plane)];
-        let of = |shift: u32| {
-            let nearer = |pixel: u32| {
-                let (x, y) = (f64::from((pixel % 200).saturating_sub(shift)) + 0.5, f64::from(pixel / 200) + 0.5);
-                let (start, ray) = (camera.ray_start(x, y), camera.ray(x, y));
-                let [a, b] = surfaces.each_ref().map(|surface| surface.first_hit(start, ray, 0.1));
-                a.is_some_and(|a| b.is_none_or(|b| a.distance < b.distance))
-            };
-            joint(&(0..40_000).map(nearer).collect::<Vec<_>>(), &camera, [&surfaces[0], &surfaces[1]]).unwrap()
+        let eye = DVec3::new(0.0, 0.0, 5.0);
+        let lens = Lens::OrthographicHeight(1.6);
+        let camera = Camera::look_at((100, 100), lens, eye, DVec3::ZERO, Some(DVec3::Y), Up::Y, 0.1).unwrap();
+        let mut tilted = mesh(Shape::Plane, 2);
+        tilted.positions.iter_mut().for_each(|p| p[2] = 0.7 * p[0]);
+        let surfaces = [Surface::Analytic(Shape::Plane), Surface::mesh(&tilted).unwrap()];
+        let of = |off: u32| {
+            // The tilted one is nearer to the right of the middle.
+            let shown: Vec<bool> = (0..100 * 100).map(|pixel| pixel % 100 < 50 + off).collect();
+            joint(&shown, &camera, surfaces.each_ref()).unwrap()
         };
-        let exact = of(0);
-        assert_eq!((exact.wrong_rate, exact.offset_px), (0.0, 0.0));
-        // The curve is half an ellipse, whose ends go along with the shift: rms of the shift times the cosine.
-        for (shift, rms) in [(2, 1.35), (6, 4.1)] {
-            let off = of(shift);
-            assert!((off.offset_px / rms - 1.0).abs() < 0.15 && off.wrong_rate > 0.1, "{shift}: {off:?}");
+        for off in [0, 1, 2, 6] {
+            let Joint { wrong_rate, offset_px } = of(off);
+            assert!((offset_px - f64::from(off)).abs() < 0.01, "{off}: {offset_px}");
+            assert!((wrong_rate - f64::from(off.min(3)) / 6.0).abs() < 0.01, "{off}: {wrong_rate}");
         }
+        // Away from one another they meet nowhere.
+        let far = Camera { eye: eye + 3.0 * DVec3::X, ..camera.clone() };
+        assert_eq!(joint(&vec![true; 100 * 100], &far, surfaces.each_ref()), None);
     }
 }

@@ -256,6 +256,9 @@ pub fn scene(facts: &Facts, options: &RenderOptions, reference: bool) -> Result<
             "the map surfaces is of surfaces that are told apart: take --composite layers, sorted or gaussians with it",
         );
     }
+    if facts.mesh.triangles > 0 && facts.encoded {
+        return usage("Gaussians are composited as codes and triangles are lit: draw one of them");
+    }
     if facts.mesh.triangles > 0 {
         triangles(options, reference)?;
     }

@@ -77,6 +77,15 @@ pub struct Plan {
     pub looks_for_lists: [bool; 2],
 }
 
+/// The words that a pixel takes at most in a buffer that some renders alone have.
+fn most_words(needs: &SceneNeeds) -> u32 {
+    let of = |has: bool, words: u32| if has { words } else { 0 };
+    let peeled = of(needs.peels.is_some(), PEELED_WORDS);
+    let moments = of(needs.oit == Some(Oit::Moments), MOMENT_WORDS);
+    let triangles = of(needs.mesh.is_some(), TRIANGLE_PIXEL_WORDS);
+    peeled.max(moments).max(triangles).max(of(needs.veils, VEIL_WORDS))
+}
+
 impl Plan {
     /// The plan for a view by `camera`, whose pixels are the samples ([`Camera::sampled`]), of the scene that `facts` are of.
     ///
@@ -118,11 +127,7 @@ impl Plan {
         // Tiles that gather store no sums.
         let sum_words = if gather { 0 } else { pixel.sum_words(&needs) };
         let head = if sum_words > 0 { needs.accumulator.row().head_words() } else { 0 };
-        let peeled = if needs.peels.is_some() { PEELED_WORDS } else { 0 };
-        let veils = if needs.veils { VEIL_WORDS } else { 0 };
-        let moments = if needs.oit == Some(Oit::Moments) { MOMENT_WORDS } else { 0 };
-        let of_triangles = if needs.mesh.is_some() { TRIANGLE_PIXEL_WORDS } else { 0 };
-        let words = sum_words.max(pixel.image_words).max(peeled).max(veils).max(moments).max(of_triangles);
+        let words = sum_words.max(pixel.image_words).max(most_words(&needs));
         let whole = || bands(adapter, camera, needs.samples.down, words, head);
         let bands = known.cuts.clone().map_or_else(whole, Ok)?;
         let several = bands.len() > 1;

@@ -17,7 +17,7 @@ use super::{
 };
 use crate::io::Points;
 use crate::scene::scene::{low_parts, shows};
-use crate::scene::{Bounds, Cap, Clip, Colors, SMALLEST_SCENE, Scene, Surfel, Texture, Triangles, body};
+use crate::scene::{Bounds, Cap, Clip, Colors, SMALLEST_SCENE, Scene, Surfel, Texture, body};
 use crate::{Error, Progress, Result};
 
 /// The largest radius of a disk, in extents of the scene: from anywhere near the scene it is a plane without an end, and depths
@@ -148,22 +148,8 @@ pub(super) fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Prog
     // Most scenes have no disk that ends before its rim.
     let clips: Vec<Clip> = clips.unwrap_or_default().into_iter().map(Clip::usable).collect();
     let clips = if clips.iter().all(Clip::is_none) { Vec::new() } else { clips };
-    let triangles = Triangles::default();
-    let scene = Scene {
-        origin,
-        surfels,
-        low,
-        clips,
-        caps,
-        normals,
-        colors,
-        encoded,
-        oriented,
-        closed,
-        triangles,
-        up,
-        provenance,
-    };
+    let of_disks = Scene { low, clips, caps, normals, ..Scene::default() };
+    let scene = Scene { origin, surfels, colors, encoded, oriented, closed, up, provenance, ..of_disks };
     // As the default view sees it.
     preparation.strays = scene.framed().1;
     Ok(((scene, preparation), texture))

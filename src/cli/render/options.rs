@@ -70,11 +70,7 @@ pub(super) fn options(arguments: &Arguments, format: Format) -> Result<RenderOpt
         accumulator: arguments.accumulator.unwrap_or_default(),
         organisation: arguments.organisation.unwrap_or_default(),
         raster: raster(arguments),
-        shading: match arguments.shading() {
-            ShadingName::Unlit => Shading::Unlit,
-            ShadingName::Lambert => Shading::Lambert,
-            ShadingName::Phong => Shading::Phong,
-        },
+        shading: shading(arguments),
         shading_at: match arguments.shading_at {
             ShadingAtName::Pixel => ShadingAt::Pixel,
             ShadingAtName::Splat => ShadingAt::Splat,
@@ -131,6 +127,14 @@ pub(super) fn for_scene(arguments: &Arguments, options: RenderOptions, scene: &S
     };
     check::options(&options, arguments.backend.0 == Some(BackendName::Reference))?;
     Ok(options)
+}
+
+fn shading(arguments: &Arguments) -> Shading {
+    match arguments.shading() {
+        ShadingName::Unlit => Shading::Unlit,
+        ShadingName::Lambert => Shading::Lambert,
+        ShadingName::Phong => Shading::Phong,
+    }
 }
 
 /// How points face the camera, if they do.

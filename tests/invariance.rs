@@ -11,6 +11,7 @@ use epsplat::gpu::layout::ONE;
 use epsplat::gpu::{Gpu, Sources};
 use epsplat::inspect::stages;
 use epsplat::passes::accumulate::PixelSums;
+use epsplat::passes::join::Beside;
 use epsplat::passes::resolve;
 use epsplat::plan::{AccumulatorRow, COLOR_CHANNEL, Optimisation, RenderOptions};
 use epsplat::render::{Backend, render};
@@ -169,7 +170,7 @@ fn resolve_matches_its_twin_on_the_devices_own_sums() {
             let device = frame(&scene, &camera, &options, &backend);
             let sums = unmapped(&scene, &camera, &options, gpu);
             let mut twin = Frame::new(&camera, Maps::ON_DEVICE);
-            resolve::reference(&sums, (&[], &[]), &scene, &camera, &options, 0, &mut twin);
+            resolve::reference(&sums, &Beside::default(), &scene, &camera, &options, 0, &mut twin);
             // Of the largest colour; of one; of the depth; of the weight.
             let largest = scene.color_range().1.map(f64::from).into_iter().fold(1.0, f64::max);
             for (pixel, sum) in sums.iter().enumerate() {

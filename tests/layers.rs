@@ -10,7 +10,7 @@ use common::scenes::generated;
 use epsplat::io::{self, Points};
 use epsplat::passes::layers::{Parting, part};
 use epsplat::passes::{Strip, fragments, project};
-use epsplat::plan::{Facts, RenderOptions, depths};
+use epsplat::plan::{Facts, RenderOptions};
 use epsplat::render::{Backend, render};
 use epsplat::scene::composite::ALL_LAYERS;
 use epsplat::scene::{Camera, Composite, Lens, Map, Maps, Scene, Shading, Surfel, Tail, Up};
@@ -93,8 +93,7 @@ fn inner(crossed: &[u32]) -> Vec<usize> {
 fn parted(scene: &Scene, camera: &Camera, options: &RenderOptions, parting: Parting) -> Vec<u32> {
     let splats = project::reference_all(scene, camera, options);
     let (splats, rows) = (splats.iter().collect(), camera.height);
-    let depths = depths(&Facts::of(scene), camera);
-    let strip = Strip { scene, camera, options, splats, corners: &[], ranks: None, depths, first_row: 0, rows };
+    let strip = Strip { splats, rows, ..Strip::of((scene, &Facts::of(scene)), camera, options) };
     let lists = fragments::reference(&strip);
     let count = |list: &fragments::List| {
         part(&list.fragments, (ALL_LAYERS, Tail::None), parting, (options, 1.0)).0.len() as u32

@@ -12,7 +12,7 @@ use epsplat::io;
 use epsplat::metrics::{DECISION_MARGIN, compare};
 use epsplat::passes::layers::{Parting, part};
 use epsplat::passes::{Strip, fragments, project};
-use epsplat::plan::{BlendFormat, Facts, Organisation, Raster, RasterDepth, RenderOptions, depths};
+use epsplat::plan::{BlendFormat, Facts, Organisation, Raster, RasterDepth, RenderOptions};
 use epsplat::render::{Backend, Renderer, Report, render};
 use epsplat::scene::composite::ALL_LAYERS;
 use epsplat::scene::{
@@ -354,8 +354,7 @@ fn maps_of_the_nearest_surface_stay() {
 fn parted(scene: &Scene, camera: &Camera, options: &RenderOptions, parting: Parting) -> Vec<usize> {
     let splats = project::reference_all(scene, camera, options);
     let (splats, rows) = (splats.iter().collect(), camera.height);
-    let depths = depths(&Facts::of(scene), camera);
-    let strip = Strip { scene, camera, options, splats, corners: &[], ranks: None, depths, first_row: 0, rows };
+    let strip = Strip { splats, rows, ..Strip::of((scene, &Facts::of(scene)), camera, options) };
     let count = |(pixel, list): (usize, &fragments::List)| {
         let along = camera.along_axis(pixel as u32 % camera.width, pixel as u32 / camera.width);
         part(&list.fragments, (ALL_LAYERS, Tail::None), parting, (options, along)).0.len()

@@ -140,8 +140,12 @@ fn cross_precisely(triangle: Triangle, p: vec2<f32>) -> Crossing {
         sum(product(a.area, shared_depth(triangle.a)), product(b.area, shared_depth(triangle.b))),
         product(c.area, shared_depth(triangle.c)),
     );
-    let depth = quotient(of_depth, whole).high;
-    let parts = vec3<f32>(weighed_a.high, weighed_b.high, weighed_c.high) / whole.high;
+    // Of a sliver whose areas all have other signs than f32 gives their sides, each corner has as much.
+    let is_told = whole.high > 0.0;
+    let told = vec3<f32>(weighed_a.high, weighed_b.high, weighed_c.high) / whole.high;
+    let parts = select(vec3<f32>(1.0 / 3.0), told, is_told);
+    let depths = vec3<f32>(triangle.a.depth.high, triangle.b.depth.high, triangle.c.depth.high);
+    let depth = select(dot(parts, depths), quotient(of_depth, whole).high, is_told);
     let spread = abs(spread_of_parts(triangle, depth, of_depth.high));
     return Crossing(is_hit(vec3<f32>(a.side, b.side, c.side), depth), depth, parts, spread);
 }

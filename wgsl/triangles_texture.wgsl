@@ -7,8 +7,6 @@
 // In a triangle's record.
 override TRIANGLE_PLACES: u32;
 
-const NO_TEXTURE: u32 = 0xffffffffu;
-
 struct Level {
     size: vec2<i32>,
     texels: u32,
@@ -44,8 +42,9 @@ fn triangle_texture(record: u32, parts: vec3<f32>, spread: f32) -> vec4<f32> {
     let a = vec2<f32>(triangle_attributes[first], triangle_attributes[first + 1u]);
     let b = vec2<f32>(triangle_attributes[first + 2u], triangle_attributes[first + 3u]);
     let c = vec2<f32>(triangle_attributes[first + 4u], triangle_attributes[first + 5u]);
-    let number = bitcast<u32>(triangle_attributes[first + 6u]);
-    let head = triangle_textures[select(number, 0u, number == NO_TEXTURE)];
+    // One more than the texture's, 0 of none.
+    let number = u32(triangle_attributes[first + 6u]);
+    let head = triangle_textures[max(number, 1u) - 1u];
     let whole = level_at(head, 0u);
     let doubled_area = abs((b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x));
     let texels = spread * doubled_area * f32(whole.size.x) * f32(whole.size.y);
@@ -55,5 +54,5 @@ fn triangle_texture(record: u32, parts: vec3<f32>, spread: f32) -> vec4<f32> {
     let place = a + parts.y * (b - a) + parts.z * (c - a);
     let near = level_color(level_at(head, u32(low)), place);
     let far = level_color(level_at(head, u32(min(low + 1.0, last))), place);
-    return select(mix(near, far, level - low), vec4<f32>(1.0), number == NO_TEXTURE);
+    return select(mix(near, far, level - low), vec4<f32>(1.0), number == 0u);
 }

@@ -1,6 +1,6 @@
 // Triangles, their visibility pass: the nearest one at every pixel, of those at one depth the one of the greatest number. One invocation a
 // triangle, one workgroup a large one, or a rare one that f32 does not tell. Twin: src/passes/triangles.rs.
-// All loops end, by 1, 2 of src/gpu/loops.rs: 0xd4cd95d04776c816
+// All loops end, by 1, 2 of src/gpu/loops.rs: 0x7df791e82f48fb01
 
 // In the form of the queue of large splats (project.wgsl): how many there are, a grid with a workgroup for each, and their numbers.
 @group(0) @binding(56) var<storage, read_write> large_triangles: array<atomic<u32>>;
@@ -61,7 +61,8 @@ fn reach_of(triangle: Triangle) -> Rectangle {
     return Rectangle(vec2<u32>(first), vec2<u32>(last));
 }
 
-// Whether the parts of f32, which err by 2^-23 of the square of its length over its area, make depths that err by more than f32 may.
+// Whether the parts of f32, which err by 2^-23 of the square of its length over its area, make depths that err by more than f32 may, or are
+// none.
 fn is_ill_formed(triangle: Triangle) -> bool {
     let a = vec2<f32>(triangle.a.x.high, triangle.a.y.high);
     let b = vec2<f32>(triangle.b.x.high, triangle.b.y.high) - a;
@@ -69,7 +70,9 @@ fn is_ill_formed(triangle: Triangle) -> bool {
     let depths = vec3<f32>(triangle.a.depth.high, triangle.b.depth.high, triangle.c.depth.high);
     let nearest_depth = min(min(depths.x, depths.y), depths.z);
     let span = max(max(depths.x, depths.y), depths.z) - nearest_depth;
-    return !(max(dot(b, b), dot(c, c)) * span <= 4.0 * abs(b.x * c.y - b.y * c.x) * nearest_depth);
+    let area = abs(b.x * c.y - b.y * c.x);
+    let length_2 = max(dot(b, b), dot(c, c));
+    return !(length_2 * span <= 4.0 * area * nearest_depth && area > 1e-6 * length_2);
 }
 
 fn is_rare(triangle: Triangle) -> bool {

@@ -51,10 +51,10 @@ use super::{note, outputs, write_json};
 pub struct Arguments {
     #[arg(required_unless_present = "triangles", help = help_of("Point clouds or meshes, which become surfels"))]
     inputs: Vec<PathBuf>,
-    /// Meshes whose triangles are drawn as they are, beside the surfels or alone: .obj or .ply
+    /// Meshes whose triangles are drawn as they are, beside the surfels, whose files come before, or alone: .obj or .ply
     #[arg(long, value_name = "MESH", num_args = 1.., help_heading = "Triangles")]
     triangles: Vec<PathBuf>,
-    /// An image to paint the triangles with that no material paints, by their texture coordinates: .png or .jpg
+    /// An image to paint the meshes with none of whose materials has one, by their texture coordinates: .png or .jpg
     #[arg(long, value_name = "IMAGE", requires = "triangles", help_heading = "Triangles")]
     triangle_texture: Option<PathBuf>,
     /// What shows where surfels meet triangles: corrected (the nearer one, surfels by the depth that they blend to), nearest (the nearer
@@ -323,7 +323,10 @@ fn scene(arguments: &Arguments, bars: &Bars) -> Result<(Scene, Preparation)> {
 fn painted(mut meshes: Vec<Mesh>, arguments: &Arguments) -> Result<Vec<Mesh>> {
     let Some(image) = &arguments.triangle_texture else { return Ok(meshes) };
     let texture = Texture::read(image)?;
-    let bare = |mesh: &&mut Mesh| mesh.materials.iter().all(|material| material.texture.is_none());
+    let bare = |mesh: &Mesh| mesh.materials.iter().all(|material| material.texture.is_none());
+    if !meshes.iter().any(bare) {
+        note("warning: every mesh has a texture of its own, so that --triangle-texture paints none");
+    }
     for (mesh, path) in meshes.iter_mut().zip(&arguments.triangles).filter(|(mesh, _)| bare(mesh)) {
         if mesh.texture.is_none() {
             return Err(Error::malformed(path, "its triangles have no texture coordinates, so they cannot be painted"));

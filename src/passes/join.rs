@@ -7,19 +7,32 @@
 use super::accumulate::PixelSums;
 use super::resolve::Surface;
 use super::triangles::Shown;
+use super::visibility::Nearest;
 use crate::plan::RenderOptions;
 use crate::plan::pass::Pass;
 use crate::scene::Join;
 
-/// The twin: what shows of a pixel's splats, their sums and what those show, and of its triangle; given are the splats' nearest depth,
-/// what the pixel's ray gains of depth, and the largest radius.
+/// What triangles show in the rows of a strip, and what of its splats they are joined by.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Beside<'a> {
+    /// What is nearest of the splats at each pixel.
+    pub nearest: &'a [Nearest],
+    /// What triangles show there; empty if there are none.
+    pub triangles: &'a [Shown],
+    /// [`Scene::largest_shorter`](crate::scene::Scene::largest_shorter), world units.
+    pub largest_shorter: f64,
+    /// No surfel lies deeper ([`farthest`](crate::plan::farthest)), world units.
+    pub farthest: f64,
+}
+
+/// The twin: what shows of a pixel's splats, their sums and what those show, and of its triangle, with the splats' nearest depth there.
 pub(super) fn joined(
     (sums, splats): (&PixelSums, Option<Surface>),
     triangle: &Shown,
-    of_pixel: (f64, f64, f64),
+    (nearest, beside): (f64, &Beside<'_>),
     options: &RenderOptions,
 ) -> Option<Surface> {
-    let (share, order) = share_of_splats(sums, triangle, of_pixel, options);
+    let (share, order) = share_of_splats(sums, triangle, (nearest, beside), options);
     let decision = sums.decision.min(triangle.decision).min(order);
     let of_triangle = triangle.depth.is_finite().then_some(Surface {
         color: triangle.color,
@@ -52,7 +65,7 @@ pub(super) fn joined(
 fn share_of_splats(
     sums: &PixelSums,
     triangle: &Shown,
-    (nearest, along, radius): (f64, f64, f64),
+    (nearest, beside): (f64, &Beside<'_>),
     options: &RenderOptions,
 ) -> (f64, f64) {
     match (sums.weight > 0.0, triangle.depth.is_finite()) {
@@ -61,7 +74,7 @@ fn share_of_splats(
         (true, true) => {}
     }
     let depth = sums.depth / sums.weight;
-    let epsilon = options.epsilon.farthest(nearest, radius, along) - nearest;
+    let epsilon = options.epsilon.farthest(nearest, beside.largest_shorter, 1.0).min(beside.farthest) - nearest;
     let nearer = |depth: f64| (f64::from(u8::from(depth < triangle.depth)), (depth / triangle.depth - 1.0).abs());
     match options.join {
         Join::Corrected => nearer(depth),

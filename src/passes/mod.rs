@@ -60,7 +60,7 @@ pub mod winner;
 use crate::frame::Frame;
 use crate::plan::pass::{Making, Module, Pass};
 use crate::plan::steps::{Stage, Twin};
-use crate::plan::{Lists, Plan, RenderOptions, SceneNeeds};
+use crate::plan::{Facts, Lists, Plan, RenderOptions, SceneNeeds, depths, farthest};
 use crate::scene::{Camera, Map, Provenance, Scene};
 use splat::Splat;
 use triangles::Corner;
@@ -81,10 +81,33 @@ pub struct Strip<'a> {
     pub ranks: Option<&'a [u32]>,
     /// Where the scene's body starts and ends ([`depths`](crate::plan::depths)), camera-space z, world units.
     pub depths: [f64; 2],
+    /// [`Scene::largest_shorter`], world units.
+    pub largest_shorter: f64,
+    /// No surfel lies deeper ([`farthest`]), camera-space z, world units.
+    pub farthest: f64,
     /// Its first row.
     pub first_row: u32,
     /// How many it has.
     pub rows: u32,
+}
+
+impl<'a> Strip<'a> {
+    /// One without rows and splats, of the scene that `facts` are of.
+    pub fn of((scene, facts): (&'a Scene, &Facts), camera: &'a Camera, options: &'a RenderOptions) -> Self {
+        Self {
+            scene,
+            camera,
+            options,
+            splats: Vec::new(),
+            corners: &[],
+            ranks: None,
+            depths: depths(facts, camera),
+            largest_shorter: facts.largest_shorter.into(),
+            farthest: farthest(facts, camera),
+            first_row: 0,
+            rows: 0,
+        }
+    }
 }
 
 /// A map that a pass of its own makes, from splats and nearest depths, in words of the image that [`resolve`] leaves alone.

@@ -4,8 +4,7 @@ use glam::{DVec3, DVec4};
 use rayon::prelude::*;
 
 use super::accumulate::PixelSums;
-use super::triangles::Shown;
-use super::visibility::Nearest;
+use super::join::Beside;
 use super::{covered, join};
 use crate::frame::Frame;
 use crate::plan::pass::Pass;
@@ -19,14 +18,14 @@ use crate::scene::{Camera, Colors, Light, MAPS, Map, Samples, Scene, Shading};
 /// beside them if there are any, and then what is nearest of the splats is known too.
 pub fn reference(
     sums: &[PixelSums],
-    (nearest, triangles): (&[Nearest], &[Shown]),
+    beside: &Beside<'_>,
     scene: &Scene,
     camera: &Camera,
     options: &RenderOptions,
     first_row: u32,
     frame: &mut Frame,
 ) {
-    let radius = f64::from(scene.largest_shorter());
+    let Beside { nearest, triangles, .. } = *beside;
     for (pixel, sum) in sums.iter().enumerate() {
         let (x, y) = (pixel as u32 % camera.width, pixel as u32 / camera.width + first_row);
         let of_splats = (sum.weight > 0.0).then(|| {
@@ -38,7 +37,7 @@ pub fn reference(
             None => of_splats,
             Some(triangle) => {
                 let nearest = nearest.get(pixel).map_or(f64::INFINITY, |nearest| nearest.depth);
-                join::joined((sum, of_splats), triangle, (nearest, camera.along_axis(x, y), radius), options)
+                join::joined((sum, of_splats), triangle, (nearest, beside), options)
             }
         };
         let background = options.background.map(f64::from);

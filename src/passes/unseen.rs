@@ -21,6 +21,8 @@ pub struct Unseen {
     pub away: u64,
     /// Over pixels that they do not change: seen edge-on, transparent, or of the background's colour.
     pub over: u64,
+    /// Triangles, wherever they lie.
+    pub triangles: u64,
 }
 
 impl Unseen {
@@ -45,7 +47,7 @@ impl Unseen {
         let add = |a: [u64; 5], b: [u64; 5]| std::array::from_fn(|k| a[k] + b[k]);
         let [behind, outside, between, away, over] =
             scene.surfels.par_iter().enumerate().map(look).reduce(|| [0; 5], add);
-        Self { behind, outside, between, away, over }
+        Self { behind, outside, between, away, over, triangles: scene.triangles.len() as u64 }
     }
 
     /// One sentence for people.
@@ -61,7 +63,10 @@ impl Unseen {
         let count = |count: u64| if count == total { "all".to_owned() } else { count.to_string() };
         let given = reasons.into_iter().filter(|(surfels, _)| *surfels > 0);
         let parts: Vec<String> = given.map(|(surfels, where_)| format!("{} lie {where_}", count(surfels))).collect();
-        format!("warning: nothing shows: of {total} surfels {}", parts.join(", "))
+        let surfels = (total > 0).then(|| format!("of {total} surfels {}", parts.join(", ")));
+        let triangles = (self.triangles > 0).then(|| format!("none of {} triangles is before the camera and over a pixel's centre, or has another colour than the background", self.triangles));
+        let reasons: Vec<String> = surfels.into_iter().chain(triangles).collect();
+        format!("warning: nothing shows: {}", reasons.join("; "))
     }
 }
 
@@ -97,9 +102,11 @@ mod tests {
         let options = RenderOptions::default();
         let mut frame = Frame::new(&camera, options.maps);
         let unseen = Unseen::of(&scene, &camera, &options);
-        assert_eq!(unseen, Unseen { behind: 1, outside: 2, between: 3, away: 0, over: 0 });
+        assert_eq!(unseen, Unseen { behind: 1, outside: 2, between: 3, ..Unseen::default() });
         assert!(unseen.sentence().contains("of 6 surfels 1 lie behind the camera"), "{}", unseen.sentence());
         assert!(Unseen { between: 6, ..Unseen::default() }.sentence().contains("all lie between"));
+        let alone = Unseen { triangles: 12, ..Unseen::default() }.sentence();
+        assert!(alone.contains("shows: none of 12 triangles") && !alone.contains("surfels"), "{alone}");
         let black = Surfel::disk(Vec3::new(0.0, 0.0, 3.0), Vec3::Z, 1.0);
         let over = Scene { surfels: vec![black], ..scene.clone() };
         assert_eq!(Unseen::of(&over, &camera, &options).over, 1);

@@ -10,7 +10,7 @@ use crate::passes::peel::MOST_LAYERS;
 use crate::scene::composite::ALL_LAYERS;
 use crate::scene::light::MAX_LIGHTS;
 use crate::scene::{
-    Blend, Camera, Composite, Cull, KernelShape, LowPass, Map, Shading, Tail, options::SHININESS_RANGE,
+    Blend, Camera, Composite, Cull, Join, KernelShape, LowPass, Map, Shading, Tail, options::SHININESS_RANGE,
 };
 
 fn usage(what: impl Into<String>) -> Result<()> {
@@ -285,6 +285,9 @@ fn triangles(options: &RenderOptions, reference: bool) -> Result<()> {
     match options {
         _ if options.composite != Composite::Opaque => {
             usage("triangles are drawn on the nearest surface alone: leave --composite out, or the triangles")
+        }
+        _ if options.join == Join::Blended && options.blend == Blend::Nearest => {
+            usage("--blend nearest has no tolerance within which triangles blend: take another --join")
         }
         _ if options.maps.has(Map::Index) => usage("triangles have no points to name: leave the map index out"),
         _ if reference => Ok(()),

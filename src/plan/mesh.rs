@@ -70,7 +70,8 @@ impl MeshNeeds {
             words.extend(triangles.colors().get(triangle).filter(|_| self.colored).into_iter().flatten().flatten());
             if let Some(painted) = triangles.paint().get(triangle) {
                 words.extend(painted.places.as_flattened());
-                words.push(f32::from_bits(painted.texture));
+                // One more, and 0 of none: as a number, not as bits, which no f32 need keep.
+                words.push(painted.texture.wrapping_add(1) as f32);
             }
         }
         words

@@ -33,7 +33,7 @@ pub use options::{BackendName, Organisation, RenderOptions};
 pub use pixel::{COLOR_CHANNEL, PixelLayout, color_channels};
 pub use raster::{BlendFormat, Raster, RasterDepth};
 pub use surfel::{SurfelLayout, splat_words};
-pub use view::{depths, device_unit};
+pub use view::{depths, device_unit, farthest};
 
 use crate::error::Result;
 use crate::gpu::adapter::AdapterDescription;

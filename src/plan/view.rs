@@ -65,9 +65,6 @@ impl View {
         };
         let (relative, absolute, of_radius) = options.epsilon.parts();
         let [first, last] = depths(facts, camera);
-        // Past every surfel, with room for the rounding of depths: an epsilon that accepts everything must not make the interval that depths
-        // are measured in infinite, nor coarser than the scene.
-        let farthest = (farthest_of(&facts.bounds, eye_relative, camera) + f64::from(facts.largest_radius)) * 1.001;
         Self {
             rotation,
             rotation_low,
@@ -91,7 +88,7 @@ impl View {
             world: (1.0 / unit) as f32,
             epsilon_radius: of_radius as f32,
             epsilon_deepest: (of_radius * f64::from(facts.largest_shorter) * unit) as f32,
-            farthest: (farthest * unit) as f32,
+            farthest: (farthest(facts, camera) * unit) as f32,
             middle: (camera.rotation.row(2).dot(core.center() - eye_relative) * unit) as f32,
             texture_width,
             texture_height,
@@ -115,6 +112,12 @@ pub fn depths(facts: &Facts, camera: &Camera) -> [f64; 2] {
     let first = (first - reach).max(camera.near);
     // Of one depth all are the first.
     [first, (last + reach).max(first * (1.0 + 1e-6)).max(first + f64::MIN_POSITIVE)]
+}
+
+/// A depth past every surfel, with room for the rounding of depths: an epsilon that accepts everything must not make the interval that depths
+/// are measured in infinite, nor coarser than the scene. World units.
+pub fn farthest(facts: &Facts, camera: &Camera) -> f64 {
+    (farthest_of(&facts.bounds, camera.eye - facts.origin, camera) + f64::from(facts.largest_radius)) * 1.001
 }
 
 /// The largest depth of a corner of `bounds`, at least 0; world units.

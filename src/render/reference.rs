@@ -11,13 +11,14 @@ use super::report::Report;
 use super::sequence;
 use crate::frame::Frame;
 use crate::passes::asks_for_order;
+use crate::passes::join::Beside;
 use crate::passes::order::order;
 use crate::passes::splat::Splat;
 use crate::passes::{
     MAP_PASSES, Strip, accumulate, layers, oit, project, resolve, sorted, triangles, visibility, winner,
 };
 use crate::plan::steps::{Step, Twin};
-use crate::plan::{Facts, Plan, RenderOptions, SceneNeeds, depths};
+use crate::plan::{Facts, Plan, RenderOptions, SceneNeeds};
 use crate::progress::Progress;
 use crate::scene::{Blend, Camera, Samples, Scene};
 
@@ -39,7 +40,6 @@ pub(super) fn frame(
     }
     let (starts, members) = bin(&splats, &plan);
     let ranks = asks_for_order(&plan.needs).then(|| ranks(scene, facts));
-    let depths = depths(facts, camera);
     let corners = triangles::corners(scene, camera);
     progress.begin("rendering rows", camera.height.into());
     let one = |band: usize| {
@@ -47,7 +47,8 @@ pub(super) fn frame(
         let splats: Vec<&Splat> =
             members[starts[band]..starts[band + 1]].iter().map(|&index| &splats[index as usize]).collect();
         let ranks = ranks.as_deref();
-        let strip = Strip { scene, camera, options, splats, corners: &corners, ranks, depths, first_row, rows };
+        let corners = &corners;
+        let strip = Strip { splats, corners, ranks, first_row, rows, ..Strip::of((scene, facts), camera, options) };
         let frame = strip_by(&strip, &of_bands[band], &spent);
         let frame =
             if options.samples == Samples::ONE { frame } else { resolve::mean_of_samples(&frame, options.samples) };
@@ -112,7 +113,9 @@ fn strip_by(strip: &Strip<'_>, twins: &[Twin], spent: &Spent) -> Frame {
             Twin::Sorted => sorted::reference(strip, &mut frame),
             Twin::Triangles => shown = triangles::reference(strip),
             Twin::Resolve => {
-                resolve::reference(&sums, (&nearest, &shown), scene, camera, options, first_row, &mut frame);
+                let Strip { largest_shorter, farthest, .. } = *strip;
+                let beside = Beside { nearest: &nearest, triangles: &shown, largest_shorter, farthest };
+                resolve::reference(&sums, &beside, scene, camera, options, first_row, &mut frame);
             }
             Twin::Map(map) => {
                 let own = MAP_PASSES.iter().filter(|own| own.map == *map);

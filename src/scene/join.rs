@@ -14,7 +14,7 @@ pub enum Join {
     Corrected,
     /// The nearer of the two, the splats by their nearest fragment, as a depth buffer that both write to has it.
     Nearest,
-    /// Both, where they lie within epsilon of each other, the nearer with the greater part: `1/2 + (z_t - z_s) / (2 epsilon)` of the
+    /// Both, where they lie within epsilon of each other, that of the largest surfel and along the axis, the nearer with the greater part: `1/2 + (z_t - z_s) / (2 epsilon)` of the
     /// splats (after Guennebaud, Barthe and Paulin 2006).
     Blended,
 }

@@ -50,7 +50,7 @@ pub const UNPAINTED: u32 = u32::MAX;
 const CELLS: f64 = ((1u32 << 21) - 1) as f64;
 
 impl Triangles {
-    /// Those of `triangles` that have three different corners, all finite.
+    /// Those of `triangles` that have an area, and finite corners.
     ///
     /// Vertices at one place are one, whichever triangles they are of: what is computed of a vertex is the same number for all of them.
     /// Normals are kept if any has some; who has none takes those of its plane.
@@ -87,7 +87,7 @@ impl Triangles {
                     .unwrap_or((UNPAINTED, [[0.0; 2]; 3]));
                 let painted = Painted { texture, places };
                 let record = Record { corners: [a, b, c], normals, colors: triangle.colors, painted };
-                (a != b && b != c && c != a).then(|| record.turned())
+                has_area(placed(triangle)).then(|| record.turned())
             })
             .collect();
         all.par_sort_unstable_by(Record::order);
@@ -191,6 +191,13 @@ fn cell(place: [f32; 3], bounds: &Bounds) -> u64 {
     morton::code(at.to_array().map(|x| x as u64))
 }
 
+/// Whether the corners are no line: the area, of differences that f64 has exactly but in a scene of many scales, is more than its rounding.
+fn has_area(corners: [[f32; 3]; 3]) -> bool {
+    let [a, b, c] = corners.map(|corner| DVec3::from_array(corner.map(f64::from)));
+    let (ab, ac) = (b - a, c - a);
+    ab.cross(ac).length() > 4.0 * f64::EPSILON * ab.length() * ac.length()
+}
+
 /// The normal of the triangle's plane at all its corners.
 fn facet(triangle: &Triangle) -> [[f32; 3]; 3] {
     let [a, b, c] = triangle.corners.map(|corner| DVec3::from_array(corner.map(f64::from)));
@@ -262,9 +269,15 @@ mod tests {
         let corners = [[0.0, -0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
         let of = |corners| Triangle { corners, ..triangle(0) };
         let [a, b, c] = corners;
-        let made =
-            Triangles::new(&[of(corners), of([a, b, a]), of([a, [0.0; 3], c]), of([a, b, [f32::NAN, 0.0, 0.0]])]);
-        assert_eq!((made.len(), made.vertices().len()), (1, 3));
+        let line = [[0.1, 0.1, 0.1], [0.7, 0.7, 0.7], [0.3, 0.3, 0.3]];
+        let made = Triangles::new(&[
+            of(corners),
+            of(line),
+            of([a, b, a]),
+            of([a, [0.0; 3], c]),
+            of([a, b, [f32::NAN, 0.0, 0.0]]),
+        ]);
+        assert_eq!(made.len(), 1);
         assert_eq!(made.normals_of(0), [DVec3::Z; 3]);
         assert!(Triangles::new(&[]).is_empty());
     }

@@ -25,7 +25,7 @@ use crate::{Error, Progress, Result};
 const LARGEST_IN_EXTENTS: f64 = 1e6;
 
 /// The largest absolute texture coordinate: f32 ones beyond have no digits after the point that a texture could use.
-const LARGEST_PLACE: f32 = 1e4;
+pub(super) const LARGEST_PLACE: f32 = 1e4;
 
 /// Makes one scene of the points of all inputs, within the default [`Limits`].
 ///

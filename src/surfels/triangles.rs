@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::build::LARGEST_PLACE;
 use super::{LARGEST_COORDINATE, guess_up, origin_for, unit};
 use crate::io::{Material, Mesh, Texture};
 use crate::scene::color::DEFAULT_COLOR;
@@ -20,7 +21,7 @@ pub struct MeshPreparation {
     pub triangles: u64,
     /// Left out because a coordinate is not finite or exceeds [`LARGEST_COORDINATE`].
     pub dropped_non_finite: u64,
-    /// Left out because two corners are at one place, as f32 coordinates have it.
+    /// Left out because they have no area, as f32 coordinates have them.
     pub dropped_degenerate: u64,
     /// Those with a colour that was not finite, which became [`DEFAULT_COLOR`], or an alpha that was not from 0 to 1, which became the
     /// nearer of the two.
@@ -35,7 +36,7 @@ impl MeshPreparation {
         let counted = |count: u64, what: &str| (count > 0).then(|| format!("{count} triangles {what}"));
         [
             counted(self.dropped_non_finite, "left out: a coordinate is not finite or too large"),
-            counted(self.dropped_degenerate, "left out: two of their corners are at one place"),
+            counted(self.dropped_degenerate, "left out: they have no area"),
             counted(self.replaced_colors, "had a colour that is none, or an alpha beyond 0 to 1, which was replaced"),
         ]
         .into_iter()
@@ -44,7 +45,8 @@ impl MeshPreparation {
     }
 }
 
-/// `scene` with the triangles of `meshes` beside its surfels, or a scene of them alone. Triangles have the colours of their corners, and
+/// `scene`, which has none yet, with the triangles of `meshes` beside its surfels, or a scene of them alone. Corners are f32 relative to the
+/// scene's origin, which is that of its surfels if it has some. Triangles have the colours of their corners, and
 /// their normals, or those of their planes where there are none.
 ///
 /// # Errors
@@ -52,6 +54,9 @@ impl MeshPreparation {
 /// [`Error::EmptyScene`] if no mesh has a usable triangle, [`Error::Usage`] for a mesh whose parts do not fit each other.
 pub fn with_triangles(scene: Option<Scene>, meshes: &[Mesh]) -> Result<(Scene, MeshPreparation)> {
     meshes.iter().try_for_each(Mesh::check)?;
+    if scene.as_ref().is_some_and(|scene| !scene.triangles.is_empty()) {
+        return Err(Error::Usage("a scene that has triangles takes no more: give all meshes at once".into()));
+    }
     let place = |mesh: &Mesh, vertex: u32| DVec3::from_array(mesh.positions[vertex as usize]);
     let usable = |mesh: &Mesh, corners: &[u32; 3]| {
         corners.iter().all(|&vertex| place(mesh, vertex).abs().cmple(DVec3::splat(LARGEST_COORDINATE)).all())
@@ -117,8 +122,8 @@ fn triangle(mesh: &Mesh, index: usize, origin: DVec3, numbers: &[Option<u32>]) -
     let material = mesh.material.as_ref().and_then(|of| of.get(index)).map(|of| *of as usize);
     let number = material.and_then(|of| *numbers.get(of)?);
     let places = mesh.texture.as_ref().and_then(|places| places.get(index));
-    let texture =
-        number.zip(places.copied().filter(|places| places.as_flattened().iter().all(|turns| turns.is_finite())));
+    let usable = |places: &[[f32; 2]; 3]| places.as_flattened().iter().all(|turns| turns.abs() <= LARGEST_PLACE);
+    let texture = number.zip(places.copied().filter(usable));
     let mut replaced = false;
     let mut color = |weights: DVec3| {
         // What a texture is multiplied with.

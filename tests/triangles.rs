@@ -409,3 +409,16 @@ fn kernels_and_twins_paint_alike() {
         }
     }
 }
+
+/// Few corners may be far from many surfels; their triangles are part of what the default view shows.
+#[test]
+fn a_floor_of_four_corners_is_framed() {
+    let corner = |x: f32, z: f32| [x, -1.0, z];
+    let [a, b, c, d] = [corner(-3.0, -3.0), corner(-3.0, 3.0), corner(3.0, 3.0), corner(3.0, -3.0)];
+    let of = |corners| Triangle { corners, normals: None, colors: [[1.0; 4]; 3], texture: None };
+    let scene = Scene { triangles: Triangles::new(&[of([a, b, c]), of([a, c, d])]), ..sphere(20_000, 1.0) };
+    let (framed, strays) = scene.framed();
+    assert_eq!((framed.min.x, framed.max.z, strays), (-3.0, 3.0, 0));
+    let alone = Scene { triangles: Triangles::default(), ..scene };
+    assert!(alone.framed().0.max.x <= 1.0);
+}

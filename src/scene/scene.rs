@@ -139,11 +139,14 @@ impl Scene {
         self.surfels.len() + self.triangles.vertices().len()
     }
 
-    /// A surfel's centre and radius, or past them a triangle's corner, whose radius is 0; world units relative to [`Scene::origin`].
+    /// A surfel's centre and radius, or past them a triangle's corner and the longest edge there; world units relative to [`Scene::origin`].
     pub(crate) fn place(&self, index: usize) -> (DVec3, f64) {
         match self.surfels.get(index) {
             Some(surfel) => (self.center(index), surfel.radius().into()),
-            None => (self.triangles.place(index - self.surfels.len()), 0.0),
+            None => {
+                let vertex = index - self.surfels.len();
+                (self.triangles.place(vertex), self.triangles.reach(vertex))
+            }
         }
     }
 

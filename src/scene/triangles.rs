@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 use std::sync::Arc;
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::{Bounds, Mipmap, Texture};
@@ -27,6 +27,7 @@ pub struct Triangle {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Triangles {
     vertices: Vec<[f32; 3]>,
+    reaches: Vec<f32>,
     corners: Vec<[u32; 3]>,
     normals: Vec<[[f32; 3]; 3]>,
     colors: Vec<[[f32; 4]; 3]>,
@@ -92,8 +93,19 @@ impl Triangles {
             .collect();
         all.par_sort_unstable_by(Record::order);
         let colored = all.par_iter().any(|record| record.colors.iter().any(|color| *color != all[0].colors[0]));
+        let mut reaches = vec![0.0; keyed.len()];
+        for record in &all {
+            let places = record.corners.map(|vertex| Vec3::from_array(keyed[vertex as usize].1.map(f32::from_bits)));
+            for k in 0..3 {
+                let (from, to) = (record.corners[k] as usize, record.corners[(k + 1) % 3] as usize);
+                let length = places[k].distance(places[(k + 1) % 3]);
+                reaches[from] = length.max(reaches[from]);
+                reaches[to] = length.max(reaches[to]);
+            }
+        }
         let is_painted = all.par_iter().any(|record| record.painted.texture != UNPAINTED);
         Self {
+            reaches,
             vertices: keyed.iter().map(|(_, bits)| bits.map(f32::from_bits)).collect(),
             corners: all.iter().map(|record| record.corners).collect(),
             normals: if has_normals { all.iter().map(|record| record.normals).collect() } else { Vec::new() },
@@ -158,6 +170,11 @@ impl Triangles {
         let place = a + parts[1] * (b - a) + parts[2] * (c - a);
         let [width, height] = mipmap.levels()[0].size().map(f64::from);
         mipmap.seen_at(place.to_array(), spread * (b - a).perp_dot(c - a).abs() * width * height)
+    }
+
+    /// The longest edge at a vertex, world units.
+    pub fn reach(&self, vertex: usize) -> f64 {
+        self.reaches[vertex].into()
     }
 
     /// The place of a vertex, world units relative to the scene's origin.

@@ -21,7 +21,7 @@
 //!
 //! **Rare triangles**, whose parts f32 would blur, are drawn by a kernel of their own, which takes areas in doubled arithmetic: those with
 //! other ends than above, and those that are long for their area and their depths, `L^2 / 2A (z_max - z_min) / z_min > 4`, as parts err
-//! by `2^-23 L^2 / 2A`. So do those of the attribute pass, which is as exact for all.
+//! by `2^-23 L^2 / 2A`; and those for which that is an eighth or more, `2A < 1e-6 L^2`, whose parts would be anybody's. So do those of the attribute pass, which is as exact for all.
 //!
 //! **The nearest** one is an atomic maximum of its depth, as what its bits lack to those of +inf, and of its number: the order of
 //! [`Triangles`](crate::scene::Triangles) depends on no order in files, so neither does any bit of the image.

@@ -79,7 +79,7 @@ pub struct Strip<'a> {
     pub corners: &'a [Corner],
     /// The place of each surfel in the [`order`] in which a device stores them, where a map asks for it.
     pub ranks: Option<&'a [u32]>,
-    /// Where the scene's body starts and ends ([`depths`](crate::plan::depths)), camera-space z, world units.
+    /// Where the scene's body starts and ends ([`depths`]), camera-space z, world units.
     pub depths: [f64; 2],
     /// [`Scene::largest_shorter`], world units.
     pub largest_shorter: f64,

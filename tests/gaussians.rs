@@ -242,7 +242,7 @@ fn far_clouds_are_drawn_to_the_bits_of_whole_lists() {
         Camera::look_at((48, 48), Lens::Fov(45.0), eye, DVec3::ZERO, Some(DVec3::Z), Up::Z, 0.01).unwrap()
     };
     let needs = |options: &RenderOptions, backend: &Backend| {
-        let (frame, report) = render(&scene, &far(25.0), options, backend, &()).unwrap();
+        let (frame, report) = render(&scene, &far(16.0), options, backend, &()).unwrap();
         (bits(&frame), report.needs.contains(&"veils"))
     };
     let small = || Gpu::with_buffer_limit(common::gpu().unwrap(), 330_000);

@@ -123,12 +123,13 @@ const MESHLESS: &[&str] = &[
     "oit-moments",
     "peels",
     "veils",
+    "long-lists",
     "index",
     "surfaces",
 ];
 
 /// Needs that no render has together (`src/plan/check.rs`, `src/plan/needs.rs`).
-const EXCLUSIVE: [(&str, &[&str]); 29] = [
+const EXCLUSIVE: [(&str, &[&str]); 31] = [
     ("painted-triangles", MESHLESS),
     ("triangles", MESHLESS),
     ("join", MESHLESS),
@@ -136,6 +137,11 @@ const EXCLUSIVE: [(&str, &[&str]); 29] = [
         "veils",
         &["tiles", "gather", "copies", "cull", "atomics-u64", "raster-exact", "raster-offset", "nearest", "peels"],
     ),
+    (
+        "long-lists",
+        &["tiles", "gather", "copies", "cull", "atomics-u64", "raster-exact", "raster-offset", "nearest", "peels"],
+    ),
+    ("long-lists", &["color-textured", "count", "depth", "index", "normal-map", "weight-map"]),
     ("veils", &["color-textured", "count", "depth", "index", "normal-map", "weight-map", "lists-layers"]),
     (
         "peels",
@@ -167,7 +173,21 @@ const EXCLUSIVE: [(&str, &[&str]); 29] = [
             "weight-map",
         ],
     ),
-    ("oit", &["tiles", "gather", "copies", "cull", "raster-exact", "raster-offset", "nearest", "peels", "veils"]),
+    (
+        "oit",
+        &[
+            "tiles",
+            "gather",
+            "copies",
+            "cull",
+            "raster-exact",
+            "raster-offset",
+            "nearest",
+            "peels",
+            "veils",
+            "long-lists",
+        ],
+    ),
     ("oit", &["lists-layers", "lists-sorted", "color-textured", "epsilon-radius", "epsilon-ray", "sides"]),
     ("oit", &["tail-map", "surfaces", "layers-map"]),
     ("lists-sorted", &["tail-map"]),

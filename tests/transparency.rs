@@ -126,8 +126,8 @@ fn kernels_and_twins_composite_alike() {
     let mut all: Vec<(Scene, Camera)> = crowded();
     all.extend(cases().into_iter().skip(2).map(|case| (case.scene, case.camera)));
     let wrong = [
-        broken("layers.wgsl", "farthest = max(farthest, ", "farthest = min(farthest, "),
-        broken("layers.wgsl", "if (side_at(key) != side) {", "if (false) {"),
+        broken("layers.wgsl", "= max(so_far.farthest, ", "= min(so_far.farthest, "),
+        broken("layers.wgsl", "if (side_at(so_far.key) != side) {", "if (false) {"),
         broken("fragments_network.wgsl", "b.x < a.x", "a.x < b.x"),
         broken("fragments_sort.wgsl", "child + 1u < count && precedes(", "child + 1u < count && !precedes("),
         broken("sorted.wgsl", "color.a * listed_weight(record)", "color.a"),

@@ -2,7 +2,7 @@
 // (fragments_network.wgsl), and by insertion where those of one depth have an order; more by a heap (Williams 1964), whose time does not
 // depend on how they lie.
 // Host side: src/passes/fragments.rs.
-// All loops end, by 1, 5 of src/gpu/loops.rs: 0xa2ca8352321290a1
+// All loops end, by 1, 5 of src/gpu/loops.rs: 0x52c7ff0d53d03c69
 
 const FEW: u32 = 16u;
 
@@ -38,16 +38,22 @@ fn sink(first: u32, count: u32, top: u32) {
     keys[first + at] = own;
 }
 
+// The greatest of the `left + 1` keys of a heap changes places with the last and leaves it.
+fn pop(first: u32, left: u32) {
+    let last = keys[first + left];
+    keys[first + left] = keys[first];
+    keys[first] = last;
+    sink(first, left, 0u);
+}
+
+// All build, then all pop: invocations of a subgroup that did either would wait for one another.
 fn sort_many(first: u32, end: u32) {
     let count = end - first;
     for (var k = count / 2u; k > 0u; k--) {
         sink(first, count, k - 1u);
     }
     for (var left = count - 1u; left > 0u; left--) {
-        let last = keys[first + left];
-        keys[first + left] = keys[first];
-        keys[first] = last;
-        sink(first, left, 0u);
+        pop(first, left);
     }
 }
 
@@ -64,6 +70,9 @@ fn sort_fragments(
         return;
     }
     let list = list_of(pixel);
+    if (is_long(list)) {
+        return;
+    }
     if (list.y > list.x + FEW) {
         sort_many(list.x, list.y);
     } else if (list.y > list.x + 1u) {

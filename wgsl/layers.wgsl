@@ -1,6 +1,6 @@
 // Stage 4: a pixel's fragments are parted into surfaces, each is blended as the nearest one always is, and they are composited.
 // Twin: src/passes/layers.rs.
-// All loops end, by 1, 6 of src/gpu/loops.rs: 0x1f99a6bf56939312
+// All loops end, by 1, 6 of src/gpu/loops.rs: 0xb058033358aff521
 
 override MOST_LAYERS: u32;
 // What follows the last layer is one more.
@@ -30,74 +30,91 @@ fn no_bend() -> Bend {
     return none;
 }
 
-// Sums the surface of the list up to `end` whose nearest fragment is at `first`; how far it is told.
-fn sum_surface(first: u32, end: u32, image: vec2<f32>) -> f32 {
-    let front = depth_at(first);
-    let side = side_at(first);
-    var farthest = front;
-    for (var key = first; key < end; key++) {
-        let depth = depth_at(key);
-        if (side_at(key) != side) {
+// Sums what is left of the surface that starts at `first`, as far as rounds last.
+fn sum_surface(begun: Compositing, end: u32, image: vec2<f32>) -> Compositing {
+    var so_far = begun;
+    let front = depth_at(so_far.first);
+    let side = side_at(so_far.first);
+    for (; so_far.key < end && next_round(); so_far.key++) {
+        let depth = depth_at(so_far.key);
+        if (side_at(so_far.key) != side) {
             continue;
         }
         // The first is at the front itself.
-        if (key != first && depth > farthest) {
+        if (so_far.key != so_far.first && depth > so_far.farthest) {
             break;
         }
-        let record = record_at(keys[key].y);
+        let record = record_at(keys[so_far.key].y);
         let radius = listed_radius(record);
-        farthest = max(farthest, farthest_shown(depth, radius, image));
+        so_far.farthest = max(so_far.farthest, farthest_shown(depth, radius, image));
         if (depth <= farthest_shown(front, radius, image)) {
-            blend_listed(record, key, front);
+            blend_listed(record, so_far.key, front);
         }
     }
-    return farthest;
+    return so_far;
 }
 
-// Sums all that no layer has.
-fn sum_rest(first: u32, end: u32, told: vec2<f32>) {
-    for (var key = first; key < end; key++) {
-        if (is_untold(key, told)) {
-            blend_listed(record_at(keys[key].y), key, depth_at(first));
+// Sums what is left of all that no layer has, as far as rounds last.
+fn sum_rest(begun: Compositing, end: u32) -> Compositing {
+    var so_far = begun;
+    let front = depth_at(so_far.first);
+    for (; so_far.key < end && next_round(); so_far.key++) {
+        if (is_untold(so_far.key, so_far.told)) {
+            blend_listed(record_at(keys[so_far.key].y), so_far.key, front);
         }
     }
+    return so_far;
 }
 
-// The maps of the pixel are at `out`.
-fn composite(pixel: u32, out: u32, x: u32, y: u32) -> Shown {
-    let list = list_of(pixel);
+// The list ends at `end`, and its maps are at `out`.
+fn composite_on(before: Compositing, end: u32, out: u32, x: u32, y: u32) -> Compositing {
     let image = vec2<f32>(vec2<u32>(x, y)) + 0.5;
-    var shown = shown_nothing();
-    var told = vec2<f32>(-1.0);
-    var first = list.x;
-    var goes_on = first < list.y;
-    while (goes_on) {
-        clear_sums();
-        let is_last = shown.layers >= MOST_LAYERS;
-        var front = depth_at(first);
+    var so_far = before;
+    loop {
+        while (so_far.first < end && !is_untold(so_far.first, so_far.told) && next_round()) {
+            so_far.first++;
+        }
+        if (so_far.first >= end || !has_rounds()) {
+            break;
+        }
+        let is_last = so_far.shown.layers >= MOST_LAYERS;
+        var front = depth_at(so_far.first);
+        if (so_far.key <= so_far.first) {
+            clear_sums();
+            so_far.key = so_far.first;
+            so_far.farthest = front;
+        }
         if (is_last) {
-            sum_rest(first, list.y, told);
+            so_far = sum_rest(so_far, end);
             // A tail has no side.
             front = bitcast<f32>(bitcast<u32>(front) & ~SIDE_BIT);
         } else {
-            let farthest = sum_surface(first, list.y, image);
-            told = select(vec2<f32>(farthest, told.y), vec2<f32>(told.x, farthest), side_at(first) == 1u);
+            so_far = sum_surface(so_far, end, image);
         }
-        let weight = sum_at(0u, WEIGHT_CHANNEL);
-        let normal = resolve_normal(0u, weight, front);
-        let color = shaded(resolve_color(0u, weight), normal, x, y);
-        if (!is_last) {
-            write_surface(out, shown.layers, surface_depth(0u, weight, front), color.a);
-        } else {
-            write_surface(out, shown.layers, front, color.a);
-            write_tail(out, shown.transmittance * color.a);
+        if (!has_rounds()) {
+            break;
         }
-        shown = with_behind(shown, color);
-        while (first < list.y && !is_untold(first, told)) {
-            first++;
+        so_far = with_surface(so_far, is_last, front, out, x, y);
+        let more = so_far.shown.transmittance >= LEAST_TRANSMITTANCE;
+        if (is_last || !more || (so_far.shown.layers == MOST_LAYERS && !TAIL)) {
+            so_far.first = end;
         }
-        let more = first < list.y && shown.transmittance >= LEAST_TRANSMITTANCE;
-        goes_on = more && !is_last && (shown.layers < MOST_LAYERS || TAIL);
     }
-    return shown;
+    return so_far;
+}
+
+// The surface that is summed comes behind what is shown.
+fn with_surface(summed: Compositing, is_last: bool, front: f32, out: u32, x: u32, y: u32) -> Compositing {
+    var so_far = summed;
+    let weight = sum_at(0u, WEIGHT_CHANNEL);
+    let normal = resolve_normal(0u, weight, front);
+    let color = shaded(resolve_color(0u, weight), normal, x, y);
+    write_surface(out, so_far.shown.layers, select(surface_depth(0u, weight, front), front, is_last), color.a);
+    let tail = select(0.0, so_far.shown.transmittance * color.a, is_last);
+    so_far.shown = with_behind(so_far.shown, color);
+    so_far.shown.tail = tail;
+    let is_back = side_at(so_far.first) == 1u;
+    so_far.told = select(vec2<f32>(so_far.farthest, so_far.told.y), vec2<f32>(so_far.told.x, so_far.farthest), is_back);
+    so_far.key = so_far.first;
+    return so_far;
 }

@@ -1,5 +1,5 @@
 // What the rasteriser's layers show so far: after each one, what it blended goes over what is behind it. Host side: src/passes/peel.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x9ec9c3a0cf7762e6
+// All loops end, by 1 of src/gpu/loops.rs: 0x6f64d54604ba503e
 
 // Of each pixel: the premultiplied colour, the transmittance, the layers, and the nearest depths of raster_peeled.wgsl.
 @group(0) @binding(49) var<storage, read_write> peeled: array<u32>;
@@ -12,7 +12,7 @@ fn composite(pixel: u32, out: u32, x: u32, y: u32) -> Shown {
     let color = bitcast<vec4<f32>>(vec4<u32>(peeled[at], peeled[at + 1u], peeled[at + 2u], peeled[at + 3u]));
     let layers = peeled[at + 5u];
     // The buffer was cleared.
-    return Shown(color, select(bitcast<f32>(peeled[at + 4u]), 1.0, layers == 0u), layers);
+    return Shown(color, select(bitcast<f32>(peeled[at + 4u]), 1.0, layers == 0u), layers, 0.0);
 }
 
 // One invocation a pixel.

@@ -11,10 +11,12 @@ struct Shown {
     color: vec4<f32>,
     transmittance: f32,
     layers: u32,
+    // Of the last one, if it is a tail.
+    tail: f32,
 }
 
 fn shown_nothing() -> Shown {
-    return Shown(vec4<f32>(0.0), 1.0, 0u);
+    return Shown(vec4<f32>(0.0), 1.0, 0u, 0.0);
 }
 
 // With a straight colour behind.
@@ -24,6 +26,7 @@ fn with_behind(shown: Shown, straight: vec4<f32>) -> Shown {
         shown.color + shows * vec4<f32>(straight.rgb, 1.0),
         shown.transmittance * (1.0 - straight.a),
         shown.layers + 1u,
+        0.0,
     );
 }
 
@@ -36,8 +39,8 @@ fn over_background(shown: Shown) -> vec4<f32> {
 
 fn resolve_pixel(sums_of: u32, pixel: u32, x: u32, y: u32) {
     let out = pixel * IMAGE_WORDS;
-    write_tail(out, 0.0);
     let shown = composite(pixel, out, x, y);
+    write_tail(out, shown.tail);
     write_color(out, over_background(shown));
     write_transmittance(out, shown.transmittance);
     write_layers(out, shown.layers);

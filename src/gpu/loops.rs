@@ -17,8 +17,8 @@
 //! 4. The outer loops of `accumulate_splat` and `list_splat` go on only if the inner one moved on in its rectangle (2).
 //! 5. A counter **shrinks** by 1 in each round, and the loop ends at 0 or at a limit that no round changes, which is not below 0; or it
 //!    grows to more than twice itself (`sink`) and the loop ends past the length of a list, which is shorter than 2^30.
-//! 6. Each round of `composite` in `layers.wgsl` tells the fragment at `first`, as its surface reaches at least as deep, or is the last; and the
-//!    inner loop moves `first`, which is a counter (1), past all that is told.
+//! 6. Each round of `composite_on` in `layers.wgsl` ends the loop, or tells the fragment at `first`, as its surface reaches at least as deep,
+//!    or is the last; and the inner loop moves `first`, which is a counter (1), past all that is told.
 //!
 //! A file of loops that end says so in a comment: by which of these, and the [`code_hash`] of what was proven. Whoever changes its
 //! code proves it again. The compare and exchange of `accumulator_cas.wgsl` is left out: a weak exchange may fail any number of times

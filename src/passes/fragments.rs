@@ -7,7 +7,7 @@
 //!
 //! **Room.** How many fragments there are is looked at before any is put anywhere. Where a band has more than a buffer holds, it is cut
 //! by the counts of its rows into bands that have not, and the frame begins again: what cannot be held at once is drawn in turns, and
-//! nothing is left out.
+//! nothing is left out. What one invocation cannot go through is sorted and composited in rounds ([`long_lists`](super::long_lists)).
 
 use glam::DVec3;
 
@@ -101,8 +101,9 @@ pub const PASS: Pass = Pass {
         };
         // Else veils count.
         let count = (!needs.veils).then_some("fragments_count.wgsl");
-        let all = ["fragments.wgsl", "fragments_sort.wgsl", "fragments_network.wgsl", ties, "layer_sums.wgsl"];
-        all.into_iter().chain(count).chain([terms_file(needs)]).collect()
+        let sort = ["fragments_sort.wgsl", "fragments_network.wgsl", ties];
+        let all = ["fragments.wgsl", "compositing.wgsl", "layer_sums.wgsl"].into_iter().chain(sort);
+        all.chain(count).chain([terms_file(needs)]).collect()
     },
     kernels: |needs| match needs.lists {
         None => Vec::new(),

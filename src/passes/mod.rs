@@ -10,7 +10,7 @@
 //! | [`visibility`] | splats | the nearest depth of each pixel |
 //! | [`accumulate`] | splats, nearest depths | [`accumulate::PixelSums`] |
 //! | [`winner`] | splats | the same of the nearest fragment alone |
-//! | [`fragments`] | splats | a list of each pixel's fragments |
+//! | [`fragments`], [`long_lists`] | splats | a list of each pixel's fragments |
 //! | [`tiles`] | large splats, or all | the same two, or the image |
 //! | [`moments`] | splats | what those of a pixel hold back, by depth |
 //! | [`oit`] | splats | [`accumulate::PixelSums`] of all of them |
@@ -37,6 +37,7 @@ pub mod index;
 pub mod join;
 pub mod layers;
 pub mod lit;
+pub mod long_lists;
 pub mod lowpass;
 pub mod moments;
 pub mod oit;
@@ -153,7 +154,7 @@ pub fn finish(frame: &mut Frame, needs: &SceneNeeds, provenance: &Provenance, or
 }
 
 /// The passes whose files every module has.
-const PASSES: [&Pass; 22] = [
+const PASSES: [&Pass; 23] = [
     &shared::PASS,
     &project::PASS,
     &facing::PASS,
@@ -164,6 +165,7 @@ const PASSES: [&Pass; 22] = [
     &winner::PASS,
     &fragments::PASS,
     &veils::PASS,
+    &long_lists::PASS,
     &oit::PASS,
     &accumulate::PASS,
     &attributes::PASS,

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::accumulate::PixelSums;
 use super::join::Beside;
-use super::{covered, join};
+use super::{covered, join, long_lists};
 use crate::frame::Frame;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Kernel, Over, Run, Stage, Twin};
@@ -252,6 +252,7 @@ const RESOLVE: Kernel = Kernel::new("resolve");
 /// The pass over the tiles that anything covers.
 pub fn steps(plan: &Plan, band: usize) -> Stage {
     let mut runs = covered::runs().to_vec();
+    runs.extend(long_lists::composites(plan));
     runs.push(Run { kernel: RESOLVE, over: Over::Covered });
     let twin = match plan.needs.lists {
         None => Twin::Resolve,

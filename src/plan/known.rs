@@ -31,11 +31,13 @@ pub struct Known {
     pub crowded: bool,
     /// Bands whose fragments fit, in this view, as far as bands were looked at.
     pub cuts: Option<Vec<Band>>,
-    /// How often a band of this view was cut: each time the next try comes farther down the image.
+    /// How often a band of this view was cut, or its lists were longer than was known: each time the next try comes farther down the image.
     pub times_cut: usize,
     /// A pixel has more fragments than are sorted, or a row more than a buffer holds: lists end where nothing more shows
     /// ([`veils`](crate::passes::veils)).
     pub veiled: bool,
+    /// Fragments of the longest list, if one invocation cannot go through it ([`long_lists`](crate::passes::long_lists)); else 0.
+    pub longest_list: u32,
     /// Fragments of this view that made a sum of the accumulator that was asked for wrap.
     pub overflows: u64,
 }
@@ -60,6 +62,6 @@ impl Known {
 
     /// Forgets what holds for one size of image.
     pub fn forget_image(&mut self) {
-        (self.entries, self.large, self.veiled) = ([None; 2], None, false);
+        (self.entries, self.large, self.veiled, self.longest_list) = ([None; 2], None, false, 0);
     }
 }

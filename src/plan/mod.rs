@@ -65,6 +65,8 @@ pub struct Plan {
     pub mesh: MeshFacts,
     /// Pages that the surfels fill, where each is drawn by itself.
     pub pages: usize,
+    /// No list is longer than this, if some are gone through in rounds.
+    pub longest_list: u32,
     /// Pixels that nothing covers differ from 0.
     pub lists_empty: bool,
     /// Each band has splats of its own: what is drawn first in it hides what is drawn later, and hidden splats are struck out.
@@ -123,7 +125,8 @@ impl Plan {
             && needs.oit.is_none()
             && needs.raster.is_none();
         let veils = needs.lists == Some(Lists::Sorted) && known.veiled;
-        let needs = SceneNeeds { gather, cull, veils, ..needs };
+        let long_lists = needs.lists.is_some() && known.longest_list > 0;
+        let needs = SceneNeeds { gather, cull, veils, long_lists, ..needs };
         // Tiles that gather store no sums.
         let sum_words = if gather { 0 } else { pixel.sum_words(&needs) };
         let head = if sum_words > 0 { needs.accumulator.row().head_words() } else { 0 };
@@ -152,6 +155,7 @@ impl Plan {
             bands,
             mesh: facts.mesh,
             pages: facts.surfels.div_ceil(page) as usize,
+            longest_list: known.longest_list,
             lists_empty: options.shows_where_nothing_is() || needs.peels.is_some() || needs.mesh.is_some(),
             projects_each_band: several && (cull || gather),
             looks_for_slots: cull && (several || !known.slots),
@@ -173,6 +177,7 @@ impl Plan {
             bands: cuts::strips(camera, tuning::REFERENCE_ROWS),
             mesh: facts.mesh,
             pages: 1,
+            longest_list: 0,
             lists_empty: options.shows_where_nothing_is(),
             projects_each_band: false,
             looks_for_slots: false,

@@ -54,6 +54,8 @@ pub struct SceneNeeds {
     pub peels: Option<u32>,
     /// Lists end where nothing more shows: without that some would be too long.
     pub veils: bool,
+    /// Some lists are sorted and composited in rounds: one invocation's loops would not last for them.
+    pub long_lists: bool,
     /// It draws a triangle a splat instead of a quad ([`tuning::PIXELS_A_TRIANGLE`]).
     pub triangles: bool,
     /// The kernel's formula.
@@ -266,6 +268,7 @@ impl SceneNeeds {
             oit,
             peels,
             veils: false,
+            long_lists: false,
             triangles: options.raster.is_some() && tuning::PIXELS_A_TRIANGLE * facts.surfels > camera.pixels() as u64,
             kernel: if blends { options.kernel.shape() } else { KernelShape::Constant },
             low_pass: options.low_pass,
@@ -401,6 +404,7 @@ impl SceneNeeds {
             (joins(Join::Corrected), "join-corrected"),
             (joins(Join::Blended), "join-blended"),
             (self.veils, "veils"),
+            (self.long_lists, "long-lists"),
             (self.samples != Samples::ONE, "samples"),
             (self.shading == Shading::Lambert, "lambert"),
             (self.shading == Shading::Phong, "phong"),

@@ -73,6 +73,8 @@ pub enum Over {
     Occlusion,
     /// Eight invocations, a row of pixels, for each tile that large splats are drawn by.
     Tiles,
+    /// An invocation for each list that is gone through in rounds, of which there may be fewer.
+    LongLists,
     /// A workgroup for each tile that anything covers.
     Covered,
     /// A workgroup for eight such tiles.

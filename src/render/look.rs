@@ -3,9 +3,9 @@
 use super::run::Run;
 use crate::error::{Error, Result};
 use crate::gpu::buffers::counts;
-use crate::gpu::layout::{BATCH, MOST_ROUNDS};
-use crate::passes::fragments;
+use crate::gpu::layout::BATCH;
 use crate::passes::tiles::{LONGEST, list_name};
+use crate::passes::{fragments, long_lists};
 use crate::plan::known::Listed;
 use crate::plan::steps::{Part, Stage};
 use crate::plan::{FragmentLayout, KEY_WORDS, Lists, tuning};
@@ -63,27 +63,27 @@ impl Run<'_> {
     }
 
     /// Makes room for the fragments of a band, which were counted; false if there is not enough for all of them at once, and the view is
-    /// cut into other bands.
+    /// cut into other bands, or if lists are longer than was known.
     pub(super) fn look_for_fragments(&mut self, band: usize) -> Result<bool> {
         self.timing.flush(self.gpu)?;
         let Some(starts) = self.store.buffer("starts") else { return Ok(true) };
         let rows = u64::from(self.plan.bands[band].rows);
         let words = starts.read(self.gpu, 2 + rows + 1)?;
         let [total, longest] = [words[0], words[1]];
-        let sorted = LONGEST_LIST.min(MOST_COMPOSITED / self.plan.needs.samples.count());
-        if self.gpu.adapter.is_software() && longest > sorted {
-            if self.veil() {
-                return Ok(false);
-            }
-            return Err(self.gpu.error(format!(
-                "{longest} fragments lie at one pixel, and this adapter ends loops before more than {sorted} are composited: \
-                 take --composite opaque, --backend reference, or fewer samples"
-            )));
+        let ends_loops = self.gpu.adapter.is_software() && longest > long_lists::most_at_once(self.plan.needs.samples);
+        if ends_loops && self.veil() {
+            return Ok(false);
         }
         let record = u64::from(FragmentLayout::of(&self.plan.needs).words).max(KEY_WORDS);
         let most = self.gpu.buffer_limit().min(tuning::MOST_FRAGMENT_BYTES) / (4 * record);
         // Of more than a word holds the starts of rows no longer tell how many there are in each.
         if u64::from(total) <= most && total < u32::MAX {
+            if ends_loops && longest > self.plan.longest_list {
+                // And a quarter more for the next view.
+                self.known.longest_list = longest.saturating_add(longest / 4);
+                self.known.times_cut += 1;
+                return Ok(false);
+            }
             self.store.make_fragments(self.gpu, self.plan, total.into(), most)?;
             return Ok(true);
         }
@@ -116,12 +116,3 @@ impl Run<'_> {
         veils
     }
 }
-
-/// The most fragments that a pixel's list has on a software adapter, which ends the loops of an invocation after 65,535 rounds: a heap
-/// of n takes fewer than n (log2 n + 2) of them.
-const LONGEST_LIST: u32 = MOST_ROUNDS / 8;
-
-/// The most that the samples of a pixel have there together, as one invocation composites them: a fragment takes five rounds at most, where
-/// fronts and backs alternate (it is looked at, passed over for the other side, ends a run, is skipped, and starts a surface), and as many
-/// again are left for other invocations of the subgroup, in whose rounds this one waits.
-const MOST_COMPOSITED: u32 = MOST_ROUNDS / 5;

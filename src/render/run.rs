@@ -12,7 +12,7 @@ use crate::gpu::layout::{
 };
 use crate::gpu::timing::Timing;
 use crate::passes::tiles::{self, LONGEST, list_name};
-use crate::passes::{covered, raster, resolve};
+use crate::passes::{covered, long_lists, raster, resolve};
 use crate::plan::known::{Known, Listed};
 use crate::plan::steps::{Clear, Kernel, Look, Over, Part, Stage, Step};
 use crate::plan::{Plan, RasterDepth};
@@ -296,6 +296,7 @@ fn over<'a>(gpu: &Gpu, plan: &Plan, store: &'a Store, (band, page): (usize, usiz
         Over::Triangles => plan.mesh.triangles,
         Over::Rows => plan.bands[band].rows.into(),
         Over::Pixels => plan.bands[band].pixels,
+        Over::LongLists => store.buffer("long_lists").map_or(0, |kept| long_lists::room(kept.len)),
         Over::Tiles => {
             let rows = plan.bands[band].rows.div_ceil(tiles::rows(&plan.needs));
             u64::from(plan.width.div_ceil(TILE_WIDTH)) * u64::from(rows) * u64::from(TILE_WIDTH)

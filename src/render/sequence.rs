@@ -1,7 +1,8 @@
 //! A frame as a list of steps: the papers' passes in their order.
 
 use crate::passes::{
-    accumulate, cull, fragments, of_maps, oit, peel, project, raster, resolve, tiles, triangles, veils, visibility,
+    accumulate, cull, fragments, long_lists, of_maps, oit, peel, project, raster, resolve, tiles, triangles, veils,
+    visibility,
 };
 use crate::plan::known::Listed;
 use crate::plan::steps::{Look, Part, Stage, Step, Twin};
@@ -69,7 +70,7 @@ fn lists(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
     let count = [visibility::steps(plan, band, Part::All).without_twin(), visibility::large(band)];
     let count = count.into_iter().chain(veils::steps(plan, band)).chain([visibility::occlude(band, Part::All)]);
     steps.extend(count.map(Step::Stage).chain(fragments::starts(band)));
-    steps.extend(fragments::steps(band).map(Step::Stage));
+    steps.extend(fragments::steps(band).into_iter().chain(long_lists::sorts(plan, band)).map(Step::Stage));
 }
 
 /// The sums of all fragments of each pixel of a band.

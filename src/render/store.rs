@@ -13,13 +13,13 @@ use crate::passes::tiles::{list_name, list_words};
 use crate::passes::triangles::{NEAREST_TRIANGLE_WORDS, TRIANGLE_PIXEL_WORDS};
 use crate::passes::upload::{self, Uploaded};
 use crate::passes::veils::VEIL_WORDS;
-use crate::passes::{asks_for_order, covered, fragments, visibility};
+use crate::passes::{asks_for_order, covered, fragments, long_lists, visibility};
 use crate::plan::known::Listed;
 use crate::plan::{Band, FragmentLayout, KEY_WORDS, Known, Oit, Plan, Raster, SceneNeeds, SurfelLayout, splat_words};
 use crate::scene::Samples;
 
 /// Names in WGSL of buffers that have another one where kernels write them.
-const ALIASES: [(&str, &str); 15] = [
+const ALIASES: [(&str, &str); 16] = [
     ("projected", "splats"),
     ("queued", "queue"),
     ("listed", "rare"),
@@ -29,6 +29,7 @@ const ALIASES: [(&str, &str); 15] = [
     ("winners", "sums"),
     ("indexed", "image"),
     ("list_starts", "starts"),
+    ("found_lists", "long_lists"),
     ("told", "peeled"),
     ("corners_seen", "corners"),
     ("queued_triangles", "large_triangles"),
@@ -310,14 +311,19 @@ impl Store {
         let holds = |(name, _, words): &(&str, &str, u64)| {
             self.frame.get(name).is_some_and(|buffer| buffer.len >= count * words)
         };
-        if buffers.iter().all(holds) {
-            return Ok(());
+        if !buffers.iter().all(holds) {
+            // The old ones make room first.
+            buffers.iter().for_each(|(name, ..)| drop(self.frame.remove(name)));
+            for (name, what, words) in buffers {
+                let room = (count + count / 8).min(most).max(1);
+                self.frame.insert(name, Buffer::storage(gpu, what, room * words)?);
+            }
         }
-        // The old ones make room first.
-        buffers.iter().for_each(|(name, ..)| drop(self.frame.remove(name)));
-        for (name, what, words) in buffers {
-            let room = (count + count / 8).min(most).max(1);
-            self.frame.insert(name, Buffer::storage(gpu, what, room * words)?);
+        if plan.needs.long_lists {
+            let words = long_lists::words(count, plan.needs.samples);
+            if self.frame.get("long_lists").is_none_or(|kept| kept.len < words) {
+                self.frame.insert("long_lists", Buffer::storage(gpu, "long lists", words)?);
+            }
         }
         Ok(())
     }

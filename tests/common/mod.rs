@@ -211,6 +211,7 @@ fn listed(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
         SceneNeeds {
             lists: Some(lists),
             veils: step % 6 == 1,
+            long_lists: step % 7 < 3,
             maps: if needs.samples == Samples::ONE { Maps::of(maps[step / 2 % 5]).but(others) } else { Maps::NONE },
             normal: lit && !needs.lit_splats,
             own_normals: needs.own_normals && lit,

@@ -164,6 +164,8 @@ pub fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         ("starts", Element::Plain(WORD)),
         ("peeled", Element::Plain(WORD)),
         ("veils", Element::Plain(WORD)),
+        ("found_lists", Element::Plain(WORD)),
+        ("long_lists", Element::Plain(WORD)),
         ("moments", Element::Plain(WORD)),
         ("told", Element::Plain(WORD)),
         ("keys", Element::Plain(&[<[u32; 2]>::SHAPE])),

@@ -1,0 +1,144 @@
+//! Lists that one invocation of a processor cannot go through: they are sorted and composited in rounds.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use common::Random;
+use common::bits;
+use common::scenes::{front, shuffled};
+use epsplat::frame::Frame;
+use epsplat::gpu::{Gpu, Sources};
+use epsplat::metrics::DECISION_MARGIN;
+use epsplat::passes::long_lists::most_at_once;
+use epsplat::plan::RenderOptions;
+use epsplat::render::{Backend, render};
+use epsplat::scene::composite::ALL_LAYERS;
+use epsplat::scene::{Colors, Composite, Epsilon, Map, Maps, Samples, Scene, Shading, Surfel};
+use glam::Vec3;
+
+/// Eight pixels squared, in whose middle about `deep` disks lie behind one another, fronts and backs, and fewer toward the corners.
+fn pile(deep: usize) -> Scene {
+    let mut random = Random(9);
+    let mut disk = |_| {
+        let [x, y] = [0; 2].map(|_| random.between(-2.0, 2.0) as f32);
+        let facing = if random.unit() < 0.5 { Vec3::Z } else { Vec3::NEG_Z };
+        let tilt = Vec3::new(random.between(-0.1, 0.1) as f32, random.between(-0.1, 0.1) as f32, 0.0);
+        Surfel::disk(Vec3::new(x, y, random.between(5.0, 80.0) as f32), (facing + tilt).normalize(), 3.0)
+    };
+    let surfels: Vec<Surfel> = (0..deep).map(&mut disk).collect();
+    let color = |_| [random.unit() as f32, random.unit() as f32, 0.5, random.between(0.2, 1.0) as f32];
+    Scene { colors: Colors::Linear((0..deep).map(color).collect()), surfels, oriented: true, ..Scene::default() }
+}
+
+fn of(composite: Composite) -> RenderOptions {
+    let maps = [Map::Transmittance, Map::Layers, Map::Surfaces, Map::Tail];
+    let maps = if composite == Composite::Layers(3) { &maps[..] } else { &maps[..3] };
+    RenderOptions {
+        composite,
+        shading: Shading::Unlit,
+        opacity: 0.002,
+        epsilon: Epsilon::Absolute(0.01),
+        maps: Maps::of(maps),
+        ..RenderOptions::default()
+    }
+}
+
+fn in_rounds(scene: &Scene, options: &RenderOptions, backend: &Backend) -> Frame {
+    let (frame, report) = render(scene, &front(8), options, backend, &()).unwrap();
+    let on_device = matches!(backend, Backend::Gpu { .. });
+    assert_eq!(report.needs.contains(&"long-lists"), on_device, "{:?}", report.needs);
+    frame
+}
+
+fn all_bits(frame: &Frame) -> Vec<u32> {
+    let maps = [Map::Transmittance, Map::Layers, Map::Surfaces, Map::Tail];
+    let of = |map| frame.map(map).into_iter().flatten().map(|value| value.to_bits());
+    bits(frame).into_iter().chain(maps.into_iter().flat_map(of)).collect()
+}
+
+/// The adapter, if it is one that ends loops; a card goes through any list at once.
+fn software() -> Option<Gpu> {
+    common::gpu().filter(|gpu| gpu.adapter.is_software())
+}
+
+fn with(changes: &[(&str, &str, &str)]) -> Backend {
+    let sources =
+        changes.iter().fold(Sources::default(), |sources, (file, from, to)| sources.replace(file, from, to).unwrap());
+    Backend::Gpu { gpu: Box::new(software().unwrap()), sources }
+}
+
+/// Ways to composite that each go through lists in another way: all surfaces, a few and a long tail, every fragment.
+const WAYS: [Composite; 3] = [Composite::Layers(ALL_LAYERS), Composite::Layers(3), Composite::Sorted];
+
+#[test]
+fn the_twin_composites_alike() {
+    let Some(gpu) = software() else { return };
+    let backend = Backend::gpu(gpu);
+    let scene = pile(9_000);
+    for composite in WAYS {
+        for samples in [Samples::ONE, "4".parse().unwrap()] {
+            let one = samples == Samples::ONE;
+            let own =
+                RenderOptions { samples, maps: if one { of(composite).maps } else { Maps::NONE }, ..of(composite) };
+            let decisions = RenderOptions { maps: Maps::of(&[Map::Decision]), ..own.clone() };
+            let decided = in_rounds(&scene, &decisions, &Backend::Reference);
+            let decided = decided.map(Map::Decision).unwrap();
+            let [device, twin] = [&backend, &Backend::Reference].map(|backend| in_rounds(&scene, &own, backend));
+            let nearest = |frame: &Frame| frame.map(Map::Surfaces).unwrap_or_default().to_vec();
+            for (a, b) in nearest(&twin).iter().zip(nearest(&device)) {
+                assert!(a == &b || (a - b).abs() < 1e-5 * a.abs() + 1e-8, "{composite:?}: {a} {b}");
+            }
+            let mut compared = 0;
+            for (pixel, (a, b)) in twin.color.iter().zip(&device.color).enumerate() {
+                // Of thousands of fragments some are near a decision at almost any pixel, but one of them changes little.
+                let near = if decided[pixel] > DECISION_MARGIN { 2e-5 } else { 2e-3 };
+                compared += usize::from(a[3] > 0.002);
+                assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < near), "{composite:?} {pixel}: {a:?} {b:?}");
+            }
+            assert!(compared > 32, "{compared}");
+        }
+    }
+}
+
+/// How much a dispatch does, in which order fragments came, and whether a list is gone through at once show in no bit; what a dispatch
+/// forgets does, and so do loops that an adapter ends.
+#[test]
+fn rounds_do_not_show() {
+    let Some(gpu) = software() else { return };
+    let backend = Backend::gpu(gpu);
+    let scene = pile(9_000);
+    for (way, composite) in WAYS.into_iter().enumerate() {
+        let own = of(composite);
+        let first = all_bits(&in_rounds(&scene, &own, &backend));
+        let same = |other: &Backend| all_bits(&in_rounds(&scene, &own, other)) == first;
+        assert!(all_bits(&in_rounds(&shuffled(&scene, 5), &own, &backend)) == first, "{composite:?}");
+        for change in [
+            ("long_lists.wgsl", "rounds_left = LOOKS;", "rounds_left = 3u * LOOKS;"),
+            ("long_lists.wgsl", "rounds_left = LOOKS;", "rounds_left = LOOKS - 300u;"),
+            ("long_lists.wgsl", "first + HEAP_STEPS,", "first + 2u * HEAP_STEPS + 7u,"),
+            ("long_lists.wgsl", "list.y > list.x + LONG;", "list.y > list.x + LONG / 2u;"),
+        ] {
+            assert!(same(&with(&[change])), "{composite:?}: {change:?}");
+        }
+        let forgets = [
+            ("so_far.farthest);", "0.0);", [true, false, false]),
+            ("so_far.told.x);", "-1.0);", [true, false, false]),
+            ("so_far.key;", "so_far.first;", [false, true, false]),
+            ("= layer_low[channel];", "= 0u;", [true, true, false]),
+            ("so_far.shown.transmittance);", "1.0);", [true, true, true]),
+            ("long_lists[kept + 1u] = end;", "long_lists[kept + 1u] = first;", [true; 3]),
+            ("list.y > list.x + LONG;", "false;", [true; 3]),
+        ];
+        for (from, to, shows) in forgets {
+            assert!(same(&with(&[("long_lists.wgsl", from, to)])) != shows[way], "{composite:?}: {from} {to}");
+        }
+    }
+}
+
+/// The lists of a pixel's samples are gone through together.
+#[test]
+fn a_list_is_long_by_its_samples() {
+    assert_eq!(most_at_once(Samples::ONE), 2048);
+    assert!(most_at_once("16".parse().unwrap()) * 16 <= 6554);
+}

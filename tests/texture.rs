@@ -10,13 +10,14 @@ use std::process::Command;
 use common::bits;
 use common::scenes::{shuffled, sphere, sphere_camera};
 use epsplat::gpu::Sources;
-use epsplat::io::{Points, Texture};
+use epsplat::io::{self, Points, Texture};
 use epsplat::passes::project::reference_all;
 use epsplat::passes::{accumulate, visibility};
 use epsplat::plan::{Accumulator, RenderOptions};
 use epsplat::render::{Backend, render};
 use epsplat::scene::{Camera, Colors, Lens, LowPass, Map, Place, Projection, Scene, Shading, Textured, Up};
-use epsplat::surfels::build_textured;
+use epsplat::surfels::simplify::{Options, SplatShape, Tolerance, points, simplify_in_texture};
+use epsplat::surfels::{build_at_vertices, build_textured};
 use glam::{DVec3, Vec3};
 
 const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data");
@@ -229,6 +230,87 @@ fn a_texture_shows_what_is_finer_than_surfels() {
     eprintln!("texture {by_texture:.4?}, colour {by_color:.4?}, centres {of_centers:.4?}, across seams {across:.4?}");
     assert!(by_texture[0] < 0.1 * by_color[0] && by_texture[0] < 0.1 * of_centers[0]);
     assert!(by_texture[1] < 0.6 * across[1] && by_texture[1] < 0.7 * by_color[1]);
+}
+
+/// Within an absolute tolerance.
+fn within(tolerance: f64, shape: SplatShape) -> Options {
+    Options { tolerance: Tolerance::Absolute(tolerance), shape, relaxations: 0 }
+}
+
+/// A plane whose coordinates jump at a seam: surfels that are left keep theirs, and none shows across it; in a file too.
+#[test]
+fn simplified_surfels_keep_their_place_in_a_texture() {
+    let across = |x: f64| if x > 0.0 { 0.5 } else { 0.0 };
+    let coordinates = |[x, y, _]: [f64; 3]| [(0.1 * x + 0.05 * y + across(x)) as f32, (0.3 * y) as f32];
+    let positions: Vec<[f64; 3]> =
+        (0..3600).map(|k| [f64::from(k % 60) / 30.0 - 0.991, f64::from(k / 60) / 30.0 - 0.99, 2.0]).collect();
+    let sampled = Points {
+        normals: Some(vec![[0.0, 0.0, 1.0]; 3600]),
+        radii: Some(vec![0.04; 3600]),
+        texture: Some(positions.iter().map(|position| coordinates(*position)).collect()),
+        positions,
+        ..Points::default()
+    };
+    let (scene, _, own) = build_at_vertices(vec![sampled], &()).unwrap();
+    let options = within(1e-3, SplatShape::Disk);
+    // How far a surfel shows past the seam, at most, from its own side.
+    let past = |left: &Points| {
+        let shown = build_at_vertices(vec![left.clone()], &()).unwrap().0;
+        let reaches = shown.surfels.iter().enumerate().map(|(index, surfel)| {
+            let own = shown.origin.x + f64::from(surfel.center[0]);
+            let rim = (0..720).flat_map(|k| [0.25, 0.5, 0.75, 1.0].map(|r| (r, TAU * f64::from(k) / 720.0)));
+            let shows = rim.filter(|(r, angle)| {
+                let clip = shown.clips.get(index).copied().unwrap_or_default();
+                clip.0.iter().all(|[x, y, z]| {
+                    f64::from(*x) * r * angle.cos() + f64::from(*y) * r * angle.sin() + f64::from(*z) >= 0.0
+                })
+            });
+            let x = shows.map(|(r, angle)| {
+                own + r * (f64::from(surfel.s[0]) * angle.cos() + f64::from(surfel.t[0]) * angle.sin())
+            });
+            x.map(|x| if (x > 0.0) == (own > 0.0) { 0.0 } else { x.abs() }).fold(0.0, f64::max)
+        });
+        reaches.fold(0.0, f64::max)
+    };
+    let (simplified, left, report) = simplify_in_texture(&scene, &own.centers, &options, &()).unwrap();
+    let left = points(&simplified, left, SplatShape::Disk);
+    assert!(past(&left) < 0.05, "{}", past(&left));
+    let (unaware, nothing, of_all) = simplify_in_texture(&scene, &[], &options, &()).unwrap();
+    assert!(report.selected > of_all.selected && report.selected < of_all.selected * 6 / 5, "{report:?} {of_all:?}");
+    assert!(nothing.centers.is_empty() && past(&points(&unaware, nothing, SplatShape::Disk)) > 0.2);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("left.ply");
+    io::ply::write_points(&path, &left, &()).unwrap();
+    let read = io::read(&path, &()).unwrap();
+    assert_eq!(read.texture_slopes.as_ref().unwrap().len() as u64, report.selected);
+    let (painted, _) = build_textured(vec![read], waves(true), &()).unwrap();
+    for (index, place) in textured(&painted).places().iter().enumerate() {
+        let center = (painted.origin + painted.center(index)).to_array();
+        let expected = coordinates(center);
+        assert!((0..2).all(|k| (place.center[k] - expected[k]).abs() < 1e-5), "{center:?}: {place:?}");
+        let [u, v] = place.slopes.map(Vec3::from_array);
+        assert!(u.distance(Vec3::new(0.1, 0.05, 0.0)) < 1e-4 && v.distance(0.3 * Vec3::Y) < 1e-4, "{u} {v}");
+    }
+}
+
+/// A third of the surfels of a globe paint it as well; with slopes that the few have of one another, they do not.
+#[test]
+fn a_texture_survives_simplification() {
+    let texture = waves(true);
+    let dense = globe(20_000, 1.3, texture.clone());
+    let centers: Vec<_> = textured(&dense).places().iter().map(|place| place.center).collect();
+    let options = within(0.0005, SplatShape::Cap);
+    let (simplified, left, _) = simplify_in_texture(&dense, &centers, &options, &()).unwrap();
+    let left = points(&simplified, left, SplatShape::Cap);
+    assert!(3 * left.positions.len() < dense.surfels.len(), "{}", left.positions.len());
+    let refitted = Points { texture_slopes: None, ..left.clone() };
+    let [painted, refitted] =
+        [left, refitted].map(|points| build_textured(vec![points], texture.clone(), &()).unwrap().0);
+    let spacing = (4.0 * PI / 20_000.0).sqrt();
+    let [before, after, refitted] =
+        [&dense, &painted, &refitted].map(|scene| apart_from_the_sphere(scene, &texture, 4.0 * spacing));
+    eprintln!("all {before:.5?}, a third {after:.5?}, refitted {refitted:.5?}");
+    assert!(before[0] < 0.001 && after[0] < 0.005 && refitted[0] > 2.0 * after[0]);
 }
 
 fn refused(arguments: &[&str]) -> (i32, String) {

@@ -12,6 +12,7 @@ use crate::io::ClassOpacities;
 use crate::plan::{BackendName, RenderOptions};
 use crate::scene::Shading;
 use crate::surfels::analytic::Shape;
+use crate::surfels::simplify::Tolerance;
 use crate::truth::DEFAULT_GRID;
 
 /// A study: every configuration on every scene.
@@ -80,6 +81,9 @@ pub struct SceneEntry {
     /// The image is looked up once a pixel; else surfels have its colours.
     #[serde(default)]
     pub lookup: bool,
+    /// Surfels are those that `epsplat simplify --shape cap` leaves, within this tolerance.
+    #[serde(default, deserialize_with = "parsed")]
+    pub simplify: Option<Tolerance>,
     /// A generated surface: sphere, torus, plane, checkerboard, text, shells or crossing.
     #[serde(default, deserialize_with = "parsed")]
     pub shape: Option<Shape>,

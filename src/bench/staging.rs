@@ -16,7 +16,10 @@ use crate::scene::{Camera, Colors, Lens, Projection, Scene, Surfel};
 use crate::surfels::analytic::{RADIUS_IN_SPACINGS, Shape, gaussians, generate, mesh};
 use crate::surfels::sampling::voxels::Voxel;
 use crate::surfels::sampling::{MeshSurface, Method, Priority, sample};
-use crate::surfels::{FromPoints, Size, Triangle, build, build_textured, curve, from_points, with_triangles};
+use crate::surfels::simplify::{self, SplatShape, Tolerance, simplify_in_texture};
+use crate::surfels::{
+    FromPoints, Size, Triangle, build, build_at_vertices, build_textured, curve, from_points, with_triangles,
+};
 use crate::truth::Surface;
 
 /// One point of a scene's sweep: how many surfels, and their mean radius in pixels.
@@ -91,6 +94,10 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
         // Reading a definition makes sure that there is one of them; no points are told as an empty scene.
         (None, None) => (Points::default(), None),
     };
+    let points = match entry.simplify {
+        Some(tolerance) => simplified(points, tolerance, progress)?,
+        None => points,
+    };
     let (mut scene, _) = match texture.filter(|_| entry.lookup) {
         Some(texture) => build_textured(vec![points], texture, progress)?,
         None => build(vec![points], progress)?,
@@ -118,6 +125,14 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
         footprint_px = wanted;
     }
     Ok(Staged { scene, cameras, surface, footprint_px })
+}
+
+/// What `epsplat simplify --shape cap` leaves of points.
+fn simplified(points: Points, tolerance: Tolerance, progress: &dyn Progress) -> Result<Points> {
+    let (scene, _, coordinates) = build_at_vertices(vec![points], progress)?;
+    let options = simplify::Options { tolerance, shape: SplatShape::Cap, relaxations: 0 };
+    let (scene, coordinates, _) = simplify_in_texture(&scene, &coordinates.centers, &options, progress)?;
+    Ok(simplify::points(&scene, coordinates, SplatShape::Cap))
 }
 
 /// The triangles beside surfels, and the surface that they stand for if rays are to meet it.

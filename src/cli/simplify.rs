@@ -4,10 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 use epsplat::Result;
-use epsplat::io::{Points, ply};
-use epsplat::scene::{Colors, Scene, Surfel};
+use epsplat::io::ply;
 use epsplat::surfels;
-use epsplat::surfels::simplify::{Options, Report, SplatShape, Tolerance, simplify};
+use epsplat::surfels::simplify::{Options, Report, SplatShape, Tolerance, points, simplify_in_texture};
 
 use super::progress::Bars;
 use super::reading::{Reading, help_of, named};
@@ -17,6 +16,7 @@ use super::{note, outputs, print, write_json};
 ///
 /// Around each point the largest disk is grown that no point inside is farther from than the tolerance. Of these as few
 /// as possible are taken that cover the surface together. Flat parts keep few surfels, edges and details keep theirs.
+/// Texture coordinates stay, with their slopes, and no surfel lies across a seam of them.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  epsplat simplify scan.ply -o small.ply --tolerance rel:0.0005 --shape ellipse --relax 3"
@@ -58,7 +58,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     outputs::check(&arguments.inputs, [&arguments.output].into_iter().chain(&arguments.json))?;
     let bars = Bars::new();
     let inputs = arguments.reading.all(&arguments.inputs, &bars)?;
-    let (scene, preparation) =
+    let (scene, preparation, coordinates) =
         surfels::build_at_vertices(inputs, &bars).map_err(|error| named(error, &arguments.inputs))?;
     preparation.notes().iter().for_each(|line| note(line));
     if preparation.estimated_normals > 0 {
@@ -73,33 +73,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         ShapeName::Cap => SplatShape::Cap,
     };
     let options = Options { tolerance: arguments.tolerance, shape, relaxations: arguments.relax };
-    let (simplified, report) = simplify(&scene, &options, &bars)?;
-    ply::write_points(&arguments.output, &points(&simplified, shape), &bars)?;
+    let (simplified, coordinates, report) = simplify_in_texture(&scene, &coordinates.centers, &options, &bars)?;
+    ply::write_points(&arguments.output, &points(&simplified, coordinates, shape), &bars)?;
     match &arguments.json {
         Some(path) => write_json(path, &report),
         None => print(&summary(&report)),
-    }
-}
-
-fn points(scene: &Scene, shape: SplatShape) -> Points {
-    let surfels = &scene.surfels;
-    let normal = |surfel: &Surfel| surfel.normal().normalize_or_zero().to_array();
-    // Lines and caps are by half-axes.
-    let half_axes = shape != SplatShape::Disk || !scene.clips.is_empty();
-    Points {
-        positions: (0..surfels.len()).map(|index| (scene.origin + scene.center(index)).to_array()).collect(),
-        normals: (!half_axes).then(|| surfels.iter().map(normal).collect()),
-        radii: (!half_axes).then(|| surfels.iter().map(|surfel| surfel.radius()).collect()),
-        axes: half_axes.then(|| surfels.iter().map(|surfel| [surfel.s, surfel.t]).collect()),
-        clips: (!scene.clips.is_empty()).then(|| scene.clips.clone()),
-        caps: (!scene.caps.is_empty()).then(|| scene.caps.clone()),
-        colors: match &scene.colors {
-            Colors::Constant(color) => Some(Colors::Linear(vec![*color; surfels.len()])),
-            colors => Some(colors.clone()),
-        },
-        up: Some(scene.up),
-        closed: scene.closed,
-        ..Points::default()
     }
 }
 

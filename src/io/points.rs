@@ -33,6 +33,8 @@ pub struct Points {
     pub flattened: Option<Flattened>,
     /// Texture coordinates (u, v), origin bottom left as in OBJ.
     pub texture: Option<Vec<[f32; 2]>>,
+    /// What u and v gain for a world unit along x, y and z; all zero where it is not known.
+    pub texture_slopes: Option<Vec<[[f32; 3]; 2]>>,
     /// The direction that the format, by convention, calls up.
     pub up: Option<Up>,
     /// Radii are those with which disks at the vertices cover the triangles of a mesh.
@@ -123,6 +125,7 @@ impl Points {
         self.clips.iter_mut().for_each(|all| retain(all, keep));
         self.caps.iter_mut().for_each(|all| retain(all, keep));
         self.texture.iter_mut().for_each(|all| retain(all, keep));
+        self.texture_slopes.iter_mut().for_each(|all| retain(all, keep));
         self.colors.iter_mut().for_each(|all| retain_colors(all, keep));
     }
 }
@@ -141,6 +144,7 @@ pub(crate) fn taken(points: Points, of: Vec<u32>) -> Points {
         positions: each(&points.positions, &of),
         colors,
         texture: points.texture.map(|texture| each(&texture, &of)),
+        texture_slopes: points.texture_slopes.map(|slopes| each(&slopes, &of)),
         numbers: Some(of),
         ..points
     }

@@ -68,33 +68,52 @@ pub fn build_within(
     if inputs.iter().any(|input| input.texture.is_none() && !input.positions.is_empty()) {
         return Err(Error::Usage("a texture paints points that have texture coordinates, and some have none".into()));
     }
-    let mut gathered = gather::gather(inputs)?;
+    let (mut scene, preparation, places) = built_in_texture(gather::gather(inputs)?, limits, progress)?;
+    scene.colors = Colors::Textured(texture::painted(&scene, texture.into(), &places, progress)?);
+    Ok((scene, preparation))
+}
+
+/// The scene of points with texture coordinates, and these, of which unusable ones are replaced.
+fn built_in_texture(
+    mut gathered: Gathered,
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> Result<(Scene, Preparation, Coordinates)> {
     let unusable = |place: &[f32; 2]| !place.iter().all(|turns| turns.abs() <= LARGEST_PLACE);
     for place in gathered.points.texture.iter_mut().flatten().filter(|place| unusable(place)) {
         *place = [0.0; 2];
         gathered.preparation.replaced_places += 1;
     }
-    let ((mut scene, preparation), places) = built(gathered, limits, progress)?;
-    scene.colors = Colors::Textured(texture::painted(&scene, texture.into(), &places.unwrap_or_default(), progress)?);
-    Ok((scene, preparation))
+    let ((scene, preparation), places) = built(gathered, limits, progress)?;
+    Ok((scene, preparation, places))
 }
 
-/// [`build`], where the surfels of a mesh are at its vertices however it looks, for what takes surfels as samples of a surface.
+/// [`build`], where the surfels of a mesh are at its vertices however it looks, for what takes surfels as samples of a surface. With the
+/// texture coordinates of the surfels, if they have any.
 ///
 /// # Errors
 ///
 /// Those of [`build`].
-pub fn build_at_vertices(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Preparation)> {
+pub fn build_at_vertices(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Preparation, Coordinates)> {
     let inputs = inputs.into_iter().map(|input| mesh::of_mesh(input, By::Vertices)).collect();
     let mut gathered = gather::gather(inputs)?;
     gathered.points = std::mem::take(&mut gathered.points).in_light();
     // Samples are where the surfels are, however those curve.
     let flat = Limits { curved: false, ..Limits::default() };
-    built(gathered, &flat, progress).map(|(made, _)| made)
+    built_in_texture(gathered, &flat, progress)
+}
+
+/// The texture coordinates of surfels.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Coordinates {
+    /// At their centres, origin bottom left; none of a scene without any.
+    pub centers: Vec<[f32; 2]>,
+    /// What they gain for a world unit along x, y and z, where the points say it; all zero of those that do not.
+    pub slopes: Vec<[[f32; 3]; 2]>,
 }
 
 /// The scene, and the texture coordinates of its surfels.
-pub(super) type Built = ((Scene, Preparation), Option<Vec<[f32; 2]>>);
+pub(super) type Built = ((Scene, Preparation), Coordinates);
 
 pub(super) fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Progress) -> Result<Built> {
     let bounds = Bounds::of(gathered.points.positions.par_iter().map(|position| DVec3::from_array(*position)));
@@ -143,7 +162,9 @@ pub(super) fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Prog
     let low = low_parts(&surfels, relative);
     preparation.rounding = rounding(&surfels, &low, relative);
     let normals = own_normals(&given, &surfels);
-    let Gathered { points: Points { colors, encoded, closed, clips, texture, .. }, provenance, .. } = gathered;
+    let Gathered { points, provenance, .. } = gathered;
+    let Points { colors, encoded, closed, clips, texture, texture_slopes, .. } = points;
+    let (centers, slopes) = (texture.unwrap_or_default(), texture_slopes.unwrap_or_default());
     let (colors, closed) = (colors::folded(colors), closed && oriented);
     // Most scenes have no disk that ends before its rim.
     let clips: Vec<Clip> = clips.unwrap_or_default().into_iter().map(Clip::usable).collect();
@@ -152,7 +173,7 @@ pub(super) fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Prog
     let scene = Scene { origin, surfels, colors, encoded, oriented, closed, up, provenance, ..of_disks };
     // As the default view sees it.
     preparation.strays = scene.framed().1;
-    Ok(((scene, preparation), texture))
+    Ok(((scene, preparation), Coordinates { centers, slopes }))
 }
 
 /// The caps of these surfels; none where all are flat, as they are in most scenes.

@@ -139,9 +139,21 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
     let caps = axes.as_ref().filter(|_| curved);
     let sided = !preparation.has_random_sides();
     let caps = caps.map(|axes| caps_of((&distinct, &graph), (&point_normals, sided), axes));
-    let Points { positions, colors, texture, .. } = gathered.points;
+    let Points { positions, colors, texture, texture_slopes, .. } = gathered.points;
     let (normals, radii, up) = (Some(point_normals), Some(radii), Some(known_up));
-    let points = Points { positions, normals, radii, axes, clips, caps, colors, texture, up, ..Points::default() };
+    let points = Points {
+        positions,
+        normals,
+        radii,
+        axes,
+        clips,
+        caps,
+        colors,
+        texture,
+        texture_slopes,
+        up,
+        ..Points::default()
+    };
     preparation.limited_by_neighbours = sizes.limited(distinct.of_point());
     let radius = |index: usize| points.radii.as_ref().map_or(0.0, |radii| f64::from(radii[index]));
     preparation.strays = framed(count, |index| (DVec3::from_array(points.positions[index]), radius(index))).1;

@@ -36,7 +36,7 @@ mod triangles;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-pub use self::build::{build, build_at_vertices, build_textured, build_within};
+pub use self::build::{Coordinates, build, build_at_vertices, build_textured, build_within};
 pub use self::coverage::{Coverage, coverage};
 pub use self::facing::build_facing;
 pub use self::from_points::{FromPoints, Surfels, curve, from_points};

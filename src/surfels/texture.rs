@@ -5,13 +5,14 @@ use std::sync::Arc;
 use glam::{DMat2, DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::build::Coordinates;
 use super::neighbours::{Neighbour, NeighbourSearch};
 use super::positions::DistinctPositions;
 use crate::scene::{Place, Scene, Surfel, Texture, Textured};
 use crate::{Progress, Result};
 
 /// Neighbours that tell how fast coordinates change: the first two rings of a square grid.
-const NEIGHBOURS: usize = 8;
+pub(super) const NEIGHBOURS: usize = 8;
 
 /// The change for each length, of those to the neighbours in order, that is typical. At a straight seam three of the first ring
 /// lie on the other side, and five at its corner.
@@ -23,18 +24,82 @@ const STRETCH: f64 = 3.0;
 /// Least squares with a smaller ratio of determinant to squared trace say nothing of one direction.
 const LEAST_SPREAD: f64 = 1e-3;
 
-/// Paints the surfels of `scene` with `texture` at the coordinates `centers`, one for each.
+/// Paints the surfels of `scene` with `texture` at their coordinates.
 pub(super) fn painted(
     scene: &Scene,
     texture: Arc<Texture>,
-    centers: &[[f32; 2]],
+    coordinates: &Coordinates,
     progress: &dyn Progress,
 ) -> Result<Textured> {
-    let places = places(scene, centers, progress)?;
+    let mut places = match given(scene, coordinates) {
+        Some(places) => places,
+        None => places(scene, &coordinates.centers, progress)?,
+    };
+    for (index, slopes) in coordinates.slopes.iter().enumerate().filter(|(_, slopes)| are_known(slopes)) {
+        places[index] = of_slopes(&scene.surfels[index], coordinates.centers[index], *slopes);
+    }
     // Disks overlap: half of one at each side is about the surfel's own part of the surface.
     let color = |place: &Place| texture.mean_about(place.center.map(f64::from), 0.5 * f64::from(place.reach));
     let colors = places.par_iter().map(color).collect();
     Textured::new(texture, places, colors)
+}
+
+/// Whether the slopes were given and can be used.
+fn are_known(slopes: &[[f32; 3]; 2]) -> bool {
+    let all = slopes.as_flattened();
+    all.iter().any(|gain| *gain != 0.0) && all.iter().all(|gain| gain.is_finite())
+}
+
+/// Places whose slopes are all to be filled in, where every surfel has its own.
+fn given(scene: &Scene, coordinates: &Coordinates) -> Option<Vec<Place>> {
+    let known = coordinates.slopes.iter().filter(|slopes| are_known(slopes)).count();
+    (known == scene.surfels.len()).then(|| vec![Place::default(); known])
+}
+
+/// The place of a surfel whose coordinates change so. It overlaps others that are as far off as it is large.
+fn of_slopes(surfel: &Surfel, center: [f32; 2], slopes: [[f32; 3]; 2]) -> Place {
+    let gains = slopes.map(|slope| DVec3::from_array(slope.map(f64::from)));
+    let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
+    let typical = (0.5 * (gains[0].length_squared() + gains[1].length_squared())).sqrt();
+    Place {
+        center,
+        slopes,
+        extent: gains.map(|gain| gain.dot(s).hypot(gain.dot(t)) as f32),
+        reach: (typical * f64::from(surfel.radius())) as f32,
+    }
+}
+
+/// The change of coordinates for each length that is typical around a point, from steps to its neighbours in the order of their distance:
+/// in space, and in the texture.
+pub(super) fn typical_change(steps: &[(DVec3, DVec2)]) -> f64 {
+    let mut changes: Vec<f64> = steps.iter().map(|(offset, gain)| gain.length() / offset.length()).collect();
+    changes.sort_by(f64::total_cmp);
+    changes.get(RANK.min(changes.len().saturating_sub(1))).copied().unwrap_or(0.0)
+}
+
+/// Whether a seam lies before a step, by the typical change around its start.
+pub(super) fn jumps((offset, gain): &(DVec3, DVec2), typical: f64) -> bool {
+    gain.length() / offset.length() > STRETCH * typical
+}
+
+/// What u and v gain along the half-axes of an ellipse, by least squares over steps.
+pub(super) fn slopes_along([s, t]: [DVec3; 2], steps: impl Iterator<Item = (DVec3, DVec2)>) -> DMat2 {
+    // Sums of x x^T and of gain x^T, for x on the unit disk.
+    let (mut squares, mut products) = (DMat2::ZERO, DMat2::ZERO);
+    for (offset, gain) in steps {
+        let x = DVec2::new(offset.dot(s) / s.length_squared(), offset.dot(t) / t.length_squared());
+        squares += DMat2::from_cols(x * x.x, x * x.y);
+        products += DMat2::from_cols(gain * x.x, gain * x.y);
+    }
+    let trace = squares.x_axis.x + squares.y_axis.y;
+    let solvable = squares.determinant() > LEAST_SPREAD * trace * trace;
+    if solvable { products * squares.inverse() } else { DMat2::ZERO }
+}
+
+/// The same in world units.
+pub(super) fn in_world(slopes: DMat2, [s, t]: [DVec3; 2]) -> [[f32; 3]; 2] {
+    let (along_s, along_t) = (s / s.length_squared(), t / t.length_squared());
+    [0, 1].map(|k| (slopes.x_axis[k] * along_s + slopes.y_axis[k] * along_t).as_vec3().to_array())
 }
 
 /// The change of coordinates over each disk, by least squares over those neighbours that no jump lies before. The reach is that of
@@ -72,27 +137,12 @@ fn places(scene: &Scene, centers: &[[f32; 2]], progress: &dyn Progress) -> Resul
 
 /// A surfel's place, from the steps to its neighbours: in world units, and in the texture.
 fn place(surfel: &Surfel, center: [f32; 2], steps: &[(DVec3, DVec2)]) -> Place {
-    let change = |(offset, gain): &(DVec3, DVec2)| gain.length() / offset.length();
-    let mut changes: Vec<f64> = steps.iter().map(change).collect();
-    changes.sort_by(f64::total_cmp);
-    let typical = changes.get(RANK.min(changes.len().saturating_sub(1))).copied().unwrap_or(0.0);
-    let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
-    // Sums of x x^T and of gain x^T, for x on the unit disk.
-    let (mut squares, mut products) = (DMat2::ZERO, DMat2::ZERO);
-    for (offset, gain) in steps.iter().filter(|step| change(step) <= STRETCH * typical) {
-        let x = DVec2::new(offset.dot(s) / s.length_squared(), offset.dot(t) / t.length_squared());
-        squares += DMat2::from_cols(x * x.x, x * x.y);
-        products += DMat2::from_cols(*gain * x.x, *gain * x.y);
-    }
-    let trace = squares.x_axis.x + squares.y_axis.y;
-    let solvable = squares.determinant() > LEAST_SPREAD * trace * trace;
-    let slopes = if solvable { products * squares.inverse() } else { DMat2::ZERO };
-    // From the unit disk to world units.
-    let (along_s, along_t) = (s / s.length_squared(), t / t.length_squared());
-    let in_world = |k: usize| (slopes.x_axis[k] * along_s + slopes.y_axis[k] * along_t).as_vec3().to_array();
+    let typical = typical_change(steps);
+    let axes = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
+    let slopes = slopes_along(axes, steps.iter().copied().filter(|step| !jumps(step, typical)));
     Place {
         center,
-        slopes: [0, 1].map(in_world),
+        slopes: in_world(slopes, axes),
         extent: [0, 1].map(|k| slopes.x_axis[k].hypot(slopes.y_axis[k]) as f32),
         reach: (typical * f64::from(surfel.radius())) as f32,
     }

@@ -11,6 +11,7 @@
 //! | `red green blue` | `uchar`: 8-bit sRGB; `float`: linear light | colour |
 //! | `alpha` | as the colour | opacity, straight |
 //! | `texture_u texture_v` | `float` | texture coordinates, origin bottom left |
+//! | `texture_u_x texture_u_y texture_u_z texture_v_x texture_v_y texture_v_z` | `float` | what they gain for a world unit along x, y and z |
 //!
 //! The header has a comment `up y` or `up z` where that is known, and `closed` for surfels that cover a closed surface: no other
 //! program says it in a PLY file, and none stumbles over it.

@@ -72,6 +72,7 @@ pub(super) struct Layout {
     color: Option<[(usize, Coding); 3]>,
     alpha: Option<(usize, Coding)>,
     texture: Option<[usize; 2]>,
+    texture_slopes: Option<[[usize; 3]; 2]>,
     gaussian: Option<GaussianLayout>,
 }
 
@@ -80,6 +81,10 @@ pub(super) const CLIP_NAMES: [&str; 6] = ["clip1_u", "clip1_v", "clip1_w", "clip
 
 /// How an ellipse curves ([`Cap`]), world units.
 pub(super) const CAP_NAMES: [&str; 3] = ["cap_uu", "cap_uv", "cap_vv"];
+
+/// What texture coordinates gain for a world unit along each axis.
+pub(super) const SLOPE_NAMES: [[&str; 3]; 2] =
+    [["texture_u_x", "texture_u_y", "texture_u_z"], ["texture_v_x", "texture_v_y", "texture_v_z"]];
 
 /// What programs call texture coordinates, the most telling names first.
 const TEXTURE_NAMES: [[&str; 2]; 5] =
@@ -128,6 +133,8 @@ impl Layout {
         let mut axis = |names: [&str; 3]| Some([column(&names[..1])?, column(&names[1..2])?, column(&names[2..])?]);
         let axes = axis(["sx", "sy", "sz"]).zip(axis(["tx", "ty", "tz"])).map(<[_; 2]>::from);
         let cap = axes.and_then(|_| axis(CAP_NAMES));
+        let [u_slopes, v_slopes] = SLOPE_NAMES.map(&mut axis);
+        let texture_slopes = u_slopes.zip(v_slopes).map(<[_; 2]>::from);
         let clip = axes.and_then(|_| {
             let found: Vec<usize> = CLIP_NAMES.iter().filter_map(|name| column(&[name])).collect();
             <[usize; 6]>::try_from(found).ok()
@@ -148,6 +155,7 @@ impl Layout {
             color,
             alpha,
             texture,
+            texture_slopes: texture_slopes.filter(|_| texture.is_some()),
             gaussian: None,
         })
     }
@@ -169,6 +177,7 @@ pub(super) struct Vertices<'a> {
     clips: Vec<Clip>,
     caps: Vec<Cap>,
     texture: Vec<[f32; 2]>,
+    texture_slopes: Vec<[[f32; 3]; 2]>,
     srgb8: Vec<[u8; 4]>,
     linear: Vec<[f32; 4]>,
     gaussians: Option<Gaussians<'a>>,
@@ -179,7 +188,7 @@ impl<'a> Vertices<'a> {
     pub(super) fn with_capacity(layout: &'a Layout, rows: u64) -> Result<Self, Fault> {
         let (mut positions, mut normals, mut radii) = (Vec::new(), Vec::new(), Vec::new());
         let (mut axes, mut clips, mut caps, mut texture) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        let (mut srgb8, mut linear) = (Vec::new(), Vec::new());
+        let (mut texture_slopes, mut srgb8, mut linear) = (Vec::new(), Vec::new(), Vec::new());
         reserve(&mut positions, rows)?;
         reserve(&mut normals, if layout.normal.is_some() { rows } else { 0 })?;
         reserve(&mut radii, if layout.radius.is_some() { rows } else { 0 })?;
@@ -187,6 +196,7 @@ impl<'a> Vertices<'a> {
         reserve(&mut clips, if layout.clip.is_some() { rows } else { 0 })?;
         reserve(&mut caps, if layout.cap.is_some() { rows } else { 0 })?;
         reserve(&mut texture, if layout.texture.is_some() { rows } else { 0 })?;
+        reserve(&mut texture_slopes, if layout.texture_slopes.is_some() { rows } else { 0 })?;
         let (codes, lights) = match (layout.color.is_some(), layout.is_srgb8()) {
             (false, _) => (0, 0),
             (true, true) => (rows, 0),
@@ -195,7 +205,20 @@ impl<'a> Vertices<'a> {
         reserve(&mut srgb8, codes)?;
         reserve(&mut linear, lights)?;
         let gaussians = layout.gaussian.as_ref().map(|own| Gaussians::with_capacity(own, rows)).transpose()?;
-        Ok(Self { layout, positions, normals, radii, axes, clips, caps, texture, srgb8, linear, gaussians })
+        Ok(Self {
+            layout,
+            positions,
+            normals,
+            radii,
+            axes,
+            clips,
+            caps,
+            texture,
+            texture_slopes,
+            srgb8,
+            linear,
+            gaussians,
+        })
     }
 
     pub(super) fn len(&self) -> u64 {
@@ -231,6 +254,10 @@ impl<'a> Vertices<'a> {
         if let Some(texture) = layout.texture {
             self.texture.extend((0..rows).map(|row| texture.map(|column| value(column, row) as f32)));
         }
+        if let Some(slopes) = layout.texture_slopes {
+            let slopes = |row: usize| slopes.map(|slope| slope.map(|column| value(column, row) as f32));
+            self.texture_slopes.extend((0..rows).map(slopes));
+        }
         if let Some(color) = layout.color {
             if layout.is_srgb8() {
                 self.srgb8.extend((0..rows).map(|row| {
@@ -262,6 +289,7 @@ impl<'a> Vertices<'a> {
             caps: layout.cap.map(|_| self.caps),
             colors,
             texture: layout.texture.map(|_| self.texture),
+            texture_slopes: layout.texture_slopes.map(|_| self.texture_slopes),
             up: None,
             ..Points::default()
         };

@@ -1,6 +1,6 @@
 //! From surfels to PLY bytes.
 
-use super::vertex::{CAP_NAMES, CLIP_NAMES};
+use super::vertex::{CAP_NAMES, CLIP_NAMES, SLOPE_NAMES};
 use super::write_gaussians;
 use crate::io::atomic::{Output, write_whole};
 use crate::io::{Points, Up};
@@ -29,6 +29,8 @@ pub struct Vertex {
     pub color: Option<Color>,
     /// Texture coordinates (u, v), origin bottom left.
     pub texture: [f32; 2],
+    /// What they gain for a world unit along x, y and z.
+    pub texture_slopes: [[f32; 3]; 2],
 }
 
 /// The colour of a vertex, alpha straight: 1 is opaque.
@@ -96,6 +98,8 @@ pub struct Properties {
     pub colors: ColorProperties,
     /// `float texture_u texture_v` are written.
     pub texture: bool,
+    /// `float texture_u_x` to `texture_v_z` are written.
+    pub texture_slopes: bool,
     /// `comment up y` or `comment up z` says which way is up.
     pub up: Option<Up>,
     /// `comment closed` says that the surfels cover a closed surface, from outside.
@@ -120,6 +124,7 @@ impl Properties {
                 Some(_) => ColorProperties::Linear,
             },
             texture: points.texture.is_some(),
+            texture_slopes: points.texture.is_some() && points.texture_slopes.is_some(),
             up: points.up,
             closed: points.closed,
         }
@@ -156,6 +161,9 @@ impl Properties {
         }
         if self.texture {
             scalars("float", &["texture_u", "texture_v"])?;
+        }
+        if self.texture_slopes {
+            scalars("float", SLOPE_NAMES.as_flattened())?;
         }
         out.write_all(b"end_header\n")
     }
@@ -194,6 +202,9 @@ impl Properties {
         }
         if self.texture {
             vertex.texture.iter().for_each(|value| row.extend(value.to_le_bytes()));
+        }
+        if self.texture_slopes {
+            vertex.texture_slopes.as_flattened().iter().for_each(|value| row.extend(value.to_le_bytes()));
         }
     }
 }
@@ -265,6 +276,7 @@ pub fn write_points(path: &Path, points: &Points, progress: &dyn Progress) -> Re
                 None => None,
             },
             texture: of(&points.texture, index).unwrap_or_default(),
+            texture_slopes: of(&points.texture_slopes, index).unwrap_or_default(),
         }
     });
     let written = write(path, Properties::of(points), count as u64, vertices);

@@ -32,7 +32,7 @@ pub(super) struct Border {
 pub(super) enum Beyond {
     /// A neighbour, and how far it is.
     Neighbour(u32, f64),
-    /// A sharp edge of the surface: the cell ends there, the graph has no edge.
+    /// A sharp edge of the surface, or a seam of its texture: the cell ends there, the graph has no edge.
     Crease,
     /// The line at which the surfel ends.
     Line,
@@ -51,7 +51,7 @@ pub(super) enum Edge {
     Bend,
     /// The surfel ends there: the line is as exact as the surfel is.
     Line,
-    /// The surface ends sharply, about there: where the tangent planes of two points meet.
+    /// The surface ends sharply, about there: where the tangent planes of two points meet, or halfway across a seam of its texture.
     Crease,
     /// Nothing is known past it.
     Outline,
@@ -107,7 +107,8 @@ impl Border {
         let distance = neighbour.squared_distance.sqrt();
         let same_side = samples.same_side(index, neighbour.index);
         let cosine = samples.normals[index as usize].dot(samples.normals[neighbour.index as usize]);
-        let beyond = Beyond::Neighbour(neighbour.index, distance);
+        let seam = samples.has_seam(index, neighbour.index);
+        let beyond = if seam { Beyond::Crease } else { Beyond::Neighbour(neighbour.index, distance) };
         if let Some((toward, distance)) = crease_between(samples, index, neighbour.index, offset, tolerance) {
             let beyond = if cosine.abs() < SHARP { Beyond::Crease } else { beyond };
             return Some(Self { toward: in_plane(toward), distance, beyond, crease: true });

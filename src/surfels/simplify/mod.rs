@@ -26,6 +26,9 @@
 //! **Edges.** Where the surfels that came in end at lines, and at creases of more than 60 degrees, cells end and the graph has no
 //! edge; disks that stand for several surfels are cut there, as far as what they cover allows. As they are cut they may grow past two ends.
 //!
+//! **Textures.** Where the surfels that came in have texture coordinates, cells end at seams too: what is painted from two parts of an image
+//! is covered by disks of each. Disks that are cut at both sides of a seam overlap little there, so little of it shows their mean colours.
+//!
 //! **Within the tolerance.** A disk covers the cells of those points in it that it grew over, none of which is farther off than
 //! the tolerance. Where the surface bends by more than that within a cell no disk covers all of it so, and at a crease any that
 //! does holds, seen along its normal, points of the other side. There the cell's own point gets a disk as large as the cell
@@ -38,6 +41,7 @@ mod cut;
 mod growing;
 mod outcome;
 mod paraboloid;
+mod points;
 mod relaxation;
 mod samples;
 mod selection;
@@ -47,11 +51,13 @@ use std::str::FromStr;
 use self::candidates::Candidates;
 use self::cells::Cells;
 pub use self::outcome::{Report, grown, written};
+pub use self::points::points;
 use self::samples::Samples;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 use crate::scene::Scene;
 use crate::scene::options::kind_and_amount;
+use crate::surfels::Coordinates;
 
 /// How far points may lie from the splat that stands for them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -126,12 +132,27 @@ pub struct Options {
 ///
 /// [`Error::Usage`] for a tolerance that is negative or not finite, or more than 2^32 - 1 surfels.
 pub fn simplify(scene: &Scene, options: &Options, progress: &dyn Progress) -> Result<(Scene, Report)> {
+    simplify_in_texture(scene, &[], options, progress).map(|(scene, _, report)| (scene, report))
+}
+
+/// [`simplify`] for surfels that have texture coordinates, origin bottom left, one pair each, and what those of the selected ones are. Their
+/// slopes are fitted over the surfels that each stands for, and none stands for surfels across a seam, where coordinates jump.
+///
+/// # Errors
+///
+/// Those of [`simplify`].
+pub fn simplify_in_texture(
+    scene: &Scene,
+    coordinates: &[[f32; 2]],
+    options: &Options,
+    progress: &dyn Progress,
+) -> Result<(Scene, Coordinates, Report)> {
     let tolerance = options.tolerance.in_world(scene.bounds().extent().length());
     if !(tolerance.is_finite() && tolerance >= 0.0) {
         return Err(Error::Usage(format!("a tolerance is finite and not negative, {tolerance} is not")));
     }
     progress.begin("sorting points", 0);
-    let samples = Samples::new(scene)?;
+    let samples = Samples::new(scene, coordinates)?;
     progress.end();
     let scaled = tolerance * samples.positions.scale();
     let cells = Cells::new(&samples, scaled, progress);
@@ -141,7 +162,7 @@ pub fn simplify(scene: &Scene, options: &Options, progress: &dyn Progress) -> Re
     if options.relaxations > 0 {
         selected = relaxation::relax(&cells, &candidates, &selected, options.relaxations, progress);
     }
-    let (simplified, deviations) = outcome::scene(scene, &samples, &cells, &candidates, &selected, scaled);
+    let (simplified, coordinates, deviations) = outcome::scene(scene, &samples, &cells, &candidates, &selected, scaled);
     // Rounding aside.
     let beyond = |&&index: &&u32| candidates.splats[index as usize].deviation > scaled * (1.0 + 1e-9);
     let beyond_tolerance = selected.iter().filter(beyond).count() as u64;
@@ -156,5 +177,5 @@ pub fn simplify(scene: &Scene, options: &Options, progress: &dyn Progress) -> Re
         mean_deviation: deviations.mean.min(deviations.max),
         beyond_tolerance,
     };
-    Ok((simplified, report))
+    Ok((simplified, coordinates, report))
 }

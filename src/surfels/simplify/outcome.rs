@@ -12,6 +12,8 @@ use super::samples::Samples;
 use crate::scene::color::linear_to_srgb;
 use crate::scene::scene::low_parts;
 use crate::scene::{Cap, Clip, Colors, Scene, Surfel};
+use crate::surfels::Coordinates;
+use crate::surfels::texture::{in_world, slopes_along};
 
 /// A half-axis is written longer than it grew by at most this part of itself,
 const LARGEST_OVERLAP: f64 = 0.4;
@@ -77,6 +79,8 @@ struct Chosen {
     clip: Clip,
     cap: Cap,
     color: [f32; 4],
+    /// Texture coordinates at the centre and their slopes, if there are any.
+    place: ([f32; 2], [[f32; 3]; 2]),
     /// Area times deviation, and area.
     sums: [f64; 2],
     /// The largest deviation.
@@ -91,11 +95,14 @@ impl Chosen {
         candidates: &Candidates,
         tolerance: f64,
     ) -> Self {
-        match *candidates.covers(index) {
+        let covers = candidates.covers(index);
+        let chosen = match *covers {
             [cover] => Self::alone(cover, scene, samples, cells),
             _ => None,
         }
-        .unwrap_or_else(|| Self::grown(index, samples, cells, candidates, tolerance))
+        .unwrap_or_else(|| Self::grown(index, samples, cells, candidates, tolerance));
+        let point = candidates.splats[index as usize].point;
+        Self { place: place(&chosen.surfel, point, covers, samples, cells), ..chosen }
     }
 
     /// What stands for one surfel is that as it came, but for a factor that lets it hold its cell. None where several share a position, as
@@ -123,6 +130,7 @@ impl Chosen {
             cap: Cap(cap.0.map(|height| (f64::from(height) * factor * factor) as f32))
                 .usable(f64::from(surfel.radius()) * factor),
             color: mean_color(samples.colors[cell as usize], 1.0),
+            place: Default::default(),
             sums: [0.0, cells.area(cell, pieces)],
             largest: 0.0,
         })
@@ -166,8 +174,22 @@ impl Chosen {
         let longer = axes[0].length().max(axes[1].length()) / scale;
         let cap = Cap(heights.map(|height| (f64::from(height) / scale) as f32)).usable(longer);
         let color = mean_color(color, sums[1]);
-        Self { center: center / scale, surfel: Surfel { center: world(center), s, t }, clip, cap, color, sums, largest }
+        let surfel = Surfel { center: world(center), s, t };
+        let place = Default::default();
+        Self { center: center / scale, surfel, clip, cap, color, place, sums, largest }
     }
+}
+
+/// The texture coordinates of a splat that grew from a point: there, and their slopes over what it covers and what is beside that point.
+fn place(surfel: &Surfel, point: u32, covers: &[Cover], samples: &Samples, cells: &Cells) -> ([f32; 2], [[f32; 3]; 2]) {
+    let Some(own) = samples.places.get(point as usize) else { return Default::default() };
+    let axes = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
+    let others = covers.iter().map(|cover| cover.cell).chain(cells.neighbours(point).iter().copied());
+    let steps = others.filter(|other| *other != point && !samples.has_seam(point, *other)).map(|other| {
+        let (offset, gain) = samples.step(point, other);
+        (offset / samples.positions.scale(), gain)
+    });
+    (own.as_vec2().to_array(), in_world(slopes_along(axes, steps), axes))
 }
 
 /// Linear and not premultiplied, of a sum of premultiplied colours over this area.
@@ -184,7 +206,7 @@ pub(super) fn scene(
     candidates: &Candidates,
     selected: &[u32],
     tolerance: f64,
-) -> (Scene, Deviations) {
+) -> (Scene, Coordinates, Deviations) {
     let chosen: Vec<Chosen> =
         selected.par_iter().map(|&index| Chosen::of(index, scene, (samples, cells), candidates, tolerance)).collect();
     let colors = match scene.colors {
@@ -199,6 +221,10 @@ pub(super) fn scene(
     let deviations = Deviations { max, mean: moment / area };
     let surfels: Vec<_> = chosen.iter().map(|chosen| chosen.surfel).collect();
     let low = low_parts(&surfels, |index| chosen[index].center);
+    let mut coordinates = Coordinates::default();
+    if !samples.places.is_empty() {
+        (coordinates.centers, coordinates.slopes) = chosen.iter().map(|chosen| chosen.place).unzip();
+    }
     let clips: Vec<Clip> = chosen.iter().map(|chosen| chosen.clip).collect();
     let caps: Vec<Cap> = chosen.iter().map(|chosen| chosen.cap).collect();
     (
@@ -215,6 +241,7 @@ pub(super) fn scene(
             up: scene.up,
             ..Scene::default()
         },
+        coordinates,
         deviations,
     )
 }

@@ -1,0 +1,31 @@
+//! What is left, as it is kept in a file.
+
+use super::SplatShape;
+use crate::io::Points;
+use crate::scene::{Colors, Scene, Surfel};
+use crate::surfels::Coordinates;
+
+/// The surfels of a scene that is simplified to this shape as points, with these texture coordinates.
+pub fn points(scene: &Scene, coordinates: Coordinates, shape: SplatShape) -> Points {
+    let surfels = &scene.surfels;
+    let normal = |surfel: &Surfel| surfel.normal().normalize_or_zero().to_array();
+    // Lines and caps are by half-axes.
+    let half_axes = shape != SplatShape::Disk || !scene.clips.is_empty();
+    Points {
+        positions: (0..surfels.len()).map(|index| (scene.origin + scene.center(index)).to_array()).collect(),
+        normals: (!half_axes).then(|| surfels.iter().map(normal).collect()),
+        radii: (!half_axes).then(|| surfels.iter().map(|surfel| surfel.radius()).collect()),
+        axes: half_axes.then(|| surfels.iter().map(|surfel| [surfel.s, surfel.t]).collect()),
+        clips: (!scene.clips.is_empty()).then(|| scene.clips.clone()),
+        caps: (!scene.caps.is_empty()).then(|| scene.caps.clone()),
+        colors: match &scene.colors {
+            Colors::Constant(color) => Some(Colors::Linear(vec![*color; surfels.len()])),
+            colors => Some(colors.clone()),
+        },
+        texture: Some(coordinates.centers).filter(|centers| !centers.is_empty()),
+        texture_slopes: Some(coordinates.slopes).filter(|slopes| !slopes.is_empty()),
+        up: Some(scene.up),
+        closed: scene.closed,
+        ..Points::default()
+    }
+}

@@ -114,7 +114,7 @@ fn sample_writes_surfels_that_cover_the_mesh() {
 
 #[test]
 fn every_command_has_help_with_an_example() {
-    for command in ["render", "compare", "coverage", "generate", "info", "sample", "adapters"] {
+    for command in ["render", "compare", "coverage", "generate", "info", "sample", "hybrid", "simplify", "adapters"] {
         let help = String::from_utf8(succeeds(&[command, "--help"]).stdout).unwrap();
         assert!(help.contains(&format!("epsplat {command}")) && help.contains("Example"), "{help}");
     }

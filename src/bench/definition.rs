@@ -169,6 +169,8 @@ pub enum Making {
     Scanned,
     /// Independent random points of a mesh, `count` of them, with its normals, and ellipses that hold their cells.
     Uniform,
+    /// As `epsplat hybrid` does: samples of a mesh whose diagonal is seen as long as `count` pixels, and the triangles that stay.
+    Hybrid,
     /// Of a shape Gaussians, as `epsplat generate --gaussians` makes them.
     Gaussians,
 }
@@ -220,7 +222,7 @@ pub enum Rims {
 impl Making {
     /// Whether the mesh is sampled at a number of points.
     pub fn samples(self) -> bool {
-        matches!(self, Self::Sample | Self::Caps | Self::Scanned | Self::Uniform)
+        matches!(self, Self::Sample | Self::Caps | Self::Scanned | Self::Uniform | Self::Hybrid)
     }
 }
 

@@ -18,7 +18,7 @@ use crate::surfels::sampling::voxels::Voxel;
 use crate::surfels::sampling::{MeshSurface, Method, Priority, sample};
 use crate::surfels::simplify::{self, SplatShape, Tolerance, simplify_in_texture};
 use crate::surfels::{
-    FromPoints, Size, Triangle, build, build_at_vertices, build_textured, curve, from_points, with_triangles,
+    FromPoints, Size, Triangle, build, build_at_vertices, build_textured, curve, from_points, hybrid, with_triangles,
 };
 use crate::truth::Surface;
 
@@ -73,7 +73,7 @@ pub(super) fn stage(
 
 fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dyn Progress) -> Result<Staged> {
     let texture = entry.texture.as_ref().map(|file| Texture::read(&present(definition, entry, file)?)).transpose()?;
-    let (points, surface) = match (&entry.file, entry.shape) {
+    let (points, surface, left) = match (&entry.file, entry.shape) {
         (Some(file), _) => {
             let file = present(definition, entry, file)?;
             of_file(&file, entry, point.count.unwrap_or(1) as usize, texture.as_ref(), progress)?
@@ -89,19 +89,24 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
                 scatter(&mut points, noise * (shape.area() / count as f64).sqrt());
             }
             let radii = points.radii.clone().filter(|_| entry.surfels != Making::Scanned);
-            (Points { radii, ..points }, surface)
+            (Points { radii, ..points }, surface, None)
         }
         // Reading a definition makes sure that there is one of them; no points are told as an empty scene.
-        (None, None) => (Points::default(), None),
+        (None, None) => (Points::default(), None, None),
     };
     let points = match entry.simplify {
         Some(tolerance) => simplified(points, tolerance, progress)?,
         None => points,
     };
-    let (mut scene, _) = match texture.filter(|_| entry.lookup) {
-        Some(texture) => build_textured(vec![points], texture, progress)?,
-        None => build(vec![points], progress)?,
+    let mut scene = match texture.filter(|_| entry.lookup) {
+        Some(texture) => build_textured(vec![points], texture, progress)?.0,
+        None if points.positions.is_empty() && left.is_some() => Scene { oriented: true, ..Scene::default() },
+        None => build(vec![points], progress)?.0,
     };
+    if let Some(left) = left {
+        let of_surfels = Some(scene).filter(|scene| !scene.surfels.is_empty());
+        (scene, _) = with_triangles(of_surfels, &[left])?;
+    }
     if entry.rims != Rims::Curved {
         scene.caps.clear();
     }
@@ -164,14 +169,14 @@ fn present(definition: &Definition, entry: &SceneEntry, file: &Path) -> Result<P
     }
 }
 
-/// The surfels that a scene makes of its file, and the triangles of the mesh if the scene asks for ground truth.
+/// The surfels that a scene makes of its file, the triangles of the mesh if the scene asks for ground truth, and those that are drawn.
 fn of_file(
     file: &Path,
     entry: &SceneEntry,
     count: usize,
     texture: Option<&Texture>,
     progress: &dyn Progress,
-) -> Result<(Points, Option<Surface>)> {
+) -> Result<(Points, Option<Surface>, Option<Mesh>)> {
     let mesh = match entry.truth || entry.surfels.samples() {
         true => {
             let mut mesh = io::read_mesh(file, progress)?;
@@ -194,6 +199,7 @@ fn of_file(
         Some(mesh) => Ok::<_, Error>(sample(mesh, count, &method, 0, progress)?.0),
         None => Ok(Points::default()),
     };
+    let mut left = None;
     let stratified = Method::Stratified { priority: &priority, depth: None };
     let points = match entry.surfels {
         // Gaussians are made of shapes: reading a definition makes sure of it.
@@ -223,9 +229,16 @@ fn of_file(
             Points { positions, up, normals, ..Points::default() }
         }
         Making::Uniform => sampled(Method::Uniform)?,
+        Making::Hybrid => {
+            let mesh = mesh.as_ref().zip(mesh.as_ref().and_then(|mesh| hybrid::pixel(mesh, count as f64)));
+            let divided = mesh.map(|(mesh, pixel)| hybrid::hybrid(mesh, pixel, progress)).transpose()?;
+            let divided = divided.unwrap_or_default();
+            left = divided.triangles;
+            divided.surfels.unwrap_or_default()
+        }
     };
     let surface = mesh.filter(|_| entry.truth).map(|mesh| Surface::mesh(&mesh)).transpose()?;
-    Ok((points, surface))
+    Ok((points, surface, left))
 }
 
 /// What `epsplat generate` writes, with disks of `radius` mean spacings.

@@ -43,6 +43,9 @@ struct Info {
     classes: BTreeMap<u8, u64>,
     /// Texture coordinates, by which `render --texture` paints.
     texture: bool,
+    /// The mesh whose triangles are drawn beside them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    triangles: Option<PathBuf>,
     /// It has triangles.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     is_mesh: bool,
@@ -60,6 +63,13 @@ struct Info {
     /// The command that supplies what can be.
     supplied_by: Option<String>,
     preparation: Preparation,
+}
+
+/// What `epsplat hybrid` leaves of a mesh without small triangles.
+#[derive(Serialize)]
+struct TrianglesAlone {
+    points: u64,
+    triangles: PathBuf,
 }
 
 /// What a file of Gaussians holds.
@@ -101,6 +111,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     outputs::check([&arguments.input], &arguments.json)?;
     let bars = Bars::new();
     let points = arguments.reading.points(&arguments.input, &bars)?;
+    let beside = points.beside.clone();
+    if let Some(triangles) = beside.clone().filter(|_| points.positions.is_empty()) {
+        return match &arguments.json {
+            Some(path) => write_json(path, &TrianglesAlone { points: 0, triangles }),
+            None => print(&format!(
+                "{}\n  points    none: what `epsplat render` draws of it are the triangles of {}\n",
+                arguments.input.display(),
+                triangles.display()
+            )),
+        };
+    }
     let bounds = surfels::bounds(&points);
     let is_mesh = points.faces.is_some();
     let (texture, classes) = (points.texture.is_some(), points.classes.clone());
@@ -127,6 +148,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         gaussians,
         classes,
         texture,
+        triangles: beside,
         is_mesh,
         up: scene.up.name(),
         min: bounds.min.to_array(),
@@ -193,6 +215,9 @@ fn table(input: &std::path::Path, info: &Info) -> String {
     }
     if info.texture {
         let _ = writeln!(text, "  texture   coordinates given: `epsplat render --texture IMAGE.png` paints by them");
+    }
+    if let Some(triangles) = &info.triangles {
+        let _ = writeln!(text, "  triangles those of {} are drawn beside them", triangles.display());
     }
     let _ = writeln!(text, "  box       {} to {}", vector(info.min), vector(info.max));
     let _ = writeln!(text, "  up        {}{}", info.up, if info.preparation.guessed_up { " (a guess)" } else { "" });

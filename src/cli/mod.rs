@@ -7,6 +7,7 @@ mod compare;
 mod coverage;
 mod generate;
 mod hardcases;
+mod hybrid;
 mod info;
 mod outputs;
 mod parse;
@@ -50,6 +51,7 @@ enum Command {
     Bench(bench::Arguments),
     Card(card::Arguments),
     Simplify(simplify::Arguments),
+    Hybrid(hybrid::Arguments),
 }
 
 /// Runs the command line and says how it ended.
@@ -68,6 +70,7 @@ pub fn run() -> ExitCode {
         Command::Bench(arguments) => bench::run(&arguments),
         Command::Card(arguments) => card::run(&arguments),
         Command::Simplify(arguments) => simplify::run(&arguments),
+        Command::Hybrid(arguments) => hybrid::run(&arguments),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use epsplat::gpu::Gpu;
-use epsplat::io::{self, Mesh, Texture};
+use epsplat::io::{self, Mesh, Points, Texture};
 use epsplat::passes::unseen::{Unseen, is_empty};
 use epsplat::plan::{Accumulator, BackendName, BlendFormat, Organisation, RasterDepth};
 use epsplat::render::{Backend, Report, render};
@@ -59,7 +59,7 @@ pub struct Arguments {
     triangle_texture: Option<PathBuf>,
     /// What shows where surfels meet triangles: corrected (the nearer one, surfels by the depth that they blend to), nearest (the nearer
     /// one, surfels by their nearest fragment, as a depth buffer has it) or blended (both, within epsilon) [default: corrected]
-    #[arg(long, value_name = "HOW", requires = "triangles", help_heading = "Triangles")]
+    #[arg(long, value_name = "HOW", help_heading = "Triangles")]
     join: Option<Join>,
     #[command(flatten)]
     reading: Reading,
@@ -305,29 +305,41 @@ struct Outcome<'a> {
 
 /// What all inputs hold, as one scene.
 fn scene(arguments: &Arguments, bars: &Bars) -> Result<(Scene, Preparation)> {
-    let of_surfels = if arguments.inputs.is_empty() { None } else { Some(surfels_of(arguments, bars)?) };
-    if arguments.triangles.is_empty() {
+    let inputs =
+        if arguments.inputs.is_empty() { Vec::new() } else { arguments.reading.all(&arguments.inputs, bars)? };
+    // What `epsplat hybrid` left of a mesh names itself.
+    let beside = inputs.iter().filter_map(|points| points.beside.clone());
+    let paths: Vec<PathBuf> = arguments.triangles.iter().cloned().chain(beside).collect();
+    let has_points = inputs.iter().any(|points| !points.positions.is_empty() || points.beside.is_none());
+    let of_surfels = if has_points { Some(surfels_of(arguments, inputs, bars)?) } else { None };
+    if paths.is_empty() {
+        if arguments.join.is_some() {
+            return Err(Error::Usage(
+                "--join says what shows where surfels meet triangles, and there are none: name some by --triangles"
+                    .into(),
+            ));
+        }
         return of_surfels.ok_or_else(|| Error::Usage("there is nothing to render: name a file".into()));
     }
-    let meshes = arguments.triangles.iter().map(|path| io::read_mesh(path, bars)).collect::<Result<Vec<_>>>()?;
-    let meshes = painted(meshes, arguments)?;
+    let meshes = paths.iter().map(|path| io::read_mesh(path, bars)).collect::<Result<Vec<_>>>()?;
+    let meshes = painted(meshes, &paths, arguments)?;
     meshes.iter().flat_map(|mesh| &mesh.notes).for_each(|line| note(line));
     let (scene, preparation) = of_surfels.unzip();
-    let (scene, of_triangles) = with_triangles(scene, &meshes).map_err(|error| named(error, &arguments.triangles))?;
+    let (scene, of_triangles) = with_triangles(scene, &meshes).map_err(|error| named(error, &paths))?;
     of_triangles.notes().iter().for_each(|line| note(line));
     let guessed_up = of_triangles.guessed_up;
     Ok((scene, preparation.unwrap_or_else(|| Preparation { guessed_up, ..Preparation::default() })))
 }
 
 /// The meshes, those that no material paints with the image for triangles.
-fn painted(mut meshes: Vec<Mesh>, arguments: &Arguments) -> Result<Vec<Mesh>> {
+fn painted(mut meshes: Vec<Mesh>, paths: &[PathBuf], arguments: &Arguments) -> Result<Vec<Mesh>> {
     let Some(image) = &arguments.triangle_texture else { return Ok(meshes) };
     let texture = Texture::read(image)?;
     let bare = |mesh: &Mesh| mesh.materials.iter().all(|material| material.texture.is_none());
     if !meshes.iter().any(bare) {
         note("warning: every mesh has a texture of its own, so that --triangle-texture paints none");
     }
-    for (mesh, path) in meshes.iter_mut().zip(&arguments.triangles).filter(|(mesh, _)| bare(mesh)) {
+    for (mesh, path) in meshes.iter_mut().zip(paths).filter(|(mesh, _)| bare(mesh)) {
         if mesh.texture.is_none() {
             return Err(Error::malformed(path, "its triangles have no texture coordinates, so they cannot be painted"));
         }
@@ -337,9 +349,8 @@ fn painted(mut meshes: Vec<Mesh>, arguments: &Arguments) -> Result<Vec<Mesh>> {
 }
 
 /// The surfels of all inputs.
-fn surfels_of(arguments: &Arguments, bars: &Bars) -> Result<(Scene, Preparation)> {
+fn surfels_of(arguments: &Arguments, inputs: Vec<Points>, bars: &Bars) -> Result<(Scene, Preparation)> {
     let texture = arguments.texture.as_deref().map(Texture::read).transpose()?;
-    let inputs = arguments.reading.all(&arguments.inputs, bars)?;
     let mut read = arguments.inputs.iter().zip(&inputs);
     if texture.is_some()
         && let Some((path, _)) = read.find(|(_, points)| points.texture.is_none())

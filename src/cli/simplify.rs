@@ -1,10 +1,10 @@
 //! `epsplat simplify`: fewer, larger surfels for the same surface.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use epsplat::Result;
-use epsplat::io::ply;
+use epsplat::io::{Points, ply};
 use epsplat::surfels;
 use epsplat::surfels::simplify::{Options, Report, SplatShape, Tolerance, points, simplify_in_texture};
 
@@ -58,6 +58,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     outputs::check(&arguments.inputs, [&arguments.output].into_iter().chain(&arguments.json))?;
     let bars = Bars::new();
     let inputs = arguments.reading.all(&arguments.inputs, &bars)?;
+    // What they are drawn beside stays beside those that are left.
+    let beside = inputs.iter().find_map(|points| points.beside.clone()).filter(|_| inputs.len() == 1);
+    let beside = beside.map(|mesh| seen_from(&arguments.output, mesh));
     let (scene, preparation, coordinates) =
         surfels::build_at_vertices(inputs, &bars).map_err(|error| named(error, &arguments.inputs))?;
     preparation.notes().iter().for_each(|line| note(line));
@@ -74,10 +77,19 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     let options = Options { tolerance: arguments.tolerance, shape, relaxations: arguments.relax };
     let (simplified, coordinates, report) = simplify_in_texture(&scene, &coordinates.centers, &options, &bars)?;
-    ply::write_points(&arguments.output, &points(&simplified, coordinates, shape), &bars)?;
+    let left = Points { beside, ..points(&simplified, coordinates, shape) };
+    ply::write_points(&arguments.output, &left, &bars)?;
     match &arguments.json {
         Some(path) => write_json(path, &report),
         None => print(&summary(&report)),
+    }
+}
+
+/// A file as one that is written names it: by its name where they are in one folder.
+fn seen_from(output: &Path, file: PathBuf) -> PathBuf {
+    match file.file_name() {
+        Some(name) if output.parent() == file.parent() => name.into(),
+        _ => std::path::absolute(&file).unwrap_or(file),
     }
 }
 

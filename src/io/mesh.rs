@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3};
 
 use super::Texture;
+use super::points::retain_colors;
 use crate::error::{Error, Result};
 use crate::scene::color::{DEFAULT_COLOR, mean_color};
 use crate::scene::{Colors, Up};
@@ -75,6 +76,41 @@ impl Mesh {
              vertices, and its normals, texture coordinates and materials as many as its triangles"
                 .into(),
         ))
+    }
+
+    /// The mesh of those triangles whose flag is set, with the vertices that they name.
+    #[must_use]
+    pub fn part(&self, keep: &[bool]) -> Self {
+        fn kept<T: Copy>(all: &[T], keep: &[bool]) -> Vec<T> {
+            all.iter().zip(keep).filter(|(_, keep)| **keep).map(|(value, _)| *value).collect()
+        }
+        let mut triangles = kept(&self.triangles, keep);
+        let mut is_named = vec![false; self.positions.len()];
+        triangles.as_flattened().iter().for_each(|&vertex| is_named[vertex as usize] = true);
+        let mut number = 0;
+        let numbers: Vec<u32> = is_named
+            .iter()
+            .map(|named| {
+                number += u32::from(*named);
+                number.wrapping_sub(1)
+            })
+            .collect();
+        triangles.as_flattened_mut().iter_mut().for_each(|vertex| *vertex = numbers[*vertex as usize]);
+        let colors = self.colors.clone().map(|mut colors| {
+            retain_colors(&mut colors, &is_named);
+            colors
+        });
+        Self {
+            positions: kept(&self.positions, &is_named),
+            triangles,
+            normals: self.normals.as_ref().map(|all| kept(all, keep)),
+            colors,
+            texture: self.texture.as_ref().map(|all| kept(all, keep)),
+            materials: self.materials.clone(),
+            material: self.material.as_ref().map(|all| kept(all, keep)),
+            up: self.up,
+            notes: Vec::new(),
+        }
     }
 
     /// Gives every triangle one material, which is `texture` alone.

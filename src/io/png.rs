@@ -5,7 +5,7 @@ use std::path::Path;
 use ::image::{ExtendedColorType, ImageEncoder, ImageFormat, ImageResult, codecs};
 
 use super::atomic::write_whole;
-use super::image;
+use super::{Texture, image};
 use crate::error::Result;
 use crate::frame::Frame;
 use crate::scene::color::{linear_to_srgb, srgb_to_linear};
@@ -14,6 +14,17 @@ use crate::scene::color::{linear_to_srgb, srgb_to_linear};
 pub fn write(path: &Path, frame: &Frame) -> Result<()> {
     let bytes = srgb_bytes(&frame.color);
     write_whole(path, |file| encode(file, frame.width, frame.height, &bytes).map_err(std::io::Error::other))
+}
+
+/// Writes the codes of a texture.
+///
+/// # Errors
+///
+/// [`Error::Write`](crate::Error::Write) where the system cannot write.
+pub fn write_texture(path: &Path, texture: &Texture) -> Result<()> {
+    let [width, height] = texture.size();
+    let bytes = texture.texels().as_flattened();
+    write_whole(path, |file| encode(file, width, height, bytes).map_err(std::io::Error::other))
 }
 
 /// Linear colours as sRGB codes, four bytes each.

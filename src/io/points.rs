@@ -1,6 +1,7 @@
 //! What one input file holds, before it becomes surfels.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 pub use crate::scene::Up;
 use crate::scene::color::srgb_to_linear;
@@ -41,6 +42,8 @@ pub struct Points {
     pub of_mesh: bool,
     /// The triangles that the points are the vertices of.
     pub faces: Option<Faces>,
+    /// A mesh that they are drawn beside: what is left of the one that they were made of.
+    pub beside: Option<PathBuf>,
     /// They are the vertices of a mesh that is closed and faces outward, or surfels that cover one: nobody sees its back who is not
     /// inside.
     pub closed: bool,
@@ -156,7 +159,7 @@ pub(crate) fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
     values.retain(|_| flags.next().copied().unwrap_or(false));
 }
 
-fn retain_colors(colors: &mut Colors, keep: &[bool]) {
+pub(super) fn retain_colors(colors: &mut Colors, keep: &[bool]) {
     match colors {
         Colors::Srgb8(codes) => retain(codes, keep),
         Colors::Linear(colors) => retain(colors, keep),

@@ -15,6 +15,7 @@ mod from_points;
 mod gaps;
 mod gather;
 mod graph;
+pub mod hybrid;
 mod limits;
 mod lines;
 mod mesh;

@@ -91,6 +91,8 @@ pub(super) struct Header {
     pub(super) textures: Vec<String>,
     /// Which way is up, as epsplat says in a comment.
     pub(super) up: Option<Up>,
+    /// The file of the triangles that surfels are drawn beside, as it says too.
+    pub(super) beside: Option<String>,
     /// The surfels cover a closed surface, as it says too.
     pub(super) closed: bool,
     /// Lines, `end_header` included: the first value of an ASCII file is on the next.
@@ -105,7 +107,7 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
     let mut line = Vec::new();
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
-    let (mut textures, mut up, mut closed) = (Vec::new(), None, false);
+    let (mut textures, mut up, mut closed, mut beside) = (Vec::new(), None, false, None);
     for number in 1.. {
         line.clear();
         reader.take(LINE_LIMIT).read_until(line_end, &mut line)?;
@@ -136,6 +138,7 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
                 textures.extend(comment.strip_prefix("TextureFile ").map(|name| name.trim().to_owned()));
                 up = [Up::Y, Up::Z].into_iter().find(|up| words.clone().eq(["up", up.name()])).or(up);
                 closed |= comment == "closed";
+                beside = comment.strip_prefix("triangles ").map(|name| name.trim().to_owned()).or(beside);
             }
             Some("format") => {
                 let unread = "not a PLY format that is read (ascii, binary_little_endian or binary_big_endian 1.0)";
@@ -155,7 +158,7 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
             }
             Some("end_header") => {
                 let encoding = encoding.ok_or_else(|| malformed("the PLY header has no format line"))?;
-                return Ok(Header { encoding, elements, textures, up, closed, lines: number, line_end });
+                return Ok(Header { encoding, elements, textures, up, closed, beside, lines: number, line_end });
             }
             Some(_) => return Err(malformed("not a PLY header line")),
         }

@@ -13,8 +13,8 @@
 //! | `texture_u texture_v` | `float` | texture coordinates, origin bottom left |
 //! | `texture_u_x texture_u_y texture_u_z texture_v_x texture_v_y texture_v_z` | `float` | what they gain for a world unit along x, y and z |
 //!
-//! The header has a comment `up y` or `up z` where that is known, and `closed` for surfels that cover a closed surface: no other
-//! program says it in a PLY file, and none stumbles over it.
+//! The header has a comment `up y` or `up z` where that is known, `closed` for surfels that cover a closed surface, and `triangles NAME`
+//! for those that are drawn beside a mesh: no other program says it in a PLY file, and none stumbles over it.
 //!
 //! Files of Gaussians, whose vertices have other names, are read too ([`read`]).
 //!
@@ -31,7 +31,9 @@ mod read;
 mod vertex;
 mod write;
 mod write_gaussians;
+mod write_mesh;
 
 pub(super) use read::companions;
 pub use read::{read, read_mesh};
 pub use write::{Color, ColorProperties, Properties, Vertex, check_extension, write, write_points};
+pub use write_mesh::write_mesh;

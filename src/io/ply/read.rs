@@ -31,7 +31,8 @@ use std::sync::Arc;
 /// half-axes of so many standard deviations that nothing shows beyond ([`EXTENT`](crate::scene::gaussian::EXTENT)), and colours with alpha that
 /// change with the view if the file says so. With `flatten` ellipsoids lose their shortest axis, however thick they are.
 ///
-/// A comment `up y` or `up z` in the header says which way is up, and `closed` that surfels cover a closed surface.
+/// A comment `up y` or `up z` in the header says which way is up, `closed` that surfels cover a closed surface, and `triangles NAME` which
+/// mesh they are drawn beside.
 ///
 /// Other properties are skipped, and so are other elements: those before the last one that is read by their declared
 /// shape, those after it without being looked at. Zero vertices are no error here.
@@ -101,11 +102,12 @@ pub fn read_mesh(input: Input, progress: &dyn Progress) -> Result<Mesh> {
     })
 }
 
-/// The textures that the PLY file at `path` names.
+/// The textures, and the mesh, that the PLY file at `path` names.
 pub(in crate::io) fn companions(path: &Path) -> Vec<PathBuf> {
     let header = File::open(path).map_err(Fault::Io).and_then(|file| header::read(&mut BufReader::new(file)));
     let folder = path.parent().unwrap_or(Path::new(""));
-    header.map_or(Vec::new(), |header| header.textures.iter().map(|name| beside(folder, name)).collect())
+    let names = |header: header::Header| header.textures.into_iter().chain(header.beside);
+    header.map_or(Vec::new(), |header| names(header).map(|name| beside(folder, &name)).collect())
 }
 
 /// A file that is named in the one at `path`, as Windows may write it.
@@ -138,6 +140,7 @@ fn contents(
     gaussian::check(&points, flatten).map_err(in_file)?;
     points.up = header.up;
     points.closed = header.closed;
+    points.beside = header.beside.map(|name| beside(path.parent().unwrap_or(Path::new("")), &name));
     let triangles = faces.finish(&points.positions).map_err(in_file)?;
     Ok((points, triangles, header.textures))
 }

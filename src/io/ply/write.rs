@@ -130,7 +130,7 @@ impl Properties {
         }
     }
 
-    fn write_header(self, out: &mut Output<'_>, count: u64) -> io::Result<()> {
+    pub(super) fn write_header(self, out: &mut Output<'_>, count: u64, comments: &[String]) -> io::Result<()> {
         write!(out, "ply\nformat binary_little_endian 1.0\ncomment epsplat {}\n", env!("CARGO_PKG_VERSION"))?;
         if let Some(up) = self.up {
             writeln!(out, "comment up {}", up.name())?;
@@ -138,6 +138,7 @@ impl Properties {
         if self.closed {
             writeln!(out, "comment closed")?;
         }
+        comments.iter().try_for_each(|comment| writeln!(out, "comment {comment}"))?;
         writeln!(out, "element vertex {count}")?;
         let mut scalars =
             |kind: &str, names: &[&str]| names.iter().try_for_each(|name| writeln!(out, "property {kind} {name}"));
@@ -165,11 +166,11 @@ impl Properties {
         if self.texture_slopes {
             scalars("float", SLOPE_NAMES.as_flattened())?;
         }
-        out.write_all(b"end_header\n")
+        Ok(())
     }
 
     /// Appends the bytes of `vertex`.
-    fn encode(self, vertex: &Vertex, row: &mut Vec<u8>) {
+    pub(super) fn encode(self, vertex: &Vertex, row: &mut Vec<u8>) {
         for coordinate in vertex.position {
             if self.double_coordinates {
                 row.extend(coordinate.to_le_bytes());
@@ -223,8 +224,21 @@ pub fn write(
     count: u64,
     vertices: impl IntoIterator<Item = Vertex>,
 ) -> Result<()> {
+    write_beside(path, properties, None, count, vertices)
+}
+
+/// The same, drawn beside the mesh of a file.
+fn write_beside(
+    path: &Path,
+    properties: Properties,
+    beside: Option<&Path>,
+    count: u64,
+    vertices: impl IntoIterator<Item = Vertex>,
+) -> Result<()> {
+    let comments: Vec<String> = beside.map(|mesh| format!("triangles {}", mesh.display())).into_iter().collect();
     write_whole(path, |out| {
-        properties.write_header(out, count)?;
+        properties.write_header(out, count, &comments)?;
+        out.write_all(b"end_header\n")?;
         let mut written = 0;
         let mut row = Vec::with_capacity(96);
         for vertex in vertices {
@@ -279,7 +293,7 @@ pub fn write_points(path: &Path, points: &Points, progress: &dyn Progress) -> Re
             texture_slopes: of(&points.texture_slopes, index).unwrap_or_default(),
         }
     });
-    let written = write(path, Properties::of(points), count as u64, vertices);
+    let written = write_beside(path, Properties::of(points), points.beside.as_deref(), count as u64, vertices);
     progress.end();
     written
 }

@@ -128,8 +128,33 @@ const MESHLESS: &[&str] = &[
     "surfaces",
 ];
 
+/// Needs of renders whose surfels no texture paints, and maps that are not made beside samples.
+const PAINTLESS: &[&str] = &[
+    "color-constant",
+    "color-srgb8",
+    "color-linear",
+    "color-harmonics",
+    "tiles",
+    "gather",
+    "copies",
+    "raster-exact",
+    "raster-offset",
+    "nearest",
+    "lists-layers",
+    "lists-sorted",
+    "long-lists",
+    "veils",
+    "oit-weighted",
+    "oit-moments",
+    "peels",
+    "facing",
+    "lit-splats",
+    "samples",
+    "surfaces",
+];
+
 /// Needs that no render has together (`src/plan/check.rs`, `src/plan/needs.rs`).
-const EXCLUSIVE: [(&str, &[&str]); 31] = [
+const EXCLUSIVE: [(&str, &[&str]); 32] = [
     ("painted-triangles", MESHLESS),
     ("triangles", MESHLESS),
     ("join", MESHLESS),
@@ -194,6 +219,7 @@ const EXCLUSIVE: [(&str, &[&str]); 31] = [
     ("surfaces", &["tiles", "gather", "copies", "cull", "atomics-u64", "nearest", "color-textured"]),
     ("surfaces", &["count", "depth", "index", "normal-map", "weight-map"]),
     ("veils", &["tail-map"]),
+    ("texz-map", PAINTLESS),
     ("oit", &["count", "depth", "index", "normal", "normal-map", "weight-map"]),
     (
         "samples",

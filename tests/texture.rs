@@ -9,13 +9,14 @@ use std::process::Command;
 
 use common::bits;
 use common::scenes::{shuffled, sphere, sphere_camera};
+use epsplat::frame::Frame;
 use epsplat::gpu::Sources;
 use epsplat::io::{self, Points, Texture};
 use epsplat::passes::project::reference_all;
 use epsplat::passes::{accumulate, visibility};
 use epsplat::plan::{Accumulator, RenderOptions};
 use epsplat::render::{Backend, render};
-use epsplat::scene::{Camera, Colors, Lens, LowPass, Map, Place, Projection, Scene, Shading, Textured, Up};
+use epsplat::scene::{Camera, Colors, Lens, LowPass, Map, Maps, Place, Projection, Scene, Shading, Textured, Up};
 use epsplat::surfels::simplify::{Options, SplatShape, Tolerance, points, simplify_in_texture};
 use epsplat::surfels::{build_at_vertices, build_textured};
 use glam::{DVec3, Vec3};
@@ -311,6 +312,49 @@ fn a_texture_survives_simplification() {
         [&dense, &painted, &refitted].map(|scene| apart_from_the_sphere(scene, &texture, 4.0 * spacing));
     eprintln!("all {before:.5?}, a third {after:.5?}, refitted {refitted:.5?}");
     assert!(before[0] < 0.001 && after[0] < 0.005 && refitted[0] > 2.0 * after[0]);
+}
+
+/// The TexZ map: coordinates are those of the very points that are seen, depths those of the map of depths, for device and twin.
+#[test]
+fn texz_holds_where_a_pixel_lies_in_the_texture() {
+    let scene = globe(6000, 1.2, waves(true));
+    let camera = sphere_camera(96, Projection::Pinhole);
+    let of = RenderOptions { maps: Maps::of(&[Map::TexZ, Map::Depth]), ..unlit() };
+    let twin = render(&scene, &camera, &of, &Backend::Reference, &()).unwrap().0;
+    let places = |frame: &Frame| frame.map(Map::TexZ).unwrap().as_chunks::<3>().0.to_vec();
+    let mut compared = 0;
+    for (pixel, [u, v, z]) in places(&twin).into_iter().enumerate() {
+        assert_eq!(z.to_bits(), twin.map(Map::Depth).unwrap()[pixel].to_bits());
+        if z.is_infinite() {
+            assert_eq!([u, v], [0.0; 2]);
+            continue;
+        }
+        let (x, y) = ((pixel % 96) as f64 + 0.5, (pixel / 96) as f64 + 0.5);
+        // On the sphere, below the disks.
+        let point = (camera.eye + camera.ray(x, y) * f64::from(z)).normalize();
+        let seam = point.x < 0.0 && point.z.abs() < 0.15;
+        if point.y.abs() < 0.6 && !seam {
+            let [expected_u, expected_v] = [0.5 + point.z.atan2(point.x) / TAU, 1.0 - point.y.acos() / PI];
+            let off = (f64::from(u) - expected_u).abs().max((f64::from(v) - expected_v).abs());
+            assert!(off < 2e-3, "{pixel}: {u} {v} and {expected_u} {expected_v}");
+            compared += 1;
+        }
+    }
+    assert!(compared > 2000, "{compared}");
+    let refused = render(&sphere(50, 1.0), &camera, &of, &Backend::Reference, &()).unwrap_err();
+    assert!(refused.to_string().contains("texz"), "{refused}");
+    let Some(gpu) = common::gpu() else { return };
+    let device = render(&scene, &camera, &of, &Backend::gpu(gpu), &()).unwrap().0;
+    let off = |other: &Frame| {
+        let pairs = places(&twin).into_iter().zip(places(other));
+        let far = |(a, b): ([f32; 3], [f32; 3])| a.iter().zip(b).any(|(a, b)| a != &b && !((a - b).abs() < 1e-4));
+        pairs.filter(|pair| far(*pair)).count()
+    };
+    // Rims and epsilon decide otherwise at few.
+    assert!(off(&device) < 40, "{}", off(&device));
+    let unslanted = with_places(&scene, |place| Place { slopes: [[0.0; 3]; 2], ..*place });
+    let gpu = common::gpu().unwrap();
+    assert!(off(&render(&unslanted, &camera, &of, &Backend::gpu(gpu), &()).unwrap().0) > 1000);
 }
 
 fn refused(arguments: &[&str]) -> (i32, String) {

@@ -48,6 +48,7 @@ fn resolve_pixel(sums_of: u32, pixel: u32, x: u32, y: u32) {
         write_color(out, held.background);
         write_normal(out, vec3<f32>(0.0));
         write_no_depth(out);
+        write_no_texz(out);
         write_weight(out, 0.0);
         write_count(out, sums_of);
         write_transmittance(out, 1.0);
@@ -57,6 +58,7 @@ fn resolve_pixel(sums_of: u32, pixel: u32, x: u32, y: u32) {
     write_color(out, over(surface.color, held.background));
     write_normal(out, surface.normal);
     write_depth(out, surface.depth);
+    write_texz(out, sums_of, select(surface.weight, 0.0, surface.of_triangle), surface.depth);
     if (surface.of_triangle) {
         write_weight(out, 1.0);
         write_one(out);

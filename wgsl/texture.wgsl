@@ -1,6 +1,6 @@
 // Surfels that are painted by a texture: what is summed of their places in it, and its lookup at the mean of these.
 // Twin: src/scene/texture.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x4d41d4fed7c0fa23
+// All loops end, by 1 of src/gpu/loops.rs: 0x68b6005fcfd57619
 
 override PLACE_CHANNEL: u32;
 
@@ -60,6 +60,12 @@ fn texture_at(place: vec2<f32>) -> vec4<f32> {
     let above = mix(texel(column, row), texel(column + 1, row), share.x);
     let below = mix(texel(column, row + 1), texel(column + 1, row + 1), share.x);
     return mix(above, below, share.y);
+}
+
+// The mean texture coordinates of a pixel.
+fn mean_place(pixel: u32, weight: f32) -> vec2<f32> {
+    let mean = vec2<f32>(sum_at(pixel, PLACE_CHANNEL), sum_at(pixel, PLACE_CHANNEL + 1u)) / weight;
+    return held.place.xy + (mean - 0.5) * held.place.z;
 }
 
 // The premultiplied colour of a pixel: by the texture where the places agree, else as blended.

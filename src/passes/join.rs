@@ -37,6 +37,7 @@ pub(super) fn joined(
     let of_triangle = triangle.depth.is_finite().then_some(Surface {
         color: triangle.color,
         normal: triangle.normal,
+        place: [0.0; 2],
         depth: triangle.depth,
         weight: 1.0,
         count: 1,

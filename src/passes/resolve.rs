@@ -31,7 +31,11 @@ pub fn reference(
         let of_splats = (sum.weight > 0.0).then(|| {
             let (color, normal) = surface(sum, scene, camera, options, (x, y));
             let (weight, count) = (sum.weight, sum.count);
-            Surface { color, normal, depth: sum.depth / weight, weight, count, decision: sum.decision }
+            let place = match &scene.colors {
+                Colors::Textured(textured) => textured.place_at(sum.place.map(|total| total / weight)),
+                _ => [0.0; 2],
+            };
+            Surface { color, normal, place, depth: sum.depth / weight, weight, count, decision: sum.decision }
         });
         let surface = match triangles.get(pixel) {
             None => of_splats,
@@ -45,11 +49,12 @@ pub fn reference(
             decision: sum.decision.min(triangles.get(pixel).map_or(f64::INFINITY, |t| t.decision)),
             ..Surface::NOTHING
         };
-        let Surface { color, normal, depth, weight, count, decision } = surface.unwrap_or(nothing);
+        let Surface { color, normal, place: [u, v], depth, weight, count, decision } = surface.unwrap_or(nothing);
         let shown = if surface.is_some() { over(color, background) } else { background };
         frame.color[pixel] = shown.map(|c| c as f32);
         set(frame, pixel, Map::Depth, &[depth]);
         set(frame, pixel, Map::Normal, &normal.to_array());
+        set(frame, pixel, Map::TexZ, &[u, v, depth]);
         set(frame, pixel, Map::Weight, &[weight]);
         set(frame, pixel, Map::Count, &[f64::from(count)]);
         set(frame, pixel, Map::Decision, &[decision]);
@@ -65,6 +70,8 @@ pub(super) struct Surface {
     pub color: [f64; 4],
     /// World space, unit.
     pub normal: DVec3,
+    /// Mean texture coordinates of surfels.
+    pub place: [f64; 2],
     /// Camera-space z, world units.
     pub depth: f64,
     /// Summed; 1 of a triangle.
@@ -80,6 +87,7 @@ impl Surface {
     pub const NOTHING: Self = Self {
         color: [0.0; 4],
         normal: DVec3::ZERO,
+        place: [0.0; 2],
         depth: f64::INFINITY,
         weight: 0.0,
         count: 0,
@@ -221,6 +229,7 @@ pub const PASS: Pass = Pass {
             pick(needs.maps.has(Map::Weight), "weight_map.wgsl", "weight_map_absent.wgsl"),
             pick(needs.maps.has(Map::Transmittance), "transmittance_map.wgsl", "transmittance_map_absent.wgsl"),
             pick(needs.maps.has(Map::Layers), "layers_map.wgsl", "layers_map_absent.wgsl"),
+            pick(needs.maps.has(Map::TexZ), "texz_map.wgsl", "texz_map_absent.wgsl"),
             pick(needs.maps.has(Map::Tail), "tail_map.wgsl", "tail_map_absent.wgsl"),
             pick(needs.maps.has(Map::Surfaces), "surfaces_map.wgsl", "surfaces_map_absent.wgsl"),
             match needs.shading {

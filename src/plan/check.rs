@@ -277,7 +277,15 @@ pub fn scene(facts: &Facts, options: &RenderOptions, reference: bool) -> Result<
         }
         _ => {}
     }
-    if facts.colors == ColorNeed::Textured { textured(options, reference) } else { Ok(()) }
+    if facts.colors == ColorNeed::Textured {
+        return textured(options, reference);
+    }
+    match options.maps.has(Map::TexZ) {
+        true => {
+            usage("the map texz holds texture coordinates of painted surfels: paint them by --texture, or leave it out")
+        }
+        false => Ok(()),
+    }
 }
 
 /// Fails for options that triangles do not go with.

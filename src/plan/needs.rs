@@ -338,7 +338,7 @@ impl SceneNeeds {
     /// Depths are summed.
     pub fn sums_depth(&self) -> bool {
         let compared = self.mesh.is_some_and(|mesh| mesh.join != Join::Nearest);
-        compared || self.maps.has(Map::Depth) || self.maps.has(Map::Surfaces)
+        compared || [Map::Depth, Map::Surfaces, Map::TexZ].into_iter().any(|map| self.maps.has(map))
     }
 
     /// Fragments have weights: they are summed, or they are the rasteriser's, whose targets hold terms even of one fragment.

@@ -32,6 +32,9 @@ pub enum Map {
     /// How much what lies behind the last of [`Composite::Layers`](super::Composite::Layers) shows: its alpha times what the layers let
     /// through to it; 0 where nothing does.
     Tail,
+    /// The TexZ map of Tien 2008 (section 5.2): the mean texture coordinates (u, v), origin bottom left, and the mean camera-space z, world
+    /// units, of the fragments of a painted pixel; 0, 0 and +inf where nothing is. Coordinates are of surfels: 0 where a triangle shows.
+    TexZ,
     /// Depth, camera-space z in world units, and alpha of the nearest [`SURFACES`] surfaces that are composited at a pixel, of
     /// [`Composite::Sorted`](super::Composite::Sorted) fragments; of a tail the nearest depth. +inf and 0 where there are no more.
     Surfaces,
@@ -68,7 +71,7 @@ pub struct MapRow {
 }
 
 /// The maps, in the order of [`Map`].
-pub const MAPS: [MapRow; 10] = [
+pub const MAPS: [MapRow; 11] = [
     row(Map::Depth, "depth", &["Z"], "depth", Some("DEPTH_IMAGE")),
     row(Map::Normal, "normal", &["X", "Y", "Z"], "normal-map", Some("NORMAL_IMAGE")),
     row(Map::Weight, "weight", &["Y"], "weight-map", Some("WEIGHT_IMAGE")),
@@ -91,6 +94,7 @@ pub const MAPS: [MapRow; 10] = [
         ..row(Map::Layers, "layers", &["Y"], "layers-map", Some("LAYERS_IMAGE"))
     },
     MapRow { raster: false, composited: true, ..row(Map::Tail, "tail", &["Y"], "tail-map", Some("TAIL_IMAGE")) },
+    MapRow { raster: false, ..row(Map::TexZ, "texz", &["U", "V", "Z"], "texz-map", Some("TEXZ_IMAGE")) },
     MapRow {
         raster: false,
         composited: true,

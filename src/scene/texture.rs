@@ -217,13 +217,18 @@ impl Textured {
         [center, [ux, uy, uz, y], [vx, vy, vz, z]].map(|values| values.map(|value| value as f32))
     }
 
+    /// The texture coordinates of a pixel from the means of [`Self::terms`].
+    pub fn place_at(&self, [u, v, ..]: [f64; 4]) -> [f64; 2] {
+        let PlaceRange { middle, span, .. } = self.range;
+        let at = |k: usize, offset: f64| f64::from(middle[k]) + f64::from(span) * offset;
+        [at(0, u), at(1, v)]
+    }
+
     /// The premultiplied colour of a pixel from the means of [`Self::terms`] and the blended premultiplied colour: by the texture
     /// where the coordinates agree, else blended. The twin of `textured` in `wgsl/texture.wgsl`.
     pub fn resolve(&self, [u, v, squared, reach_2]: [f64; 4], blended: [f64; 4]) -> [f64; 4] {
         let share = (2.0 - (squared - u * u - v * v) / reach_2).clamp(0.0, 1.0);
-        let PlaceRange { middle, span, .. } = self.range;
-        let at = |k: usize, offset: f64| f64::from(middle[k]) + f64::from(span) * offset;
-        let texel = self.texture.premultiplied_at([at(0, u), at(1, v)]);
+        let texel = self.texture.premultiplied_at(self.place_at([u, v, squared, reach_2]));
         std::array::from_fn(|k| blended[k] + share * (texel[k] - blended[k]))
     }
 }

@@ -311,6 +311,8 @@ fn base_needs() -> Vec<SceneNeeds> {
             let wanted = [(1, Map::Normal), (5, Map::Depth), (6, Map::Count), (7, Map::Weight)];
             let wanted = wanted.into_iter().filter(|(k, _)| bit(*k)).map(|(_, map)| map);
             let wanted = wanted.chain((bits % 3 == 1).then_some(Map::Index));
+            let painted = color == ColorNeed::Textured;
+            let wanted = wanted.chain((painted && (bits & 0b1110_0010 != 0) && bits % 5 < 2).then_some(Map::TexZ));
             let some = bits & 0b1110_0010 != 0;
             let wanted = wanted.chain((some && bits % 5 == 1).then_some(Map::Transmittance));
             let wanted = wanted.chain((some && bits % 7 == 1).then_some(Map::Layers));

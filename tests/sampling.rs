@@ -270,6 +270,46 @@ fn samples_follow_the_priority() {
     assert!((980..1020).contains(&even), "{even}");
 }
 
+/// Where Tien 2008 places samples: the middle of each voxel projected, on the surface, and covering it; not as even as what is relaxed.
+#[test]
+fn projected_samples_cover_the_surface_less_evenly() {
+    let mesh = sphere(4, true);
+    let tree = TriangleTree::new(&mesh).unwrap();
+    let priority = |surface: &MeshSurface<'_>, voxels: &[Voxel]| Priority::Touched.of(surface, voxels);
+    let method = Method::Projected { priority: &priority, depth: None };
+    let (points, sampling) = sample(&mesh, 3000, &method, 0, &()).unwrap();
+    assert_eq!((points.positions.len() as u64, sampling.samples), (3000, 3000));
+    let off = points.positions.iter().map(|p| tree.distance(DVec3::from(*p))).fold(0.0, f64::max);
+    assert!(off < 1e-9, "{off}");
+    let scene = build(vec![points.clone()], &()).unwrap().0;
+    assert!(coverage(&tree, &scene, 64, 96, &()).unwrap().is_hole_free());
+    let nearest = |points: &Points| spacings(points).into_iter().fold(f64::INFINITY, f64::min);
+    assert!(nearest(&points) < 0.3 * nearest(&by(&mesh, 3000, Priority::Area)));
+    // One in each voxel is at its middle: on a flat square, that of its box.
+    let method = Method::Projected { priority: &|_, voxels| vec![1.0; voxels.len()], depth: Some(4) };
+    let mut square = sample(&strip(1), 16, &method, 0, &()).unwrap().0.positions;
+    square.sort_by(|a, b| a.partial_cmp(b).unwrap());
+    for (k, [x, y, z]) in square.into_iter().enumerate() {
+        let [column, row] = [k / 2, k % 2].map(|at| at as f64);
+        assert!((x - 0.125 - 0.25 * column).abs() < 1e-9 && (y - 0.25 - 0.5 * row).abs() < 1e-9 && z == 0.0, "{x} {y}");
+    }
+}
+
+#[test]
+fn a_triangle_counts_wholly_in_each_voxel_that_it_reaches() {
+    let surface_mesh = strip(1);
+    let seen = std::sync::Mutex::new(Vec::new());
+    let both = |surface: &MeshSurface<'_>, voxels: &[Voxel]| {
+        let [touched, shared] = [Priority::Touched, Priority::Triangles].map(|priority| priority.of(surface, voxels));
+        seen.lock().unwrap().push((touched.iter().sum::<f64>(), shared.iter().sum::<f64>()));
+        touched
+    };
+    sample(&surface_mesh, 64, &Method::Stratified { priority: &both, depth: Some(3) }, 0, &()).unwrap();
+    let [(touched, shared)] = seen.into_inner().unwrap()[..] else { panic!("asked twice") };
+    // Four triangles; each is cut by lines between the eight squares.
+    assert!((shared - 4.0).abs() < 1e-9 && touched > 8.0 && touched.fract() == 0.0, "{touched} {shared}");
+}
+
 /// The square with a texture: its left half one colour, its right half with stripes.
 fn striped() -> Mesh {
     let mut mesh = strip(1);

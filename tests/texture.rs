@@ -347,7 +347,7 @@ fn texz_holds_where_a_pixel_lies_in_the_texture() {
     let device = render(&scene, &camera, &of, &Backend::gpu(gpu), &()).unwrap().0;
     let off = |other: &Frame| {
         let pairs = places(&twin).into_iter().zip(places(other));
-        let far = |(a, b): ([f32; 3], [f32; 3])| a.iter().zip(b).any(|(a, b)| a != &b && !((a - b).abs() < 1e-4));
+        let far = |(a, b): ([f32; 3], [f32; 3])| a.iter().zip(b).any(|(a, b)| a != &b && (a - b).abs() >= 1e-4);
         pairs.filter(|pair| far(*pair)).count()
     };
     // Rims and epsilon decide otherwise at few.

@@ -12,6 +12,7 @@ use crate::io::ClassOpacities;
 use crate::plan::{BackendName, RenderOptions};
 use crate::scene::Shading;
 use crate::surfels::analytic::Shape;
+use crate::surfels::sampling::Priority;
 use crate::surfels::simplify::Tolerance;
 use crate::truth::DEFAULT_GRID;
 
@@ -73,6 +74,9 @@ pub struct SceneEntry {
     /// How surfels are made of the file; as `epsplat render` reads it by default.
     #[serde(default)]
     pub surfels: Making,
+    /// By what samples of a mesh are handed out, as `epsplat sample` takes it.
+    #[serde(default, deserialize_with = "parsed")]
+    pub priority: Option<Priority>,
     /// What is kept of how they end; all by default.
     #[serde(default)]
     pub rims: Rims,
@@ -163,7 +167,9 @@ pub enum Making {
     Qsplat,
     /// As `epsplat sample` does: `count` of a mesh, with ellipses that cover it.
     Sample,
-    /// The same, curved as the mesh is around them.
+    /// The same, where Tien 2008 places them.
+    Projected,
+    /// As `epsplat sample` does, curved as the mesh is around them.
     Caps,
     /// Samples of a mesh, or of a shape, `count` of them, with its normals alone, as `epsplat render` draws them.
     Scanned,
@@ -222,7 +228,7 @@ pub enum Rims {
 impl Making {
     /// Whether the mesh is sampled at a number of points.
     pub fn samples(self) -> bool {
-        matches!(self, Self::Sample | Self::Caps | Self::Scanned | Self::Uniform | Self::Hybrid)
+        matches!(self, Self::Sample | Self::Projected | Self::Caps | Self::Scanned | Self::Uniform | Self::Hybrid)
     }
 }
 

@@ -98,6 +98,9 @@ impl SceneEntry {
         if self.texture.is_some() && !self.surfels.samples() && !self.truth {
             return Err("texture: it is of a mesh that is sampled, or that rays meet".into());
         }
+        if self.priority.is_some() && !self.surfels.samples() {
+            return Err("priority: it is of samples of a mesh".into());
+        }
         not_beside("radius", self.radius.is_some() && self.footprint_px.is_some(), "footprint_px")?;
         not_beside("ortho", self.ortho.is_some() && self.fov.is_some(), "fov")?;
         if self.eye.is_none() && (self.target.is_some() || self.up.is_some()) {

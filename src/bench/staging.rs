@@ -15,7 +15,7 @@ use crate::scene::camera::DEFAULT_FOV;
 use crate::scene::{Camera, Colors, Lens, Projection, Scene, Surfel};
 use crate::surfels::analytic::{RADIUS_IN_SPACINGS, Shape, gaussians, generate, mesh};
 use crate::surfels::sampling::voxels::Voxel;
-use crate::surfels::sampling::{MeshSurface, Method, Priority, sample};
+use crate::surfels::sampling::{MeshSurface, Method, sample};
 use crate::surfels::simplify::{self, SplatShape, Tolerance, simplify_in_texture};
 use crate::surfels::{
     FromPoints, Size, Triangle, build, build_at_vertices, build_textured, curve, from_points, hybrid, with_triangles,
@@ -194,7 +194,7 @@ fn of_file(
         let options = FromPoints { size, ..FromPoints::default() };
         Ok::<_, Error>(from_points(vec![bare()?], &options, progress)?.points)
     };
-    let priority = |surface: &MeshSurface<'_>, voxels: &[Voxel]| Priority::default().of(surface, voxels);
+    let priority = |surface: &MeshSurface<'_>, voxels: &[Voxel]| entry.priority.unwrap_or_default().of(surface, voxels);
     let sampled = |method| match &mesh {
         Some(mesh) => Ok::<_, Error>(sample(mesh, count, &method, 0, progress)?.0),
         None => Ok(Points::default()),
@@ -223,6 +223,7 @@ fn of_file(
             from_points(vec![bare], &options, progress)?.points
         }
         Making::Sample => sampled(stratified)?,
+        Making::Projected => sampled(Method::Projected { priority: &priority, depth: None })?,
         Making::Caps => curve(sampled(stratified)?, progress)?,
         Making::Scanned => {
             let Points { positions, up, normals, .. } = sampled(stratified)?;

@@ -15,7 +15,7 @@ use super::{note, outputs};
 /// Write surfels that cover a mesh as PLY: on its triangles, with half-axes, and its colours, normals and texture coordinates.
 ///
 /// The mesh is divided into voxels, and a heap hands out the samples by the voxels' priority: triangles (as many as the
-/// mesh has there), area (evenly), curvature (where the surface bends) or texture (where the colour changes).
+/// mesh has there), touched (the same, but triangles count wholly wherever they reach), area (evenly), curvature (where the surface bends) or texture (where the colour changes).
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat sample bunny.obj -o surfels.ply --count 60000")]
 pub struct Arguments {
@@ -29,7 +29,7 @@ pub struct Arguments {
     /// Samples
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..=MOST as u64))]
     count: u64,
-    /// triangles, area, curvature or texture
+    /// triangles, touched (as in Tien 2008), area, curvature or texture
     #[arg(long, default_value = "triangles")]
     priority: Priority,
     /// How samples are placed
@@ -53,6 +53,8 @@ pub struct Arguments {
 enum Placement {
     /// By the priority of voxels, and spread evenly
     Stratified,
+    /// By the priority of voxels, at points of these projected onto their triangles, as in Tien 2008: a baseline
+    Projected,
     /// Independent random points, by area: a baseline without radii
     Uniform,
 }
@@ -83,6 +85,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let priority = |surface: &MeshSurface<'_>, voxels: &[Voxel]| arguments.priority.of(surface, voxels);
     let method = match arguments.method {
         Placement::Stratified => Method::Stratified { priority: &priority, depth: arguments.depth },
+        Placement::Projected => Method::Projected { priority: &priority, depth: arguments.depth },
         Placement::Uniform => Method::Uniform,
     };
     let (points, sampling) = sample(&mesh, arguments.count as usize, &method, arguments.seed, &bars)

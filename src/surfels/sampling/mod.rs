@@ -17,6 +17,7 @@ mod distribute;
 mod ends;
 mod overlap;
 pub mod priority;
+mod projected;
 mod relax;
 pub mod surface;
 mod uniform;
@@ -30,6 +31,7 @@ use serde::Serialize;
 pub use self::priority::{Priority, PriorityFunction};
 pub use self::surface::MeshSurface;
 use self::surface::Place;
+use self::voxels::Voxel;
 use crate::error::{Error, Result};
 use crate::io::closed::is_closed;
 use crate::io::{Mesh, Points};
@@ -54,6 +56,13 @@ pub enum Method<'a> {
         /// The priority function.
         priority: &'a PriorityFunction<'a>,
         /// How often boxes are halved, but not beyond 2^21 voxels or as many as samples; None for as many voxels as samples allow.
+        depth: Option<u32>,
+    },
+    /// By the priority of voxels, where Tien 2008 places samples (section 3.2): a baseline.
+    Projected {
+        /// The priority function.
+        priority: &'a PriorityFunction<'a>,
+        /// As of [`Method::Stratified`].
         depth: Option<u32>,
     },
     /// Independent random points, evenly by area: a baseline. Their radii are left to [`build`](super::build).
@@ -135,37 +144,66 @@ pub fn sample(
             let colors = surface.is_colored().then(|| places.par_iter().map(|place| surface.color(*place)).collect());
             points(&surface, &places, normals_at(&surface, &places), colors)
         }
+        Method::Projected { priority, depth } => {
+            let (voxels, quotas, _) = divided(&surface, count, (priority, *depth), &mut sampling, progress);
+            let places = projected::places(&surface, &voxels, &quotas);
+            let colors = surface.is_colored().then(|| places.par_iter().map(|place| surface.color(*place)).collect());
+            covering(&surface, &places, colors, progress)?
+        }
         Method::Stratified { priority, depth } => {
-            progress.begin("dividing the mesh", 0);
-            let most = if depth.is_some() { MOST_VOXELS.max(count) } else { count / FOR_EACH_VOXEL };
-            let (voxels, halvings) = voxels::voxels(&surface, *depth, most);
-            sampling.halvings = halvings;
-            sampling.undone = depth.map_or(0, |depth| depth - halvings);
-            let priorities = priority(&surface, &voxels);
-            let quotas = distribute::distribute(&priorities, count);
-            progress.end();
-            sampling.voxels = voxels.len() as u64;
-            sampling.empty_voxels = quotas.iter().filter(|quota| **quota == 0).count() as u64;
-            // As the heap takes them; where none is positive, quotas alone decide.
-            let usable = |priority: &f64| if priority.is_finite() && *priority > 0.0 { *priority } else { 0.0 };
-            let sum = priorities.iter().map(usable).sum::<f64>().max(f64::MIN_POSITIVE);
-            let fair: Vec<f64> = priorities.iter().map(|priority| count as f64 * (usable(priority) / sum)).collect();
+            let (voxels, quotas, fair) = divided(&surface, count, (priority, *depth), &mut sampling, progress);
             let (candidates, mut places) = candidates::candidates(&voxels, &quotas, &fair, seed);
             let cells = relax::relax(&surface, &candidates, &mut places, progress)?;
-            let mut disks = disks::disks(&surface, &places, progress)?;
             let colors = surface.is_colored().then(|| relax::colors(&surface, &candidates, &places, &cells));
-            let named = mesh.normals.as_ref().map(|_| normals_at(&surface, &places));
-            let faces_as_named = named.as_ref().is_none_or(|named| disks.turn_to(named));
-            let normals = named.clone().unwrap_or_else(|| disks.normals());
-            let mut points = points(&surface, &places, normals, colors);
-            let whole = surface.dropped_non_finite == 0;
-            points.closed = whole && faces_as_named && is_closed(&mesh.positions, &mesh.triangles);
-            (points.axes, points.radii) = (Some(disks.half_axes()), Some(disks.radii()));
-            points.clips = (!disks.clips.is_empty()).then_some(disks.clips);
-            points
+            covering(&surface, &places, colors, progress)?
         }
     };
     Ok((points, sampling))
+}
+
+/// The voxels of a surface, how many of `count` samples each gets, and how many it should have.
+fn divided(
+    surface: &MeshSurface<'_>,
+    count: usize,
+    (priority, depth): (&PriorityFunction<'_>, Option<u32>),
+    sampling: &mut Sampling,
+    progress: &dyn Progress,
+) -> (Vec<Voxel>, Vec<usize>, Vec<f64>) {
+    progress.begin("dividing the mesh", 0);
+    let most = if depth.is_some() { MOST_VOXELS.max(count) } else { count / FOR_EACH_VOXEL };
+    let (voxels, halvings) = voxels::voxels(surface, depth, most);
+    sampling.halvings = halvings;
+    sampling.undone = depth.map_or(0, |depth| depth - halvings);
+    let priorities = priority(surface, &voxels);
+    let quotas = distribute::distribute(&priorities, count);
+    progress.end();
+    sampling.voxels = voxels.len() as u64;
+    sampling.empty_voxels = quotas.iter().filter(|quota| **quota == 0).count() as u64;
+    // As the heap takes them; where none is positive, quotas alone decide.
+    let usable = |priority: &f64| if priority.is_finite() && *priority > 0.0 { *priority } else { 0.0 };
+    let sum = priorities.iter().map(usable).sum::<f64>().max(f64::MIN_POSITIVE);
+    let fair = priorities.iter().map(|priority| count as f64 * (usable(priority) / sum)).collect();
+    (voxels, quotas, fair)
+}
+
+/// Samples with half-axes with which they cover the surface.
+fn covering(
+    surface: &MeshSurface<'_>,
+    places: &[Place],
+    colors: Option<Vec<[f32; 4]>>,
+    progress: &dyn Progress,
+) -> Result<Points> {
+    let mesh = surface.mesh;
+    let mut disks = disks::disks(surface, places, progress)?;
+    let named = mesh.normals.as_ref().map(|_| normals_at(surface, places));
+    let faces_as_named = named.as_ref().is_none_or(|named| disks.turn_to(named));
+    let normals = named.unwrap_or_else(|| disks.normals());
+    let mut points = points(surface, places, normals, colors);
+    let whole = surface.dropped_non_finite == 0;
+    points.closed = whole && faces_as_named && is_closed(&mesh.positions, &mesh.triangles);
+    (points.axes, points.radii) = (Some(disks.half_axes()), Some(disks.radii()));
+    points.clips = (!disks.clips.is_empty()).then_some(disks.clips);
+    Ok(points)
 }
 
 fn normals_at(surface: &MeshSurface<'_>, places: &[Place]) -> Vec<DVec3> {

@@ -15,10 +15,12 @@ pub type PriorityFunction<'a> = dyn Fn(&MeshSurface<'_>, &[Voxel]) -> Vec<f64> +
 /// A priority that is built in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Priority {
-    /// The number of triangles, as in Tien 2008, each counted in a voxel by the share of its area there. The thesis counts a
-    /// triangle in each voxel that it touches, which favours voxels that the surface only just reaches into.
+    /// The number of triangles, each counted in a voxel by the share of its area there.
     #[default]
     Triangles,
+    /// The number of triangles that have a part in the voxel, as in Tien 2008 (section 3.1): it favours voxels that the surface only just
+    /// reaches into.
+    Touched,
     /// The area of the surface.
     Area,
     /// The area times the variance of the normals, so with the square of the curvature.
@@ -36,8 +38,9 @@ const PROBES: usize = 16;
 
 impl Priority {
     /// Each priority with its name and what it is, for a command line's help.
-    pub const ALL: [(Self, &'static str, &'static str); 4] = [
+    pub const ALL: [(Self, &'static str, &'static str); 5] = [
         (Self::Triangles, "triangles", "where the mesh has many"),
+        (Self::Touched, "touched", "the same, each counted wholly wherever it reaches"),
         (Self::Area, "area", "evenly"),
         (Self::Curvature, "curvature", "where the surface bends"),
         (Self::Texture, "texture", "where the colour changes"),
@@ -48,6 +51,7 @@ impl Priority {
         let share = |patch: &Patch| patch.area / surface.triangles[patch.triangle as usize].area;
         match self {
             Self::Triangles => voxels.par_iter().map(|voxel| voxel.patches.iter().map(share).sum()).collect(),
+            Self::Touched => voxels.par_iter().map(|voxel| voxel.patches.len() as f64).collect(),
             Self::Area => voxels.par_iter().map(|voxel| voxel.area).collect(),
             Self::Curvature => blended(voxels, |voxel| bend(surface, voxel)),
             Self::Texture => blended(voxels, |voxel| contrast(surface, voxel)),

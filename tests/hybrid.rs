@@ -7,6 +7,7 @@ mod common;
 use std::sync::Arc;
 
 use common::command::{DATA, Folder, fails, succeeds, text};
+use common::meshes::sphere;
 use epsplat::io::{self, Material, Mesh, Texture};
 use epsplat::metrics::compare;
 use epsplat::scene::{Colors, Scene};
@@ -139,6 +140,47 @@ fn large_triangles_all_stay() {
     succeeds(&[&own[..], &view].concat());
     assert!(std::fs::read(&a).unwrap() == std::fs::read(&b).unwrap());
     assert!(String::from_utf8(succeeds(&["info", text(&output)]).stdout).unwrap().contains("cube.mesh.ply"));
+}
+
+/// Normals that disagree with the winding leave no surface to be taken for closed, and what an image is multiplied with stays.
+#[test]
+fn normals_and_materials_stay_what_they_are() {
+    let mut ball = sphere(5, true);
+    let pixel = pixel(&ball, 15.0).unwrap();
+    let closed = |mesh: &Mesh| hybrid(mesh, pixel, &()).unwrap().surfels.unwrap().closed;
+    assert!(closed(&ball));
+    let inverted =
+        |normals: &mut Vec<[[f32; 3]; 3]>| normals.as_flattened_mut().iter_mut().for_each(|n| *n = n.map(|c| -c));
+    ball.normals.iter_mut().for_each(inverted);
+    assert!(ball.normals.is_some() && !closed(&ball));
+
+    let image = Arc::new(Texture::new(1, 1, vec![[188, 255, 0, 200]]).unwrap());
+    let dim = Material { name: String::new(), diffuse: [0.5, 1.0, 1.0, 0.5], texture: Some(image.clone()) };
+    // Half the light of 188 is the code 137.
+    assert_eq!(dim.painted().unwrap().texels(), [[137, 255, 0, 100]]);
+    assert!(Arc::ptr_eq(&Material { diffuse: [1.0; 4], ..dim }.painted().unwrap(), &image));
+    // Materials that no triangle has are left out.
+    let mesh = rich();
+    assert_eq!(mesh.part(&[true, false]).materials.len(), 1);
+    assert!(mesh.part(&[true, false]).materials[0].texture.is_some());
+}
+
+/// Only what epsplat wrote names triangles, and names that a header cannot hold are refused.
+#[test]
+fn names_of_triangles_are_read_whole_or_refused() {
+    let folder = Folder::new();
+    let cloud = |comments: &str| {
+        let rows = "element vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n";
+        let path = folder.file("c.ply", format!("ply\nformat ascii 1.0\n{comments}{rows}"));
+        io::read(&path, &()).unwrap().beside
+    };
+    assert_eq!(cloud("comment triangles 69451\n"), None);
+    assert_eq!(cloud("comment epsplat 0.1.0\ncomment triangles a b.ply\n"), Some(folder.path("a b.ply")));
+    for name in ["a\nb.ply", " a.ply", "a\\b.ply"] {
+        let output = folder.path(name);
+        fails(&["hybrid", &format!("{DATA}/bunny.obj"), "-o", text(&output)], 2, &["choose another name"]);
+    }
+    assert_eq!(folder.names(), ["c.ply"]);
 }
 
 #[test]

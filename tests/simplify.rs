@@ -19,7 +19,7 @@ use epsplat::surfels::analytic::{Shape, generate};
 use epsplat::surfels::build;
 use epsplat::surfels::sampling::voxels::Voxel;
 use epsplat::surfels::sampling::{MeshSurface, Method, Priority, sample};
-use epsplat::surfels::simplify::{Options, Report, SplatShape, Tolerance, grown, simplify, written};
+use epsplat::surfels::simplify::{Options, Report, SplatShape, Tolerance, as_in_the_thesis, grown, simplify, written};
 use epsplat::truth::{DiskTree, TriangleTree};
 use glam::{DVec3, Vec3};
 
@@ -496,6 +496,37 @@ fn colours_are_means_over_what_is_covered() {
         }
     }
     assert!(mixed > 0);
+}
+
+/// As Tien 2008 selects: every point lies within the ratio of a disk's radius, at its height within the tolerance; more disks than cells need,
+/// and the fewer the greater the ratio. The order of points changes nothing.
+#[test]
+fn disks_as_in_the_thesis_conquer_every_point() {
+    let (tolerance, sphere) = (0.004, shape(Shape::Sphere, 6_000));
+    let by = |scene: &Scene, ratio: f64| as_in_the_thesis(scene, tolerance, ratio, &()).unwrap();
+    let (disks, report) = by(&sphere, 0.6);
+    assert_eq!((report.selected, report.surfels), (disks.surfels.len() as u64, 6_000));
+    assert!(report.max_deviation <= tolerance * (1.0 + 1e-9) && report.mean_deviation < 0.5 * tolerance, "{report:?}");
+    for sample in &sphere.surfels {
+        let conquers = |disk: &Surfel| {
+            let offset = center(sample) - center(disk);
+            let height = offset.dot(disk.normal().as_dvec3().normalize()).abs();
+            offset.length() <= 0.6 * f64::from(disk.radius()) * (1.0 + 1e-6) && height <= tolerance * (1.0 + 1e-5)
+        };
+        assert!(disks.surfels.iter().any(conquers), "{sample:?}");
+    }
+    let [few, many] = [0.9, 0.4].map(|ratio| by(&sphere, ratio).1.selected);
+    let ours = run(&sphere, within(tolerance)).1.selected;
+    assert!(ours < few && few < report.selected && report.selected < many, "{ours} {few} {} {many}", report.selected);
+    let mut other = sphere.clone();
+    Random(4).shuffle(&mut other.surfels);
+    let [mut a, mut b] =
+        [disks.surfels, by(&other, 0.6).0.surfels].map(|all| all.into_iter().map(|s| s.center).collect::<Vec<_>>());
+    [&mut a, &mut b].into_iter().for_each(|all| all.sort_by(|a, b| a.partial_cmp(b).unwrap()));
+    assert_eq!(a, b);
+    // A few points are all there are neighbours.
+    let three = scene(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], Some(vec![[0.0, 0.0, 1.0]; 3]));
+    assert_eq!(by(&three, 1.0).1.selected, 1);
 }
 
 #[test]

@@ -18,7 +18,7 @@ use epsplat::plan::{Accumulator, RenderOptions};
 use epsplat::render::{Backend, render};
 use epsplat::scene::{Camera, Colors, Lens, LowPass, Map, Maps, Place, Projection, Scene, Shading, Textured, Up};
 use epsplat::surfels::simplify::{Options, SplatShape, Tolerance, points, simplify_in_texture};
-use epsplat::surfels::{build_at_vertices, build_textured};
+use epsplat::surfels::{Coordinates, build_at_vertices, build_textured};
 use glam::{DVec3, Vec3};
 
 const DATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/data");
@@ -273,10 +273,10 @@ fn simplified_surfels_keep_their_place_in_a_texture() {
         });
         reaches.fold(0.0, f64::max)
     };
-    let (simplified, left, report) = simplify_in_texture(&scene, &own.centers, &options, &()).unwrap();
+    let (simplified, left, report) = simplify_in_texture(&scene, &own, &options, &()).unwrap();
     let left = points(&simplified, left, SplatShape::Disk);
     assert!(past(&left) < 0.05, "{}", past(&left));
-    let (unaware, nothing, of_all) = simplify_in_texture(&scene, &[], &options, &()).unwrap();
+    let (unaware, nothing, of_all) = simplify_in_texture(&scene, &Coordinates::default(), &options, &()).unwrap();
     assert!(report.selected > of_all.selected && report.selected < of_all.selected * 6 / 5, "{report:?} {of_all:?}");
     assert!(nothing.centers.is_empty() && past(&points(&unaware, nothing, SplatShape::Disk)) > 0.2);
     let folder = tempfile::tempdir().unwrap();
@@ -299,9 +299,10 @@ fn simplified_surfels_keep_their_place_in_a_texture() {
 fn a_texture_survives_simplification() {
     let texture = waves(true);
     let dense = globe(20_000, 1.3, texture.clone());
-    let centers: Vec<_> = textured(&dense).places().iter().map(|place| place.center).collect();
+    let centers = textured(&dense).places().iter().map(|place| place.center).collect();
+    let own = Coordinates { centers, slopes: Vec::new() };
     let options = within(0.0005, SplatShape::Cap);
-    let (simplified, left, _) = simplify_in_texture(&dense, &centers, &options, &()).unwrap();
+    let (simplified, left, _) = simplify_in_texture(&dense, &own, &options, &()).unwrap();
     let left = points(&simplified, left, SplatShape::Cap);
     assert!(3 * left.positions.len() < dense.surfels.len(), "{}", left.positions.len());
     let refitted = Points { texture_slopes: None, ..left.clone() };

@@ -92,14 +92,19 @@ impl SceneEntry {
     fn check(&self) -> Result<(), String> {
         self.check_source()?;
         self.check_sweeps()?;
-        if self.lookup && (self.texture.is_none() || !self.surfels.samples()) {
+        let placed = self.surfels.samples() && self.surfels != Making::Hybrid;
+        if self.lookup && (self.texture.is_none() || !placed) {
             return Err("lookup: it needs a texture, and surfels that are sampled with texture coordinates".into());
         }
         if self.texture.is_some() && !self.surfels.samples() && !self.truth {
             return Err("texture: it is of a mesh that is sampled, or that rays meet".into());
         }
-        if self.priority.is_some() && !self.surfels.samples() {
-            return Err("priority: it is of samples of a mesh".into());
+        let stratified = [Making::Sample, Making::Projected, Making::Caps, Making::Scanned];
+        if self.priority.is_some() && !(stratified.contains(&self.surfels) && self.file.is_some()) {
+            return Err("priority: it is of samples of a mesh that voxels hand out".into());
+        }
+        if self.simplify.is_some() && !(self.surfels.samples() && self.surfels != Making::Hybrid) {
+            return Err("simplify: it is of samples of a mesh".into());
         }
         not_beside("radius", self.radius.is_some() && self.footprint_px.is_some(), "footprint_px")?;
         not_beside("ortho", self.ortho.is_some() && self.fov.is_some(), "fov")?;

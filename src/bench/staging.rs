@@ -14,6 +14,7 @@ use crate::random::Random;
 use crate::scene::camera::DEFAULT_FOV;
 use crate::scene::{Camera, Colors, Lens, Projection, Scene, Surfel};
 use crate::surfels::analytic::{RADIUS_IN_SPACINGS, Shape, gaussians, generate, mesh};
+use crate::surfels::hybrid::Hybrid;
 use crate::surfels::sampling::voxels::Voxel;
 use crate::surfels::sampling::{MeshSurface, Method, sample};
 use crate::surfels::simplify::{self, SplatShape, Tolerance, simplify_in_texture};
@@ -136,7 +137,7 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
 fn simplified(points: Points, tolerance: Tolerance, progress: &dyn Progress) -> Result<Points> {
     let (scene, _, coordinates) = build_at_vertices(vec![points], progress)?;
     let options = simplify::Options { tolerance, shape: SplatShape::Cap, relaxations: 0 };
-    let (scene, coordinates, _) = simplify_in_texture(&scene, &coordinates.centers, &options, progress)?;
+    let (scene, coordinates, _) = simplify_in_texture(&scene, &coordinates, &options, progress)?;
     Ok(simplify::points(&scene, coordinates, SplatShape::Cap))
 }
 
@@ -231,15 +232,19 @@ fn of_file(
         }
         Making::Uniform => sampled(Method::Uniform)?,
         Making::Hybrid => {
-            let mesh = mesh.as_ref().zip(mesh.as_ref().and_then(|mesh| hybrid::pixel(mesh, count as f64)));
-            let divided = mesh.map(|(mesh, pixel)| hybrid::hybrid(mesh, pixel, progress)).transpose()?;
-            let divided = divided.unwrap_or_default();
+            let divided = mesh.as_ref().map(|mesh| divided(mesh, count, progress)).transpose()?.unwrap_or_default();
             left = divided.triangles;
             divided.surfels.unwrap_or_default()
         }
     };
     let surface = mesh.filter(|_| entry.truth).map(|mesh| Surface::mesh(&mesh)).transpose()?;
     Ok((points, surface, left))
+}
+
+/// What `epsplat hybrid --pixels` makes of a mesh.
+fn divided(mesh: &Mesh, pixels: usize, progress: &dyn Progress) -> Result<Hybrid> {
+    let pixel = hybrid::pixel(mesh, pixels as f64);
+    pixel.map_or_else(|| Ok(Hybrid::default()), |pixel| hybrid::hybrid(mesh, pixel, progress))
 }
 
 /// What `epsplat generate` writes, with disks of `radius` mean spacings.

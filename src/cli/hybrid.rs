@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use epsplat::io::{self, Texture};
+use epsplat::io::{self, Material, Texture};
 use epsplat::surfels::hybrid::{Report, hybrid, pixel};
 use epsplat::{Error, Result};
 
@@ -46,6 +46,7 @@ fn pixels(text: &str) -> std::result::Result<f64, String> {
 pub fn run(arguments: &Arguments) -> Result<()> {
     io::ply::check_extension(&arguments.output)?;
     let beside = arguments.output.with_extension("mesh.ply");
+    outputs::check_named_in_ply(beside.file_name().map_or(Path::new(""), Path::new))?;
     let inputs = || [&arguments.mesh].into_iter().chain(&arguments.texture);
     let written = || [&arguments.output, &beside].into_iter().chain(&arguments.json);
     outputs::check(inputs(), written())?;
@@ -61,8 +62,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let pixel = pixel(&mesh, arguments.pixels)
         .ok_or_else(|| Error::malformed(&arguments.mesh, "it has no triangles whose corners are finite and apart"))?;
     let divided = hybrid(&mesh, pixel, &bars).map_err(|error| named(error, std::slice::from_ref(&arguments.mesh)))?;
-    let images: Vec<&Texture> =
-        divided.triangles.iter().flat_map(|mesh| &mesh.materials).filter_map(|of| of.texture.as_deref()).collect();
+    let painted = divided.triangles.iter().filter(|mesh| mesh.texture.is_some());
+    let images: Vec<_> = painted.flat_map(|mesh| &mesh.materials).filter_map(Material::painted).collect();
     let paths: Vec<PathBuf> =
         (1..=images.len()).map(|k| arguments.output.with_extension(format!("mesh-{k}.png"))).collect();
     outputs::check(inputs(), written().chain(&paths))?;

@@ -5,8 +5,10 @@ use std::collections::HashMap;
 use std::fs::Metadata;
 use std::path::{Path, PathBuf};
 
-use epsplat::io::{atomic, companions};
+use epsplat::io::{Points, atomic, companions};
 use epsplat::{Error, Result};
+
+use super::note;
 
 /// Refuses outputs that cannot be written, or that [`check_distinct`] refuses.
 pub(super) fn check<I: AsRef<Path>, O: AsRef<Path>>(
@@ -59,6 +61,42 @@ pub(super) fn check_distinct<I: AsRef<Path>, O: AsRef<Path>>(
         }
     }
     Ok(())
+}
+
+/// Refuses a file that a line of a PLY header cannot name.
+pub(super) fn check_named_in_ply(path: &Path) -> Result<()> {
+    let name = path.to_str().filter(|name| name.trim() == *name && !name.contains(|c: char| c.is_control()));
+    match name.filter(|name| cfg!(windows) || !name.contains('\\')) {
+        Some(_) => Ok(()),
+        None => Err(Error::Usage(format!(
+            "{} has a character, or a space at an end, with which a PLY file cannot name it: choose another name",
+            path.display()
+        ))),
+    }
+}
+
+/// The mesh that `output` is drawn beside if the one input is, as a file there names it; that of several is left out, and told.
+pub(super) fn beside(inputs: &[Points], output: &Path) -> Result<Option<PathBuf>> {
+    let meshes: Vec<&PathBuf> = inputs.iter().filter_map(|points| points.beside.as_ref()).collect();
+    if let ([mesh], [_]) = (meshes.as_slice(), inputs) {
+        let folder = |path: &Path| {
+            let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            parent.canonicalize().ok()
+        };
+        let named = match mesh.file_name() {
+            Some(name) if folder(mesh).is_some_and(|of| folder(output) == Some(of)) => name.into(),
+            _ => std::path::absolute(mesh).unwrap_or_else(|_| (*mesh).clone()),
+        };
+        check_named_in_ply(&named)?;
+        return Ok(Some(named));
+    }
+    for mesh in meshes {
+        note(&format!(
+            "warning: the triangles of {} are left out: name them by --triangles to render them",
+            mesh.display()
+        ));
+    }
+    Ok(None)
 }
 
 /// Files that are written, by what makes them one: the place that a path leads to, and the file that is there already.

@@ -55,7 +55,7 @@ pub struct Arguments {
     #[arg(long, value_name = "MESH", num_args = 1.., help_heading = "Triangles")]
     triangles: Vec<PathBuf>,
     /// An image to paint the meshes with none of whose materials has one, by their texture coordinates: .png or .jpg
-    #[arg(long, value_name = "IMAGE", requires = "triangles", help_heading = "Triangles")]
+    #[arg(long, value_name = "IMAGE", help_heading = "Triangles")]
     triangle_texture: Option<PathBuf>,
     /// What shows where surfels meet triangles: corrected (the nearer one, surfels by the depth that they blend to), nearest (the nearer
     /// one, surfels by their nearest fragment, as a depth buffer has it) or blended (both, within epsilon) [default: corrected]
@@ -313,11 +313,9 @@ fn scene(arguments: &Arguments, bars: &Bars) -> Result<(Scene, Preparation)> {
     let has_points = inputs.iter().any(|points| !points.positions.is_empty() || points.beside.is_none());
     let of_surfels = if has_points { Some(surfels_of(arguments, inputs, bars)?) } else { None };
     if paths.is_empty() {
-        if arguments.join.is_some() {
-            return Err(Error::Usage(
-                "--join says what shows where surfels meet triangles, and there are none: name some by --triangles"
-                    .into(),
-            ));
+        if arguments.join.is_some() || arguments.triangle_texture.is_some() {
+            let what = "--join and --triangle-texture are of triangles, and there are none: name some by --triangles";
+            return Err(Error::Usage(what.into()));
         }
         return of_surfels.ok_or_else(|| Error::Usage("there is nothing to render: name a file".into()));
     }
@@ -353,7 +351,7 @@ fn surfels_of(arguments: &Arguments, inputs: Vec<Points>, bars: &Bars) -> Result
     let texture = arguments.texture.as_deref().map(Texture::read).transpose()?;
     let mut read = arguments.inputs.iter().zip(&inputs);
     if texture.is_some()
-        && let Some((path, _)) = read.find(|(_, points)| points.texture.is_none())
+        && let Some((path, _)) = read.find(|(_, points)| points.texture.is_none() && !points.positions.is_empty())
     {
         let what = "its points have no texture coordinates, so they cannot be textured; `epsplat sample` gives surfels of a mesh some";
         return Err(Error::malformed(path, what));

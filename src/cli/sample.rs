@@ -44,7 +44,7 @@ pub struct Arguments {
     /// An image for the whole mesh, in place of its own materials: .png or .jpg
     #[arg(long, value_name = "FILE")]
     texture: Option<PathBuf>,
-    /// Another seed gives other samples
+    /// Another seed gives other samples, but of projected ones
     #[arg(long, default_value_t = 0)]
     seed: u64,
 }

@@ -1,12 +1,15 @@
 //! `epsplat simplify`: fewer, larger surfels for the same surface.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use std::str::FromStr;
 
 use clap::Args;
-use epsplat::Result;
 use epsplat::io::{Points, ply};
-use epsplat::surfels;
-use epsplat::surfels::simplify::{Options, Report, SplatShape, Tolerance, points, simplify_in_texture};
+use epsplat::surfels::simplify::{
+    Options, Report, SplatShape, Tolerance, as_in_the_thesis, points, simplify_in_texture,
+};
+use epsplat::surfels::{self, Coordinates};
+use epsplat::{Error, Result};
 
 use super::progress::Bars;
 use super::reading::{Reading, help_of, named};
@@ -16,7 +19,7 @@ use super::{note, outputs, print, write_json};
 ///
 /// Around each point the largest disk is grown that no point inside is farther from than the tolerance. Of these as few
 /// as possible are taken that cover the surface together. Flat parts keep few surfels, edges and details keep theirs.
-/// Texture coordinates stay, with their slopes, and no surfel lies across a seam of them.
+/// Texture coordinates stay, with their slopes, and no surfel stands for points on both sides of a seam.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  epsplat simplify scan.ply -o small.ply --tolerance rel:0.0005 --shape ellipse --relax 3"
@@ -38,12 +41,16 @@ pub struct Arguments {
     /// Rounds in which surfels move until some are not needed; more than 3 hardly change anything
     #[arg(long, value_name = "ROUNDS", default_value_t = 0)]
     relax: u32,
+    /// cells, without holes; or thesis:R, disks as Tien 2008 selects them, to compare with: each conquers what is within R (0.5 to 0.7
+    /// there) of its radius, and holes may be left
+    #[arg(long, value_name = "HOW", default_value = "cells")]
+    cover: Cover,
     /// Counts and deviations as JSON, to a file or - for stdout
     #[arg(long, value_name = "FILE|-")]
     json: Option<PathBuf>,
 }
 
-#[derive(Clone, Copy, clap::ValueEnum)]
+#[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 enum ShapeName {
     /// Circles
     Disk,
@@ -53,14 +60,40 @@ enum ShapeName {
     Cap,
 }
 
+/// How what a splat covers is told.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Cover {
+    Cells,
+    Thesis(f64),
+}
+
+impl FromStr for Cover {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let ratio = || text.strip_prefix("thesis:")?.parse().ok().filter(|ratio| *ratio > 0.0 && *ratio <= 1.0);
+        match text {
+            "cells" => Ok(Self::Cells),
+            _ => ratio().map(Self::Thesis).ok_or_else(|| "it is cells, or thesis:R with R from 0 to 1".to_owned()),
+        }
+    }
+}
+
 pub fn run(arguments: &Arguments) -> Result<()> {
     ply::check_extension(&arguments.output)?;
+    if arguments.cover != Cover::Cells && !(arguments.shape == ShapeName::Disk && arguments.relax == 0) {
+        return Err(Error::Usage(
+            "the thesis has disks and no relaxation: leave --shape and --relax out with --cover thesis:R".into(),
+        ));
+    }
     outputs::check(&arguments.inputs, [&arguments.output].into_iter().chain(&arguments.json))?;
     let bars = Bars::new();
     let inputs = arguments.reading.all(&arguments.inputs, &bars)?;
-    // What they are drawn beside stays beside those that are left.
-    let beside = inputs.iter().find_map(|points| points.beside.clone()).filter(|_| inputs.len() == 1);
-    let beside = beside.map(|mesh| seen_from(&arguments.output, mesh));
+    let beside = outputs::beside(&inputs, &arguments.output)?;
+    let with_places = inputs.iter().filter(|points| points.texture.is_some()).count();
+    if with_places > 0 && inputs.iter().any(|points| points.texture.is_none() && !points.positions.is_empty()) {
+        note("warning: texture coordinates are left out, as some inputs have none");
+    }
     let (scene, preparation, coordinates) =
         surfels::build_at_vertices(inputs, &bars).map_err(|error| named(error, &arguments.inputs))?;
     preparation.notes().iter().for_each(|line| note(line));
@@ -76,20 +109,19 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         ShapeName::Cap => SplatShape::Cap,
     };
     let options = Options { tolerance: arguments.tolerance, shape, relaxations: arguments.relax };
-    let (simplified, coordinates, report) = simplify_in_texture(&scene, &coordinates.centers, &options, &bars)?;
+    let (simplified, coordinates, report) = match arguments.cover {
+        Cover::Cells => simplify_in_texture(&scene, &coordinates, &options, &bars)?,
+        Cover::Thesis(ratio) => {
+            let tolerance = options.tolerance.in_world(scene.bounds().extent().length());
+            let (simplified, report) = as_in_the_thesis(&scene, tolerance, ratio, &bars)?;
+            (simplified, Coordinates::default(), report)
+        }
+    };
     let left = Points { beside, ..points(&simplified, coordinates, shape) };
     ply::write_points(&arguments.output, &left, &bars)?;
     match &arguments.json {
         Some(path) => write_json(path, &report),
         None => print(&summary(&report)),
-    }
-}
-
-/// A file as one that is written names it: by its name where they are in one folder.
-fn seen_from(output: &Path, file: PathBuf) -> PathBuf {
-    match file.file_name() {
-        Some(name) if output.parent() == file.parent() => name.into(),
-        _ => std::path::absolute(&file).unwrap_or(file),
     }
 }
 

@@ -54,7 +54,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     outputs::check(&arguments.inputs, [&arguments.output])?;
     let bars = Bars::new();
     let inputs = arguments.reading.all(&arguments.inputs, &bars)?;
-    let surfels = from_points(inputs, &options, &bars).map_err(|error| named(error, &arguments.inputs))?;
+    let beside = outputs::beside(&inputs, &arguments.output)?;
+    let mut surfels = from_points(inputs, &options, &bars).map_err(|error| named(error, &arguments.inputs))?;
+    surfels.points.beside = beside;
     ply::write_points(&arguments.output, &surfels.points, &bars)?;
     for line in surfels.notes() {
         note(&line);

@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use super::Texture;
 use super::points::retain_colors;
 use crate::error::{Error, Result};
-use crate::scene::color::{DEFAULT_COLOR, mean_color};
+use crate::scene::color::{DEFAULT_COLOR, SRGB8_TO_LINEAR, linear_to_srgb, mean_color};
 use crate::scene::{Colors, Up};
 
 /// A triangle mesh as a file gives it: f64 world coordinates and whatever attributes exist.
@@ -45,6 +45,24 @@ pub struct Material {
     pub texture: Option<Arc<Texture>>,
 }
 
+impl Material {
+    /// The image times the diffuse colour, in linear light and codes of 8 bits; if there is an image.
+    pub fn painted(&self) -> Option<Arc<Texture>> {
+        let texture = self.texture.as_ref()?;
+        if self.diffuse == [1.0; 4] {
+            return Some(texture.clone());
+        }
+        let [width, height] = texture.size();
+        let times = |[r, g, b, a]: &[u8; 4]| {
+            let [r, g, b] = [r, g, b].map(|code| SRGB8_TO_LINEAR[usize::from(*code)]);
+            let code = |value: f64| (255.0 * value.clamp(0.0, 1.0)).round() as u8;
+            let light = [0, 1, 2].map(|k| code(linear_to_srgb(f64::from([r, g, b][k] * self.diffuse[k]))));
+            [light[0], light[1], light[2], code(f64::from(*a) / 255.0 * f64::from(self.diffuse[3]))]
+        };
+        Texture::new(width, height, texture.texels().iter().map(times).collect()).map(Arc::new)
+    }
+}
+
 impl Mesh {
     /// Whether the parts fit each other.
     ///
@@ -78,7 +96,7 @@ impl Mesh {
         ))
     }
 
-    /// The mesh of those triangles whose flag is set, with the vertices that they name.
+    /// The mesh of those triangles whose flag is set, with the vertices and materials that they name.
     #[must_use]
     pub fn part(&self, keep: &[bool]) -> Self {
         fn kept<T: Copy>(all: &[T], keep: &[bool]) -> Vec<T> {
@@ -100,14 +118,23 @@ impl Mesh {
             retain_colors(&mut colors, &is_named);
             colors
         });
+        let mut material = self.material.as_ref().map(|all| kept(all, keep));
+        let mut is_used = vec![false; self.materials.len()];
+        material
+            .iter()
+            .flatten()
+            .for_each(|&of| is_used.get_mut(of as usize).into_iter().for_each(|used| *used = true));
+        let before = |of: u32| is_used.iter().take(of as usize).filter(|used| **used).count() as u32;
+        material.iter_mut().flatten().for_each(|of| *of = before(*of));
+        let materials = self.materials.iter().zip(&is_used).filter(|(_, used)| **used).map(|(of, _)| of.clone());
         Self {
+            materials: materials.collect(),
+            material,
             positions: kept(&self.positions, &is_named),
             triangles,
             normals: self.normals.as_ref().map(|all| kept(all, keep)),
             colors,
             texture: self.texture.as_ref().map(|all| kept(all, keep)),
-            materials: self.materials.clone(),
-            material: self.material.as_ref().map(|all| kept(all, keep)),
             up: self.up,
             notes: Vec::new(),
         }

@@ -89,14 +89,18 @@ fn built_in_texture(
 }
 
 /// [`build`], where the surfels of a mesh are at its vertices however it looks, for what takes surfels as samples of a surface. With the
-/// texture coordinates of the surfels, if they have any.
+/// texture coordinates of the surfels, if all inputs have some.
 ///
 /// # Errors
 ///
 /// Those of [`build`].
 pub fn build_at_vertices(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Preparation, Coordinates)> {
-    let inputs = inputs.into_iter().map(|input| mesh::of_mesh(input, By::Vertices)).collect();
+    let inputs: Vec<Points> = inputs.into_iter().map(|input| mesh::of_mesh(input, By::Vertices)).collect();
+    let all_placed = inputs.iter().all(|input| input.texture.is_some() || input.positions.is_empty());
     let mut gathered = gather::gather(inputs)?;
+    if !all_placed {
+        (gathered.points.texture, gathered.points.texture_slopes) = (None, None);
+    }
     gathered.points = std::mem::take(&mut gathered.points).in_light();
     // Samples are where the surfels are, however those curve.
     let flat = Limits { curved: false, ..Limits::default() };

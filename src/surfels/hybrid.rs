@@ -95,12 +95,14 @@ pub fn hybrid(mesh: &Mesh, pixel: f64, progress: &dyn Progress) -> Result<Hybrid
 
 /// Surfels that cover the triangles of `small`, a part of `mesh`.
 fn surfels_of(small: &Mesh, mesh: &Mesh, pixel: f64, progress: &dyn Progress) -> Result<Points> {
-    let area: f64 = small.triangles.iter().map(|corners| area(small, *corners)).sum();
-    let count = (DENSITY * area / (pixel * pixel)).ceil().clamp(1.0, 1.0 + MOST as f64) as usize;
+    let area =
+        small.triangles.iter().map(|corners| u128::from(units(small, *corners, pixel))).sum::<u128>() as f64 * UNIT;
+    let count = (DENSITY * area).ceil().clamp(1.0, 1.0 + MOST as f64) as usize;
     let priority = |surface: &MeshSurface<'_>, voxels: &[Voxel]| Priority::default().of(surface, voxels);
-    let (mut points, _) = sample(small, count, &Method::Stratified { priority: &priority, depth: None }, 0, progress)?;
+    let (mut points, sampling) =
+        sample(small, count, &Method::Stratified { priority: &priority, depth: None }, 0, progress)?;
     // Together with the triangles beside them they cover what the mesh does.
-    points.closed = is_closed(&mesh.positions, &mesh.triangles);
+    points.closed = sampling.faces_as_wound && is_closed(&mesh.positions, &mesh.triangles);
     Ok(points)
 }
 
@@ -118,11 +120,16 @@ pub fn splatted(mesh: &Mesh, pixel: f64) -> Vec<bool> {
     let welded = distinct(&mesh.positions);
     let corners: Vec<[u32; 3]> =
         mesh.triangles.iter().map(|triangle| triangle.map(|vertex| welded[vertex as usize])).collect();
-    let units = |corners: &[u32; 3]| (area(mesh, *corners) / (pixel * pixel) / UNIT).clamp(0.0, MOST_UNITS) as u64;
-    let areas: Vec<u64> = corners.iter().map(units).collect();
+    let areas: Vec<u64> = corners.iter().map(|corners| units(mesh, *corners, pixel)).collect();
     let sizes = (0..ROUNDS).fold(areas.clone(), |sizes, _| around(&corners, &sizes, mesh.positions.len()));
     let edges = edges(&corners);
-    let chosen: Vec<bool> = sizes.iter().map(|size| *size < (LARGEST / UNIT) as u64).collect();
+    // What has no area is left to whoever draws triangles, who tells of it.
+    let has_area = |corners: &[u32; 3]| area(mesh, *corners) > 0.0;
+    let chosen: Vec<bool> = sizes
+        .iter()
+        .zip(&corners)
+        .map(|(size, corners)| *size < (LARGEST / UNIT) as u64 && has_area(corners))
+        .collect();
     let mut patches = Sets::new(corners.len());
     for sides in edges.chunk_by(|a, b| a.0 == b.0) {
         let mut chosen = sides.iter().filter(|(_, side)| chosen[*side as usize]);
@@ -139,9 +146,18 @@ pub fn splatted(mesh: &Mesh, pixel: f64) -> Vec<bool> {
     chosen.into_iter().enumerate().map(|(triangle, chosen)| chosen && is_large(triangle)).collect()
 }
 
-/// None of what is not finite.
+/// The area of a triangle in parts of a square pixel.
+fn units(mesh: &Mesh, corners: [u32; 3], pixel: f64) -> u64 {
+    (area(mesh, corners) / (pixel * pixel) / UNIT).clamp(0.0, MOST_UNITS) as u64
+}
+
+/// None of what is not finite. The same whichever corner comes first.
 fn area(mesh: &Mesh, corners: [u32; 3]) -> f64 {
-    let [a, b, c] = corners.map(|vertex| DVec3::from_array(mesh.positions[vertex as usize]));
+    let mut places = corners.map(|vertex| mesh.positions[vertex as usize]);
+    let least = |k: &usize| places[*k].map(f64::to_bits);
+    let first = (0..3).min_by_key(least).unwrap_or(0);
+    places.rotate_left(first);
+    let [a, b, c] = places.map(DVec3::from_array);
     let twice = (b - a).cross(c - a).length();
     if twice.is_finite() { 0.5 * twice } else { 0.0 }
 }

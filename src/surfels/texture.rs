@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{DMat2, DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::build::Coordinates;
+use super::build::{Coordinates, LARGEST_PLACE};
 use super::neighbours::{Neighbour, NeighbourSearch};
 use super::positions::DistinctPositions;
 use crate::scene::{Place, Scene, Surfel, Texture, Textured};
@@ -35,8 +35,9 @@ pub(super) fn painted(
         Some(places) => places,
         None => places(scene, &coordinates.centers, progress)?,
     };
-    for (index, slopes) in coordinates.slopes.iter().enumerate().filter(|(_, slopes)| are_known(slopes)) {
-        places[index] = of_slopes(&scene.surfels[index], coordinates.centers[index], *slopes);
+    let given = scene.surfels.iter().zip(&coordinates.slopes).enumerate();
+    for (index, (surfel, slopes)) in given.filter(|(_, given)| are_known(*given)) {
+        places[index] = of_slopes(surfel, coordinates.centers[index], *slopes);
     }
     // Disks overlap: half of one at each side is about the surfel's own part of the surface.
     let color = |place: &Place| texture.mean_about(place.center.map(f64::from), 0.5 * f64::from(place.reach));
@@ -44,15 +45,15 @@ pub(super) fn painted(
     Textured::new(texture, places, colors)
 }
 
-/// Whether the slopes were given and can be used.
-fn are_known(slopes: &[[f32; 3]; 2]) -> bool {
+/// Whether the slopes of a surfel were given and can be used: over its disk they gain no more than coordinates may be.
+fn are_known((surfel, slopes): (&Surfel, &[[f32; 3]; 2])) -> bool {
     let all = slopes.as_flattened();
-    all.iter().any(|gain| *gain != 0.0) && all.iter().all(|gain| gain.is_finite())
+    all.iter().any(|gain| *gain != 0.0) && all.iter().all(|gain| gain.abs() * surfel.radius() <= LARGEST_PLACE)
 }
 
 /// Places whose slopes are all to be filled in, where every surfel has its own.
 fn given(scene: &Scene, coordinates: &Coordinates) -> Option<Vec<Place>> {
-    let known = coordinates.slopes.iter().filter(|slopes| are_known(slopes)).count();
+    let known = scene.surfels.iter().zip(&coordinates.slopes).filter(|given| are_known(*given)).count();
     (known == scene.surfels.len()).then(|| vec![Place::default(); known])
 }
 

@@ -107,7 +107,8 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
     let mut line = Vec::new();
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
-    let (mut textures, mut up, mut closed, mut beside) = (Vec::new(), None, false, None);
+    let (mut textures, mut up, mut closed) = (Vec::new(), None, false);
+    let (mut own, mut beside) = (false, None);
     for number in 1.. {
         line.clear();
         reader.take(LINE_LIMIT).read_until(line_end, &mut line)?;
@@ -138,7 +139,10 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
                 textures.extend(comment.strip_prefix("TextureFile ").map(|name| name.trim().to_owned()));
                 up = [Up::Y, Up::Z].into_iter().find(|up| words.clone().eq(["up", up.name()])).or(up);
                 closed |= comment == "closed";
-                beside = comment.strip_prefix("triangles ").map(|name| name.trim().to_owned()).or(beside);
+                own |= comment.starts_with("epsplat ");
+                // Others may mean something else by it.
+                let named = comment.strip_prefix("triangles ").filter(|_| own);
+                beside = named.map(|name| name.trim().to_owned()).or(beside);
             }
             Some("format") => {
                 let unread = "not a PLY format that is read (ascii, binary_little_endian or binary_big_endian 1.0)";

@@ -15,7 +15,7 @@ type Key = ([u64; 3], [u32; 3], [u32; 4]);
 
 /// Writes the triangles of `mesh`, whose parts fit each other ([`Mesh::check`]), so that [`read_mesh`](super::read_mesh) gives them back:
 /// with normals, and with colours in linear light, those of materials too. Materials with an image have those that `images` name, one each
-/// in the order of the mesh's materials, beside the file; what an image is multiplied with is left out.
+/// in the order of the mesh's materials, beside the file, times what an image is multiplied with ([`Material::painted`](crate::io::Material)).
 ///
 /// # Errors
 ///

@@ -84,6 +84,8 @@ pub struct Sampling {
     pub voxels: u64,
     /// Of these, voxels that got no sample.
     pub empty_voxels: u64,
+    /// No triangle was left out for its coordinates, and each disk is turned as its triangles are, whatever normals the mesh gives.
+    pub faces_as_wound: bool,
     /// How often boxes were halved.
     pub halvings: u32,
     /// How many of the halvings that were asked for were left out, as there would have been too many voxels.
@@ -111,7 +113,7 @@ impl Sampling {
 }
 
 /// Samples a mesh at `count` points: with positions on its triangles, normals, texture coordinates and colours as far as the
-/// mesh has them, and, by [`Method::Stratified`], half-axes with which the disks cover it. Without normals of the mesh those are
+/// mesh has them, and, but by [`Method::Uniform`], half-axes with which the disks cover it. Without normals of the mesh those are
 /// those of the disks' planes, which lie nearest to the part that each sample stands for, or of [`Method::Uniform`] of triangles.
 ///
 /// The same seed gives the same points, whatever the machine's number of threads.
@@ -148,14 +150,14 @@ pub fn sample(
             let (voxels, quotas, _) = divided(&surface, count, (priority, *depth), &mut sampling, progress);
             let places = projected::places(&surface, &voxels, &quotas);
             let colors = surface.is_colored().then(|| places.par_iter().map(|place| surface.color(*place)).collect());
-            covering(&surface, &places, colors, progress)?
+            covering(&surface, &places, colors, &mut sampling, progress)?
         }
         Method::Stratified { priority, depth } => {
             let (voxels, quotas, fair) = divided(&surface, count, (priority, *depth), &mut sampling, progress);
             let (candidates, mut places) = candidates::candidates(&voxels, &quotas, &fair, seed);
             let cells = relax::relax(&surface, &candidates, &mut places, progress)?;
             let colors = surface.is_colored().then(|| relax::colors(&surface, &candidates, &places, &cells));
-            covering(&surface, &places, colors, progress)?
+            covering(&surface, &places, colors, &mut sampling, progress)?
         }
     };
     Ok((points, sampling))
@@ -191,6 +193,7 @@ fn covering(
     surface: &MeshSurface<'_>,
     places: &[Place],
     colors: Option<Vec<[f32; 4]>>,
+    sampling: &mut Sampling,
     progress: &dyn Progress,
 ) -> Result<Points> {
     let mesh = surface.mesh;
@@ -199,8 +202,8 @@ fn covering(
     let faces_as_named = named.as_ref().is_none_or(|named| disks.turn_to(named));
     let normals = named.unwrap_or_else(|| disks.normals());
     let mut points = points(surface, places, normals, colors);
-    let whole = surface.dropped_non_finite == 0;
-    points.closed = whole && faces_as_named && is_closed(&mesh.positions, &mesh.triangles);
+    sampling.faces_as_wound = surface.dropped_non_finite == 0 && faces_as_named;
+    points.closed = sampling.faces_as_wound && is_closed(&mesh.positions, &mesh.triangles);
     (points.axes, points.radii) = (Some(disks.half_axes()), Some(disks.radii()));
     points.clips = (!disks.clips.is_empty()).then_some(disks.clips);
     Ok(points)

@@ -45,6 +45,7 @@ mod points;
 mod relaxation;
 mod samples;
 mod selection;
+mod thesis;
 
 use std::str::FromStr;
 
@@ -53,6 +54,7 @@ use self::cells::Cells;
 pub use self::outcome::{Report, grown, written};
 pub use self::points::points;
 use self::samples::Samples;
+pub use self::thesis::as_in_the_thesis;
 use crate::error::{Error, Result};
 use crate::progress::Progress;
 use crate::scene::Scene;
@@ -132,18 +134,18 @@ pub struct Options {
 ///
 /// [`Error::Usage`] for a tolerance that is negative or not finite, or more than 2^32 - 1 surfels.
 pub fn simplify(scene: &Scene, options: &Options, progress: &dyn Progress) -> Result<(Scene, Report)> {
-    simplify_in_texture(scene, &[], options, progress).map(|(scene, _, report)| (scene, report))
+    simplify_in_texture(scene, &Coordinates::default(), options, progress).map(|(scene, _, report)| (scene, report))
 }
 
-/// [`simplify`] for surfels that have texture coordinates, origin bottom left, one pair each, and what those of the selected ones are. Their
-/// slopes are fitted over the surfels that each stands for, and none stands for surfels across a seam, where coordinates jump.
+/// [`simplify`] for surfels that have texture coordinates, and what those of the selected ones are. Slopes are fitted over the surfels that
+/// each stands for, or stay of one that stands for itself, and none stands for surfels on both sides of a seam, where coordinates jump.
 ///
 /// # Errors
 ///
 /// Those of [`simplify`].
 pub fn simplify_in_texture(
     scene: &Scene,
-    coordinates: &[[f32; 2]],
+    coordinates: &Coordinates,
     options: &Options,
     progress: &dyn Progress,
 ) -> Result<(Scene, Coordinates, Report)> {
@@ -152,7 +154,7 @@ pub fn simplify_in_texture(
         return Err(Error::Usage(format!("a tolerance is finite and not negative, {tolerance} is not")));
     }
     progress.begin("sorting points", 0);
-    let samples = Samples::new(scene, coordinates)?;
+    let samples = Samples::new(scene, &coordinates.centers)?;
     progress.end();
     let scaled = tolerance * samples.positions.scale();
     let cells = Cells::new(&samples, scaled, progress);
@@ -162,7 +164,8 @@ pub fn simplify_in_texture(
     if options.relaxations > 0 {
         selected = relaxation::relax(&cells, &candidates, &selected, options.relaxations, progress);
     }
-    let (simplified, coordinates, deviations) = outcome::scene(scene, &samples, &cells, &candidates, &selected, scaled);
+    let (simplified, left, deviations) =
+        outcome::scene((scene, &coordinates.slopes), &samples, &cells, &candidates, &selected, scaled);
     // Rounding aside.
     let beyond = |&&index: &&u32| candidates.splats[index as usize].deviation > scaled * (1.0 + 1e-9);
     let beyond_tolerance = selected.iter().filter(beyond).count() as u64;
@@ -177,5 +180,5 @@ pub fn simplify_in_texture(
         mean_deviation: deviations.mean.min(deviations.max),
         beyond_tolerance,
     };
-    Ok((simplified, coordinates, report))
+    Ok((simplified, left, report))
 }

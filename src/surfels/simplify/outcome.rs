@@ -71,6 +71,9 @@ pub(super) struct Deviations {
     pub mean: f64,
 }
 
+/// What u and v gain for a world unit along each axis.
+type Slopes = [[f32; 3]; 2];
+
 /// A selected splat as it is written.
 struct Chosen {
     /// Of the scene, world units.
@@ -80,7 +83,7 @@ struct Chosen {
     cap: Cap,
     color: [f32; 4],
     /// Texture coordinates at the centre and their slopes, if there are any.
-    place: ([f32; 2], [[f32; 3]; 2]),
+    place: ([f32; 2], Slopes),
     /// Area times deviation, and area.
     sums: [f64; 2],
     /// The largest deviation.
@@ -90,7 +93,7 @@ struct Chosen {
 impl Chosen {
     fn of(
         index: u32,
-        scene: &Scene,
+        (scene, slopes): (&Scene, &[Slopes]),
         (samples, cells): (&Samples, &Cells),
         candidates: &Candidates,
         tolerance: f64,
@@ -102,7 +105,15 @@ impl Chosen {
         }
         .unwrap_or_else(|| Self::grown(index, samples, cells, candidates, tolerance));
         let point = candidates.splats[index as usize].point;
-        Self { place: place(&chosen.surfel, point, covers, samples, cells), ..chosen }
+        let (center, fitted) = place(&chosen.surfel, point, covers, samples, cells);
+        // A surfel that stands for itself has what it came with.
+        let given = match (covers.len(), samples.only[point as usize]) {
+            (1, Some(own)) => {
+                slopes.get(own as usize).filter(|slopes| slopes.as_flattened().iter().any(|gain| *gain != 0.0))
+            }
+            _ => None,
+        };
+        Self { place: (center, given.copied().unwrap_or(fitted)), ..chosen }
     }
 
     /// What stands for one surfel is that as it came, but for a factor that lets it hold its cell. None where several share a position, as
@@ -181,7 +192,7 @@ impl Chosen {
 }
 
 /// The texture coordinates of a splat that grew from a point: there, and their slopes over what it covers and what is beside that point.
-fn place(surfel: &Surfel, point: u32, covers: &[Cover], samples: &Samples, cells: &Cells) -> ([f32; 2], [[f32; 3]; 2]) {
+fn place(surfel: &Surfel, point: u32, covers: &[Cover], samples: &Samples, cells: &Cells) -> ([f32; 2], Slopes) {
     let Some(own) = samples.places.get(point as usize) else { return Default::default() };
     let axes = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
     let others = covers.iter().map(|cover| cover.cell).chain(cells.neighbours(point).iter().copied());
@@ -193,22 +204,24 @@ fn place(surfel: &Surfel, point: u32, covers: &[Cover], samples: &Samples, cells
 }
 
 /// Linear and not premultiplied, of a sum of premultiplied colours over this area.
-fn mean_color([r, g, b, alpha]: [f64; 4], area: f64) -> [f32; 4] {
+pub(super) fn mean_color([r, g, b, alpha]: [f64; 4], area: f64) -> [f32; 4] {
     let opaque = if alpha > 0.0 { alpha } else { f64::INFINITY };
     [r / opaque, g / opaque, b / opaque, alpha / area].map(|c| c as f32)
 }
 
 /// The selected splats as a scene like `scene`; the tolerance in scaled units.
 pub(super) fn scene(
-    scene: &Scene,
+    (scene, slopes): (&Scene, &[Slopes]),
     samples: &Samples,
     cells: &Cells,
     candidates: &Candidates,
     selected: &[u32],
     tolerance: f64,
 ) -> (Scene, Coordinates, Deviations) {
-    let chosen: Vec<Chosen> =
-        selected.par_iter().map(|&index| Chosen::of(index, scene, (samples, cells), candidates, tolerance)).collect();
+    let chosen: Vec<Chosen> = selected
+        .par_iter()
+        .map(|&index| Chosen::of(index, (scene, slopes), (samples, cells), candidates, tolerance))
+        .collect();
     let colors = match scene.colors {
         Colors::Constant(color) => Colors::Constant(color),
         Colors::Srgb8(_) => Colors::Srgb8(chosen.iter().map(|chosen| srgb8(chosen.color)).collect()),

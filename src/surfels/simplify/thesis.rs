@@ -1,0 +1,218 @@
+//! Growing and selection as Tien 2008 has them (sections 4.1 to 4.3), to compare with: the parent module says what it does instead.
+//!
+//! ```text
+//! graph    = 10 nearest neighbours
+//! grow     = from a point breadth first, nearest first, until one is farther from its plane than the tolerance; the radius is that of the
+//!            farthest point before
+//! conquers = what growth reaches within RATIO times the radius
+//! Q        = the sum of w = pi d^2 over what it conquers and no selected one does, d to the tenth neighbour
+//! select   = the greatest Q, until all are 0
+//! ```
+//!
+//! Nothing says that what lies between points is covered; RATIO, 0.5 to 0.7 in the thesis, makes that likely.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use rayon::prelude::*;
+
+use super::Report;
+use super::samples::Samples;
+use crate::progress::Progress;
+use crate::scene::scene::low_parts;
+use crate::scene::{Colors, Scene, Surfel};
+use crate::surfels::neighbours::{Neighbour, NeighbourSearch};
+
+/// K of the thesis.
+const NEIGHBOURS: usize = 10;
+
+/// A point on the way of a growing splat, or a splat by its contribution; equals in the order of points.
+#[derive(PartialEq)]
+struct Next(f64, u32);
+
+impl Eq for Next {}
+
+impl Ord for Next {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.0.total_cmp(&other.0).then(other.1.cmp(&self.1))
+    }
+}
+
+impl PartialOrd for Next {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+/// The graph: the neighbours of each point, and its surface area element, square scaled units.
+struct Graph {
+    neighbours: Vec<[u32; NEIGHBOURS]>,
+    elements: Vec<f64>,
+}
+
+impl Graph {
+    fn new(samples: &Samples) -> Self {
+        let search = NeighbourSearch::new(&samples.positions, NEIGHBOURS);
+        let of = |found: &mut Vec<Neighbour>, index: u32| {
+            search.nearest(index, found);
+            // Of fewer points than that the point itself fills up.
+            let neighbours = std::array::from_fn(|k| found.get(k).map_or(index, |neighbour| neighbour.index));
+            let squared = found.last().map_or(1.0, |last| last.squared_distance);
+            (neighbours, std::f64::consts::PI * squared)
+        };
+        let all = (0..samples.len() as u32).into_par_iter().map_init(Vec::new, of);
+        let (neighbours, elements) = all.unzip();
+        Self { neighbours, elements }
+    }
+}
+
+/// What a thread needs to grow splats one after the other.
+#[derive(Default)]
+struct Growth {
+    /// The splat for which each point was met last, and one more.
+    met: Vec<u32>,
+    front: BinaryHeap<Next>,
+    /// Points that it reached, nearest first, and how far they are, scaled units.
+    reached: Vec<(u32, f64)>,
+}
+
+impl Growth {
+    /// Grows over points that are at most `limit` away and not farther from the plane than `tolerance`; it ends at the first that is.
+    fn grow(&mut self, seed: u32, (samples, graph): (&Samples, &Graph), tolerance: f64, limit: f64) {
+        self.met.resize(samples.len(), 0);
+        self.front.clear();
+        self.reached.clear();
+        let (center, normal) = (samples.positions.position(seed), samples.normals[seed as usize]);
+        self.met[seed as usize] = seed + 1;
+        self.front.push(Next(0.0, seed));
+        while let Some(Next(nearness, point)) = self.front.pop() {
+            let offset = samples.positions.position(point) - center;
+            if offset.dot(normal).abs() > tolerance {
+                break;
+            }
+            self.reached.push((point, -nearness));
+            for &other in &graph.neighbours[point as usize] {
+                let distance = samples.positions.position(other).distance(center);
+                if self.met[other as usize] != seed + 1 && distance <= limit {
+                    self.met[other as usize] = seed + 1;
+                    self.front.push(Next(-distance, other));
+                }
+            }
+        }
+    }
+
+    /// What a selected splat would add, of what is not covered.
+    fn contribution(&self, graph: &Graph, covered: &[bool]) -> f64 {
+        self.reached
+            .iter()
+            .filter(|(point, _)| !covered[*point as usize])
+            .map(|(p, _)| graph.elements[*p as usize])
+            .sum()
+    }
+}
+
+/// What is selected.
+#[derive(Default)]
+struct Selection {
+    /// Points that splats grew from, and their radii, scaled units.
+    splats: Vec<(u32, f64)>,
+    /// The largest distance of a point from a splat that conquers it, along its normal, scaled units.
+    largest: f64,
+    /// The sum of these by surface area elements, and of the elements.
+    sums: [f64; 2],
+}
+
+impl Selection {
+    fn add(&mut self, (seed, radius): (u32, f64), growth: &Growth, (samples, graph): (&Samples, &Graph)) {
+        self.splats.push((seed, radius));
+        for &(point, _) in &growth.reached {
+            let offset = samples.positions.position(point) - samples.positions.position(seed);
+            let (off, element) = (offset.dot(samples.normals[seed as usize]).abs(), graph.elements[point as usize]);
+            self.largest = self.largest.max(off);
+            self.sums = [self.sums[0] + element * off, self.sums[1] + element];
+        }
+    }
+}
+
+/// What the thesis would select of the samples.
+fn select(samples: &Samples, tolerance: f64, ratio: f64, progress: &dyn Progress) -> Selection {
+    let graph = Graph::new(samples);
+    progress.begin("growing splats", samples.len() as u64);
+    let none = vec![false; samples.len()];
+    let grown = |growth: &mut Growth, seed: u32| {
+        growth.grow(seed, (samples, &graph), tolerance, f64::INFINITY);
+        let radius = growth.reached.iter().map(|(_, distance)| *distance).fold(0.0, f64::max);
+        growth.grow(seed, (samples, &graph), tolerance, ratio * radius);
+        progress.advance(1);
+        (radius, growth.contribution(&graph, &none))
+    };
+    let (radii, contributions): (Vec<f64>, Vec<f64>) =
+        (0..samples.len() as u32).into_par_iter().map_init(Growth::default, grown).unzip();
+    progress.end();
+    progress.begin("selecting splats", samples.len() as u64);
+    let mut heap: BinaryHeap<Next> = contributions.into_iter().zip(0..).map(|(q, point)| Next(q, point)).collect();
+    let (mut covered, mut selected, mut growth) = (none, Selection::default(), Growth::default());
+    // Contributions only fall, so the greatest is the one that is still so when it is summed again.
+    while let Some(Next(_, seed)) = heap.pop() {
+        growth.grow(seed, (samples, &graph), tolerance, ratio * radii[seed as usize]);
+        let own = growth.contribution(&graph, &covered);
+        if own == 0.0 {
+            continue;
+        }
+        if heap.peek().is_some_and(|next| Next(own, seed) < *next) {
+            heap.push(Next(own, seed));
+            continue;
+        }
+        selected.add((seed, radii[seed as usize]), &growth, (samples, &graph));
+        for (point, _) in &growth.reached {
+            progress.advance(u64::from(!covered[*point as usize]));
+            covered[*point as usize] = true;
+        }
+    }
+    progress.end();
+    selected
+}
+
+/// The disks that the thesis would select of the surfels of `scene`, each at a surfel and of its colour, within a tolerance in world units;
+/// what they conquer lies within `ratio` of their radii.
+///
+/// # Errors
+///
+/// [`Error::Usage`](crate::Error::Usage) for more than 2^32 - 1 surfels.
+pub fn as_in_the_thesis(
+    scene: &Scene,
+    tolerance: f64,
+    ratio: f64,
+    progress: &dyn Progress,
+) -> crate::Result<(Scene, Report)> {
+    let samples = Samples::new(scene, &[])?;
+    let scale = samples.positions.scale();
+    let Selection { splats: selected, largest, sums: [off, area] } =
+        select(&samples, tolerance * scale, ratio, progress);
+    let disk = |&(point, radius): &(u32, f64)| {
+        // A point alone is as large as its surfel.
+        let radius = if radius > 0.0 { radius } else { samples.radii[point as usize] } / scale;
+        let center = samples.positions.position(point) / scale;
+        Surfel::disk(center.as_vec3(), samples.normals[point as usize].as_vec3(), radius as f32)
+    };
+    let surfels: Vec<Surfel> = selected.iter().map(disk).collect();
+    let low = low_parts(&surfels, |index| samples.positions.position(selected[index].0) / scale);
+    let color = |&(point, _): &(u32, f64)| super::outcome::mean_color(samples.colors[point as usize], 1.0);
+    let colors = match scene.colors {
+        Colors::Constant(color) => Colors::Constant(color),
+        _ => Colors::Linear(selected.iter().map(color).collect()),
+    };
+    let count = selected.len() as u64;
+    let report = Report {
+        surfels: scene.surfels.len() as u64,
+        distinct_positions: samples.len() as u64,
+        selected: count,
+        before_relaxation: count,
+        tolerance,
+        max_deviation: largest / scale,
+        mean_deviation: off / area / scale,
+        beyond_tolerance: 0,
+    };
+    let Scene { origin, encoded, oriented, closed, up, .. } = *scene;
+    Ok((Scene { origin, surfels, low, colors, encoded, oriented, closed, up, ..Scene::default() }, report))
+}

@@ -159,7 +159,7 @@ fn a_broken_kernel_fails_a_hard_case() {
         ("axes_facing.wgsl", "MOST_RADIUS * row", "1.0001 * MOST_RADIUS * row", "points of 0 and 50 pixels"),
         ("resolve_samples.wgsl", "f32(SAMPLES_ACROSS * SAMPLES_DOWN)", "16.001", "16 samples, thin parts"),
         ("resolve.wgsl", "straight.rgb * straight.a", "straight.rgb", "16 samples, thin parts"),
-        ("layers.wgsl", "farthest = max(farthest, ", "farthest = min(farthest, ", "layers closer than epsilon"),
+        ("layers.wgsl", "= max(so_far.farthest, ", "= min(so_far.farthest, ", "layers closer than epsilon"),
         ("layers.wgsl", "if (is_last) {", "if (is_last && false) {", "a tail of most of the weight"),
         (
             "fragments_sort.wgsl",

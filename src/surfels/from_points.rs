@@ -3,8 +3,8 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::caps::caps_of;
 use super::creases::clips;
-use super::curvature::{Around, normals_at};
 use super::estimate::{LONE_RADIUS, NORMAL_NEIGHBOURS, RADIUS_RANGE, fitted_normal};
 use super::gather::{Gathered, gather};
 use super::graph::NeighbourGraph;
@@ -18,7 +18,7 @@ use super::sizes::{
 };
 use super::{Limits, Preparation, guess_up, origin_for, unit, usable_axes};
 use crate::io::Points;
-use crate::scene::{Bounds, Cap, Clip, Surfel, body, framed};
+use crate::scene::{Bounds, Clip, Surfel, body, framed};
 use crate::{Error, Progress, Result};
 
 /// A disk that ends at an edge is larger by this factor, as neither cells nor planes are certain there: of 4.0 million rays at 60,000
@@ -139,21 +139,9 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
     let caps = axes.as_ref().filter(|_| curved);
     let sided = !preparation.has_random_sides();
     let caps = caps.map(|axes| caps_of((&distinct, &graph), (&point_normals, sided), axes));
-    let Points { positions, colors, texture, texture_slopes, .. } = gathered.points;
     let (normals, radii, up) = (Some(point_normals), Some(radii), Some(known_up));
-    let points = Points {
-        positions,
-        normals,
-        radii,
-        axes,
-        clips,
-        caps,
-        colors,
-        texture,
-        texture_slopes,
-        up,
-        ..Points::default()
-    };
+    // Which surfels cover a closed surface nobody knows.
+    let points = Points { normals, radii, axes, clips, caps, up, closed: false, ..gathered.points };
     preparation.limited_by_neighbours = sizes.limited(distinct.of_point());
     let radius = |index: usize| points.radii.as_ref().map_or(0.0, |radii| f64::from(radii[index]));
     preparation.strays = framed(count, |index| (DVec3::from_array(points.positions[index]), radius(index))).1;
@@ -184,7 +172,7 @@ fn prepared(
 }
 
 /// Half-axes s and t of each point.
-type HalfAxes = Vec<[[f32; 3]; 2]>;
+pub(super) type HalfAxes = Vec<[[f32; 3]; 2]>;
 
 /// The lengths of the half-axes s, of which t is not longer.
 fn longer(axes: &HalfAxes) -> Vec<f32> {
@@ -231,43 +219,6 @@ fn cut(
         _ => half_axes(point),
     };
     (Some((0..normals.len()).into_par_iter().map(at_lines).collect()), Some(of_points))
-}
-
-/// The caps of points of these normals, which tell sides if they are `sided`, and half-axes.
-fn caps_of(
-    (distinct, graph): (&DistinctPositions, &NeighbourGraph),
-    (normals, sided): (&[[f32; 3]], bool),
-    axes: &HalfAxes,
-) -> Vec<Cap> {
-    let of_positions = normals_at(distinct, |point| Some(Vec3::from_array(normals[point])));
-    let normal =
-        |position: u32| of_positions[position as usize].map_or(DVec3::ZERO, |n| n.as_dvec3().normalize_or_zero());
-    let around = Around { distinct, graph, normal, sided };
-    axes.par_iter().zip(distinct.of_point()).map(|(axes, &position)| around.cap(position, *axes)).collect()
-}
-
-/// Gives points with half-axes the caps of the surface that their planes touch, whatever normals it is lit by. Points without half-axes
-/// stay as they are.
-///
-/// # Errors
-/// [`Error::Usage`] for more than 2^32 - 1 points.
-pub fn curve(points: Points, progress: &dyn Progress) -> Result<Points> {
-    let Some(axes) = &points.axes else { return Ok(points) };
-    let normals: Vec<[f32; 3]> = axes
-        .par_iter()
-        .map(|axes| {
-            let [s, t] = axes.map(|axis| DVec3::from_array(axis.map(f64::from)));
-            s.cross(t).normalize_or_zero().as_vec3().to_array()
-        })
-        .collect();
-    let bounds = Bounds::of(points.positions.par_iter().map(|position| DVec3::from_array(*position)));
-    let (body, _) = body(points.positions.len(), |index| DVec3::from_array(points.positions[index]));
-    progress.begin("sorting points", 0);
-    let distinct = DistinctPositions::new(&points.positions, &bounds, origin_for(&body))?;
-    progress.end();
-    let graph = NeighbourGraph::new(&distinct, NORMAL_NEIGHBOURS, progress);
-    let caps = caps_of((&distinct, &graph), (&normals, true), axes);
-    Ok(Points { caps: Some(caps), ..points })
 }
 
 /// Turns the `normals` of positions to one side; the connected parts of the surface, if they were looked for.

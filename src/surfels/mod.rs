@@ -2,6 +2,7 @@
 
 pub mod analytic;
 mod build;
+mod caps;
 mod colors;
 mod coverage;
 mod creases;
@@ -38,9 +39,10 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 pub use self::build::{Coordinates, build, build_at_vertices, build_textured, build_within};
+pub use self::caps::curve;
 pub use self::coverage::{Coverage, coverage};
 pub use self::facing::build_facing;
-pub use self::from_points::{FromPoints, Surfels, curve, from_points};
+pub use self::from_points::{FromPoints, Surfels, from_points};
 pub use self::limits::Limits;
 pub use self::orient::Orientation;
 pub use self::preparation::Preparation;

@@ -257,6 +257,7 @@ fn unmapped(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu) 
             normal: [0, 1, 2].map(normal),
             place: [0.0; 4],
             depth: weight * front + common::depth_span(&device.view, front) * sum(device.sums.pixel.depth_channel),
+            depth_weight: weight,
             count: device.sums.count(pixel).unwrap() as u32,
             decision: 0.0,
             ..PixelSums::ZERO

@@ -397,6 +397,7 @@ fn the_channels_of_a_pixel_do_not_overlap() {
             (COLOR_CHANNEL, color_channels(&needs)),
             (pixel.normal_channel, of(needs.normal, 3)),
             (pixel.depth_channel, of(needs.sums_depth(), 1)),
+            (pixel.middles_channel, of(needs.compares_depth(), 1)),
             (pixel.count_channel, of(needs.maps.has(Map::Count), 1)),
             (pixel.held_back_channel, of(needs.oit.is_some(), 1)),
             (pixel.place_channel, of(needs.color == ColorNeed::Textured, 4)),

@@ -12,6 +12,11 @@ fn quantise(weight: f32) -> Term {
     return weight;
 }
 
+// The weight of its term.
+fn part_of(weight: Term) -> f32 {
+    return weight;
+}
+
 fn term(weight: Term, value: f32) -> Term {
     return weight * clamp(value, 0.0, 1.0);
 }

@@ -23,6 +23,11 @@ fn quantise(weight: f32) -> Term {
     return u32(round(weight * one()));
 }
 
+// The weight of its term.
+fn part_of(weight: Term) -> f32 {
+    return f32(weight) / one();
+}
+
 // The weight came from an f32, so it has at most 24 significant bits and is exact as f32.
 fn term(weight: Term, value: f32) -> Term {
     return u32(round(f32(weight) * clamp(value, 0.0, 1.0)));

@@ -22,6 +22,11 @@ fn quantise(weight: f32) -> Term {
     return u32(round(weight * one()));
 }
 
+// The weight of its term.
+fn part_of(weight: Term) -> f32 {
+    return f32(weight) / one();
+}
+
 fn term(weight: Term, value: f32) -> Term {
     return u32(round(f32(weight) * clamp(value, 0.0, 1.0)));
 }

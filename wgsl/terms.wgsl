@@ -10,6 +10,11 @@ fn quantise(weight: f32) -> Term {
     return u32(round(weight * ONE));
 }
 
+// The weight of its term.
+fn part_of(weight: Term) -> f32 {
+    return f32(weight) / ONE;
+}
+
 // A term's low and high word.
 fn term_words(value: Term) -> vec2<u32> {
     return vec2<u32>(value, 0u);

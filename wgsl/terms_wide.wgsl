@@ -9,6 +9,11 @@ const COUNT_ONE: Term = 1.0;
 // The units of a weight of 1, a power of two.
 override ONE: f32;
 
+// The weight of its term.
+fn part_of(weight: Term) -> f32 {
+    return weight / ONE;
+}
+
 const WORD: f32 = 4294967296.0;
 
 fn quantise(weight: f32) -> Term {

@@ -32,6 +32,7 @@
 
 use super::attributes;
 use super::footprint::footprint;
+use super::join;
 use super::splat::{Intersection, Splat};
 use super::visibility::Nearest;
 use crate::gpu::layout::TILE;
@@ -119,8 +120,10 @@ pub struct PixelSums {
     pub normal: [f64; 3],
     /// The side that is seen is the back.
     pub back: bool,
-    /// Of the depth.
+    /// Of the depth, and of the weights that it is summed by.
     pub depth: f64,
+    /// Weights, or where surfaces are told apart by their depths, their squares.
+    pub depth_weight: f64,
     /// The depth of the nearest fragment; of lists alone.
     pub nearest: f64,
     /// Of [`Textured::terms`](crate::scene::Textured::terms), places in a texture.
@@ -141,6 +144,7 @@ impl PixelSums {
         normal: [0.0; 3],
         back: false,
         depth: 0.0,
+        depth_weight: 0.0,
         nearest: f64::INFINITY,
         place: [0.0; 4],
         held_back: 0.0,
@@ -148,6 +152,10 @@ impl PixelSums {
         decision: f64::INFINITY,
     };
 }
+
+/// The least part of its weight that a fragment has in a depth that surfaces are told apart by, where it is its weight's square: no pixel
+/// is without any.
+pub const LEAST_MIDDLE: f64 = 1.0 / 256.0;
 
 /// How far outside a decision a fragment is still looked at to record its distance, relative.
 const NEARBY: f64 = 1e-3;
@@ -164,6 +172,7 @@ pub fn reference<'a>(
     let width = camera.width as usize;
     let rows = (nearest.len() / width) as u32;
     let mut sums = vec![PixelSums::ZERO; nearest.len()];
+    let compares_depth = join::compares_depth(scene, options);
     for splat in splats {
         let surfel = &scene.surfels[splat.surfel as usize];
         let center = scene.origin + scene.center(splat.surfel as usize);
@@ -187,7 +196,8 @@ pub fn reference<'a>(
                     continue;
                 }
                 sum.back = front.back;
-                let weight = times * (gain * options.kernel.weight(at.rho2)).max(LEAST_WEIGHT);
+                let once = (gain * options.kernel.weight(at.rho2)).max(LEAST_WEIGHT);
+                let weight = times * once;
                 sum.weight += weight;
                 for (total, value) in sum.color.iter_mut().zip(color) {
                     *total += weight * value;
@@ -203,7 +213,9 @@ pub fn reference<'a>(
                 for (total, value) in sum.normal.iter_mut().zip(splat.normal_at(&at).to_array()) {
                     *total += weight * value;
                 }
-                sum.depth += weight * at.depth;
+                let depth_weight = if compares_depth { weight * once.max(LEAST_MIDDLE) } else { weight };
+                sum.depth += depth_weight * at.depth;
+                sum.depth_weight += depth_weight;
                 sum.count += splat.copies;
             }
         }

@@ -20,6 +20,7 @@ pub const PASS: Pass = Pass {
             // Of one fragment nothing is summed.
             match needs.sums_depth() && needs.winner.is_none() {
                 false => "depth_absent.wgsl",
+                true if needs.compares_depth() => "depth_middles.wgsl",
                 true => pick(whole, "depth_whole.wgsl", "depth.wgsl"),
             },
             pick(needs.maps.has(Map::Depth), "depth_map.wgsl", "depth_map_absent.wgsl"),
@@ -53,6 +54,7 @@ pub const PASS: Pass = Pass {
             ("TURNS", u32::from(making.needs.sides != Sides::Both).into()),
             ("NORMAL_CHANNEL", layout.normal_channel.into()),
             ("DEPTH_CHANNEL", layout.depth_channel.into()),
+            ("MIDDLES_CHANNEL", layout.middles_channel.into()),
             ("COUNT_CHANNEL", layout.count_channel.into()),
             ("PLACE_CHANNEL", layout.place_channel.into()),
             ("HELD_BACK_CHANNEL", layout.held_back_channel.into()),

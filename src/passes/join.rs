@@ -10,7 +10,7 @@ use super::triangles::Shown;
 use super::visibility::Nearest;
 use crate::plan::RenderOptions;
 use crate::plan::pass::Pass;
-use crate::scene::Join;
+use crate::scene::{Join, Scene};
 
 /// What triangles show in the rows of a strip, and what of its splats they are joined by.
 #[derive(Clone, Copy, Debug, Default)]
@@ -62,6 +62,11 @@ pub(super) fn joined(
     }
 }
 
+/// Whether the depth that a scene's splats blend to decides what shows.
+pub(super) fn compares_depth(scene: &Scene, options: &RenderOptions) -> bool {
+    !scene.triangles.is_empty() && options.join != Join::Nearest
+}
+
 /// The part of the pixel that splats have beside a triangle, and its relative distance to a decision.
 fn share_of_splats(
     sums: &PixelSums,
@@ -74,7 +79,7 @@ fn share_of_splats(
         (true, false) => return (1.0, f64::INFINITY),
         (true, true) => {}
     }
-    let depth = sums.depth / sums.weight;
+    let depth = sums.depth / sums.depth_weight;
     let epsilon = options.epsilon.farthest(nearest, beside.largest_shorter, 1.0).min(beside.farthest) - nearest;
     let nearer = |depth: f64| (f64::from(u8::from(depth < triangle.depth)), (depth / triangle.depth - 1.0).abs());
     match options.join {

@@ -96,6 +96,7 @@ pub fn reference(strip: &Strip<'_>) -> Vec<PixelSums> {
     visit(strip, near, |f| {
         let (sum, weight) = (&mut sums[f.pixel], f.weight * before(&f));
         sum.weight += weight;
+        sum.depth_weight += weight;
         sum.color.iter_mut().zip(f.color).for_each(|(total, value)| *total += weight * value);
         sum.held_back += held_back(f.alpha(options));
         sum.count += 1;

@@ -35,7 +35,7 @@ pub fn reference(
                 Colors::Textured(textured) => textured.place_at(sum.place.map(|total| total / weight)),
                 _ => [0.0; 2],
             };
-            Surface { color, normal, place, depth: sum.depth / weight, weight, count, decision: sum.decision }
+            Surface { color, normal, place, depth: sum.depth / sum.depth_weight, weight, count, decision: sum.decision }
         });
         let surface = match triangles.get(pixel) {
             None => of_splats,

@@ -94,7 +94,7 @@ pub fn reference<'a>(
         let Some(best) = best else { continue };
         let [r, g, b, alpha] = scene.colors.linear(best.surfel).map(f64::from);
         let color = [r * alpha, g * alpha, b * alpha, alpha];
-        *sum = PixelSums { weight: 1.0, color, depth: best.depth, count: 1, ..*sum };
+        *sum = PixelSums { weight: 1.0, color, depth: best.depth, depth_weight: 1.0, count: 1, ..*sum };
     }
     sums
 }

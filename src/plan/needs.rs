@@ -335,10 +335,14 @@ impl SceneNeeds {
         self.raster.is_none() && self.winner.is_none() && self.lists.is_none()
     }
 
+    /// Surfaces are told apart by the depth that they blend to.
+    pub fn compares_depth(&self) -> bool {
+        self.mesh.is_some_and(|mesh| mesh.join != Join::Nearest)
+    }
+
     /// Depths are summed.
     pub fn sums_depth(&self) -> bool {
-        let compared = self.mesh.is_some_and(|mesh| mesh.join != Join::Nearest);
-        compared || [Map::Depth, Map::Surfaces, Map::TexZ].into_iter().any(|map| self.maps.has(map))
+        self.compares_depth() || [Map::Depth, Map::Surfaces, Map::TexZ].into_iter().any(|map| self.maps.has(map))
     }
 
     /// Fragments have weights: they are summed, or they are the rasteriser's, whose targets hold terms even of one fragment.

@@ -12,6 +12,8 @@ pub struct PixelLayout {
     pub normal_channel: u32,
     /// The depth's channel.
     pub depth_channel: u32,
+    /// The channel of the weights of depths, where they are others than those of all else.
+    pub middles_channel: u32,
     /// The fragment count's channel.
     pub count_channel: u32,
     /// The channel of what is held back, where that is summed ([`oit`](crate::passes::oit)).
@@ -37,7 +39,8 @@ impl PixelLayout {
         // The normal's x and y are a pair, and pairs start at even channels.
         let normal_channel = (COLOR_CHANNEL + color_channels(needs)).next_multiple_of(2);
         let depth_channel = normal_channel + channels(needs.normal, 3);
-        let count_channel = depth_channel + channels(needs.sums_depth(), 1);
+        let middles_channel = depth_channel + channels(needs.sums_depth(), 1);
+        let count_channel = middles_channel + channels(needs.compares_depth(), 1);
         let held_back_channel = count_channel + channels(needs.maps.has(Map::Count), 1);
         let place_channel = (held_back_channel + channels(needs.oit.is_some(), 1)).next_multiple_of(2);
         let mut image_words = COLOR_WORDS;
@@ -50,6 +53,7 @@ impl PixelLayout {
             channels: place_channel + channels(needs.color == ColorNeed::Textured, 4),
             normal_channel,
             depth_channel,
+            middles_channel,
             count_channel,
             held_back_channel,
             place_channel,

@@ -170,7 +170,8 @@ fn resolve_matches_its_twin_on_the_devices_own_sums() {
             let device = frame(&scene, &camera, &options, &backend);
             let sums = unmapped(&scene, &camera, &options, gpu);
             let mut twin = Frame::new(&camera, Maps::ON_DEVICE);
-            resolve::reference(&sums, &Beside::default(), &scene, &camera, &options, 0, &mut twin);
+            let surfaces = resolve::surfaces(&sums, &[], (&scene, &camera, &options), 0);
+            resolve::reference(&surfaces, &Beside::default(), &options, &mut twin);
             // Of the largest colour; of one; of the depth; of the weight.
             let largest = scene.color_range().1.map(f64::from).into_iter().fold(1.0, f64::max);
             for (pixel, sum) in sums.iter().enumerate() {

@@ -1,5 +1,7 @@
 fn accumulate_count(pixel: u32, weight: Term) {}
 
-fn write_one(out: u32) {}
+fn count_of(pixel: u32) -> f32 {
+    return 0.0;
+}
 
-fn write_count(out: u32, pixel: u32) {}
+fn write_count(out: u32, count: f32) {}

@@ -4,13 +4,13 @@
 @group(0) @binding(62) var<storage, read> beside: array<vec4<f32>>;
 
 // The nearer of the two, or of one depth the triangle.
-fn joined(splats: Surface, pixel: u32, front: f32) -> Surface {
+fn joined(splats: Surface, pixel: u32) -> Surface {
     let placed = beside[2u * pixel + 1u];
-    let share = share_of_splats(splats, placed.w, front);
+    let share = share_of_splats(splats, placed.w);
     if (placed.w == 0.0 || share == 1.0) {
         return splats;
     }
-    let of_triangle = Surface(beside[2u * pixel], placed.xyz, placed.w, 1.0, true, true);
+    let of_triangle = Surface(beside[2u * pixel], placed.xyz, placed.w, 1.0, 1.0, vec2<f32>(0.0), placed.w, true);
     if (share == 0.0) {
         return of_triangle;
     }
@@ -26,7 +26,9 @@ fn mean_of(splats: Surface, triangle: Surface, share: f32) -> Surface {
         normal * inverseSqrt(max(dot(normal, normal), 1e-12)),
         mix(triangle.depth, splats.depth, share),
         splats.weight,
+        splats.count,
+        splats.place,
+        splats.front,
         true,
-        false,
     );
 }

@@ -1,8 +1,8 @@
 // Where splats and triangles lie within epsilon of each other they are blended, the nearer with the greater part (after Guennebaud, Barthe and
 // Paulin 2006, who smooth the seam so). Same interface as join_nearest.wgsl.
 
-fn share_of_splats(splats: Surface, triangle: f32, front: f32) -> f32 {
-    let epsilon = deepest_accepted(front) - front;
+fn share_of_splats(splats: Surface, triangle: f32) -> f32 {
+    let epsilon = deepest_accepted(splats.front) - splats.front;
     let share = clamp(0.5 + (triangle - splats.depth) / (2.0 * epsilon), 0.0, 1.0);
     return select(0.0, select(share, 1.0, triangle == 0.0), splats.exists);
 }

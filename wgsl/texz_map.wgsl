@@ -1,11 +1,11 @@
 override TEXZ_IMAGE: u32;
 
-// Of no surfel where the weight is 0. The depth in device units.
-fn write_texz(out: u32, sums_of: u32, weight: f32, depth: f32) {
-    var place = vec2<f32>(0.0);
-    if (weight > 0.0) {
-        place = mean_place(sums_of, weight);
-    }
+fn place_of_sums(sums_of: u32, weight: f32) -> vec2<f32> {
+    return mean_place(sums_of, weight);
+}
+
+// The depth in device units.
+fn write_texz(out: u32, place: vec2<f32>, depth: f32) {
     image[out + TEXZ_IMAGE] = place.x;
     image[out + TEXZ_IMAGE + 1u] = place.y;
     image[out + TEXZ_IMAGE + 2u] = depth * held.world;

@@ -67,6 +67,9 @@ pub struct Config {
     /// What shows where splats and triangles meet.
     #[serde(default, deserialize_with = "parsed")]
     pub join: Option<Join>,
+    /// Inputs are kept apart.
+    #[serde(default)]
+    pub separate: bool,
     /// The rasteriser's targets.
     #[serde(default, deserialize_with = "parsed")]
     pub blend_format: Option<BlendFormat>,
@@ -112,6 +115,7 @@ impl Config {
             opacity: self.opacity.unwrap_or(default.opacity),
             tail: self.tail.unwrap_or_default(),
             join: self.join.unwrap_or_default(),
+            separate: self.separate,
             kernel: self.kernel.unwrap_or(default.kernel),
             low_pass: self.lowpass.unwrap_or(default.low_pass),
             accumulator: self.accumulator().unwrap_or_default(),

@@ -61,6 +61,10 @@ pub struct Arguments {
     /// one, surfels by their nearest fragment, as a depth buffer has it) or blended (both, within epsilon) [default: corrected]
     #[arg(long, value_name = "HOW", help_heading = "Triangles")]
     join: Option<Join>,
+    /// Keep the inputs apart: surfels of different files do not blend, however near they are, and where they meet the nearer one shows, by
+    /// the depth that it blends to
+    #[arg(long)]
+    separate: bool,
     #[command(flatten)]
     reading: Reading,
     #[command(flatten)]

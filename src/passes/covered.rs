@@ -34,9 +34,14 @@ pub fn start(plan: &Plan, band: usize) -> u64 {
     if plan.needs.raster.is_some() { 0 } else { band.pixels + band.tiles }
 }
 
+/// The head of the list, cleared: nothing is in it.
+pub fn restart(plan: &Plan, band: usize) -> Clear {
+    Clear::of("nearest", start(plan, band), COVERED_LIST.into())
+}
+
 /// What is cleared before the list is made: its head, and the image, of which covered tiles alone are written.
 pub fn clears(plan: &Plan, band: usize) -> Vec<Clear> {
-    let mut clears = vec![Clear::of("nearest", start(plan, band), COVERED_LIST.into())];
+    let mut clears = vec![restart(plan, band)];
     if !plan.lists_empty || super::asks_for_order(&plan.needs) {
         let words = plan.image_pixels(band) * u64::from(plan.pixel.image_words);
         clears.push(Clear::of("image", 0, words));
@@ -44,7 +49,10 @@ pub fn clears(plan: &Plan, band: usize) -> Vec<Clear> {
     clears
 }
 
-/// What makes the list.
-pub fn runs() -> [Run; 2] {
-    [Run { kernel: LIST, over: Over::Occlusion }, Run { kernel: ARRANGE, over: Over::Once }]
+/// What lists the tiles in which a nearest depth is.
+pub const LISTS: Run = Run { kernel: LIST, over: Over::Occlusion };
+
+/// What makes the list, by what `lists` its tiles.
+pub fn runs(lists: Run) -> [Run; 2] {
+    [lists, Run { kernel: ARRANGE, over: Over::Once }]
 }

@@ -4,10 +4,8 @@
 //! Splats are a surface by themselves before: nearest depths and sums see no triangle, else a splat's fragments just behind one would be
 //! left out of a mean that those just before it are in.
 
-use super::accumulate::PixelSums;
 use super::resolve::Surface;
 use super::triangles::Shown;
-use super::visibility::Nearest;
 use crate::plan::RenderOptions;
 use crate::plan::pass::Pass;
 use crate::scene::{Join, Scene};
@@ -15,8 +13,6 @@ use crate::scene::{Join, Scene};
 /// What triangles show in the rows of a strip, and what of its splats they are joined by.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Beside<'a> {
-    /// What is nearest of the splats at each pixel.
-    pub nearest: &'a [Nearest],
     /// What triangles show there; empty if there are none.
     pub triangles: &'a [Shown],
     /// [`Scene::largest_shorter`](crate::scene::Scene::largest_shorter), world units.
@@ -25,61 +21,54 @@ pub struct Beside<'a> {
     pub farthest: f64,
 }
 
-/// The twin: what shows of a pixel's splats, their sums and what those show, and of its triangle, with the splats' nearest depth there.
-pub(super) fn joined(
-    (sums, splats): (&PixelSums, Option<Surface>),
-    triangle: &Shown,
-    (nearest, beside): (f64, &Beside<'_>),
-    options: &RenderOptions,
-) -> Option<Surface> {
-    let (share, order) = share_of_splats(sums, triangle, (nearest, beside), options);
-    let decision = sums.decision.min(triangle.decision).min(order);
-    let of_triangle = triangle.depth.is_finite().then_some(Surface {
+/// The twin: what shows of a pixel's splats and of its triangle.
+pub(super) fn joined(splats: &Surface, triangle: &Shown, beside: &Beside<'_>, options: &RenderOptions) -> Surface {
+    let (share, order) = share_of_splats(splats, triangle, beside, options);
+    let decision = splats.decision.min(triangle.decision).min(order);
+    if !triangle.depth.is_finite() || share == 1.0 {
+        return Surface { decision, ..*splats };
+    }
+    let of_triangle = Surface {
         color: triangle.color,
         normal: triangle.normal,
         place: [0.0; 2],
         depth: triangle.depth,
+        front: triangle.depth,
         weight: 1.0,
         count: 1,
         decision,
-    });
-    match (splats, of_triangle) {
-        (Some(splats), Some(_)) if share == 1.0 => Some(Surface { decision, ..splats }),
-        (Some(splats), None) => Some(Surface { decision, ..splats }),
-        (Some(splats), Some(of_triangle)) if share > 0.0 => {
-            let mix = |triangle: f64, splats: f64| triangle + share * (splats - triangle);
-            let alpha = mix(of_triangle.color[3], splats.color[3]);
-            let premultiplied = |surface: &Surface, k: usize| surface.color[k] * surface.color[3];
-            let straight = |k: usize| {
-                let mixed = mix(premultiplied(&of_triangle, k), premultiplied(&splats, k));
-                if alpha > 0.0 { mixed / alpha } else { 0.0 }
-            };
-            let normal = of_triangle.normal.lerp(splats.normal, share).normalize_or_zero();
-            let color = [straight(0), straight(1), straight(2), alpha];
-            Some(Surface { color, normal, depth: mix(of_triangle.depth, splats.depth), decision, ..splats })
-        }
-        (_, of_triangle) => of_triangle,
-    }
+    };
+    if share > 0.0 { mean(&of_triangle, splats, share) } else { of_triangle }
+}
+
+/// The mean of a triangle and of splats, which have a `share` of it.
+fn mean(triangle: &Surface, splats: &Surface, share: f64) -> Surface {
+    let mix = |triangle: f64, splats: f64| triangle + share * (splats - triangle);
+    let alpha = mix(triangle.color[3], splats.color[3]);
+    let premultiplied = |surface: &Surface, k: usize| surface.color[k] * surface.color[3];
+    let straight = |k: usize| {
+        let mixed = mix(premultiplied(triangle, k), premultiplied(splats, k));
+        if alpha > 0.0 { mixed / alpha } else { 0.0 }
+    };
+    let normal = triangle.normal.lerp(splats.normal, share).normalize_or_zero();
+    let color = [straight(0), straight(1), straight(2), alpha];
+    Surface { color, normal, depth: mix(triangle.depth, splats.depth), decision: triangle.decision, ..*splats }
 }
 
 /// Whether the depth that a scene's splats blend to decides what shows.
 pub(super) fn compares_depth(scene: &Scene, options: &RenderOptions) -> bool {
-    !scene.triangles.is_empty() && options.join != Join::Nearest
+    let apart = options.separate && scene.provenance.ranges(scene.surfels.len() as u64).nth(1).is_some();
+    apart || (!scene.triangles.is_empty() && options.join != Join::Nearest)
 }
 
 /// The part of the pixel that splats have beside a triangle, and its relative distance to a decision.
-fn share_of_splats(
-    sums: &PixelSums,
-    triangle: &Shown,
-    (nearest, beside): (f64, &Beside<'_>),
-    options: &RenderOptions,
-) -> (f64, f64) {
-    match (sums.weight > 0.0, triangle.depth.is_finite()) {
+fn share_of_splats(splats: &Surface, triangle: &Shown, beside: &Beside<'_>, options: &RenderOptions) -> (f64, f64) {
+    match (splats.exists(), triangle.depth.is_finite()) {
         (false, _) => return (0.0, f64::INFINITY),
         (true, false) => return (1.0, f64::INFINITY),
         (true, true) => {}
     }
-    let depth = sums.depth / sums.depth_weight;
+    let (depth, nearest) = (splats.depth, splats.front);
     let epsilon = options.epsilon.farthest(nearest, beside.largest_shorter, 1.0).min(beside.farthest) - nearest;
     let nearer = |depth: f64| (f64::from(u8::from(depth < triangle.depth)), (depth / triangle.depth - 1.0).abs());
     match options.join {

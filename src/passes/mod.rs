@@ -14,6 +14,7 @@
 //! | [`tiles`] | large splats, or all | the same two, or the image |
 //! | [`moments`] | splats | what those of a pixel hold back, by depth |
 //! | [`oit`] | splats | [`accumulate::PixelSums`] of all of them |
+//! | [`individuals`] | sums of an input that is kept apart | what shows of it and of those before |
 //! | [`triangles`] | triangles | what the nearest shows of each pixel |
 //! | [`covered`] | nearest depths | the tiles that have anything |
 //! | [`resolve`], [`join`] | sums, what triangles show | [`Frame`] |
@@ -34,6 +35,7 @@ pub mod footprint;
 pub mod fragments;
 pub mod homography;
 pub mod index;
+pub mod individuals;
 pub mod join;
 pub mod layers;
 pub mod lit;
@@ -154,7 +156,7 @@ pub fn finish(frame: &mut Frame, needs: &SceneNeeds, provenance: &Provenance, or
 }
 
 /// The passes whose files every module has.
-const PASSES: [&Pass; 23] = [
+const PASSES: [&Pass; 24] = [
     &shared::PASS,
     &project::PASS,
     &facing::PASS,
@@ -174,6 +176,7 @@ const PASSES: [&Pass; 23] = [
     &triangles::PASS,
     &resolve::PASS,
     &join::PASS,
+    &individuals::PASS,
     &layers::PASS,
     &sorted::PASS,
     &peel::PASS,

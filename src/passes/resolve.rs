@@ -5,7 +5,8 @@ use rayon::prelude::*;
 
 use super::accumulate::PixelSums;
 use super::join::Beside;
-use super::{covered, join, long_lists};
+use super::visibility::Nearest;
+use super::{covered, individuals, join, long_lists};
 use crate::frame::Frame;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Kernel, Over, Run, Stage, Twin};
@@ -14,43 +15,41 @@ use crate::scene::maps::SURFACES;
 use crate::scene::options::HIGHLIGHT;
 use crate::scene::{Camera, Colors, Light, MAPS, Map, Samples, Scene, Shading};
 
-/// The twin: resolves `sums`, which start at row `first_row` of the image, into `frame`, which holds just their rows. Triangles show
-/// beside them if there are any, and then what is nearest of the splats is known too.
-pub fn reference(
+/// The twin: what the splats of each pixel show, by their `sums`, which start at row `first_row` of the image, and what is `nearest` of them,
+/// where that is known.
+pub fn surfaces(
     sums: &[PixelSums],
-    beside: &Beside<'_>,
-    scene: &Scene,
-    camera: &Camera,
-    options: &RenderOptions,
+    nearest: &[Nearest],
+    (scene, camera, options): (&Scene, &Camera, &RenderOptions),
     first_row: u32,
-    frame: &mut Frame,
-) {
-    let Beside { nearest, triangles, .. } = *beside;
-    for (pixel, sum) in sums.iter().enumerate() {
-        let (x, y) = (pixel as u32 % camera.width, pixel as u32 / camera.width + first_row);
-        let of_splats = (sum.weight > 0.0).then(|| {
-            let (color, normal) = surface(sum, scene, camera, options, (x, y));
-            let (weight, count) = (sum.weight, sum.count);
-            let place = match &scene.colors {
-                Colors::Textured(textured) => textured.place_at(sum.place.map(|total| total / weight)),
-                _ => [0.0; 2],
-            };
-            Surface { color, normal, place, depth: sum.depth / sum.depth_weight, weight, count, decision: sum.decision }
-        });
-        let surface = match triangles.get(pixel) {
-            None => of_splats,
-            Some(triangle) => {
-                let nearest = nearest.get(pixel).map_or(f64::INFINITY, |nearest| nearest.depth);
-                join::joined((sum, of_splats), triangle, (nearest, beside), options)
-            }
+) -> Vec<Surface> {
+    let of = |(pixel, sum): (usize, &PixelSums)| {
+        let (weight, count, decision) = (sum.weight, sum.count, sum.decision);
+        if weight == 0.0 {
+            return Surface { decision, ..Surface::NOTHING };
+        }
+        let at = (pixel as u32 % camera.width, pixel as u32 / camera.width + first_row);
+        let (color, normal) = surface(sum, scene, camera, options, at);
+        let place = match &scene.colors {
+            Colors::Textured(textured) => textured.place_at(sum.place.map(|total| total / weight)),
+            _ => [0.0; 2],
+        };
+        let (depth, front) = (sum.depth / sum.depth_weight, nearest.get(pixel).map_or(f64::INFINITY, |n| n.depth));
+        Surface { color, normal, place, depth, front, weight, count, decision }
+    };
+    sums.iter().enumerate().map(of).collect()
+}
+
+/// The twin: `surfaces`, and triangles beside them if there are any, into `frame`, which holds just their rows.
+pub fn reference(surfaces: &[Surface], beside: &Beside<'_>, options: &RenderOptions, frame: &mut Frame) {
+    for (pixel, of_splats) in surfaces.iter().enumerate() {
+        let surface = match beside.triangles.get(pixel) {
+            None => *of_splats,
+            Some(triangle) => join::joined(of_splats, triangle, beside, options),
         };
         let background = options.background.map(f64::from);
-        let nothing = Surface {
-            decision: sum.decision.min(triangles.get(pixel).map_or(f64::INFINITY, |t| t.decision)),
-            ..Surface::NOTHING
-        };
-        let Surface { color, normal, place: [u, v], depth, weight, count, decision } = surface.unwrap_or(nothing);
-        let shown = if surface.is_some() { over(color, background) } else { background };
+        let Surface { color, normal, place: [u, v], depth, weight, count, decision, .. } = surface;
+        let shown = if surface.exists() { over(color, background) } else { background };
         frame.color[pixel] = shown.map(|c| c as f32);
         set(frame, pixel, Map::Depth, &[depth]);
         set(frame, pixel, Map::Normal, &normal.to_array());
@@ -59,13 +58,13 @@ pub fn reference(
         set(frame, pixel, Map::Count, &[f64::from(count)]);
         set(frame, pixel, Map::Decision, &[decision]);
         set(frame, pixel, Map::Transmittance, &[1.0 - color[3]]);
-        set(frame, pixel, Map::Layers, &[f64::from(u8::from(surface.is_some()))]);
+        set(frame, pixel, Map::Layers, &[f64::from(u8::from(surface.exists()))]);
     }
 }
 
 /// What a pixel shows of one surface.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Surface {
+pub struct Surface {
     /// Straight, lit.
     pub color: [f64; 4],
     /// World space, unit.
@@ -74,6 +73,8 @@ pub(super) struct Surface {
     pub place: [f64; 2],
     /// Camera-space z, world units.
     pub depth: f64,
+    /// That of the nearest fragment.
+    pub front: f64,
     /// Summed; 1 of a triangle.
     pub weight: f64,
     /// Fragments; 1 of a triangle.
@@ -89,10 +90,16 @@ impl Surface {
         normal: DVec3::ZERO,
         place: [0.0; 2],
         depth: f64::INFINITY,
+        front: f64::INFINITY,
         weight: 0.0,
         count: 0,
         decision: f64::INFINITY,
     };
+
+    /// Whether it is one.
+    pub fn exists(&self) -> bool {
+        self.weight > 0.0
+    }
 }
 
 /// Sets a pixel of a map, if the frame has that.
@@ -260,7 +267,8 @@ const RESOLVE: Kernel = Kernel::new("resolve");
 
 /// The pass over the tiles that anything covers.
 pub fn steps(plan: &Plan, band: usize) -> Stage {
-    let mut runs = covered::runs().to_vec();
+    let lists = if plan.needs.separate { individuals::LISTS } else { covered::LISTS };
+    let mut runs = covered::runs(lists).to_vec();
     runs.extend(long_lists::composites(plan));
     runs.push(Run { kernel: RESOLVE, over: Over::Covered });
     let twin = match plan.needs.lists {

@@ -107,7 +107,13 @@ impl Source for Scene {
             indices: indices.into(),
             copies: copies.clone(),
         };
-        order.chunks(most).map(|indices| Box::new(page(indices)) as Box<dyn Page>).collect()
+        let of = |indices: &[u32]| Box::new(page(indices)) as Box<dyn Page>;
+        if !needs.separate {
+            return order.chunks(most).map(of).collect();
+        }
+        let own = self.provenance.ranges(self.surfels.len() as u64);
+        let individual = own.map(|own| order.iter().copied().filter(|&index| own.contains(&index.into())).collect());
+        individual.flat_map(|indices: Vec<u32>| indices.chunks(most).map(of).collect::<Vec<_>>()).collect()
     }
 
     fn texture(&self) -> Option<&Texture> {

@@ -150,7 +150,7 @@ pub fn accumulate(plan: &Plan, band: usize) -> Vec<Stage> {
 
 /// The attribute pass of all splats, which are of one page, and what becomes of the sums.
 pub fn resolve(plan: &Plan, band: usize) -> Vec<Stage> {
-    let mut runs = covered::runs().to_vec();
+    let mut runs = covered::runs(covered::LISTS).to_vec();
     runs.push(Run { kernel: RESOLVE, over: Over::CoveredEights });
     let stage = Stage::new("accumulate", band, runs).after(covered::clears(plan, band));
     vec![bin(plan, Listed::Small, (band, 0), true, true), stage]

@@ -48,6 +48,9 @@ pub fn options(options: &RenderOptions, reference: bool) -> Result<()> {
         composite(options, reference)?;
     }
     let cut = matches!(options.composite, Composite::Layers(most) if most < ALL_LAYERS);
+    if options.separate {
+        separate(options, reference)?;
+    }
     if options.maps.has(Map::Tail) && !(cut && options.tail == Tail::Sum) {
         return usage("a tail lies behind a last layer: take the map tail with --composite layers:L, and --tail sum");
     }
@@ -262,6 +265,9 @@ pub fn scene(facts: &Facts, options: &RenderOptions, reference: bool) -> Result<
     if facts.mesh.triangles > 0 {
         triangles(options, reference)?;
     }
+    if options.separate && facts.encoded {
+        return usage("Gaussians are sorted and not blended with each other: leave --separate out");
+    }
     if facts.encoded && options.shading != Shading::Unlit {
         return usage("Gaussians have the colours that pictures of them show, light and all: take --shading unlit");
     }
@@ -285,6 +291,29 @@ pub fn scene(facts: &Facts, options: &RenderOptions, reference: bool) -> Result<
             usage("the map texz holds texture coordinates of painted surfels: paint them by --texture, or leave it out")
         }
         false => Ok(()),
+    }
+}
+
+/// Inputs are kept apart by what each blends to.
+fn separate(options: &RenderOptions, reference: bool) -> Result<()> {
+    match options {
+        _ if options.blend == Blend::Nearest => {
+            usage("--blend nearest blends nothing, and so keeps all inputs apart: leave --separate out")
+        }
+        _ if options.composite != Composite::Opaque => {
+            usage("inputs are kept apart on the nearest surface alone: leave --composite or --separate out")
+        }
+        _ if options.maps.has(Map::Index) => {
+            usage("the map index names the strongest point of all inputs: leave it out, or --separate")
+        }
+        _ if reference => Ok(()),
+        RenderOptions { raster: Some(_), .. } => {
+            usage("the rasteriser blends all splats: leave --separate out, or render by compute")
+        }
+        _ if options.organisation == Organisation::Tile => {
+            usage("tiles blend all splats: leave the organisation out with --separate")
+        }
+        _ => Ok(()),
     }
 }
 

@@ -31,6 +31,8 @@ pub struct Facts {
     pub origin: DVec3,
     /// Its surfels.
     pub surfels: u64,
+    /// The surfels of each of its inputs that has some ([`Scene::provenance`]), in their order.
+    pub individuals: Vec<u64>,
     /// Its triangles.
     pub mesh: MeshFacts,
     /// [`Scene::bounds`].
@@ -77,6 +79,7 @@ impl Facts {
         Self {
             origin: scene.origin,
             surfels: scene.surfels.len() as u64,
+            individuals: scene.provenance.ranges(scene.surfels.len() as u64).map(|own| own.end - own.start).collect(),
             mesh: MeshFacts::of(&scene.triangles),
             bounds: scene.bounds(),
             body: scene.body().0,

@@ -35,9 +35,12 @@ pub use raster::{BlendFormat, Raster, RasterDepth};
 pub use surfel::{SurfelLayout, splat_words};
 pub use view::{depths, device_unit, farthest};
 
+use std::ops::Range;
+
 use crate::error::Result;
 use crate::gpu::adapter::AdapterDescription;
 use crate::gpu::layout::{BATCH, ONE};
+use crate::passes::individuals;
 use crate::passes::moments::MOMENT_WORDS;
 use crate::passes::peel::PEELED_WORDS;
 use crate::passes::triangles::TRIANGLE_PIXEL_WORDS;
@@ -65,6 +68,8 @@ pub struct Plan {
     pub mesh: MeshFacts,
     /// Pages that the surfels fill, where each is drawn by itself.
     pub pages: usize,
+    /// Those of each individual, where they are kept apart.
+    pub individuals: Vec<Range<usize>>,
     /// No list is longer than this, if some are gone through in rounds.
     pub longest_list: u32,
     /// Pixels that nothing covers differ from 0.
@@ -85,7 +90,18 @@ fn most_words(needs: &SceneNeeds) -> u32 {
     let peeled = of(needs.peels.is_some(), PEELED_WORDS);
     let moments = of(needs.oit == Some(Oit::Moments), MOMENT_WORDS);
     let triangles = of(needs.mesh.is_some(), TRIANGLE_PIXEL_WORDS);
-    peeled.max(moments).max(triangles).max(of(needs.veils, VEIL_WORDS))
+    peeled.max(moments).max(triangles).max(individuals::words(needs)).max(of(needs.veils, VEIL_WORDS))
+}
+
+/// The pages that individuals of so many surfels fill, each its own.
+fn pages_of(individuals: &[u64], most: u64) -> Vec<Range<usize>> {
+    let mut end = 0;
+    let pages = individuals.iter().map(|surfels| {
+        let first = end;
+        end += surfels.div_ceil(most) as usize;
+        first..end
+    });
+    pages.collect()
 }
 
 impl Plan {
@@ -123,7 +139,9 @@ impl Plan {
             && !needs.copies
             && needs.lists.is_none()
             && needs.oit.is_none()
+            && !needs.separate
             && needs.raster.is_none();
+        let individuals = if needs.separate { pages_of(&facts.individuals, page) } else { Vec::new() };
         let veils = needs.lists == Some(Lists::Sorted) && known.veiled;
         let long_lists = needs.lists.is_some() && known.longest_list > 0;
         let needs = SceneNeeds { gather, cull, veils, long_lists, ..needs };
@@ -154,7 +172,8 @@ impl Plan {
             width: camera.width,
             bands,
             mesh: facts.mesh,
-            pages: facts.surfels.div_ceil(page) as usize,
+            pages: individuals.last().map_or(facts.surfels.div_ceil(page) as usize, |last| last.end),
+            individuals,
             longest_list: known.longest_list,
             lists_empty: options.shows_where_nothing_is() || needs.peels.is_some() || needs.mesh.is_some(),
             projects_each_band: several && (cull || gather),
@@ -177,6 +196,7 @@ impl Plan {
             bands: cuts::strips(camera, tuning::REFERENCE_ROWS),
             mesh: facts.mesh,
             pages: 1,
+            individuals: if needs.separate { vec![0..1; facts.individuals.len()] } else { Vec::new() },
             longest_list: 0,
             lists_empty: options.shows_where_nothing_is(),
             projects_each_band: false,

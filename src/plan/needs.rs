@@ -46,6 +46,8 @@ pub struct SceneNeeds {
     pub winner: Option<Winner>,
     /// There are triangles beside the splats.
     pub mesh: Option<MeshNeeds>,
+    /// Inputs are kept apart ([`individuals`](crate::passes::individuals)).
+    pub separate: bool,
     /// Pixels have lists of their fragments, and what becomes of these.
     pub lists: Option<Lists>,
     /// Every fragment is summed, by what is before it as far as sums in any order tell.
@@ -244,6 +246,7 @@ impl SceneNeeds {
         let lists = Lists::of(facts, options);
         let peels = lists.and(peel::layers(options));
         let oit = Oit::of(options);
+        let separate = options.separate && facts.individuals.len() > 1;
         let unblended = if options.raster.is_some() { Winner::Rasterised } else { Winner::Second };
         Self {
             projection: camera.projection,
@@ -257,6 +260,7 @@ impl SceneNeeds {
             tiles: fixed
                 && lists.is_none()
                 && oit.is_none()
+                && !separate
                 && facts.colors != ColorNeed::Textured
                 && options.organisation != Organisation::Scatter,
             gather: false,
@@ -264,6 +268,7 @@ impl SceneNeeds {
             raster: options.raster,
             winner: (!blends).then_some(unblended),
             mesh: mesh(facts, options),
+            separate,
             lists: if options.raster.is_some() { None } else { lists },
             oit,
             peels,
@@ -315,6 +320,7 @@ impl SceneNeeds {
             && options.draws_copies_once()
             && fixed
             && picture.oit.is_none()
+            && !picture.separate
             && picture.color != ColorNeed::Textured;
         // Of copies tiles would make long lists.
         let tiles = picture.tiles && !copies;
@@ -337,7 +343,7 @@ impl SceneNeeds {
 
     /// Surfaces are told apart by the depth that they blend to.
     pub fn compares_depth(&self) -> bool {
-        self.mesh.is_some_and(|mesh| mesh.join != Join::Nearest)
+        self.separate || self.mesh.is_some_and(|mesh| mesh.join != Join::Nearest)
     }
 
     /// Depths are summed.
@@ -405,6 +411,7 @@ impl SceneNeeds {
             (self.peels.is_some(), "peels"),
             (self.mesh.is_some(), "triangles"),
             (self.mesh.is_some_and(|mesh| mesh.textured), "painted-triangles"),
+            (self.separate, "separate"),
             (joins(Join::Corrected), "join-corrected"),
             (joins(Join::Blended), "join-blended"),
             (self.veils, "veils"),

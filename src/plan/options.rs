@@ -88,6 +88,8 @@ pub struct RenderOptions {
     pub tail: Tail,
     /// What shows where splats and triangles meet.
     pub join: Join,
+    /// The surfels of different inputs do not blend, however near they are.
+    pub separate: bool,
     /// Blending kernel.
     pub kernel: Kernel,
     /// Low-pass filter.
@@ -156,6 +158,7 @@ impl Default for RenderOptions {
             opacity: 1.0,
             tail: Tail::Sum,
             join: Join::Corrected,
+            separate: false,
             kernel: Kernel::Ellipse { a: 6.0, n: 3.0, smooth: false },
             low_pass: LowPass::None,
             accumulator: Accumulator::Fixed,

@@ -121,6 +121,8 @@ pub enum Twin {
     Accumulate,
     /// [`oit`](crate::passes::oit): sums.
     Oit,
+    /// [`individuals`](crate::passes::individuals): what one of them shows, where it is nearest.
+    Individual(usize),
     /// [`triangles`](crate::passes::triangles): what they show.
     Triangles,
     /// [`resolve`](crate::passes::resolve): the image.
@@ -141,7 +143,7 @@ impl Twin {
             Self::Visibility => "visibility",
             Self::Triangles => "triangles",
             Self::Accumulate | Self::Oit => "accumulate",
-            Self::Resolve | Self::Layers | Self::Sorted => "resolve",
+            Self::Individual(_) | Self::Resolve | Self::Layers | Self::Sorted => "resolve",
             Self::Map(map) => map.row().name,
         }
     }
@@ -173,6 +175,11 @@ impl Stage {
     /// This stage, before which `clears` are done.
     pub fn after(self, clears: Vec<Clear>) -> Self {
         Self { clears, ..self }
+    }
+
+    /// This stage on one page.
+    pub fn of_page(self, page: usize) -> Self {
+        Self { page: Some(page), ..self }
     }
 
     /// This stage, which the reference does in another's place.

@@ -13,9 +13,10 @@ use crate::frame::Frame;
 use crate::passes::asks_for_order;
 use crate::passes::join::Beside;
 use crate::passes::order::order;
+use crate::passes::resolve::Surface;
 use crate::passes::splat::Splat;
 use crate::passes::{
-    MAP_PASSES, Strip, accumulate, layers, oit, project, resolve, sorted, triangles, visibility, winner,
+    MAP_PASSES, Strip, accumulate, individuals, layers, oit, project, resolve, sorted, triangles, visibility, winner,
 };
 use crate::plan::steps::{Step, Twin};
 use crate::plan::{Facts, Plan, RenderOptions, SceneNeeds};
@@ -97,6 +98,9 @@ fn strip_by(strip: &Strip<'_>, twins: &[Twin], spent: &Spent) -> Frame {
     let Strip { scene, camera, options, first_row, rows, .. } = *strip;
     let splats = || strip.splats.iter().copied();
     let (mut nearest, mut sums, mut shown) = (Vec::new(), Vec::new(), Vec::new());
+    let pixels = camera.width as usize * rows as usize;
+    // What individuals show.
+    let mut kept = None;
     let mut frame = Frame::new(&Camera { height: rows, ..camera.clone() }, options.maps);
     for twin in twins {
         spent.timed(twin.pass(), rayon::current_num_threads(), || match twin {
@@ -111,11 +115,16 @@ fn strip_by(strip: &Strip<'_>, twins: &[Twin], spent: &Spent) -> Frame {
             Twin::Oit => sums = oit::reference(strip),
             Twin::Layers => layers::reference(strip, &mut frame),
             Twin::Sorted => sorted::reference(strip, &mut frame),
+            Twin::Individual(individual) => {
+                let kept = kept.get_or_insert_with(|| vec![Surface::NOTHING; pixels]);
+                individuals::keep_nearest(kept, individuals::reference(strip, *individual));
+            }
             Twin::Triangles => shown = triangles::reference(strip),
             Twin::Resolve => {
                 let Strip { largest_shorter, farthest, .. } = *strip;
-                let beside = Beside { nearest: &nearest, triangles: &shown, largest_shorter, farthest };
-                resolve::reference(&sums, &beside, scene, camera, options, first_row, &mut frame);
+                let beside = Beside { triangles: &shown, largest_shorter, farthest };
+                let blended = || resolve::surfaces(&sums, &nearest, (scene, camera, options), first_row);
+                resolve::reference(&kept.take().unwrap_or_else(blended), &beside, options, &mut frame);
             }
             Twin::Map(map) => {
                 let own = MAP_PASSES.iter().filter(|own| own.map == *map);

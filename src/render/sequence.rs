@@ -1,8 +1,8 @@
 //! A frame as a list of steps: the papers' passes in their order.
 
 use crate::passes::{
-    accumulate, cull, fragments, long_lists, of_maps, oit, peel, project, raster, resolve, tiles, triangles, veils,
-    visibility,
+    accumulate, cull, fragments, individuals, long_lists, of_maps, oit, peel, project, raster, resolve, tiles,
+    triangles, veils, visibility,
 };
 use crate::plan::known::Listed;
 use crate::plan::steps::{Look, Part, Stage, Step, Twin};
@@ -26,6 +26,7 @@ pub fn steps(plan: &Plan) -> Vec<Step> {
             (Some(_), _) => {}
             (None, Some(_)) => lists(plan, band, &mut steps),
             (None, None) if plan.needs.oit.is_some() => order_free(plan, band, &mut steps),
+            (None, None) if plan.needs.separate => apart(plan, band, &mut steps),
             (None, None) => {
                 nearest(plan, band, &mut steps);
                 sums(plan, band, &mut steps);
@@ -84,6 +85,14 @@ fn order_free(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
     let covered = oit::marks(&plan.needs).then(|| oit::mark(band)).into_iter();
     let covered = covered.chain([visibility::occlude(band, Part::All)]);
     steps.extend(before.chain(sums).chain(covered).map(Step::Stage));
+}
+
+/// Inputs that are kept apart, one after the other.
+fn apart(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
+    if plan.projects_in(band) {
+        steps.push(Step::Stage(project::steps(plan, band, Part::All)));
+    }
+    steps.extend(individuals::steps(plan, band).into_iter().map(Step::Stage));
 }
 
 /// The sums of each pixel of a band; by tiles that gather, its image too.

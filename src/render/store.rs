@@ -13,7 +13,7 @@ use crate::passes::tiles::{list_name, list_words};
 use crate::passes::triangles::{NEAREST_TRIANGLE_WORDS, TRIANGLE_PIXEL_WORDS};
 use crate::passes::upload::{self, Uploaded};
 use crate::passes::veils::VEIL_WORDS;
-use crate::passes::{asks_for_order, covered, fragments, long_lists, visibility};
+use crate::passes::{asks_for_order, covered, fragments, individuals, long_lists, visibility};
 use crate::plan::known::Listed;
 use crate::plan::{Band, FragmentLayout, KEY_WORDS, Known, Oit, Plan, Raster, SceneNeeds, SurfelLayout, splat_words};
 use crate::scene::Samples;
@@ -130,6 +130,7 @@ struct Made {
     moments: bool,
     peels: bool,
     mesh: bool,
+    individual_words: u32,
     raster: Option<(Raster, u32)>,
 }
 
@@ -138,6 +139,8 @@ struct Made {
 struct Uploading {
     /// Surfels that are the same are one.
     copies: bool,
+    /// Each input has pages of its own.
+    separate: bool,
     surfel: SurfelLayout,
     splat_words: u64,
     /// The numbers of the surfels are kept.
@@ -147,7 +150,7 @@ struct Uploading {
 impl Uploading {
     fn of(needs: &SceneNeeds) -> Self {
         let (surfel, splat_words) = (SurfelLayout::of(needs), splat_words(needs));
-        Self { copies: needs.copies, surfel, splat_words, order: asks_for_order(needs) }
+        Self { copies: needs.copies, separate: needs.separate, surfel, splat_words, order: asks_for_order(needs) }
     }
 }
 
@@ -215,7 +218,21 @@ impl Store {
         let moments = plan.needs.oit == Some(Oit::Moments);
         let peels = plan.needs.peels.is_some();
         let mesh = plan.needs.mesh.is_some();
-        let made = Made { width, samples, bands, sum_words, image_words, lists, veils, moments, peels, mesh, raster };
+        let individual_words = individuals::words(&plan.needs);
+        let made = Made {
+            width,
+            samples,
+            bands,
+            sum_words,
+            image_words,
+            lists,
+            veils,
+            moments,
+            peels,
+            mesh,
+            individual_words,
+            raster,
+        };
         let fresh = self.made.as_ref() != Some(&made);
         if fresh {
             // The old ones make room first.
@@ -280,6 +297,10 @@ impl Store {
             ] {
                 self.frame.insert(name, Buffer::storage(gpu, what, pixels * u64::from(words))?);
             }
+        }
+        if plan.needs.separate {
+            let words = pixels * u64::from(individuals::words(&plan.needs));
+            self.frame.insert("individuals", Buffer::storage(gpu, "pixels of individuals", words)?);
         }
         if plan.sum_words > 0 {
             let words = plan.needs.accumulator.row().head_words() + pixels * u64::from(plan.sum_words);

@@ -113,6 +113,9 @@ fn stored(options: &RenderOptions) -> Result<RenderOptions> {
             "surfaces that show through each other leave no sums: render, or leave composite out".into(),
         ));
     }
+    if options.separate {
+        return Err(Error::Usage("inputs that are kept apart leave no sums: leave separate out, or render".into()));
+    }
     if options.blend == Blend::Nearest {
         return Err(Error::Usage("--blend nearest sums nothing: leave it out, or render".into()));
     }

@@ -1,5 +1,7 @@
 //! Which point of which input a surfel is.
 
+use std::ops::Range;
+
 /// Where the surfels of a scene come from: inputs one after the other, each without the points that were left out. A scene that nobody
 /// read says nothing and counts as one input.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -44,6 +46,13 @@ impl Provenance {
             self.push(kept, left_out, numbers);
             kept += (own.len() - dropped.len()) as u64;
         }
+    }
+
+    /// The surfels of each input that has some, of `surfels` in all.
+    pub fn ranges(&self, surfels: u64) -> impl Iterator<Item = Range<u64>> {
+        let firsts = self.0.iter().skip(1).map(|input| input.first);
+        let ends = firsts.clone().chain([surfels]);
+        [0].into_iter().chain(firsts).zip(ends).map(|(first, end)| first..end).filter(|own| !own.is_empty())
     }
 
     /// The number of the input that surfel `index` comes from, and of the point in it; both start at 0.

@@ -57,6 +57,7 @@ pub(super) fn options(arguments: &Arguments, format: Format) -> Result<RenderOpt
         opacity: arguments.opacity,
         tail: arguments.tail.unwrap_or_default(),
         join: arguments.join.unwrap_or_default(),
+        separate: arguments.separate,
         cull: arguments.cull,
         samples: arguments.samples.unwrap_or(SAMPLES),
         facing: facing(arguments),

@@ -56,7 +56,8 @@ fn lines(plan: &Plan) -> Vec<String> {
         Step::Look(Look::Fragments(band)) => format!("look for fragments of {band}"),
         Step::Look(Look::Lists(of, _)) => format!("look for lists of {of:?}"),
         Step::Large { by_tiles, by_workgroups } => {
-            format!("{}, or {}", by_tiles.iter().map(line).collect::<Vec<_>>().join(", then "), line(by_workgroups))
+            let all = |stages: &[Stage]| stages.iter().map(line).collect::<Vec<_>>().join(", then ");
+            format!("{}, or {}", all(by_tiles), all(by_workgroups))
         }
         Step::Draw => "draw".to_owned(),
         Step::ReadBack(band) => format!("read back {band}"),
@@ -164,7 +165,7 @@ fn tiles_of_a_software_adapter_gather_splats_that_are_not_tiny() {
         [
             "look for lists of Small",
             "bin: bin_count/Slots(All), bin_scan, bin_place/Slots(All) page 0",
-            "accumulate: list_covered/Occlusion, arrange_covered, tile_resolve/CoveredEights",
+            "accumulate: list_covered/Occlusion, arrange_covered, tile_resolve/CoveredEights page 0",
             "read back 0",
         ]
     );

@@ -154,10 +154,12 @@ const PAINTLESS: &[&str] = &[
 ];
 
 /// Needs that no render has together (`src/plan/check.rs`, `src/plan/needs.rs`).
-const EXCLUSIVE: [(&str, &[&str]); 32] = [
+const EXCLUSIVE: [(&str, &[&str]); 34] = [
     ("painted-triangles", MESHLESS),
     ("triangles", MESHLESS),
     ("join", MESHLESS),
+    ("separate", MESHLESS),
+    ("separate", &["copies", "cull", "nearest"]),
     (
         "veils",
         &["tiles", "gather", "copies", "cull", "atomics-u64", "raster-exact", "raster-offset", "nearest", "peels"],

@@ -1,6 +1,6 @@
 // Inputs that are kept apart, the individuals of Tien 2008: each is blended by itself, one after the other, and of what they show at a
 // pixel the nearest is kept, by the depth that each blends to (section 5.3). Twin: src/passes/individuals.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x2557bb62d2b87093
+// All loops end, by 1 of src/gpu/loops.rs: 0xffc197b5e1340d2f
 
 // Of each pixel: the straight colour, shaded; then the normal, world space, unit, and the depth, device units, 0 where nothing is. Then, for
 // joins and maps, the depth of the nearest fragment and the summed weight, and how many there are; then their place in a texture.
@@ -53,6 +53,14 @@ fn shows_before(a: Surface, b: Surface) -> bool {
     return a.exists && (!b.exists || is_before);
 }
 
+// What an individual shows at the pixel (x, y), the band's `pixel`th, where it is nearest of all so far.
+fn keep_nearest_of(sums_of: u32, pixel: u32, x: u32, y: u32) {
+    let surface = surface_of(sums_of, front_at(pixel), x, y);
+    if (shows_before(surface, kept_surface(pixel))) {
+        keep_surface(pixel, surface);
+    }
+}
+
 // After an individual's sums: one workgroup a tile that it covers.
 @compute @workgroup_size(WORKGROUP)
 fn keep_individual(
@@ -67,11 +75,7 @@ fn keep_individual(
         let y = tile / tiles_across() * TILE_ROWS + row + local / TILE_WIDTH;
         if (tile < tiles_in_band() && x < held.width && y < held_band.rows) {
             let pixel = y * held.width + x;
-            show(pixel);
-            let surface = surface_of(pixel, front_at(pixel), x, y + held_band.first_row);
-            if (shows_before(surface, kept_surface(pixel))) {
-                keep_surface(pixel, surface);
-            }
+            keep_nearest_of(pixel, pixel, x, y + held_band.first_row);
         }
     }
 }

@@ -1,5 +1,5 @@
 // The sums of accumulator_fixed.wgsl, bit for bit, of one surface of a pixel, in registers.
-// All loops end, by 1 of src/gpu/loops.rs: 0xd1412cb75e68ce9c
+// All loops end, by 1 of src/gpu/loops.rs: 0x5ddb7c4b554145a0
 
 override CHANNELS: u32;
 
@@ -34,5 +34,3 @@ fn sum_at(pixel: u32, channel: u32) -> f32 {
 fn weight_at(pixel: u32) -> f32 {
     return sum_at(pixel, WEIGHT_CHANNEL) / ONE;
 }
-
-fn show(pixel: u32) {}

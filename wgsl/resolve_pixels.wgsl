@@ -1,5 +1,5 @@
 // Where each pixel has one sample: its colour and maps (resolve_surface.wgsl, resolve_lists.wgsl). One invocation a pixel of a covered tile. Twin: src/passes/resolve.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x1344ad82f017c462
+// All loops end, by 1 of src/gpu/loops.rs: 0x1cce65108f45b35b
 
 // One workgroup a covered tile.
 @compute @workgroup_size(WORKGROUP)
@@ -15,7 +15,6 @@ fn resolve(
         let y = tile / tiles_across() * TILE_ROWS + row + local / TILE_WIDTH;
         if (tile < tiles_in_band() && x < held.width && y < held_band.rows) {
             let pixel = y * held.width + x;
-            show(pixel);
             resolve_pixel(pixel, pixel, x, y + held_band.first_row);
         }
     }

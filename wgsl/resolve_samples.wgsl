@@ -1,7 +1,7 @@
 // Where each pixel has several samples, which all other kernels take for pixels: the mean of their premultiplied colours
 // (resolve_surface.wgsl, resolve_lists.wgsl). One
 // invocation a pixel of a covered tile. Twin: src/passes/resolve.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xfffd4e04cc3ea70e
+// All loops end, by 1 of src/gpu/loops.rs: 0x2159d9d77d8a1b37
 
 override SAMPLES_ACROSS: u32;
 override SAMPLES_DOWN: u32;
@@ -24,7 +24,6 @@ fn resolve(
                 var column = vec4<f32>(0.0);
                 for (var j = 0u; j < SAMPLES_DOWN; j++) {
                     let sample = (corner.y + j) * held.width + corner.x + i;
-                    show(sample);
                     column += sample_color(sample, sample, corner.x + i, corner.y + j);
                 }
                 sum += column;

@@ -21,6 +21,7 @@ struct Surface {
 fn shown_weight(sums_of: u32, front: f32) -> f32 {
     var weight = 0.0;
     if (bitcast<u32>(front) != NOTHING) {
+        show(sums_of);
         weight = sum_at(sums_of, WEIGHT_CHANNEL);
     }
     return weight;

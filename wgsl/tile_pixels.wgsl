@@ -1,9 +1,8 @@
 // The pixels of a tile's column, where each has one sample. Same interface as tile_samples.wgsl.
-// All loops end, by 1 of src/gpu/loops.rs: 0xd1fc71bda331e1a7
+// All loops end, by 1 of src/gpu/loops.rs: 0x580a95c3715cde77
 
 fn resolve_column(column: Column, local: u32) {
     for (var k = 0u; k < column.pixels; k++) {
-        show(k);
         resolve_pixel(k, column.pixel + k * held.width, column.x, column.y + k);
     }
 }

@@ -1,6 +1,6 @@
 // The samples of a tile's column, which belong to pixels with those of the columns beside it: added in the order of
 // resolve_samples.wgsl.
-// All loops end, by 1 of src/gpu/loops.rs: 0x4acf543ad390eae7
+// All loops end, by 1 of src/gpu/loops.rs: 0xe8f9843fa8bb0301
 
 var<workgroup> of_column: array<vec4<f32>, WORKGROUP>;
 
@@ -11,7 +11,6 @@ fn resolve_column(column: Column, local: u32) {
         var sum = vec4<f32>(0.0);
         if (exists) {
             for (var k = first; k < first + SAMPLES_DOWN; k++) {
-                show(k);
                 sum += sample_color(k, column.pixel + k * held.width, column.x, row + k);
             }
         }

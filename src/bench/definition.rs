@@ -101,6 +101,9 @@ pub struct SceneEntry {
     pub radius: Option<f64>,
     /// How far a shape's points lie off it, along its normals: the standard deviation in units of their mean spacing.
     pub noise: Option<f64>,
+    /// The same points once more, as another input, so far out along their normals, world units. What share of the pixels show a mean of
+    /// both is measured.
+    pub shirt: Option<f64>,
     /// The mean radius of the splats, pixels, as if seen face-on: disks are enlarged or shrunk to it.
     pub footprint_px: Option<OneOrMany<f64>>,
     /// Leaves out what of a sweep would cover more pixels than this, counting `surfels * pi * footprint_px^2`.

@@ -94,6 +94,11 @@ pub(super) fn against_truth(
     progress: &dyn Progress,
 ) -> Result<Vec<BTreeMap<String, f64>>> {
     let mut worst = vec![BTreeMap::new(); timed.len()];
+    if case.staged.dressed {
+        for (timed, worst) in timed.iter().zip(&mut worst) {
+            between_inputs(case, timed, worst)?;
+        }
+    }
     let Some(surface) = &case.staged.surface else { return Ok(worst) };
     let seen = |timed: &Timed<'_>| {
         (timed.options.shading, timed.options.composite != Composite::Opaque, timed.options.opacity)
@@ -136,13 +141,7 @@ fn beside_joint(
         triangles: triangles.painted([0.0, 1.0, 0.0, 1.0]),
         ..case.staged.scene.clone()
     };
-    let options = RenderOptions {
-        shading: Shading::Unlit,
-        shading_at: ShadingAt::Pixel,
-        maps: Maps::NONE,
-        opacity: 1.0,
-        ..timed.options.clone()
-    };
+    let options = in_own_colors(timed.options);
     let mut renderer = Renderer::new(&scene, &options, case.backend(timed.config))?;
     for camera in &case.staged.cameras {
         let (frame, _) = renderer.frame(camera, &())?;
@@ -154,6 +153,38 @@ fn beside_joint(
         }
     }
     Ok(())
+}
+
+/// How many of the pixels that show anything show a mean of the first input and of the others, the worst of all cameras.
+fn between_inputs(case: &Case<'_>, timed: &Timed<'_>, worst: &mut BTreeMap<String, f64>) -> Result<()> {
+    let scene = &case.staged.scene;
+    let all = 0..scene.surfels.len() as u64;
+    let of_first = |surfel| scene.provenance.of(surfel).0 == 0;
+    let color = |surfel| if of_first(surfel) { [1.0, 0.0, 0.0, 1.0] } else { [0.0, 1.0, 0.0, 1.0] };
+    let told_apart = Scene { colors: Colors::Linear(all.map(color).collect()), ..scene.clone() };
+    let options = in_own_colors(timed.options);
+    let mut renderer = Renderer::new(&told_apart, &options, case.backend(timed.config))?;
+    for camera in &case.staged.cameras {
+        let (frame, _) = renderer.frame(camera, &())?;
+        let shown = || frame.color.iter().filter(|color| color[3] > 0.0);
+        // An eighth of a code of 8 bits is none that anybody sees.
+        let mixed = shown().filter(|[r, g, ..]| r.min(*g) > 1.0 / 2048.0).count();
+        let rate = mixed as f64 / shown().count().max(1) as f64;
+        let known = worst.entry("mixed_rate".to_owned()).or_insert(rate);
+        *known = known.max(rate);
+    }
+    Ok(())
+}
+
+/// Pictures whose colours are those of their surfels.
+fn in_own_colors(options: &RenderOptions) -> RenderOptions {
+    RenderOptions {
+        shading: Shading::Unlit,
+        shading_at: ShadingAt::Pixel,
+        maps: Maps::NONE,
+        opacity: 1.0,
+        ..options.clone()
+    }
 }
 
 /// What each that approximates another is apart from that one's reference, the worst of all cameras: over the whole picture, as what is

@@ -117,6 +117,7 @@ impl SceneEntry {
         sized("size", self.size)?;
         positive("radius", self.radius)?;
         positive("noise", self.noise)?;
+        positive("shirt", self.shirt)?;
         positive("fill", self.fill)?;
         positive("fov", self.fov)?;
         if self.opacity.is_some_and(|opacity| !(0.0..=1.0).contains(&opacity)) {
@@ -144,6 +145,7 @@ impl SceneEntry {
                 not_beside("count", counts && !self.surfels.samples(), "file, unless surfels are sampled")?;
                 not_beside("radius", self.radius.is_some(), "file (footprint_px serves)")?;
                 not_beside("noise", self.noise.is_some(), "file")?;
+                not_beside("shirt", self.shirt.is_some(), "file")?;
                 not_beside("surfels = gaussians", self.surfels == Making::Gaussians, "file: they are made of a shape")?;
                 let is_mesh =
                     file.extension().is_some_and(|e| ["obj", "ply"].iter().any(|m| e.eq_ignore_ascii_case(m)));

@@ -40,6 +40,8 @@ pub(super) struct Staged {
     pub cameras: Vec<Camera>,
     /// What the surfels stand for, and the triangles beside them, if the study asks for ground truth.
     pub surface: Option<Surface>,
+    /// Two inputs lie one over the other.
+    pub dressed: bool,
     /// Mean radius of the splats, pixels, as [`SceneEntry::footprint_px`] counts it.
     pub footprint_px: f64,
 }
@@ -102,7 +104,7 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
     let mut scene = match texture.filter(|_| entry.lookup) {
         Some(texture) => build_textured(vec![points], texture, progress)?.0,
         None if points.positions.is_empty() && left.is_some() => Scene { oriented: true, ..Scene::default() },
-        None => build(vec![points], progress)?.0,
+        None => build(dressed(points, entry.shirt), progress)?.0,
     };
     if let Some(left) = left {
         let of_surfels = Some(scene).filter(|scene| !scene.surfels.is_empty());
@@ -130,7 +132,17 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
         }
         footprint_px = wanted;
     }
-    Ok(Staged { scene, cameras, surface, footprint_px })
+    Ok(Staged { scene, cameras, surface, dressed: entry.shirt.is_some(), footprint_px })
+}
+
+/// Points, and if a shirt is to be so far out along their normals, those of that.
+fn dressed(points: Points, shirt: Option<f64>) -> Vec<Points> {
+    let Some(out) = shirt else { return vec![points] };
+    let mut moved = points.clone();
+    for (position, normal) in moved.positions.iter_mut().zip(moved.normals.iter().flatten()) {
+        position.iter_mut().zip(normal).for_each(|(into, along)| *into += out * f64::from(*along));
+    }
+    vec![points, moved]
 }
 
 /// What `epsplat simplify --shape cap` leaves of points.

@@ -269,12 +269,12 @@ pub const SUMS: Pass = Pass {
 const ACCUMULATE: Kernel = Kernel::new("accumulate");
 const ACCUMULATE_LARGE: Kernel = Kernel::of("accumulate_large", [TILE, TILE, 1]);
 
-/// The pass of the small splats.
-pub fn steps(plan: &Plan, band: usize) -> Stage {
+/// The pass of the small splats; of inputs that are kept apart, of the `first` one or of another.
+pub fn steps(plan: &Plan, band: usize, first: bool) -> Stage {
     // What wrapped is counted over all bands, in the words before the sums.
     let head = plan.needs.accumulator.row().head_words();
     let mut clears = vec![Clear::of("sums", head, plan.bands[band].pixels * u64::from(plan.sum_words))];
-    if band == 0 && head > 0 {
+    if band == 0 && first && head > 0 {
         clears.push(Clear::of("sums", 0, head));
     }
     let runs = vec![Run { kernel: ACCUMULATE, over: Over::Slots(Part::All) }];

@@ -8,7 +8,7 @@
 use super::resolve::Surface;
 use super::{Strip, accumulate, covered, resolve, visibility};
 use crate::plan::pass::Pass;
-use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
+use crate::plan::steps::{Clear, Kernel, Over, Run, Stage};
 use crate::plan::{Plan, SceneNeeds};
 
 /// The pass's kernels, files and constants.
@@ -39,42 +39,18 @@ pub fn words(needs: &SceneNeeds) -> u32 {
 /// What lists the tiles in which any shows.
 pub const LISTS: Run = Run { kernel: LIST, over: Over::Occlusion };
 
-/// The stages of a band, after its splats: each individual's visibility and attribute passes, and what it leaves.
-pub fn steps(plan: &Plan, band: usize) -> Vec<Stage> {
-    let mut stages = Vec::new();
-    for (individual, pages) in plan.individuals.iter().enumerate() {
-        let on_pages = |stage: Stage| {
-            let first = pages.start;
-            let of_page = move |page: usize| {
-                let stage = stage.clone().without_twin().of_page(page);
-                if page == first { stage } else { stage.after(Vec::new()) }
-            };
-            pages.clone().map(of_page)
-        };
-        stages.extend(on_pages(visibility::steps(plan, band, Part::All)));
-        stages.extend(on_pages(visibility::large(band)));
-        stages.push(visibility::occlude(band, Part::All));
-        let sums = accumulate::steps(plan, band);
-        // What wrapped is counted over all of them.
-        let head = plan.needs.accumulator.row().head_words();
-        let clears = sums.clears.iter().filter(|clear| individual == 0 || clear.first >= head).copied().collect();
-        stages.extend(on_pages(sums.after(clears)));
-        stages.extend(on_pages(accumulate::large(band)));
-        stages.push(keep(plan, band, individual));
-    }
-    stages
-}
-
-/// What an individual shows, where it is nearest.
-fn keep(plan: &Plan, band: usize, individual: usize) -> Stage {
+/// What an individual shows, where it is nearest, of the sums that are stored.
+pub fn keep(plan: &Plan, band: usize, first: bool) -> Stage {
     let mut runs = covered::runs(covered::LISTS).to_vec();
     runs.push(Run { kernel: KEEP, over: Over::Covered });
-    let mut clears = vec![covered::restart(plan, band)];
-    if individual == 0 {
-        let words = plan.bands[band].pixels * u64::from(words(&plan.needs));
-        clears.push(Clear::of("individuals", 0, words));
-    }
-    Stage::new("resolve", band, runs).after(clears).as_twin(Twin::Individual(individual))
+    Stage::new("resolve", band, runs).after(clears(plan, band, first))
+}
+
+/// What is cleared before an individual's tiles are listed; before the `first` one nothing is kept.
+pub fn clears(plan: &Plan, band: usize, first: bool) -> Vec<Clear> {
+    let words = plan.bands[band].pixels * u64::from(words(&plan.needs));
+    let kept = first.then(|| Clear::of("individuals", 0, words));
+    [covered::restart(plan, band)].into_iter().chain(kept).collect()
 }
 
 /// The twin: what an individual shows at the pixels of `strip`.

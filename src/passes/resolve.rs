@@ -246,7 +246,7 @@ pub const PASS: Pass = Pass {
             },
         ]
     },
-    kernels: |needs| if needs.gather { Vec::new() } else { vec![RESOLVE] },
+    kernels: |needs| if needs.gather && !needs.separate { Vec::new() } else { vec![RESOLVE] },
     constants: |making| {
         let layout = PixelLayout::of(making.needs);
         let mut constants =

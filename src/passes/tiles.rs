@@ -12,8 +12,10 @@
 //!
 //! What room the lists need is read from the device once; a later frame that needs more is rendered again.
 
+use std::ops::Range;
+
 use super::lowpass::Design;
-use super::{accumulate, covered, project};
+use super::{accumulate, covered, individuals, project};
 use crate::gpu::layout::{BLOCK_SIDE, LIST_ENDS, TILE_ROWS_PLAIN, TILE_ROWS_SHARED, TILE_WIDTH};
 use crate::plan::known::Listed;
 use crate::plan::pass::Pass;
@@ -34,7 +36,10 @@ pub const PASS: Pass = Pass {
             pick(needs.clips, "tile_clip.wgsl", "tile_clip_absent.wgsl"),
             pick(needs.facing.is_some(), "tile_facing.wgsl", pick(needs.curved, "tile_curved.wgsl", "tile_flat.wgsl")),
             pick(needs.gather, "tile_small.wgsl", "tile_small_absent.wgsl"),
-            pick(needs.samples == Samples::ONE, "tile_pixels.wgsl", "tile_samples.wgsl"),
+            match needs.separate {
+                true => "tile_individuals.wgsl",
+                false => pick(needs.samples == Samples::ONE, "tile_pixels.wgsl", "tile_samples.wgsl"),
+            },
             pick(needs.subgroups, "splat_shared.wgsl", "splat_plain.wgsl"),
         ];
         files.extend(accumulate::tile_files(needs));
@@ -119,41 +124,44 @@ fn bin(plan: &Plan, of: Listed, (band, page): (usize, usize), fresh: bool, place
     Stage { page: Some(page), ..stage }.after(vec![Clear::of(list_name(of), first, most - first)])
 }
 
-/// Counts the entries of all lists of a kind, in the bands that have their splats from `band` on.
-pub fn look(plan: &Plan, of: Listed, band: usize) -> Step {
+/// Counts the entries of all lists of a kind of some pages, in the bands that have their splats from `band` on.
+pub fn look(plan: &Plan, of: Listed, band: usize, pages: Range<usize>) -> Step {
     let bands = if plan.projects_each_band { band..band + 1 } else { 0..plan.bands.len() };
-    let cuts = bands.flat_map(|band| (0..plan.pages).map(move |page| (band, page)));
+    let cuts = bands.flat_map(|band| pages.clone().map(move |page| (band, page)));
     let count = |(number, cut)| bin(plan, of, cut, number == 0, false);
     Step::Look(Look::Lists(of, cuts.enumerate().map(count).collect()))
 }
 
-/// The visibility pass of the large splats.
-pub fn visibility(plan: &Plan, band: usize) -> Vec<Stage> {
+/// The visibility pass of the large splats of some pages.
+pub fn visibility(plan: &Plan, band: usize, pages: Range<usize>) -> Vec<Stage> {
     let draw = |page| {
         let stage = Stage::new("visibility", band, vec![Run { kernel: VISIBILITY, over: Over::Tiles }]);
         Stage { page: Some(page), ..stage }
     };
     let fresh = |page| plan.projects_in(band) && page == 0;
-    (0..plan.pages).flat_map(|page| [bin(plan, Listed::Large, (band, page), fresh(page), true), draw(page)]).collect()
+    pages.flat_map(|page| [bin(plan, Listed::Large, (band, page), fresh(page), true), draw(page)]).collect()
 }
 
-/// The attribute pass of the large splats.
-pub fn accumulate(plan: &Plan, band: usize) -> Vec<Stage> {
+/// The attribute pass of the large splats of some pages.
+pub fn accumulate(plan: &Plan, band: usize, pages: Range<usize>) -> Vec<Stage> {
     let draw = |page| {
         let stage = Stage::new("accumulate", band, vec![Run { kernel: ACCUMULATE, over: Over::Tiles }]);
         Stage { page: Some(page), ..stage }
     };
     // Of one page the lists stay from the first pass to the second.
-    let again = |page| (plan.pages > 1).then(|| bin(plan, Listed::Large, (band, page), false, true));
-    (0..plan.pages).flat_map(|page| again(page).into_iter().chain([draw(page)])).collect()
+    let several = pages.len() > 1;
+    let again = |page| several.then(|| bin(plan, Listed::Large, (band, page), false, true));
+    pages.flat_map(|page| again(page).into_iter().chain([draw(page)])).collect()
 }
 
-/// The attribute pass of all splats, which are of one page, and what becomes of the sums.
-pub fn resolve(plan: &Plan, band: usize) -> Vec<Stage> {
+/// The attribute pass of all splats of a page, and what becomes of the sums: the image, or what an individual shows.
+pub fn resolve(plan: &Plan, band: usize, page: usize) -> Vec<Stage> {
     let mut runs = covered::runs(covered::LISTS).to_vec();
     runs.push(Run { kernel: RESOLVE, over: Over::CoveredEights });
-    let stage = Stage::new("accumulate", band, runs).after(covered::clears(plan, band));
-    vec![bin(plan, Listed::Small, (band, 0), true, true), stage]
+    let separate = plan.needs.separate;
+    let clears = if separate { individuals::clears(plan, band, page == 0) } else { covered::clears(plan, band) };
+    let stage = Stage::new("accumulate", band, runs).of_page(page).after(clears);
+    vec![bin(plan, Listed::Small, (band, page), page == 0, true), stage]
 }
 
 #[cfg(test)]

@@ -310,9 +310,6 @@ fn separate(options: &RenderOptions, reference: bool) -> Result<()> {
         RenderOptions { raster: Some(_), .. } => {
             usage("the rasteriser blends all splats: leave --separate out, or render by compute")
         }
-        _ if options.organisation == Organisation::Tile => {
-            usage("tiles blend all splats: leave the organisation out with --separate")
-        }
         _ => Ok(()),
     }
 }

@@ -127,9 +127,12 @@ impl Plan {
             Organisation::Tile => true,
             Organisation::Scatter => false,
         };
+        // What tiles gather is of one page.
+        let largest = facts.individuals.iter().copied().max().filter(|_| needs.separate);
+        let together = largest.unwrap_or(facts.surfels);
         let gather = needs.tiles
             && gathers
-            && (1..=page).contains(&facts.surfels)
+            && (1..=page).contains(&together)
             && !known.crowded
             && options.has(Optimisation::Gathering);
         // The rasteriser draws every splat.
@@ -186,6 +189,7 @@ impl Plan {
     /// The plan of the f64 reference, which draws strips of rows of samples: no device is asked for anything, and nothing is left out.
     pub fn of_reference(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Self {
         let needs = SceneNeeds::of_picture(facts, camera, options);
+        let individuals = if needs.separate { pages_of(&facts.individuals, u64::MAX) } else { Vec::new() };
         Self {
             // What a device draws in another way, the twins draw as all else.
             needs: SceneNeeds { raster: None, tiles: false, lists: Lists::of(facts, options), peels: None, ..needs },
@@ -195,8 +199,8 @@ impl Plan {
             width: camera.width,
             bands: cuts::strips(camera, tuning::REFERENCE_ROWS),
             mesh: facts.mesh,
-            pages: 1,
-            individuals: if needs.separate { vec![0..1; facts.individuals.len()] } else { Vec::new() },
+            pages: individuals.len().max(1),
+            individuals,
             longest_list: 0,
             lists_empty: options.shows_where_nothing_is(),
             projects_each_band: false,
@@ -204,6 +208,11 @@ impl Plan {
             large_by_tiles: false,
             looks_for_lists: [false; 2],
         }
+    }
+
+    /// Pages whose surfels blend with each other: all, or those of each individual.
+    pub fn together(&self) -> Vec<Range<usize>> {
+        if self.needs.separate { self.individuals.clone() } else { vec![0..self.pages] }
     }
 
     /// Whether splats are projected in `band`, and what is unknown of them is looked at.

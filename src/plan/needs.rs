@@ -260,7 +260,6 @@ impl SceneNeeds {
             tiles: fixed
                 && lists.is_none()
                 && oit.is_none()
-                && !separate
                 && facts.colors != ColorNeed::Textured
                 && options.organisation != Organisation::Scatter,
             gather: false,

@@ -216,7 +216,7 @@ pub enum Step {
         /// With lists.
         by_tiles: Vec<Stage>,
         /// Without.
-        by_workgroups: Stage,
+        by_workgroups: Vec<Stage>,
     },
     /// The rasteriser's visibility and attribute pass.
     Draw,

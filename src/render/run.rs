@@ -80,7 +80,7 @@ impl<'a> Run<'a> {
                 Step::Large { by_tiles, .. } if self.by_tiles => {
                     by_tiles.iter().try_for_each(|stage| self.stage(stage))?;
                 }
-                Step::Large { by_workgroups, .. } => self.stage(by_workgroups)?,
+                Step::Large { by_workgroups, .. } => by_workgroups.iter().try_for_each(|stage| self.stage(stage))?,
                 Step::Draw => self.draw()?,
                 Step::ReadBack(band) => {
                     self.end_band(*band)?;

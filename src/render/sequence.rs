@@ -1,5 +1,7 @@
 //! A frame as a list of steps: the papers' passes in their order.
 
+use std::ops::Range;
+
 use crate::passes::{
     accumulate, cull, fragments, individuals, long_lists, of_maps, oit, peel, project, raster, resolve, tiles,
     triangles, veils, visibility,
@@ -26,13 +28,15 @@ pub fn steps(plan: &Plan) -> Vec<Step> {
             (Some(_), _) => {}
             (None, Some(_)) => lists(plan, band, &mut steps),
             (None, None) if plan.needs.oit.is_some() => order_free(plan, band, &mut steps),
-            (None, None) if plan.needs.separate => apart(plan, band, &mut steps),
             (None, None) => {
-                nearest(plan, band, &mut steps);
-                sums(plan, band, &mut steps);
+                project_in(plan, band, &mut steps);
+                for pages in plan.together() {
+                    nearest(plan, band, &pages, &mut steps);
+                    sums(plan, band, &pages, &mut steps);
+                }
             }
         }
-        if !plan.needs.gather {
+        if !plan.needs.gather || plan.needs.separate {
             steps.push(Step::Stage(resolve::steps(plan, band)));
         }
         steps.extend(of_maps(plan, band).map(Step::Stage));
@@ -41,26 +45,44 @@ pub fn steps(plan: &Plan) -> Vec<Step> {
     steps
 }
 
-/// Splats, which bands share or have each, and the nearest depth of each pixel of a band.
-fn nearest(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
+/// Splats, which bands share or have each, but for those that are drawn after others.
+fn project_in(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
+    if !plan.needs.cull && plan.projects_in(band) {
+        steps.push(Step::Stage(project::steps(plan, band, Part::All)));
+    }
+}
+
+/// The nearest depth of each pixel of a band.
+fn nearest(plan: &Plan, band: usize, pages: &Range<usize>, steps: &mut Vec<Step>) {
     for &part in plan.parts() {
-        if plan.projects_in(band) {
-            if plan.needs.cull {
-                steps.push(Step::Stage(cull::steps(band, part)));
-                steps.extend(plan.looks_for_slots.then_some(Step::Look(Look::Slots(part))));
-            }
+        if plan.needs.cull && plan.projects_in(band) {
+            steps.push(Step::Stage(cull::steps(band, part)));
+            steps.extend(plan.looks_for_slots.then_some(Step::Look(Look::Slots(part))));
             steps.push(Step::Stage(project::steps(plan, band, part)));
         }
-        steps.push(Step::Stage(visibility::steps(plan, band, part)));
+        steps.extend(on(plan, pages, visibility::steps(plan, band, part)).map(Step::Stage));
         if part == Part::Near {
             steps.push(Step::Stage(visibility::occlude(band, part)));
         }
     }
     if plan.looks_for_lists[Listed::Large as usize] && plan.projects_in(band) {
-        steps.push(tiles::look(plan, Listed::Large, band));
+        steps.push(tiles::look(plan, Listed::Large, band, pages.clone()));
     }
-    large(plan, (tiles::visibility(plan, band), visibility::large(band)), steps);
+    let by_workgroups = on(plan, pages, visibility::large(band)).collect();
+    large(plan, (tiles::visibility(plan, band, pages.clone()), by_workgroups), steps);
     steps.push(Step::Stage(visibility::occlude(band, Part::All)));
+}
+
+/// A stage over all pages, or where inputs are kept apart over those of one, by the reference in one go with others.
+fn on(plan: &Plan, pages: &Range<usize>, stage: Stage) -> impl Iterator<Item = Stage> {
+    let each = if plan.needs.separate { pages.clone() } else { 0..0 };
+    let whole = (!plan.needs.separate).then(|| stage.clone());
+    let first = pages.start;
+    let of_page = move |page: usize| {
+        let stage = stage.clone().without_twin().of_page(page);
+        if page == first { stage } else { stage.after(Vec::new()) }
+    };
+    whole.into_iter().chain(each.map(of_page))
 }
 
 /// A list of each pixel's fragments, from front to back.
@@ -81,42 +103,43 @@ fn order_free(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
     }
     let of_all = [visibility::steps(plan, band, Part::All).without_twin(), visibility::large(band)];
     let before = of_all.into_iter().filter(|_| plan.needs.oit == Some(Oit::Moments));
-    let sums = [accumulate::steps(plan, band).as_twin(Twin::Oit), accumulate::large(band)];
+    let sums = [accumulate::steps(plan, band, true).as_twin(Twin::Oit), accumulate::large(band)];
     let covered = oit::marks(&plan.needs).then(|| oit::mark(band)).into_iter();
     let covered = covered.chain([visibility::occlude(band, Part::All)]);
     steps.extend(before.chain(sums).chain(covered).map(Step::Stage));
 }
 
-/// Inputs that are kept apart, one after the other.
-fn apart(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
-    if plan.projects_in(band) {
-        steps.push(Step::Stage(project::steps(plan, band, Part::All)));
-    }
-    steps.extend(individuals::steps(plan, band).into_iter().map(Step::Stage));
-}
-
-/// The sums of each pixel of a band; by tiles that gather, its image too.
-fn sums(plan: &Plan, band: usize, steps: &mut Vec<Step>) {
+/// The sums of each pixel of a band, and what an individual shows; by tiles that gather, its image too.
+fn sums(plan: &Plan, band: usize, pages: &Range<usize>, steps: &mut Vec<Step>) {
     // The visibility pass has told all.
     if matches!(plan.needs.winner, Some(Winner::Depth | Winner::Once)) {
         return;
     }
+    let looks = plan.looks_for_lists[Listed::Small as usize];
     if plan.needs.gather {
-        steps.extend(plan.looks_for_lists[Listed::Small as usize].then(|| tiles::look(plan, Listed::Small, band)));
-        steps.extend(tiles::resolve(plan, band).into_iter().map(Step::Stage));
-        return;
+        steps.extend(looks.then(|| tiles::look(plan, Listed::Small, band, pages.clone())));
+        steps.extend(tiles::resolve(plan, band, pages.start).into_iter().map(Step::Stage));
+    } else {
+        let first = pages.start == 0;
+        steps.extend(on(plan, pages, accumulate::steps(plan, band, first)).map(Step::Stage));
+        let by_workgroups = on(plan, pages, accumulate::large(band)).collect();
+        large(plan, (tiles::accumulate(plan, band, pages.clone()), by_workgroups), steps);
+        if plan.needs.separate {
+            steps.push(Step::Stage(individuals::keep(plan, band, first)));
+        }
     }
-    steps.push(Step::Stage(accumulate::steps(plan, band)));
-    large(plan, (tiles::accumulate(plan, band), accumulate::large(band)), steps);
+    if let (true, Some(Step::Stage(last))) = (plan.needs.separate, steps.last_mut()) {
+        last.twin = plan.individuals.iter().position(|own| own == pages).map(Twin::Individual);
+    }
 }
 
 /// The large splats, in the way that the plan knows or that a look will show.
-fn large(plan: &Plan, (by_tiles, by_workgroups): (Vec<Stage>, Stage), steps: &mut Vec<Step>) {
+fn large(plan: &Plan, (by_tiles, by_workgroups): (Vec<Stage>, Vec<Stage>), steps: &mut Vec<Step>) {
     // Tiles that gather have lists, or the frame is tried again without them.
     let looks = plan.looks_for_lists[Listed::Large as usize] && !plan.needs.gather;
     match plan.large_by_tiles {
         true if looks => steps.push(Step::Large { by_tiles, by_workgroups }),
         true => steps.extend(by_tiles.into_iter().map(Step::Stage)),
-        false => steps.push(Step::Stage(by_workgroups)),
+        false => steps.extend(by_workgroups.into_iter().map(Step::Stage)),
     }
 }

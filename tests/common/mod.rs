@@ -179,6 +179,7 @@ pub fn all_needs() -> Vec<SceneNeeds> {
     all.extend(order_free(&all));
     all.extend(peeled(&all));
     all.extend(beside_triangles(&all));
+    all.extend(kept_apart(&all));
     for needs in &mut all {
         needs.outline &= needs.low_pass == LowPass::None;
     }
@@ -260,6 +261,17 @@ fn beside_triangles(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
         }
     };
     all.iter().filter(opaque).step_by(3).enumerate().map(of).collect()
+}
+
+/// Those of renders whose inputs are kept apart, a fifth of what they could be.
+fn kept_apart(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
+    let opaque = |needs: &&SceneNeeds| needs.raster.is_none() && needs.lists.is_none() && needs.oit.is_none();
+    let blended = |needs: &&SceneNeeds| needs.winner.is_none() && !needs.copies;
+    let of = |needs: &SceneNeeds| {
+        let maps = needs.maps.but(&[Map::Index]);
+        SceneNeeds { separate: true, cull: false, maps, ..*needs }
+    };
+    all.iter().filter(opaque).filter(blended).step_by(5).map(of).collect()
 }
 
 /// Those of the rasteriser that peels layers.

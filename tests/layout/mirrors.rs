@@ -184,6 +184,7 @@ pub fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         ("named_triangles", Element::Plain(WORD)),
         ("triangle_attributes", Element::Plain(&[f32::SHAPE])),
         ("triangle_textures", Element::Plain(WORD)),
+        ("individuals", Element::Plain(&[<[f32; 4]>::SHAPE])),
         ("triangle_pixels", Element::Plain(&[<[f32; 4]>::SHAPE])),
         ("beside", Element::Plain(&[<[f32; 4]>::SHAPE])),
         ("texels", Element::Plain(WORD)),

@@ -60,6 +60,7 @@ fn lines(plan: &Plan) -> Vec<String> {
             format!("{}, or {}", all(by_tiles), all(by_workgroups))
         }
         Step::Draw => "draw".to_owned(),
+        Step::DrawTriangles => "draw triangles".to_owned(),
         Step::ReadBack(band) => format!("read back {band}"),
     };
     steps(plan).iter().map(step).collect()

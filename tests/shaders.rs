@@ -76,7 +76,12 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
         } else {
             &[]
         };
-        let own: BTreeSet<&str> = kernels.iter().map(|kernel| kernel.name).chain(drawn.iter().copied()).collect();
+        let of_mesh: &[&str] = match (needs.raster, needs.mesh) {
+            (Some(_), Some(_)) => &["drawn_corner", "drawn_triangle"],
+            _ => &[],
+        };
+        let drawn = drawn.iter().chain(of_mesh).copied();
+        let own: BTreeSet<&str> = kernels.iter().map(|kernel| kernel.name).chain(drawn).collect();
         // Of a render by tiles each module has entry points that only the other needs; weights by depth need no visibility pass.
         let shared = entries.difference(&own).count();
         let leaves = made.of_tiles() || needs.gather || needs.oit == Some(Oit::Weighted);
@@ -115,7 +120,6 @@ const ALTERNATIVES: [&[&str]; 9] = [
 
 /// Needs of renders without triangles.
 const MESHLESS: &[&str] = &[
-    "raster-exact",
     "raster-offset",
     "lists-layers",
     "lists-sorted",
@@ -159,7 +163,7 @@ const EXCLUSIVE: [(&str, &[&str]); 34] = [
     ("triangles", MESHLESS),
     ("join", MESHLESS),
     ("separate", MESHLESS),
-    ("separate", &["copies", "cull", "nearest"]),
+    ("separate", &["copies", "cull", "nearest", "raster-exact"]),
     (
         "veils",
         &["tiles", "gather", "copies", "cull", "atomics-u64", "raster-exact", "raster-offset", "nearest", "peels"],

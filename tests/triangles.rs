@@ -12,7 +12,7 @@ use epsplat::frame::Frame;
 use epsplat::gpu::{Gpu, Sources};
 use epsplat::io::{Mesh, Texture};
 use epsplat::metrics::DECISION_MARGIN;
-use epsplat::plan::{Organisation, RenderOptions};
+use epsplat::plan::{BlendFormat, Organisation, Raster, RasterDepth, RenderOptions};
 use epsplat::render::{Backend, Renderer, render};
 use epsplat::scene::{
     Camera, Epsilon, Join, Lens, Map, Maps, Projection, Samples, Scene, Shading, Triangle, Triangles, Up,
@@ -306,6 +306,36 @@ fn kernels_and_twins_join_alike() {
         let shown = frame(&scene, &camera, &of(join), &broken(file, from, to));
         assert!(differ(join, &shown) > 10, "{file}");
     }
+}
+
+/// The rasteriser snaps corners to parts of pixels, so it differs at edges, and nowhere else.
+#[test]
+fn the_rasteriser_draws_the_same_but_for_edges() {
+    let Some(backend) = gpu() else { return };
+    let Backend::Gpu { gpu, .. } = &backend else { return };
+    let format = if gpu.adapter.blends_f32 { BlendFormat::Rgba32Float } else { BlendFormat::Rgba16Float };
+    let (joined, camera) = joined();
+    let alone = Scene { triangles: joined.triangles.clone(), ..scene_of(&rough()) };
+    let parallel = sphere_camera(96, Projection::Orthographic);
+    for (scene, camera) in [(&joined, &camera), (&alone, &camera), (&alone, &parallel)] {
+        let computed = frame(scene, camera, &unlit(), &backend);
+        let raster = Some(Raster { format, depth: RasterDepth::Exact });
+        let options = RenderOptions { raster, ..unlit() };
+        let shown = frame(scene, camera, &options, &backend);
+        let depths = |frame: &Frame| frame.map(Map::Depth).unwrap().to_vec();
+        let (a, b) = (depths(&computed), depths(&shown));
+        let off = |(a, b): (&f32, &f32)| a != b && (a - b).abs() > 1e-3 * (a + b);
+        let apart = a.iter().zip(&b).filter(|pair| off(*pair)).count();
+        let covered = a.iter().filter(|depth| depth.is_finite()).count();
+        assert!(apart * 50 < covered && covered > 2000, "{apart} of {covered}");
+        // Another mesh is told apart.
+        let other = frame(&scene_of(&rough()), camera, &options, &backend);
+        let others = depths(&other);
+        assert!(a.iter().zip(&others).filter(|pair| off(*pair)).count() * 5 > covered);
+    }
+    let offset = Some(Raster { format, depth: RasterDepth::Offset });
+    let error = render(&joined, &camera, &RenderOptions { raster: offset, ..unlit() }, &backend, &()).unwrap_err();
+    assert!(error.to_string().contains("--raster-depth"), "{error}");
 }
 
 /// The order of triangles and surfels, bands, organisations and features do not show, nor how many numbers an atomic has.

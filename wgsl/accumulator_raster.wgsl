@@ -1,6 +1,6 @@
 // Sums by the rasteriser's blender, four channels a target: a fragment's terms are gathered, then returned at once. What
 // blending makes of them depends on the format, and on the order. Bounds: src/passes/raster.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x08b8043d93b849a9
+// All loops end, by 1 of src/gpu/loops.rs: 0x9dd5c527955ba572
 
 // What terms are multiplied with, so that the sums of formats that end at 1 do not.
 override BLEND_SCALE: f32;
@@ -11,6 +11,11 @@ const COUNT_ONE: Term = 1.0;
 var<private> terms: array<f32, 12>;
 
 fn quantise(weight: f32) -> Term {
+    return weight;
+}
+
+// The weight of its term.
+fn part_of(weight: Term) -> f32 {
     return weight;
 }
 

@@ -13,6 +13,12 @@ fn homogeneous_depth(corner: Corner) -> Double {
     return single(1.0);
 }
 
+// A rasteriser's: 1 at the near depth, 0 beyond all there is.
+fn clip_depth(corner: Corner) -> f32 {
+    let beyond = 2.0 * held.farthest - held.near;
+    return (beyond - corner.depth.high) / (beyond - held.near);
+}
+
 fn spread_of_parts(triangle: Triangle, depth: f32, of_depth: f32) -> f32 {
     return depth / of_depth;
 }

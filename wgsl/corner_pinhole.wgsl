@@ -28,6 +28,11 @@ fn homogeneous_depth(corner: Corner) -> Double {
     return single(1.0);
 }
 
+// A rasteriser's: 1 at the near depth, 0 infinitely far away, where it is divided by the depth.
+fn clip_depth(corner: Corner) -> f32 {
+    return held.near;
+}
+
 // How much of a triangle's parts a pixel has at `depth`, where the mean of the corners' shared depths by areas is `of_depth`: the determinant of
 // the parts by columns and rows.
 fn spread_of_parts(triangle: Triangle, depth: f32, of_depth: f32) -> f32 {

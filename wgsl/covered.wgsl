@@ -1,6 +1,6 @@
 // Stage 4, its start: which tiles of the image have anything. The others stay as the image was cleared, and no invocation
 // looks at their pixels. Host side: src/passes/covered.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xaff6575ade4c8e39
+// All loops end, by 1 of src/gpu/loops.rs: 0xa34c69eac6dcacb6
 
 // Pixels of a tile, across and down.
 const TILE_WIDTH: u32 = 8u;
@@ -34,7 +34,7 @@ fn list_covered(
 ) {
     hold();
     let tile = linear_index(workgroup, workgroups, local);
-    if (tile < tiles_in_band() && (LIST_EMPTY != 0u || has_any(tile))) {
+    if (tile < tiles_in_band() && (LIST_EMPTY != 0u || has_any(tile) || has_triangles(tile))) {
         // Places depend on the schedule, but tiles share no pixel.
         let place = atomicAdd(&nearest[covered_start()], 1u);
         atomicStore(&nearest[covered_start() + COVERED_LIST + place], tile);

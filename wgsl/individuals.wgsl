@@ -1,6 +1,6 @@
 // Inputs that are kept apart, the individuals of Tien 2008: each is blended by itself, one after the other, and of what they show at a
 // pixel the nearest is kept, by the depth that each blends to (section 5.3). Twin: src/passes/individuals.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xffc197b5e1340d2f
+// All loops end, by 1 of src/gpu/loops.rs: 0x0bfb67947e78eb1d
 
 // Of each pixel: the straight colour, shaded; then the normal, world space, unit, and the depth, device units, 0 where nothing is. Then, for
 // joins and maps, the depth of the nearest fragment and the summed weight, and how many there are; then their place in a texture.
@@ -97,7 +97,7 @@ fn list_individuals(
             any_shows = any_shows || individuals[(at.y * held.width + at.x) * INDIVIDUAL_VECTORS + 1u].w != 0.0;
         }
     }
-    if (tile < tiles_in_band() && any_shows) {
+    if (tile < tiles_in_band() && (any_shows || has_triangles(tile))) {
         let place = atomicAdd(&nearest[covered_start()], 1u);
         atomicStore(&nearest[covered_start() + COVERED_LIST + place], tile);
     }

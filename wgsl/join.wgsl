@@ -1,10 +1,13 @@
 // What shows of a pixel's splats and its triangles (Tien 2008, section 5.3). Twin: src/passes/join.rs.
 
-// As triangles_attributes.wgsl left them.
+// As triangles_attributes.wgsl left them, in the tiles of triangles.
 @group(0) @binding(62) var<storage, read> beside: array<vec4<f32>>;
 
 // The nearer of the two, or of one depth the triangle.
-fn joined(splats: Surface, pixel: u32) -> Surface {
+fn joined(splats: Surface, pixel: u32, x: u32, row: u32) -> Surface {
+    if (!shows_triangles(x, row)) {
+        return splats;
+    }
     let placed = beside[2u * pixel + 1u];
     let share = share_of_splats(splats, placed.w);
     if (placed.w == 0.0 || share == 1.0) {

@@ -1,5 +1,5 @@
 // Splats alone. Same interface as join.wgsl.
 
-fn joined(splats: Surface, pixel: u32) -> Surface {
+fn joined(splats: Surface, pixel: u32, x: u32, row: u32) -> Surface {
     return splats;
 }

@@ -6,7 +6,7 @@
 
 // What a splat's fragments need is read once a corner and handed on unchanged: reading the record again at each fragment
 // took a software adapter twice as long.
-struct Corner {
+struct ShapeCorner {
     @builtin(position) position: vec4<f32>,
     @location(0) @interpolate(flat) index: u32,
     // And bounds_last.
@@ -27,7 +27,7 @@ override VERTICES: u32;
 // How far the shape reaches past the disk, pixels: more than the rasteriser rounds corners.
 const SHAPE_MARGIN: f32 = 0.05;
 
-// Corner `number` of the shape about the unit disk, in the disk's coordinates: a triangle, or a square.
+// ShapeCorner `number` of the shape about the unit disk, in the disk's coordinates: a triangle, or a square.
 fn disk_corner(number: u32) -> vec2<f32> {
     if (VERTICES == 3u) {
         return vec2<f32>(select(f32(number) * 3.4641016 - 5.1961524, 0.0, number == 0u), select(-1.0, 2.0, number == 0u));
@@ -35,7 +35,7 @@ fn disk_corner(number: u32) -> vec2<f32> {
     return vec2<f32>(f32(number & 1u), f32(number >> 1u)) * 2.0 - 1.0;
 }
 
-// Corner `number` of the shape about a box of pixels, from the box's first corner in units of its sides.
+// ShapeCorner `number` of the shape about a box of pixels, from the box's first corner in units of its sides.
 fn box_corner(number: u32) -> vec2<f32> {
     return vec2<f32>(f32(number & 1u), f32(number >> 1u)) * select(1.0, 2.0, VERTICES == 3u);
 }
@@ -70,7 +70,7 @@ fn corner_image(splat: Splat, number: u32) -> vec2<f32> {
 }
 
 // A corner in clip space; a splat out of view has none.
-fn corner_of(vertex: u32) -> Corner {
+fn shape_corner(vertex: u32) -> ShapeCorner {
     hold();
     let index = vertex / VERTICES;
     let place = vertex % VERTICES;
@@ -80,7 +80,7 @@ fn corner_of(vertex: u32) -> Corner {
     let clip = image / vec2<f32>(f32(held.width), f32(held.height)) * vec2<f32>(2.0, -2.0) + vec2<f32>(-1.0, 1.0);
     let extent = bounds(splat);
     let empty = any(extent.first > extent.last);
-    var corner: Corner;
+    var corner: ShapeCorner;
     corner.position = vec4<f32>(-2.0, -2.0, 0.0, 1.0);
     if (!empty) {
         corner.position = vec4<f32>(clip, corner_depth(splat, image, index), 1.0);
@@ -95,13 +95,13 @@ fn corner_of(vertex: u32) -> Corner {
 }
 
 @vertex
-fn shape(@builtin(vertex_index) vertex: u32) -> Corner {
-    return corner_of(vertex);
+fn shape(@builtin(vertex_index) vertex: u32) -> ShapeCorner {
+    return shape_corner(vertex);
 }
 
 @vertex
-fn shape_with_attributes(@builtin(vertex_index) vertex: u32) -> Corner {
-    var corner = corner_of(vertex);
+fn shape_with_attributes(@builtin(vertex_index) vertex: u32) -> ShapeCorner {
+    var corner = shape_corner(vertex);
     let attributes = attributes_of(corner.index, splat_of(projected[corner.index]));
     corner.color = attributes.color;
     corner.normal = attributes.normal;
@@ -109,7 +109,7 @@ fn shape_with_attributes(@builtin(vertex_index) vertex: u32) -> Corner {
     return corner;
 }
 
-fn fragment_of(corner: Corner) -> Fragment {
+fn fragment_of(corner: ShapeCorner) -> Fragment {
     hold();
     var splat: Splat;
     splat.anchor_x = corner.anchor.x;
@@ -125,7 +125,7 @@ fn fragment_of(corner: Corner) -> Fragment {
     return footprint(splat, filter_in(projected[corner.index]), pixel.x, pixel.y);
 }
 
-fn carried(corner: Corner) -> Attributes {
+fn carried(corner: ShapeCorner) -> Attributes {
     // The rasteriser draws flat disks (src/plan/needs.rs).
     var flat_: Bend;
     return attributes_without_place(corner.color, corner.normal, flat_, corner.radius);

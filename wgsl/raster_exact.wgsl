@@ -3,7 +3,7 @@
 
 // Scaling by a power of two is exact.
 @fragment
-fn raster_visibility(corner: Corner) -> @builtin(frag_depth) f32 {
+fn raster_visibility(corner: ShapeCorner) -> @builtin(frag_depth) f32 {
     let fragment = fragment_of(corner);
     if (!fragment.hit || is_peeled(fragment, corner.radius, vec2<u32>(corner.position.xy))) {
         discard;
@@ -12,7 +12,7 @@ fn raster_visibility(corner: Corner) -> @builtin(frag_depth) f32 {
 }
 
 @fragment
-fn raster_attributes(corner: Corner) -> Targets {
+fn raster_attributes(corner: ShapeCorner) -> Targets {
     let fragment = fragment_of(corner);
     let pixel = vec2<u32>(corner.position.xy);
     let place = pixel_index(pixel.x, pixel.y);

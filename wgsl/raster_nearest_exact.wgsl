@@ -3,7 +3,7 @@
 
 // Scaling by a power of two is exact.
 @fragment
-fn raster_nearest(corner: Corner) -> Seen {
+fn raster_nearest(corner: ShapeCorner) -> Seen {
     let fragment = fragment_of(corner);
     if (!fragment.hit) {
         discard;

@@ -11,7 +11,7 @@ fn front_at(pixel: u32) -> f32 {
 }
 
 @fragment
-fn raster_nearest(corner: Corner) -> Targets {
+fn raster_nearest(corner: ShapeCorner) -> Targets {
     let fragment = fragment_of(corner);
     if (!fragment.hit) {
         discard;

@@ -16,14 +16,14 @@ fn corner_depth(splat: Splat, image: vec2<f32>, index: u32) -> f32 {
 }
 
 @fragment
-fn raster_visibility(corner: Corner) {
+fn raster_visibility(corner: ShapeCorner) {
     if (!fragment_of(corner).hit) {
         discard;
     }
 }
 
 @fragment
-fn raster_attributes(corner: Corner) -> Targets {
+fn raster_attributes(corner: ShapeCorner) -> Targets {
     let fragment = fragment_of(corner);
     // Outside the disk the sums gain nothing: no fragment is discarded, so that the depth test may come first.
     if (fragment.hit) {

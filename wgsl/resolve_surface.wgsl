@@ -48,7 +48,7 @@ fn surface_of(sums_of: u32, front: f32, x: u32, y: u32) -> Surface {
 // The pixel (x, y), the band's `pixel`th, from what `sums_of` names its sums.
 fn resolve_pixel(sums_of: u32, pixel: u32, x: u32, y: u32) {
     let out = pixel * IMAGE_WORDS;
-    let surface = joined(blended_at(sums_of, pixel, x, y), pixel);
+    let surface = joined(blended_at(sums_of, pixel, x, y), pixel, x, y - held_band.first_row);
     write_tail(out, 0.0);
     if (!surface.exists) {
         write_color(out, held.background);
@@ -73,7 +73,7 @@ fn resolve_pixel(sums_of: u32, pixel: u32, x: u32, y: u32) {
 
 // The premultiplied colour of the sample in a column and row of the band, its `sample`th, from what `sums_of` names its sums.
 fn sample_color(sums_of: u32, sample: u32, x: u32, row: u32) -> vec4<f32> {
-    let surface = joined(blended_at(sums_of, sample, x, row + held_band.first_row), sample);
+    let surface = joined(blended_at(sums_of, sample, x, row + held_band.first_row), sample, x, row);
     var color = held.background;
     if (surface.exists) {
         color = over(surface.color, held.background);

@@ -1,14 +1,12 @@
-// Triangles, their attribute pass: what the nearest one of each pixel shows there. One invocation a pixel. Twin: src/passes/triangles.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x7bbaf1ccf52e8bad
+// Triangles, their attribute pass: what the nearest one of each pixel shows there. One workgroup a tile in which any shows. Twin: src/passes/triangles.rs.
+// All loops end, by 1 of src/gpu/loops.rs: 0x063edf382cd1e3eb
 
-// Two words a pixel: the nearest triangle's number, and its depth.
-@group(0) @binding(59) var<storage, read> named_triangles: array<u32>;
 // A record a triangle: its corners' normals, if it has some, then their premultiplied colours, then their places in a texture and its number. If all
 // have one colour, that is before the
 // records, and in none.
 @group(0) @binding(60) var<storage, read> triangle_attributes: array<f32>;
 // What triangles show at a pixel: the straight colour, shaded; then the normal, world space, unit, and the depth, camera-space z in device
-// units, 0 where nothing is.
+// units, 0 where nothing is. Then what triangles_tiles.wgsl tells of tiles.
 @group(0) @binding(61) var<storage, read_write> triangle_pixels: array<vec4<f32>>;
 
 // Words of a record; of its normals; and before the first one.
@@ -54,17 +52,20 @@ fn shade_triangles(
     @builtin(local_invocation_index) local: u32,
 ) {
     hold();
-    let pixel = linear_index(workgroup, workgroups, local);
-    if (pixel >= band_pixels()) {
+    let tile = triangle_tile(workgroup.y * workgroups.x + workgroup.x);
+    let x = tile % triangle_tiles_across() * TRIANGLE_TILE + local % TRIANGLE_TILE;
+    let row = tile / triangle_tiles_across() * TRIANGLE_TILE + local / TRIANGLE_TILE;
+    if (tile >= triangle_tiles_in_band() || x >= held.width || row >= held_band.rows) {
         return;
     }
-    if (named_triangles[2u * pixel + 1u] == 0u) {
+    let pixel = row * held.width + x;
+    let y = row + held_band.first_row;
+    let named = nearest_triangle(pixel, x, y);
+    if (named.y == 0u) {
         triangle_pixels[2u * pixel + 1u] = vec4<f32>(0.0);
         return;
     }
-    let number = named_triangles[2u * pixel];
-    let x = pixel % held.width;
-    let y = pixel / held.width + held_band.first_row;
+    let number = named.x;
     let triangle = triangle_at(number);
     let crossed = cross_precisely(triangle, vec2<f32>(f32(x), f32(y)) + 0.5);
     // Lengths of facets are squares of small ones.

@@ -180,6 +180,9 @@ pub enum Making {
     Uniform,
     /// As `epsplat hybrid` does: samples of a mesh whose diagonal is seen as long as `count` pixels, and the triangles that stay.
     Hybrid,
+    /// Of a shape none: `count` triangles stand for it, and the orthographic camera comes so near that a disk of their mean area has a radius of
+    /// `footprint_px`.
+    Triangles,
     /// Of a shape Gaussians, as `epsplat generate --gaussians` makes them.
     Gaussians,
 }
@@ -229,6 +232,9 @@ pub enum Rims {
 }
 
 impl Making {
+    /// What a shape may become.
+    pub const OF_SHAPES: [Self; 4] = [Self::File, Self::Scanned, Self::Gaussians, Self::Triangles];
+
     /// Whether the mesh is sampled at a number of points.
     pub fn samples(self) -> bool {
         matches!(self, Self::Sample | Self::Projected | Self::Caps | Self::Scanned | Self::Uniform | Self::Hybrid)

@@ -146,7 +146,8 @@ impl SceneEntry {
                 not_beside("radius", self.radius.is_some(), "file (footprint_px serves)")?;
                 not_beside("noise", self.noise.is_some(), "file")?;
                 not_beside("shirt", self.shirt.is_some(), "file")?;
-                not_beside("surfels = gaussians", self.surfels == Making::Gaussians, "file: they are made of a shape")?;
+                let of_shape = matches!(self.surfels, Making::Gaussians | Making::Triangles);
+                not_beside("surfels = gaussians or triangles", of_shape, "file: they are made of a shape")?;
                 let is_mesh =
                     file.extension().is_some_and(|e| ["obj", "ply"].iter().any(|m| e.eq_ignore_ascii_case(m)));
                 if self.truth && !is_mesh {
@@ -156,8 +157,14 @@ impl SceneEntry {
             (None, Some(_)) if self.texture.is_some() || self.source.is_some() => {
                 return Err("texture, source: they are of a file".into());
             }
-            (None, Some(_)) if !matches!(self.surfels, Making::File | Making::Scanned | Making::Gaussians) => {
-                return Err("surfels: of a shape they are scanned, gaussians, or as generated".into());
+            (None, Some(_)) if !Making::OF_SHAPES.contains(&self.surfels) => {
+                return Err("surfels: of a shape they are scanned, gaussians, triangles, or as generated".into());
+            }
+            (None, Some(_)) if self.surfels == Making::Triangles && self.ortho.is_none() => {
+                return Err("ortho: the triangles of a shape are seen in parallel".into());
+            }
+            (None, Some(_)) if self.surfels == Making::Triangles && (self.truth || self.triangles.is_some()) => {
+                return Err("truth, triangles: the triangles of a shape are drawn alone".into());
             }
             (None, Some(_)) if self.surfels == Making::Gaussians && self.shading != Some(Shading::Unlit) => {
                 return Err("shading: Gaussians have the colours that pictures of them show: it is unlit".into());

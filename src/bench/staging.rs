@@ -81,6 +81,9 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
             let file = present(definition, entry, file)?;
             of_file(&file, entry, point.count.unwrap_or(1) as usize, texture.as_ref(), progress)?
         }
+        (None, Some(shape)) if entry.surfels == Making::Triangles => {
+            (Points::default(), None, Some(mesh(shape, point.count.unwrap_or(1))))
+        }
         (None, Some(shape)) => {
             let surface = entry.truth.then_some(Surface::Analytic(shape));
             let count = point.count.unwrap_or(1);
@@ -122,9 +125,14 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
         (scene, _) = with_triangles(Some(scene), &[mesh])?;
         surface = surface.zip(of_triangles).map(|(first, second)| Surface::Both(Box::new([first, second])));
     }
-    let cameras = cameras(entry.size.unwrap_or(definition.size), entry, &scene)?;
+    let mut cameras = cameras(entry.size.unwrap_or(definition.size), entry, &scene)?;
     let mut footprint_px = footprint(&scene, &cameras);
-    if let Some(wanted) = point.footprint_px.filter(|_| footprint_px > 0.0) {
+    if let (Making::Triangles, Some(shape), Some(wanted)) = (entry.surfels, entry.shape, point.footprint_px) {
+        let scale = wanted * (PI * scene.triangles.len() as f64 / shape.area()).sqrt();
+        cameras.iter_mut().for_each(|camera| (camera.fx, camera.fy) = (scale, scale));
+        footprint_px = wanted;
+    }
+    if let Some(wanted) = point.footprint_px.filter(|_| !scene.surfels.is_empty()) {
         let factor = (wanted / footprint_px) as f32;
         let scaled = |axis: [f32; 3]| axis.map(|c| c * factor);
         for surfel in &mut scene.surfels {
@@ -215,8 +223,8 @@ fn of_file(
     let mut left = None;
     let stratified = Method::Stratified { priority: &priority, depth: None };
     let points = match entry.surfels {
-        // Gaussians are made of shapes: reading a definition makes sure of it.
-        Making::File | Making::Gaussians => {
+        // Gaussians and triangles are made of shapes: reading a definition makes sure of it.
+        Making::File | Making::Gaussians | Making::Triangles => {
             let classes = entry.classes.unwrap_or_default();
             let points = io::read_with(file, ReadOptions { classes, ..ReadOptions::default() }, progress)?;
             if entry.classes.is_some() && points.classes.is_empty() {

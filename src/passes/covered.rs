@@ -15,7 +15,7 @@ pub const PASS: Pass = Pass {
     constants: |making| {
         // Of peeled layers the last one may be empty.
         let needs = making.needs;
-        let list_empty = making.options.shows_where_nothing_is() || needs.peels.is_some() || needs.mesh.is_some();
+        let list_empty = making.options.shows_where_nothing_is() || needs.peels.is_some();
         vec![("LIST_EMPTY", u32::from(list_empty).into()), ("TILE_ROWS", super::tiles::rows(making.needs).into())]
     },
 };

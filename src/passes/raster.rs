@@ -17,6 +17,7 @@
 //! step of 1/255 of the [`BlendFormat::MOST_WEIGHTS_8`] weights that it can hold: `8 n / (255 w)` for a summed weight w,
 //! and what passes 8 weights is lost. Blending rounds in the order of the quads, so the order of the surfels shows.
 
+use super::triangles;
 use crate::gpu::program::Draw;
 use crate::plan::pass::Pass;
 use crate::plan::steps::Step;
@@ -133,8 +134,9 @@ pub fn draws(raster: Raster, needs: &SceneNeeds) -> Vec<Draw> {
             false,
         )];
     }
+    let of_triangles = needs.mesh.map(|_| triangles::draw());
     let shape = if needs.peels.is_some() { "shape_to_peel" } else { "shape" };
-    vec![
+    [
         draw("visibility", (shape, "raster_visibility"), vec![], depth(near_first, true), true),
         draw(
             "accumulate",
@@ -144,6 +146,9 @@ pub fn draws(raster: Raster, needs: &SceneNeeds) -> Vec<Draw> {
             false,
         ),
     ]
+    .into_iter()
+    .chain(of_triangles)
+    .collect()
 }
 
 /// Both passes, over the whole image.

@@ -30,11 +30,13 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::Strip;
+use super::raster::DEPTH_FORMAT;
 use super::resolve::shaded;
 use crate::gpu::layout::{QUEUE_START, TILE};
+use crate::gpu::program::Draw;
 use crate::plan::pass::Pass;
-use crate::plan::steps::{Clear, Kernel, Over, Run, Stage, Twin};
-use crate::plan::{ColorNeed, Plan};
+use crate::plan::steps::{Clear, Kernel, Over, Run, Stage, Step, Twin};
+use crate::plan::{Band, ColorNeed, Plan};
 use crate::scene::{Camera, Projection, Scene};
 
 /// A vertex as the camera sees it. Relative to the point p of the image it is `place - p w`.
@@ -248,6 +250,19 @@ pub const NEAREST_TRIANGLE_WORDS: u32 = 2;
 /// Words of what triangles show at a pixel.
 pub const TRIANGLE_PIXEL_WORDS: u32 = 8;
 
+/// The word at which the list of tiles in which triangles show starts: after how many there are, and a grid.
+const TRIANGLE_TILES: u64 = 8;
+
+/// Words of the list of tiles of a band.
+pub fn tile_words(band: &Band) -> u64 {
+    TRIANGLE_TILES + band.tiles
+}
+
+/// Words of what triangles show in a band: of each pixel, and of each tile.
+pub fn pixel_words(band: &Band) -> u64 {
+    u64::from(TRIANGLE_PIXEL_WORDS) * band.pixels + 4 * band.tiles
+}
+
 /// Words of a corner.
 pub const CORNER_WORDS: u32 = 9;
 
@@ -255,22 +270,28 @@ pub const CORNER_WORDS: u32 = 9;
 pub const PASS: Pass = Pass {
     name: "triangles",
     files: |needs| {
-        let Some(mesh) = needs.mesh else { return Vec::new() };
+        let Some(mesh) = needs.mesh else { return vec!["triangles_tiles_absent.wgsl"] };
         let corner = match needs.projection {
             Projection::Pinhole => "corner_pinhole.wgsl",
             Projection::Orthographic => "corner_orthographic.wgsl",
         };
-        let nearest = if mesh.once { "triangles_once.wgsl" } else { "triangles_twice.wgsl" };
+        let visibility: &[&str] = match (needs.raster, mesh.once) {
+            (Some(_), _) => &["triangles_raster.wgsl"],
+            (None, true) => &["triangles_visibility.wgsl", "triangles_named.wgsl", "triangles_once.wgsl"],
+            (None, false) => &["triangles_visibility.wgsl", "triangles_named.wgsl", "triangles_twice.wgsl"],
+        };
         let texture = if mesh.textured { "triangles_texture.wgsl" } else { "triangles_texture_absent.wgsl" };
         // Else surfels' colours need it.
         let decodes = mesh.textured && !matches!(needs.color, ColorNeed::Srgb8 | ColorNeed::Textured);
-        let all = ["corners.wgsl", "triangles.wgsl", "triangles_visibility.wgsl", "triangles_attributes.wgsl"];
-        all.into_iter().chain([corner, nearest, texture]).chain(decodes.then_some("srgb.wgsl")).collect()
+        let all =
+            ["corners.wgsl", "triangles.wgsl", "triangles_tiles.wgsl", "triangles_attributes.wgsl", corner, texture];
+        all.into_iter().chain(visibility.iter().copied()).chain(decodes.then_some("srgb.wgsl")).collect()
     },
     kernels: |needs| match needs.mesh {
         None => Vec::new(),
+        Some(_) if needs.raster.is_some() => vec![SEE_CORNERS, LIST_TILES, ARRANGE_TILES, SHADE],
         Some(mesh) => {
-            let all = [SEE_CORNERS, DRAW, ARRANGE, DRAW_LARGE, DRAW_RARE, SHADE];
+            let all = [SEE_CORNERS, DRAW, ARRANGE, DRAW_LARGE, DRAW_RARE, LIST_TILES, ARRANGE_TILES, SHADE];
             all.into_iter().chain([NAME, NAME_LARGE, NAME_RARE].into_iter().filter(|_| !mesh.once)).collect()
         }
     },
@@ -295,12 +316,51 @@ const DRAW_RARE: Kernel = Kernel::of("draw_rare_triangles", [TILE, TILE, 1]);
 const NAME: Kernel = Kernel::new("name_triangles");
 const NAME_LARGE: Kernel = Kernel::of("name_large_triangles", [TILE, TILE, 1]);
 const NAME_RARE: Kernel = Kernel::of("name_rare_triangles", [TILE, TILE, 1]);
+const LIST_TILES: Kernel = Kernel::new("list_triangle_tiles");
+const ARRANGE_TILES: Kernel = Kernel::of("arrange_triangle_tiles", [1; 3]);
 const SHADE: Kernel = Kernel::new("shade_triangles");
+
+/// By the rasteriser: corners, and the nearest triangle of each pixel of the whole image.
+pub fn drawn() -> [Step; 2] {
+    let corners = vec![Run { kernel: SEE_CORNERS, over: Over::Vertices }];
+    [Step::Stage(Stage::new("triangles", 0, corners)), Step::DrawTriangles]
+}
+
+/// The pipeline of the rasteriser's visibility pass: depths are largest in front.
+pub fn draw() -> Draw {
+    let target = wgpu::ColorTargetState { format: NUMBERS, blend: None, write_mask: wgpu::ColorWrites::ALL };
+    let depth = wgpu::DepthStencilState {
+        format: DEPTH_FORMAT,
+        depth_write_enabled: Some(true),
+        depth_compare: Some(wgpu::CompareFunction::Greater),
+        stencil: Default::default(),
+        bias: Default::default(),
+    };
+    Draw {
+        name: DRAWN,
+        vertex: "drawn_corner",
+        fragment: "drawn_triangle",
+        targets: vec![target],
+        depth: Some(depth),
+        constant: None,
+    }
+}
+
+/// That pipeline's name.
+pub const DRAWN: &str = "triangles";
+
+/// The format of the numbers that it leaves.
+pub const NUMBERS: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
 
 /// The stages of a band: corners once, the nearest triangle of each pixel, and what it shows.
 pub fn steps(plan: &Plan, band: usize) -> Vec<Stage> {
     let run = |kernel, over| Run { kernel, over };
     let once = plan.needs.mesh.is_some_and(|mesh| mesh.once);
+    let tiles = Clear::of("triangle_tiles", 0, TRIANGLE_TILES);
+    let shade = [run(LIST_TILES, Over::Occlusion), run(ARRANGE_TILES, Over::Once), run(SHADE, Over::TriangleTiles)];
+    if plan.needs.raster.is_some() {
+        return vec![Stage::new("triangles", band, shade.to_vec()).after(vec![tiles])];
+    }
     let mut runs = Vec::new();
     if band == 0 {
         runs.push(run(SEE_CORNERS, Over::Vertices));
@@ -310,9 +370,10 @@ pub fn steps(plan: &Plan, band: usize) -> Vec<Stage> {
     if !once {
         runs.extend([NAME, NAME_LARGE, NAME_RARE].into_iter().zip(over).map(|(kernel, over)| run(kernel, over)));
     }
-    runs.push(run(SHADE, Over::Pixels));
+    runs.extend(shade);
     let words = plan.bands[band].pixels * u64::from(NEAREST_TRIANGLE_WORDS);
     let start = |queue| Clear::of(queue, 0, QUEUE_START.into());
-    let clears = vec![start("large_triangles"), start("rare_triangles"), Clear::of("nearest_triangles", 0, words)];
+    let nearest = Clear::of("nearest_triangles", 0, words);
+    let clears = vec![start("large_triangles"), start("rare_triangles"), nearest, tiles];
     vec![Stage::new("triangles", band, runs).after(clears).as_twin(Twin::Triangles)]
 }

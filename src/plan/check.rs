@@ -325,8 +325,13 @@ fn triangles(options: &RenderOptions, reference: bool) -> Result<()> {
         }
         _ if options.maps.has(Map::Index) => usage("triangles have no points to name: leave the map index out"),
         _ if reference => Ok(()),
-        RenderOptions { raster: Some(_), .. } => {
-            usage("the rasteriser draws splats alone: leave the triangles out, or render by compute")
+        RenderOptions { raster: Some(raster), .. }
+            if raster.depth != RasterDepth::Exact || options.blend == Blend::Nearest =>
+        {
+            usage(
+                "the rasteriser draws triangles beside splats that are blended by exact depths: leave --raster-depth and --blend \
+                 out, or the triangles",
+            )
         }
         _ => Ok(()),
     }
@@ -376,9 +381,9 @@ fn rasteriser(adapter: &AdapterDescription, needs: &SceneNeeds, camera: &Camera)
             adapter.error("vertex shaders cannot read the splats here: take --backend gpu, or another --adapter")
         );
     }
-    if raster.depth != RasterDepth::Exact && adapter.api == "gl" {
+    if (raster.depth != RasterDepth::Exact || needs.mesh.is_some()) && adapter.api == "gl" {
         return Err(
-            adapter.error("OpenGL interpolates depths too coarsely: take --raster-depth exact, or another --adapter")
+            adapter.error("OpenGL interpolates depths too coarsely: take --raster-depth exact without triangles, or another --adapter")
         );
     }
     if raster.format == BlendFormat::Rgba32Float && !adapter.blends_f32 {

@@ -178,7 +178,7 @@ impl Plan {
             pages: individuals.last().map_or(facts.surfels.div_ceil(page) as usize, |last| last.end),
             individuals,
             longest_list: known.longest_list,
-            lists_empty: options.shows_where_nothing_is() || needs.peels.is_some() || needs.mesh.is_some(),
+            lists_empty: options.shows_where_nothing_is() || needs.peels.is_some(),
             projects_each_band: several && (cull || gather),
             looks_for_slots: cull && (several || !known.slots),
             large_by_tiles: needs.tiles && (looks[0] || known.entries_of(Listed::Large).is_some()),

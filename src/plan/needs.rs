@@ -327,7 +327,7 @@ impl SceneNeeds {
             copies,
             tiles,
             winner,
-            mesh: picture.mesh.map(|mesh| MeshNeeds { once: long_atomics, ..mesh }),
+            mesh: picture.mesh.map(|mesh| MeshNeeds { once: long_atomics && picture.raster.is_none(), ..mesh }),
             atomics_u64: long_atomics && fixed && !copies,
             long_words: adapter.integers_u64 && options.has(Optimisation::LongWords),
             subgroups: tiles && tuning::shares(adapter) && options.has(Optimisation::Sharing),

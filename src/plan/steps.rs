@@ -61,6 +61,8 @@ pub enum Over {
     Triangles,
     /// A workgroup for each large triangle, as the device counted them.
     LargeTriangles,
+    /// A workgroup for each tile in which triangles show.
+    TriangleTiles,
     /// A workgroup for each triangle that f32 does not tell.
     RareTriangles,
     /// An invocation for each large splat, to list it.
@@ -220,6 +222,8 @@ pub enum Step {
     },
     /// The rasteriser's visibility and attribute pass.
     Draw,
+    /// The rasteriser's visibility pass of triangles.
+    DrawTriangles,
     /// Rows of the image go to the host.
     ReadBack(usize),
 }

@@ -12,7 +12,7 @@ use crate::gpu::layout::{
 };
 use crate::gpu::timing::Timing;
 use crate::passes::tiles::{self, LONGEST, list_name};
-use crate::passes::{covered, long_lists, raster, resolve};
+use crate::passes::{covered, long_lists, raster, resolve, triangles};
 use crate::plan::known::{Known, Listed};
 use crate::plan::steps::{Clear, Kernel, Look, Over, Part, Stage, Step};
 use crate::plan::{Plan, RasterDepth};
@@ -82,6 +82,7 @@ impl<'a> Run<'a> {
                 }
                 Step::Large { by_workgroups, .. } => by_workgroups.iter().try_for_each(|stage| self.stage(stage))?,
                 Step::Draw => self.draw()?,
+                Step::DrawTriangles => self.draw_triangles()?,
                 Step::ReadBack(band) => {
                     self.end_band(*band)?;
                     self.read_back(*band, frame)?;
@@ -224,6 +225,24 @@ impl<'a> Run<'a> {
         self.timing.draw(gpu, "accumulate", &sums, depth, |pass| draw(pass, "accumulate"))
     }
 
+    /// The rasteriser's visibility pass of triangles over the whole image. The depth buffer is cleared once more before splats.
+    fn draw_triangles(&mut self) -> Result<()> {
+        let (gpu, plan, store) = (self.gpu, self.plan, &*self.store);
+        let Some(targets) = &store.targets else { return Ok(()) };
+        let program = self.kernels.first(gpu)?;
+        let vertices = u32::try_from(3 * plan.mesh.triangles)
+            .map_err(|_| gpu.error("there are too many triangles for the rasteriser's vertices"))?;
+        let ops = wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT), store: wgpu::StoreOp::Store };
+        let attach = |view| wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops };
+        let numbers = [targets.triangles.as_ref().map(attach)];
+        let depth_ops = Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Discard });
+        let depth = wgpu::RenderPassDepthStencilAttachment { view: &targets.depth, depth_ops, stencil_ops: None };
+        self.timing.draw(gpu, "triangles", &numbers, Some(depth), |pass| {
+            let binding = |name: &str| store.binding(name, 0, 0);
+            program.draw(gpu, pass, triangles::DRAWN, &binding, vertices)
+        })
+    }
+
     fn read_back(&mut self, band: usize, frame: &mut Frame) -> Result<()> {
         self.timing.flush(self.gpu)?;
         let Some((image, readback)) = self.store.image() else { return Ok(()) };
@@ -284,6 +303,7 @@ fn over<'a>(gpu: &Gpu, plan: &Plan, store: &'a Store, (band, page): (usize, usiz
         Over::Rare => return counted(of_page.and_then(|page| page.buffer("rare")), QUEUE_GRID.into()),
         Over::Large => return counted(queue(), QUEUE_GRID.into()),
         Over::LargeTriangles => return counted(store.buffer("large_triangles"), QUEUE_GRID.into()),
+        Over::TriangleTiles => return counted(store.buffer("triangle_tiles"), 1),
         Over::RareTriangles => return counted(store.buffer("rare_triangles"), QUEUE_GRID.into()),
         Over::Listing => return counted(queue(), QUEUE_LISTING.into()),
         Over::Covered => return covered(COVERED_GRID),

@@ -15,6 +15,7 @@ pub fn steps(plan: &Plan) -> Vec<Step> {
     let mut steps = Vec::new();
     if plan.needs.raster.is_some() {
         steps.push(Step::Stage(project::steps(plan, 0, Part::All)));
+        steps.extend(plan.needs.mesh.into_iter().flat_map(|_| triangles::drawn()));
         match plan.needs.peels {
             Some(layers) => steps.extend(peel::steps(plan, layers)),
             None => steps.push(raster::STEP),

@@ -10,7 +10,7 @@ use crate::gpu::layout::{BATCH, Band as BandUniform, LIST_START, QUEUE_START, Vi
 use crate::passes::moments::MOMENT_WORDS;
 use crate::passes::peel::PEELED_WORDS;
 use crate::passes::tiles::{list_name, list_words};
-use crate::passes::triangles::{NEAREST_TRIANGLE_WORDS, TRIANGLE_PIXEL_WORDS};
+use crate::passes::triangles::{self, NEAREST_TRIANGLE_WORDS};
 use crate::passes::upload::{self, Uploaded};
 use crate::passes::veils::VEIL_WORDS;
 use crate::passes::{asks_for_order, covered, fragments, individuals, long_lists, visibility};
@@ -19,7 +19,7 @@ use crate::plan::{Band, FragmentLayout, KEY_WORDS, Known, Oit, Plan, Raster, Sce
 use crate::scene::Samples;
 
 /// Names in WGSL of buffers that have another one where kernels write them.
-const ALIASES: [(&str, &str); 16] = [
+const ALIASES: [(&str, &str); 17] = [
     ("projected", "splats"),
     ("queued", "queue"),
     ("listed", "rare"),
@@ -36,6 +36,7 @@ const ALIASES: [(&str, &str); 16] = [
     ("listed_triangles", "rare_triangles"),
     ("named_triangles", "nearest_triangles"),
     ("beside", "triangle_pixels"),
+    ("tiles_of_triangles", "triangle_tiles"),
 ];
 
 /// Names of buffers that each page has.
@@ -291,12 +292,12 @@ impl Store {
             self.frame.insert("peeled", Buffer::storage(gpu, "peeled layers", words)?);
         }
         if plan.needs.mesh.is_some() {
-            for (name, what, words) in [
-                ("nearest_triangles", "nearest triangles", NEAREST_TRIANGLE_WORDS),
-                ("triangle_pixels", "pixels of triangles", TRIANGLE_PIXEL_WORDS),
-            ] {
-                self.frame.insert(name, Buffer::storage(gpu, what, pixels * u64::from(words))?);
-            }
+            let words = pixels * u64::from(NEAREST_TRIANGLE_WORDS);
+            self.frame.insert("nearest_triangles", Buffer::storage(gpu, "nearest triangles", words)?);
+            let words = most(&triangles::pixel_words);
+            self.frame.insert("triangle_pixels", Buffer::storage(gpu, "pixels of triangles", words)?);
+            let words = most(&triangles::tile_words);
+            self.frame.insert("triangle_tiles", Buffer::indirect(gpu, "tiles of triangles", words)?);
         }
         if plan.needs.separate {
             let words = pixels * u64::from(individuals::words(&plan.needs));

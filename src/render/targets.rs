@@ -3,6 +3,7 @@
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::passes::raster::{DEPTH_FORMAT, SUM_NAMES, texture_format};
+use crate::passes::triangles::NUMBERS;
 use crate::plan::{Plan, Raster};
 
 /// The textures.
@@ -11,6 +12,8 @@ pub struct Targets {
     pub depth: wgpu::TextureView,
     /// Four channels each.
     pub sums: Vec<wgpu::TextureView>,
+    /// The numbers of the nearest triangles, if there are any.
+    pub triangles: Option<wgpu::TextureView>,
     /// Device memory, bytes.
     pub bytes: u64,
 }
@@ -39,17 +42,22 @@ impl Targets {
         let depth = view("nearest depths", DEPTH_FORMAT);
         let format = texture_format(raster.format);
         let sums = SUM_NAMES.iter().take(plan.pixel.targets() as usize).map(|name| view(name, format)).collect();
+        let triangles = plan.needs.mesh.map(|_| view("nearest triangles", NUMBERS));
         if pollster::block_on(guard.pop()).is_some() {
             return Err(gpu.error("out of memory for the blended sums: choose a smaller image"));
         }
         gpu.check()?;
-        Ok(Self { depth, sums, bytes })
+        Ok(Self { depth, sums, triangles, bytes })
     }
 
     /// The texture that a variable of WGSL is bound to.
     pub fn binding(&self, name: &str) -> Option<wgpu::BindingResource<'_>> {
         let sums = SUM_NAMES.iter().zip(&self.sums).find(|(sums, _)| **sums == name).map(|(_, view)| view);
-        let view = sums.or((name == "nearest_depth").then_some(&self.depth))?;
+        let view = match name {
+            "nearest_depth" => Some(&self.depth),
+            "drawn_triangles" => self.triangles.as_ref(),
+            _ => sums,
+        }?;
         Some(wgpu::BindingResource::TextureView(view))
     }
 }

@@ -250,10 +250,16 @@ fn order_free(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
 
 /// Those of renders of triangles beside splats, a third of what they could be.
 fn beside_triangles(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
-    let opaque = |needs: &&SceneNeeds| needs.raster.is_none() && needs.lists.is_none() && needs.oit.is_none();
+    let drawn = |needs: &SceneNeeds| {
+        let exact = needs.raster.is_some_and(|raster| raster.depth == RasterDepth::Exact);
+        exact && needs.winner.is_none() && needs.peels.is_none()
+    };
+    let opaque =
+        |needs: &&SceneNeeds| (needs.raster.is_none() && needs.lists.is_none() && needs.oit.is_none()) || drawn(needs);
     let of = |(step, needs): (usize, &SceneNeeds)| {
         let join = [Join::Corrected, Join::Nearest, Join::Blended][step % 3];
         let [normals, colored, once, textured] = [1, 2, 4, 8].map(|bit| (step / 3) & bit != 0);
+        let once = once && needs.raster.is_none();
         SceneNeeds {
             mesh: Some(MeshNeeds { join, normals, colored, textured, once }),
             maps: needs.maps.but(&[Map::Index]),

@@ -186,6 +186,8 @@ pub fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         ("triangle_textures", Element::Plain(WORD)),
         ("individuals", Element::Plain(&[<[f32; 4]>::SHAPE])),
         ("triangle_pixels", Element::Plain(&[<[f32; 4]>::SHAPE])),
+        ("triangle_tiles", Element::Plain(WORD)),
+        ("tiles_of_triangles", Element::Plain(WORD)),
         ("beside", Element::Plain(&[<[f32; 4]>::SHAPE])),
         ("texels", Element::Plain(WORD)),
         ("srgb_to_linear", Element::Plain(&[<[f32; 256]>::SHAPE])),

@@ -1,0 +1,8 @@
+// The nearest triangle of each pixel, as the compute path's visibility pass left it. Same interface as triangles_raster.wgsl.
+
+// Two words a pixel: the nearest triangle's number, and its depth.
+@group(0) @binding(59) var<storage, read> named_triangles: array<u32>;
+
+fn nearest_triangle(pixel: u32, x: u32, y: u32) -> vec2<u32> {
+    return vec2<u32>(named_triangles[2u * pixel], named_triangles[2u * pixel + 1u]);
+}

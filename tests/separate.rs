@@ -11,7 +11,7 @@ use common::{Random, bits, meshes};
 use epsplat::frame::Frame;
 use epsplat::gpu::{Gpu, Sources};
 use epsplat::io::{Mesh, Points};
-use epsplat::plan::{Accumulator, Optimisation, Organisation, RenderOptions};
+use epsplat::plan::{Accumulator, Facts, Optimisation, Organisation, RenderOptions};
 use epsplat::render::{Backend, render};
 use epsplat::scene::{
     Blend, Camera, Colors, Composite, Join, Map, Maps, Projection, Samples, Scene, Shading, Triangles,
@@ -236,6 +236,7 @@ fn triangles_are_joined_to_the_nearest_input() {
     let Some(backend) = gpu() else { return };
     let (scene, _) = with_triangles(Some(scene()), &[body()]).unwrap();
     assert!(scene.triangles != Triangles::default());
+    assert_eq!(Facts::of(&scene).individuals, [1500, 1100, 900]);
     for join in [Join::Corrected, Join::Nearest, Join::Blended] {
         let options = RenderOptions { join, ..apart() };
         let shown = frame(&scene, &options, &backend);

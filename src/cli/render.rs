@@ -45,6 +45,7 @@ use super::{note, outputs, write_json};
     epsplat render surfels.ply -o painted.png --texture image.png\n  \
     epsplat render bunny.obj -o glass.png --composite layers --opacity 0.5\n  \
     epsplat render statue.ply -o hall.png --triangles hall.obj\n  \
+    epsplat render skin.ply shirt.ply -o dressed.png --separate\n  \
     epsplat render scan.laz -o top.png --eye 0,0,500 --target 0,0,0 --ortho 300\n  \
     epsplat render scan.laz -o views --cameras transforms.json"
 )]
@@ -311,6 +312,11 @@ struct Outcome<'a> {
 fn scene(arguments: &Arguments, bars: &Bars) -> Result<(Scene, Preparation)> {
     let inputs =
         if arguments.inputs.is_empty() { Vec::new() } else { arguments.reading.all(&arguments.inputs, bars)? };
+    if arguments.separate && arguments.inputs.len() < 2 {
+        note(
+            "--separate keeps the surfels of several files apart, and here is one of them at most: it changes nothing",
+        );
+    }
     // What `epsplat hybrid` left of a mesh names itself.
     let beside = inputs.iter().filter_map(|points| points.beside.clone());
     let paths: Vec<PathBuf> = arguments.triangles.iter().cloned().chain(beside).collect();

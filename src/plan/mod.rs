@@ -89,7 +89,8 @@ fn most_words(needs: &SceneNeeds) -> u32 {
     let of = |has: bool, words: u32| if has { words } else { 0 };
     let peeled = of(needs.peels.is_some(), PEELED_WORDS);
     let moments = of(needs.oit == Some(Oit::Moments), MOMENT_WORDS);
-    let triangles = of(needs.mesh.is_some(), TRIANGLE_PIXEL_WORDS);
+    // Four words a tile of 64 pixels, or of fewer at the image's edges, are less than one more a pixel, but for images of a few pixels.
+    let triangles = of(needs.mesh.is_some(), TRIANGLE_PIXEL_WORDS + 1);
     peeled.max(moments).max(triangles).max(individuals::words(needs)).max(of(needs.veils, VEIL_WORDS))
 }
 

@@ -12,9 +12,10 @@ use epsplat::frame::Frame;
 use epsplat::gpu::{Gpu, Sources};
 use epsplat::io::{Mesh, Points};
 use epsplat::plan::{Accumulator, Facts, Optimisation, Organisation, RenderOptions};
-use epsplat::render::{Backend, render};
+use epsplat::render::{Backend, Renderer, render};
 use epsplat::scene::{
-    Blend, Camera, Colors, Composite, Join, Map, Maps, Projection, Samples, Scene, Shading, Triangles,
+    Blend, Camera, Colors, Composite, Epsilon, Join, Kernel, LowPass, Map, Maps, Projection, Samples, Scene, Shading,
+    Triangles,
 };
 use epsplat::surfels::{build, with_triangles};
 use glam::DVec3;
@@ -133,11 +134,14 @@ fn inputs_do_not_blend_and_kernels_agree_with_twins() {
             }
         }
     }
-    // Lit, by rasters of other sums, and along other rays.
+    // Lit, by other sums, tolerances and filters, and over something.
     for options in [
         RenderOptions { shading: Shading::Phong, ..apart() },
         RenderOptions { accumulator: Accumulator::Fixed32, ..apart() },
         RenderOptions { accumulator: Accumulator::Cas, ..apart() },
+        RenderOptions { accumulator: Accumulator::Fixed32, kernel: Kernel::Constant, ..apart() },
+        RenderOptions { epsilon: Epsilon::Ray(0.02), ..apart() },
+        RenderOptions { low_pass: LowPass::Max, ..apart() },
         RenderOptions { background: [0.2, 0.4, 0.6, 0.5], ..apart() },
     ] {
         let shown = frame(&scene, &options, &backend);
@@ -156,11 +160,15 @@ fn a_wrong_kernel_is_noticed() {
         ("individuals.wgsl", "(a.depth < b.depth)", "(a.depth > b.depth)"),
         ("individuals.wgsl", "kept.weight = summed.y;", "kept.weight = summed.x;"),
         ("individuals.wgsl", "a.exists && (!b.exists || is_before)", "a.exists"),
+        ("individuals.wgsl", "any_shows = any_shows ||", "any_shows = any_shows &&"),
         ("depth_middles.wgsl", "max(part_of(weight), LEAST_MIDDLE)", "1.0"),
     ] {
         let shown = frame(&scene, &scattered, &broken(file, from, to));
         assert!(differ(&shown, &all) > 10, "{file}: {from}");
     }
+    let tiles = RenderOptions { organisation: Organisation::Tile, ..apart() };
+    let shown = frame(&scene, &tiles, &broken("tile_individuals.wgsl", "keep_nearest_of(k,", "keep_nearest_of(0u,"));
+    assert!(differ(&shown, &all) > 10);
 }
 
 #[test]
@@ -177,6 +185,12 @@ fn the_same_bits_however_they_are_drawn() {
         same("tile", &scene, &organised(Organisation::Tile), &backend);
         let small = Backend::gpu(Gpu::with_buffer_limit(common::gpu().unwrap(), 60_000));
         same("bands and pages", &scene, &apart(), &small);
+        let banded = Backend::gpu(Gpu::with_buffer_limit(common::gpu().unwrap(), 330_000));
+        same("bands of tiles", &scene, &organised(Organisation::Tile), &banded);
+        let mut renderer = Renderer::new(&scene, &apart(), &backend).unwrap();
+        for _ in 0..3 {
+            assert!(bits(&renderer.frame(&camera(), &()).unwrap().0) == one, "one frame after another");
+        }
         same("bands and pages, scattered", &scene, &organised(Organisation::Scatter), &small);
         same("a core adapter", &scene, &apart(), &Backend::gpu(common::core_gpu().unwrap()));
         for optimisation in Optimisation::ALL {

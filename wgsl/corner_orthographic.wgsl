@@ -16,7 +16,8 @@ fn homogeneous_depth(corner: Corner) -> Double {
 // A rasteriser's: 1 at the near depth, 0 beyond all there is.
 fn clip_depth(corner: Corner) -> f32 {
     let beyond = 2.0 * held.farthest - held.near;
-    return (beyond - corner.depth.high) / (beyond - held.near);
+    // Where nothing lies beyond the near depth, all is clipped.
+    return (beyond - corner.depth.high) / max(beyond - held.near, 1e-30);
 }
 
 fn spread_of_parts(triangle: Triangle, depth: f32, of_depth: f32) -> f32 {

@@ -1,6 +1,6 @@
 // Stage 4, its start: which tiles of the image have anything. The others stay as the image was cleared, and no invocation
 // looks at their pixels. Host side: src/passes/covered.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xa34c69eac6dcacb6
+// All loops end, by 1 of src/gpu/loops.rs: 0xd09eb1f53779705e
 
 // Pixels of a tile, across and down.
 const TILE_WIDTH: u32 = 8u;
@@ -8,6 +8,8 @@ override TILE_ROWS: u32;
 
 // 1 where the image differs from 0 even where nothing is, so that all tiles are listed.
 override LIST_EMPTY: u32;
+// 1 where inputs are kept apart: each lists the tiles that it covers itself, and what they leave is listed by individuals.wgsl.
+override LIST_APART: u32;
 
 // From covered_start() on: how many tiles are listed; a grid of workgroups with one for each; a grid with one for eight; and
 // from COVERED_LIST on the tiles.
@@ -34,7 +36,8 @@ fn list_covered(
 ) {
     hold();
     let tile = linear_index(workgroup, workgroups, local);
-    if (tile < tiles_in_band() && (LIST_EMPTY != 0u || has_any(tile) || has_triangles(tile))) {
+    let of_others = LIST_APART == 0u && (LIST_EMPTY != 0u || has_triangles(tile));
+    if (tile < tiles_in_band() && (of_others || has_any(tile))) {
         // Places depend on the schedule, but tiles share no pixel.
         let place = atomicAdd(&nearest[covered_start()], 1u);
         atomicStore(&nearest[covered_start() + COVERED_LIST + place], tile);

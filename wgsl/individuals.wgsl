@@ -1,6 +1,6 @@
 // Inputs that are kept apart, the individuals of Tien 2008: each is blended by itself, one after the other, and of what they show at a
 // pixel the nearest is kept, by the depth that each blends to (section 5.3). Twin: src/passes/individuals.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x0bfb67947e78eb1d
+// All loops end, by 1 of src/gpu/loops.rs: 0x4f9b625f5cb1d36b
 
 // Of each pixel: the straight colour, shaded; then the normal, world space, unit, and the depth, device units, 0 where nothing is. Then, for
 // joins and maps, the depth of the nearest fragment and the summed weight, and how many there are; then their place in a texture.
@@ -45,10 +45,13 @@ fn order_of(a: vec4<f32>, b: vec4<f32>) -> f32 {
     return order;
 }
 
-// Whether a shows instead of b: it is nearer, or at one depth has the greater colour or normal, so that the order of inputs shows nowhere.
+// Whether a shows instead of b: it is nearer, or at one depth has the greater of the first of its values that differs, so that the order of
+// inputs shows nowhere.
 fn shows_before(a: Surface, b: Surface) -> bool {
     let by_color = order_of(a.color, b.color);
-    let by_value = select(order_of(vec4<f32>(a.normal, a.weight), vec4<f32>(b.normal, b.weight)), by_color, by_color != 0.0);
+    let by_normal = order_of(vec4<f32>(a.normal, a.weight), vec4<f32>(b.normal, b.weight));
+    let by_rest = order_of(vec4<f32>(a.place, a.count, a.front), vec4<f32>(b.place, b.count, b.front));
+    let by_value = select(select(by_rest, by_normal, by_normal != 0.0), by_color, by_color != 0.0);
     let is_before = select((a.depth < b.depth), (by_value > 0.0), a.depth == b.depth);
     return a.exists && (!b.exists || is_before);
 }

@@ -27,7 +27,7 @@ override VERTICES: u32;
 // How far the shape reaches past the disk, pixels: more than the rasteriser rounds corners.
 const SHAPE_MARGIN: f32 = 0.05;
 
-// ShapeCorner `number` of the shape about the unit disk, in the disk's coordinates: a triangle, or a square.
+// Corner `number` of the shape about the unit disk, in the disk's coordinates: a triangle, or a square.
 fn disk_corner(number: u32) -> vec2<f32> {
     if (VERTICES == 3u) {
         return vec2<f32>(select(f32(number) * 3.4641016 - 5.1961524, 0.0, number == 0u), select(-1.0, 2.0, number == 0u));
@@ -35,7 +35,7 @@ fn disk_corner(number: u32) -> vec2<f32> {
     return vec2<f32>(f32(number & 1u), f32(number >> 1u)) * 2.0 - 1.0;
 }
 
-// ShapeCorner `number` of the shape about a box of pixels, from the box's first corner in units of its sides.
+// Corner `number` of the shape about a box of pixels, from the box's first corner in units of its sides.
 fn box_corner(number: u32) -> vec2<f32> {
     return vec2<f32>(f32(number & 1u), f32(number >> 1u)) * select(1.0, 2.0, VERTICES == 3u);
 }

@@ -1,6 +1,6 @@
 // The tiles of the image in which triangles show: no other pixel is shaded, or looked at when splats and triangles are joined. Host side:
 // src/passes/triangles.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x34caaa3bef6d2311
+// All loops end, by 1 of src/gpu/loops.rs: 0x5a024c5f69138886
 
 // How many are listed; a grid of workgroups with one for each; from TRIANGLE_TILES on, the tiles, of 8 by 8 pixels. After the pixels of
 // triangle_pixels each tile of the band says whether it is one of them.
@@ -70,6 +70,7 @@ fn shows_triangles(x: u32, row: u32) -> bool {
 // Whether they do in a tile of covered.wgsl, which is one tile here, or two.
 fn has_triangles(tile: u32) -> bool {
     let upper = tile / triangle_tiles_across() * (TILE_ROWS / TRIANGLE_TILE) * triangle_tiles_across() + tile % triangle_tiles_across();
-    let lower = min(upper + triangle_tiles_across() * (TILE_ROWS / TRIANGLE_TILE - 1u), triangle_tiles_in_band() - 1u);
+    let below = upper + triangle_tiles_across() * (TILE_ROWS / TRIANGLE_TILE - 1u);
+    let lower = select(upper, below, below < triangle_tiles_in_band());
     return tile_has_triangles(upper) || tile_has_triangles(lower);
 }

@@ -118,6 +118,8 @@ impl SceneEntry {
         positive("radius", self.radius)?;
         positive("noise", self.noise)?;
         positive("shirt", self.shirt)?;
+        let bare = self.triangles.is_some() || !matches!(self.surfels, Making::File | Making::Scanned);
+        not_beside("shirt", self.shirt.is_some() && bare, "triangles, or surfels other than scanned")?;
         positive("fill", self.fill)?;
         positive("fov", self.fov)?;
         if self.opacity.is_some_and(|opacity| !(0.0..=1.0).contains(&opacity)) {

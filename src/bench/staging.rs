@@ -132,7 +132,7 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
         cameras.iter_mut().for_each(|camera| (camera.fx, camera.fy) = (scale, scale));
         footprint_px = wanted;
     }
-    if let Some(wanted) = point.footprint_px.filter(|_| !scene.surfels.is_empty()) {
+    if let Some(wanted) = point.footprint_px.filter(|_| !scene.surfels.is_empty() && footprint_px > 0.0) {
         let factor = (wanted / footprint_px) as f32;
         let scaled = |axis: [f32; 3]| axis.map(|c| c * factor);
         for surfel in &mut scene.surfels {

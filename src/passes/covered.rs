@@ -16,7 +16,11 @@ pub const PASS: Pass = Pass {
         // Of peeled layers the last one may be empty.
         let needs = making.needs;
         let list_empty = making.options.shows_where_nothing_is() || needs.peels.is_some();
-        vec![("LIST_EMPTY", u32::from(list_empty).into()), ("TILE_ROWS", super::tiles::rows(making.needs).into())]
+        vec![
+            ("LIST_EMPTY", u32::from(list_empty).into()),
+            ("LIST_APART", u32::from(needs.separate).into()),
+            ("TILE_ROWS", super::tiles::rows(needs).into()),
+        ]
     },
 };
 

@@ -76,12 +76,13 @@ pub fn keep_nearest(kept: &mut [Surface], shown: Vec<Surface>) {
     }
 }
 
-/// Whether `a` shows instead of `b`: it is nearer, or at one depth has the greater colour or normal.
+/// Whether `a` shows instead of `b`: it is nearer, or at one depth has the greater of the first of its values that differs.
 fn shows_before(a: &Surface, b: &Surface) -> bool {
     let values = |of: &Surface| {
         let [x, y, z] = of.normal.to_array();
         let [red, green, blue, alpha] = of.color;
-        [-of.depth, red, green, blue, alpha, x, y, z, of.weight]
+        let [u, v] = of.place;
+        [-of.depth, red, green, blue, alpha, x, y, z, of.weight, u, v, of.count.into(), of.front]
     };
     a.exists() && (!b.exists() || values(a).partial_cmp(&values(b)).is_some_and(std::cmp::Ordering::is_gt))
 }

@@ -12,6 +12,9 @@
 //!   the quads' corners, and a plane that passes the eye within its quad is bent. OpenGL has no such depths: it takes them
 //!   from -1 to 1, of which those far from the eye, all near the end that is 0 elsewhere, keep no digits.
 //!
+//! Triangles beside them are drawn before, each with its number, into a texture: its coverage and its interpolated depths are the
+//! rasteriser's, what is nearest is shaded as the compute path's is ([`triangles`]).
+//!
 //! **Error.** A sum of n terms in a format of unit roundoff r, in the rasteriser's order, errs by at most `n r` of itself
 //! if the format is floating (r = 2^-11 or 2^-24), so a mean by `2 n r + 4 u`; in 8 bits each of the n sums errs by half a
 //! step of 1/255 of the [`BlendFormat::MOST_WEIGHTS_8`] weights that it can hold: `8 n / (255 w)` for a summed weight w,
@@ -63,7 +66,7 @@ fn targets_file(needs: &SceneNeeds) -> &'static str {
     match PixelLayout::of(needs).targets() {
         1 => "raster_targets_1.wgsl",
         2 => "raster_targets_2.wgsl",
-        // Weight, four of colour, a gap, three of the normal, depth and count: twelve channels at most.
+        // Weight, four of colour, a gap, three of the normal, depth and its weights, count: twelve channels at most.
         _ => "raster_targets_3.wgsl",
     }
 }
@@ -88,7 +91,7 @@ pub fn texture_format(format: BlendFormat) -> wgpu::TextureFormat {
 /// The format of nearest depths.
 pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-/// The pipelines of the two passes, or of the one in which the nearest fragment's terms replace those of others.
+/// The pipelines of the two passes and of triangles, or of the one in which the nearest fragment's terms replace those of others.
 pub fn draws(raster: Raster, needs: &SceneNeeds) -> Vec<Draw> {
     let pixel = PixelLayout::of(needs);
     let depth = |compare, write| {

@@ -5,7 +5,7 @@
 //! made by count, scan and place, and keeps its pixels' nearest depths, and then their sums, in registers. A splat costs each
 //! tile that it touches about as much as a dozen of scatter's fragments, so large splats are cheaper by tiles on any adapter:
 //! those whose bounds hold more than [`LARGE_BY_TILES`](crate::plan::tuning::LARGE_BY_TILES) pixels are. On a software adapter,
-//! whose atomics are slow, all splats are summed so if they are not tiny ([`touched`]) and have one page
+//! whose atomics are slow, all splats are summed so if they are not tiny ([`touched`]) and those that blend have one page
 //! ([`SceneNeeds::gather`](crate::plan::SceneNeeds::gather)): then a tile resolves its pixels at once, and no sum is
 //! stored. Nearest depths of small splats are found by scatter in any case, and all splats share the nearest depths before any
 //! is accumulated. Opaque blending within epsilon does not ask for an order, so no list is sorted.

@@ -24,7 +24,8 @@
 //! by `2^-23 L^2 / 2A`; and those for which that is an eighth or more, `2A < 1e-6 L^2`, whose parts would be anybody's. So do those of the attribute pass, which is as exact for all.
 //!
 //! **The nearest** one is an atomic maximum of its depth, as what its bits lack to those of +inf, and of its number: the order of
-//! [`Triangles`](crate::scene::Triangles) depends on no order in files, so neither does any bit of the image.
+//! [`Triangles`](crate::scene::Triangles) depends on no order in files, so neither does any bit of the image. By the rasteriser, for
+//! comparison, it is the first that is drawn of those that are nearest by its own depths, at the points that it covers.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;

@@ -381,9 +381,13 @@ fn rasteriser(adapter: &AdapterDescription, needs: &SceneNeeds, camera: &Camera)
             adapter.error("vertex shaders cannot read the splats here: take --backend gpu, or another --adapter")
         );
     }
-    if (raster.depth != RasterDepth::Exact || needs.mesh.is_some()) && adapter.api == "gl" {
+    if needs.mesh.is_some() && adapter.api == "gl" {
+        let what = "OpenGL interpolates depths of triangles too coarsely: take --backend gpu, or another --adapter";
+        return Err(adapter.error(what));
+    }
+    if raster.depth != RasterDepth::Exact && adapter.api == "gl" {
         return Err(
-            adapter.error("OpenGL interpolates depths too coarsely: take --raster-depth exact without triangles, or another --adapter")
+            adapter.error("OpenGL interpolates depths too coarsely: take --raster-depth exact, or another --adapter")
         );
     }
     if raster.format == BlendFormat::Rgba32Float && !adapter.blends_f32 {
@@ -394,5 +398,10 @@ fn rasteriser(adapter: &AdapterDescription, needs: &SceneNeeds, camera: &Camera)
     limit("max_texture_dimension_2d", most, side, "for the image; choose a smaller one")?;
     let bytes = raster.format.bytes() * PixelLayout::of(needs).targets();
     let most = adapter.max_color_attachment_bytes_per_sample;
-    limit("max_color_attachment_bytes_per_sample", most, bytes, "for the sums; ask for fewer maps")
+    limit(
+        "max_color_attachment_bytes_per_sample",
+        most,
+        bytes,
+        "for the sums; ask for fewer maps, or take --blend-format rgba16float",
+    )
 }

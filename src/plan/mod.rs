@@ -94,6 +94,12 @@ fn most_words(needs: &SceneNeeds) -> u32 {
     peeled.max(moments).max(triangles).max(individuals::words(needs)).max(of(needs.veils, VEIL_WORDS))
 }
 
+/// Surfels that blend with each other, at most: of one page tiles gather them.
+fn most_together(facts: &Facts, needs: &SceneNeeds) -> u64 {
+    let largest = facts.individuals.iter().copied().max();
+    largest.filter(|_| needs.separate).unwrap_or(facts.surfels)
+}
+
 /// The pages that individuals of so many surfels fill, each its own.
 fn pages_of(individuals: &[u64], most: u64) -> Vec<Range<usize>> {
     let mut end = 0;
@@ -128,12 +134,9 @@ impl Plan {
             Organisation::Tile => true,
             Organisation::Scatter => false,
         };
-        // What tiles gather is of one page.
-        let largest = facts.individuals.iter().copied().max().filter(|_| needs.separate);
-        let together = largest.unwrap_or(facts.surfels);
         let gather = needs.tiles
             && gathers
-            && (1..=page).contains(&together)
+            && (1..=page).contains(&most_together(facts, &needs))
             && !known.crowded
             && options.has(Optimisation::Gathering);
         // The rasteriser draws every splat.

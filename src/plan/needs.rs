@@ -28,14 +28,14 @@ pub struct SceneNeeds {
     pub long_words: bool,
     /// The f32 centres of surfels leave out digits that show, so trailing parts are stored too.
     pub doubled: bool,
-    /// A surfel stands for all that are the same: the accumulator is `fixed`, one has many copies, and there is no texture.
+    /// A surfel stands for all that are the same: the accumulator is `fixed`, one has many copies, there is no texture, and no inputs are kept apart.
     pub copies: bool,
     /// Batches of surfels that are out of view or hidden are left out: there are enough surfels for the image's pixels, all of which are looked at for what hides ([`tuning::PIXELS_A_CULLED_SURFEL`]).
     pub cull: bool,
     /// Large splats, at least, are drawn by tiles: the accumulator is `fixed`, the options do not say scatter, and there is no
     /// texture, whose sums are more than a tile's registers hold.
     pub tiles: bool,
-    /// Tiles sum all splats, large and small, and resolve their pixels at once: no sum is stored.
+    /// Tiles sum all splats, large and small, and resolve their pixels at once, or keep what an input shows: no sum is stored.
     pub gather: bool,
     /// A splat's record is read by a subgroup together, as the adapter's processor would else read it for each of its
     /// invocations.

@@ -52,6 +52,9 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
     if options.composite != Composite::Opaque {
         return Err(Error::Usage("stages are read back of opaque pictures: leave composite out".into()));
     }
+    if options.separate {
+        return Err(Error::Usage("stages are read back of surfels that all blend: leave separate out".into()));
+    }
     // A slot for each surfel, and sums in storage.
     let mut without = options.without.clone();
     without.extend([Optimisation::Culling, Optimisation::Copies]);

@@ -36,6 +36,8 @@ impl Run<'_> {
         if of == Listed::Large && !gathers {
             let queues: Vec<_> = self.store.pages.iter().filter_map(|page| page.buffer("queue")).collect();
             let large = counts(self.gpu, &queues)?.iter().any(|[large, _]| *large > 0);
+            // What no list holds of one individual is drawn without, and then that of all is: bands that follow look no more.
+            let large = large && !(self.plan.needs.separate && self.unlisted);
             self.by_tiles = large;
             if !large {
                 return Ok(true);

@@ -292,7 +292,8 @@ impl Store {
             self.frame.insert("peeled", Buffer::storage(gpu, "peeled layers", words)?);
         }
         if plan.needs.mesh.is_some() {
-            let words = pixels * u64::from(NEAREST_TRIANGLE_WORDS);
+            // The rasteriser has a texture.
+            let words = if plan.needs.raster.is_some() { 1 } else { pixels * u64::from(NEAREST_TRIANGLE_WORDS) };
             self.frame.insert("nearest_triangles", Buffer::storage(gpu, "nearest triangles", words)?);
             let words = most(&triangles::pixel_words);
             self.frame.insert("triangle_pixels", Buffer::storage(gpu, "pixels of triangles", words)?);

@@ -8,7 +8,8 @@ use crate::error::Error;
 /// A map beside the colour. Every one is normalised by the weight sum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Map {
-    /// Camera-space z, world units; +inf where nothing is.
+    /// Camera-space z, world units; +inf where nothing is. Where it tells surfaces apart, beside triangles or of inputs that are kept apart,
+    /// a fragment counts by the square of its weight, as it lies nearer to its surface the more it weighs.
     Depth,
     /// Unit normal in world space; 0 where nothing is. Normals that were estimated have no side of their own and are
     /// turned toward the viewer; given ones stay as they are, and those of the pixel's side alone are blended ([`Sides`](crate::plan::Sides)).

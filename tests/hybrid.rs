@@ -100,7 +100,11 @@ fn one_command_draws_surfels_and_triangles() {
     };
     render(&["--triangles", text(&input)], &whole);
     let told = render(&[text(&output)], &both);
-    assert!(told.contains("surfels and") && told.contains("triangles drawn"), "{told}");
+    let triangles = format!("{kept} triangles drawn");
+    assert!(told.contains("surfels and") && told.contains(&triangles), "{told}");
+    // Named twice they are drawn once.
+    let twice = render(&[text(&output), text(&output)], &folder.path("twice.exr"));
+    assert!(twice.contains(&triangles), "{twice}");
     let difference =
         |image: &std::path::Path| compare(&io::exr::read(image).unwrap(), &io::exr::read(&whole).unwrap()).unwrap();
     assert!(difference(&both).coverage_mismatch < 0.01, "{:?}", difference(&both));

@@ -5,6 +5,7 @@ mod output;
 mod view;
 mod views;
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -319,7 +320,10 @@ fn scene(arguments: &Arguments, bars: &Bars) -> Result<(Scene, Preparation)> {
     }
     // What `epsplat hybrid` left of a mesh names itself.
     let beside = inputs.iter().filter_map(|points| points.beside.clone());
-    let paths: Vec<PathBuf> = arguments.triangles.iter().cloned().chain(beside).collect();
+    let mut paths: Vec<PathBuf> = arguments.triangles.iter().cloned().chain(beside).collect();
+    // What two files of surfels name is drawn once.
+    let mut known = BTreeSet::new();
+    paths.retain(|path| known.insert(path.canonicalize().unwrap_or_else(|_| path.clone())));
     let has_points = inputs.iter().any(|points| !points.positions.is_empty() || points.beside.is_none());
     let of_surfels = if has_points { Some(surfels_of(arguments, inputs, bars)?) } else { None };
     if paths.is_empty() {

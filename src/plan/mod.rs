@@ -216,7 +216,7 @@ impl Plan {
 
     /// Pages whose surfels blend with each other: all, or those of each individual.
     pub fn together(&self) -> Vec<Range<usize>> {
-        if self.needs.separate { self.individuals.clone() } else { vec![0..self.pages] }
+        if self.needs.separate { self.individuals.clone() } else { std::iter::once(0..self.pages).collect() }
     }
 
     /// Whether splats are projected in `band`, and what is unknown of them is looked at.

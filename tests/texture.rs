@@ -151,8 +151,8 @@ fn the_device_paints_as_its_twin_does() {
         ("srgb.wgsl", "(code >> 8u) & 0xffu", "(code >> 9u) & 0xffu"),
         (
             "resolve_surface.wgsl",
-            "textured(sums_of, surface.weight, resolve_color(sums_of, surface.weight))",
-            "resolve_color(sums_of, surface.weight)",
+            "textured(sums_of, weight, resolve_color(sums_of, weight))",
+            "resolve_color(sums_of, weight)",
         ),
     ] {
         let broken = Sources::default().replace(file, from, to).unwrap();

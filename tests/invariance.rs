@@ -256,7 +256,7 @@ fn unmapped(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu) 
             // The last bit of a nearest depth, kept as what it lacks to +inf, whose own is 0.
             back: scene.oriented && device.sums.nearest[pixel] % 2 == 1,
             normal: [0, 1, 2].map(normal),
-            place: [0.0; 4],
+            place: [0.0; 5],
             depth: weight * front + common::depth_span(&device.view, front) * sum(device.sums.pixel.depth_channel),
             depth_weight: weight,
             count: device.sums.count(pixel).unwrap() as u32,

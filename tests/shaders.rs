@@ -406,7 +406,7 @@ fn the_channels_of_a_pixel_do_not_overlap() {
             (pixel.middles_channel, of(needs.compares_depth(), 1)),
             (pixel.count_channel, of(needs.maps.has(Map::Count), 1)),
             (pixel.held_back_channel, of(needs.oit.is_some(), 1)),
-            (pixel.place_channel, of(needs.color == ColorNeed::Textured, 4)),
+            (pixel.place_channel, of(needs.color == ColorNeed::Textured, 5)),
         ]);
         let maps = MAPS.iter().zip(pixel.map_words).filter(|(row, _)| needs.maps.has(row.map));
         let maps = maps.map(|(row, word)| (word, row.map.width() as u32));
@@ -415,8 +415,8 @@ fn the_channels_of_a_pixel_do_not_overlap() {
             assert!(places.iter().all(|place| *place < room), "{places:?} of {room}, {:?}", needs.names());
             assert_eq!(places.iter().collect::<BTreeSet<_>>().len(), places.len(), "{:?}", needs.names());
         }
-        // At most one channel is there to make pairs whole, and one to start one.
-        assert!(pixel.channels as usize <= sums.len() + 2 && pixel.image_words as usize == image.len());
+        // At most one channel is there to make pairs whole, and two to start one.
+        assert!(pixel.channels as usize <= sums.len() + 3 && pixel.image_words as usize == image.len());
         // What is added as a pair starts at an even channel, the colour's second at 2.
         let pairs = [pixel.channels, pixel.normal_channel, pixel.place_channel].map(|channel| channel % 2);
         assert_eq!((pairs, COLOR_CHANNEL), ([0; 3], 1));

@@ -13,7 +13,7 @@ use epsplat::passes::index::NOTHING;
 use epsplat::passes::source::{Page, Source};
 use epsplat::plan::{Facts, Optimisation, RenderOptions, SceneNeeds};
 use epsplat::render::{Backend, Renderer, render};
-use epsplat::scene::{Colors, Map, Maps, Projection, Provenance, Scene, Surfel, Texture};
+use epsplat::scene::{Colors, Map, Maps, Mipmap, Projection, Provenance, Scene, Surfel};
 
 /// The surfels of `common::scenes::sphere`, made one by one.
 struct Made {
@@ -48,7 +48,7 @@ impl Source for Made {
         (0..COUNT).step_by(most).map(|first| Box::new(part(first)) as Box<dyn Page>).collect()
     }
 
-    fn texture(&self) -> Option<&Texture> {
+    fn texture(&self) -> Option<&Mipmap> {
         None
     }
 

@@ -94,7 +94,7 @@ fn beyond_bounds(scene: &Scene, camera: &Camera, accumulator: Accumulator, sourc
             found[2] += 1;
             continue;
         }
-        let [u, v, squared, reach_2] = sum.place.map(|total| total / sum.weight);
+        let [u, v, squared, reach_2, _] = sum.place.map(|total| total / sum.weight);
         let variance = squared - u * u - v * v;
         // Of a mean as a fraction of its range; and what f32 makes of a fragment's weight and of its place on the disk.
         let mean = 3.0 * (row.error_bound)(sum.count.max(1).into(), sum.weight, fraction_bits);
@@ -144,10 +144,10 @@ fn the_device_paints_as_its_twin_does() {
         assert!(found[0] == 0 && found[1] > 8000, "{found:?}");
     }
     for (file, from, to) in [
-        ("texture.wgsl", "fract(turns)", "fract(turns + 0.001)"),
+        ("textures.wgsl", "fract(vec2<f32>(place.x,", "fract(vec2<f32>(place.x + 0.001,"),
         ("texture.wgsl", "clamp(2.0 -", "clamp(200.0 -"),
         ("texture.wgsl", "(point - place.position) * held.world", "(point - place.position) * (0.9 * held.world)"),
-        ("texture.wgsl", "texel(column + 1, row + 1), share.x)", "texel(column + 1, row + 1), 0.99 * share.x)"),
+        ("textures.wgsl", "column + 1, row + 1), share.x)", "column + 1, row + 1), 0.99 * share.x)"),
         ("srgb.wgsl", "(code >> 8u) & 0xffu", "(code >> 9u) & 0xffu"),
         (
             "resolve_surface.wgsl",
@@ -171,6 +171,61 @@ fn a_painted_image_does_not_depend_on_the_order_of_surfels() {
     assert_eq!(first, drawn(&shuffled(&scene, 7)));
     // Another texture makes another image.
     assert_ne!(first, drawn(&globe(2000, 1.5, waves(false))));
+}
+
+/// A square with a checkerboard of single texels, black and white.
+fn board() -> Scene {
+    let texels = (0..256 * 256).map(|k| if (k % 256 + k / 256) % 2 == 0 { [255; 4] } else { [0, 0, 0, 255] });
+    let texture = Texture::new(256, 256, texels.collect()).unwrap();
+    let at = |k: usize| [(k % 41) as f64 / 20.0 - 1.0, (k / 41) as f64 / 20.0 - 1.0, 0.0];
+    let positions: Vec<_> = (0..41 * 41).map(at).collect();
+    let points = Points {
+        normals: Some(vec![[0.0, 0.0, 1.0]; positions.len()]),
+        radii: Some(vec![0.06; positions.len()]),
+        texture: Some(positions.iter().map(|[x, y, _]| [0.5 + 0.5 * *x as f32, 0.5 + 0.5 * *y as f32]).collect()),
+        positions,
+        ..Points::default()
+    };
+    build_textured(vec![points], texture, &()).unwrap().0
+}
+
+/// Of many texels a pixel shows their mean, of few the texels; the device as the twin does. A kernel that knows no halvings picks some.
+#[test]
+fn what_is_seen_from_afar_is_averaged() {
+    let Some(gpu) = common::gpu() else { return };
+    let scene = board();
+    let eye = DVec3::new(0.8, 1.1, 3.0);
+    let view = |lens| Camera::look_at((48, 48), lens, eye, DVec3::ZERO, None, Up::Y, 1e-3).unwrap();
+    let cameras = [
+        view(Lens::Fov(40.0)),
+        view(Lens::OrthographicHeight(2.2)),
+        // Four pixels a texel.
+        view(Lens::OrthographicHeight(2.0 / 256.0 * 48.0 / 4.0)),
+    ];
+    let picking = Sources::default().replace("textures.wgsl", "0.5 * log2(max(texels, 1.0))", "0.0").unwrap();
+    let backend = Backend::gpu(gpu);
+    let picks = Backend::Gpu { gpu: Box::new(common::gpu().unwrap()), sources: picking };
+    for (camera, far) in cameras.iter().zip([true, true, false]) {
+        let exact = RenderOptions { maps: Maps::of(&[Map::Decision]), ..unlit() };
+        let (twin, _) = render(&scene, camera, &exact, &Backend::Reference, &()).unwrap();
+        let (device, _) = render(&scene, camera, &unlit(), &backend, &()).unwrap();
+        let (picked, _) = render(&scene, camera, &unlit(), &picks, &()).unwrap();
+        // Away from the square's outline, where nothing but it shows.
+        let inner = |pixel: &usize| (16..32).contains(&(pixel % 48)) && (16..32).contains(&(pixel / 48));
+        let off = |frame: &Frame, pixel: usize| f64::from((frame.color[pixel][0] - twin.color[pixel][0]).abs());
+        let decided = twin.map(Map::Decision).unwrap();
+        let inner: Vec<usize> = (0..48 * 48).filter(inner).filter(|&pixel| decided[pixel] > 1e-5).collect();
+        assert!(inner.len() > 200);
+        let worst = |frame: &Frame| inner.iter().map(|&pixel| off(frame, pixel)).fold(0.0, f64::max);
+        assert!(worst(&device) < 2e-4, "{}", worst(&device));
+        let spread = |frame: &Frame| {
+            let from_mean = inner.iter().map(|&pixel| (f64::from(frame.color[pixel][0]) - 0.5).abs());
+            from_mean.sum::<f64>() / inner.len() as f64
+        };
+        assert_eq!(far, spread(&twin) < 0.02, "{}", spread(&twin));
+        assert!(spread(&picked) > 0.1, "{}", spread(&picked));
+        assert_eq!(far, worst(&picked) > 0.1, "{}", worst(&picked));
+    }
 }
 
 /// A scene with other places.

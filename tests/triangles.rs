@@ -417,9 +417,9 @@ fn kernels_and_twins_paint_alike() {
         (wrong, shown)
     };
     let wrong = [
-        broken("triangles_texture.wgsl", "0.5 * log2(max(texels, 1.0))", "0.6 * log2(max(texels, 1.0))"),
-        broken("triangles_texture.wgsl", "1.0 - place.y", "place.y"),
-        broken("triangles_texture.wgsl", "number == 0u);\n}", "false);\n}"),
+        broken("textures.wgsl", "0.5 * log2(max(texels, 1.0))", "0.6 * log2(max(texels, 1.0))"),
+        broken("textures.wgsl", "1.0 - place.y", "place.y"),
+        broken("triangles_texture.wgsl", "number == 0u", "number != 0u"),
         broken("corner_pinhole.wgsl", "a * b * c / of_depth", "a * b / of_depth"),
     ];
     for (number, lens) in [Lens::Fov(60.0), Lens::OrthographicHeight(2.4)].into_iter().enumerate() {

@@ -2,7 +2,7 @@
 // of one u64, so that a fragment makes half as many additions. What wraps in the low half runs into the high one; both
 // halves' carries are counted in a u64 of their own, which follows, so that it can be taken out again.
 // Error bound: src/passes/accumulate.rs.
-// All loops end, by 1, 3 of src/gpu/loops.rs: 0xa09ce6213cc6de43
+// All loops end, by 1, 3 of src/gpu/loops.rs: 0x8d89caff991eca3f
 
 override CHANNELS: u32;
 
@@ -46,8 +46,8 @@ fn settle(pixel: u32) {
 @group(0) @binding(37) var<storage, read> added: array<vec2<u64>>;
 
 // The sums of the pixel that is shown, low and high words: both of a pair are read at once.
-var<private> shown_low: array<u32, 16>;
-var<private> shown_high: array<u32, 16>;
+var<private> shown_low: array<u32, 18>;
+var<private> shown_high: array<u32, 18>;
 
 fn show_pair(pixel: u32, pair: u32) {
     let of_pair = added[pixel * (CHANNELS / 2u) + pair];

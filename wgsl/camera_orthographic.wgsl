@@ -134,6 +134,11 @@ fn seen_at(x: u32, y: u32, depth: f32) -> vec3<f32> {
     return image.x * held.rotation[0].xyz + image.y * held.rotation[1].xyz + depth * held.rotation[2].xyz;
 }
 
+fn area_in_pixel(normal: vec3<f32>, point: vec3<f32>, depth: f32) -> f32 {
+    let facing = max(abs(dot(normal, held.rotation[2].xyz)), 1e-30);
+    return dot(normal, normal) / facing / (held.intrinsics.x * held.intrinsics.y);
+}
+
 fn homogeneous_row(splat: Splat) -> vec3<f32> {
     return vec3<f32>(0.0, 0.0, 1.0);
 }

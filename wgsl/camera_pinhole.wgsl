@@ -1,6 +1,6 @@
 // The pinhole camera x = fx X/Z + cx: homography and bounds of a disk, and the evaluation at a pixel.
 // Twin: src/passes/homography.rs and src/passes/footprint.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x0a9118a74b35410c
+// All loops end, by 1 of src/gpu/loops.rs: 0xfd5bb64a53685c1f
 
 fn image_of(position: Double, depth: Double, axis: u32) -> Double {
     let focal = Double(held.intrinsics[axis], held.intrinsics_low[axis]);
@@ -277,6 +277,13 @@ fn ray_to(relative: vec3<f32>) -> vec3<f32> {
 fn seen_at(x: u32, y: u32, depth: f32) -> vec3<f32> {
     let image = (vec2<f32>(f32(x), f32(y)) + 0.5 - held.intrinsics.zw) / held.intrinsics.xy * depth;
     return image.x * held.rotation[0].xyz + image.y * held.rotation[1].xyz + depth * held.rotation[2].xyz;
+}
+
+// What a pixel has of a measure of the plane through `point`, relative to the eye: the measure's normal is as long as what a unit of area has
+// of it. Device units.
+fn area_in_pixel(normal: vec3<f32>, point: vec3<f32>, depth: f32) -> f32 {
+    let facing = max(abs(dot(normal, point / depth)), 1e-30);
+    return dot(normal, normal) / facing * (depth / held.intrinsics.x) * (depth / held.intrinsics.y);
 }
 
 // The third row of the matrix that takes an image point to (u, v, 1), up to a factor.

@@ -39,17 +39,12 @@ struct View {
     farthest: f32,
     // Depth of the middle of the scene's core, device units.
     middle: f32,
-    // Texels; 0 without a texture.
-    texture_width: u32,
-    texture_height: u32,
     // What an epsilon by the radius does not exceed, as a fraction of the nearest depth.
     epsilon_most: f32,
     // The depths at which the scene's body starts and ends, device units.
     first: f32,
     last: f32,
     padding_0: u32,
-    padding_1: u32,
-    padding_2: u32,
     // The middle of the range of texture coordinates, its span, and the largest squared reach in units of the span.
     place: vec4<f32>,
 }

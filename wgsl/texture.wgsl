@@ -1,11 +1,11 @@
-// Surfels that are painted by a texture: what is summed of their places in it, and its lookup at the mean of these.
+// Surfels that are painted by a texture: what is summed of their places in it, and its lookup (textures.wgsl) at the mean of these.
 // Twin: src/scene/texture.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x68b6005fcfd57619
+// All loops end, by 1 of src/gpu/loops.rs: 0x163d10f45b231635
 
 override PLACE_CHANNEL: u32;
 
-// Rows from the top, four bytes of sRGB and straight alpha each.
-@group(0) @binding(36) var<storage, read> texels: array<u32>;
+// The surfels' among textures.
+const OF_SURFELS: u32 = 0u;
 
 // Texture coordinates are in units of their range.
 struct Place {
@@ -39,27 +39,10 @@ fn accumulate_place(pixel: u32, weight: Term, place: Place, depth: f32) {
     add_pair(pixel, PLACE_CHANNEL, term(weight, at.x), term(weight, at.y));
     // Of coordinates in [0, 1] the squared distance from the middle is at most 1/2.
     add_pair(pixel, PLACE_CHANNEL + 2u, term(weight, 2.0 * dot(offset, offset)), term(weight, place.reach_2));
-}
-
-fn texel(column: i32, row: i32) -> vec4<f32> {
-    let size = vec2<i32>(i32(held.texture_width), i32(held.texture_height));
-    // Both are at least -1 and at most the size.
-    let at = (vec2<i32>(column, row) + size) % size;
-    return premultiplied_of(texels[at.y * size.x + at.x]);
-}
-
-// Premultiplied linear colour at texture coordinates, origin bottom left: between the middles of texels interpolated, beyond
-// [0, 1] repeated.
-fn texture_at(place: vec2<f32>) -> vec4<f32> {
-    let turns = vec2<f32>(place.x, 1.0 - place.y);
-    let at = fract(turns) * vec2<f32>(f32(held.texture_width), f32(held.texture_height)) - 0.5;
-    let low = floor(at);
-    let share = at - low;
-    let column = i32(low.x);
-    let row = i32(low.y);
-    let above = mix(texel(column, row), texel(column + 1, row), share.x);
-    let below = mix(texel(column, row + 1), texel(column + 1, row + 1), share.x);
-    return mix(above, below, share.y);
+    // Of the whole texture what a pixel covers; with slopes for a device unit, so that no square overflows.
+    let area = cross(place.u_slope * held.world, place.v_slope * held.world);
+    let covered_part = area_in_pixel(area, point, depth) * held.place.z * held.place.z;
+    add(pixel, PLACE_CHANNEL + 4u, term(weight, covered_part));
 }
 
 // The mean texture coordinates of a pixel.
@@ -77,5 +60,7 @@ fn textured(pixel: u32, weight: f32, blended: vec4<f32>) -> vec4<f32> {
     let offset = mean.xy - 0.5;
     let variance = 0.5 * mean.z - dot(offset, offset);
     let share = clamp(2.0 - variance / (mean.w * held.place.w), 0.0, 1.0);
-    return blended + share * (texture_at(held.place.xy + offset * held.place.z) - blended);
+    let place = held.place.xy + offset * held.place.z;
+    let covered_part = sum_at(pixel, PLACE_CHANNEL + 4u) / weight;
+    return blended + share * (seen_texture(OF_SURFELS, place, covered_part) - blended);
 }

@@ -99,14 +99,10 @@ pub struct View {
     pub epsilon_deepest: f32,
     pub farthest: f32,
     pub middle: f32,
-    pub texture_width: u32,
-    pub texture_height: u32,
     pub epsilon_most: f32,
     pub first: f32,
     pub last: f32,
     pub padding_0: u32,
-    pub padding_1: u32,
-    pub padding_2: u32,
     pub place: [f32; 4],
 }
 

@@ -130,7 +130,7 @@ pub struct PixelSums {
     /// The depth of the nearest fragment; of lists alone.
     pub nearest: f64,
     /// Of [`Textured::terms`](crate::scene::Textured::terms), places in a texture.
-    pub place: [f64; 4],
+    pub place: [f64; 5],
     /// What fragments hold back, as optical depth; where all of a pixel are summed ([`oit`](super::oit)).
     pub held_back: f64,
     /// Accepted fragments.
@@ -149,7 +149,7 @@ impl PixelSums {
         depth: 0.0,
         depth_weight: 0.0,
         nearest: f64::INFINITY,
-        place: [0.0; 4],
+        place: [0.0; 5],
         held_back: 0.0,
         count: 0,
         decision: f64::INFINITY,
@@ -207,8 +207,9 @@ pub fn reference<'a>(
                 }
                 if let Colors::Textured(textured) = &scene.colors {
                     let (x, y) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
-                    let point = camera.ray_start(x, y) + at.depth * camera.ray(x, y);
-                    let terms = textured.terms(splat.surfel as usize, point - center);
+                    let (surfel, ray) = (splat.surfel as usize, camera.ray(x, y));
+                    let part = textured.part_in_pixel(surfel, camera, ray, at.depth);
+                    let terms = textured.terms(surfel, camera.ray_start(x, y) + at.depth * ray - center, part);
                     for (total, value) in sum.place.iter_mut().zip(terms) {
                         *total += weight * value;
                     }

@@ -34,7 +34,7 @@ pub const PASS: Pass = Pass {
             ColorNeed::Constant => &["color_constant.wgsl"],
             ColorNeed::Srgb8 => &["color_srgb8.wgsl", "srgb.wgsl", "color_sums.wgsl"],
             ColorNeed::Linear => &["color_linear.wgsl", "color_sums.wgsl"],
-            ColorNeed::Textured => &["color_textured.wgsl", "srgb.wgsl", "color_sums.wgsl"],
+            ColorNeed::Textured => &["color_textured.wgsl", "textures.wgsl", "srgb.wgsl", "color_sums.wgsl"],
             ColorNeed::Harmonics(_) => &["color_harmonics.wgsl", "color_sums.wgsl"],
         });
         files

@@ -11,7 +11,7 @@ use super::cull::ball;
 use super::order::order;
 use crate::gpu::layout::BATCH;
 use crate::plan::{ColorNeed, Facts, SceneNeeds, SurfelLayout};
-use crate::scene::{Cap, Colors, Provenance, Scene, Surfel, Texture, Triangles, copies};
+use crate::scene::{Cap, Colors, Mipmap, Provenance, Scene, Surfel, Triangles, copies};
 
 /// Surfels, page by page.
 pub trait Source: Send + Sync {
@@ -23,7 +23,7 @@ pub trait Source: Send + Sync {
     fn pages<'a>(&'a self, needs: &SceneNeeds, most: usize, ordered: Option<&Facts>) -> Vec<Box<dyn Page + 'a>>;
 
     /// What paints them.
-    fn texture(&self) -> Option<&Texture>;
+    fn texture(&self) -> Option<&Mipmap>;
 
     /// The triangles beside them.
     fn triangles(&self) -> Option<&Triangles> {
@@ -67,7 +67,7 @@ macro_rules! leads_to_source {
                 (**self).pages(needs, most, ordered)
             }
 
-            fn texture(&self) -> Option<&Texture> {
+            fn texture(&self) -> Option<&Mipmap> {
                 (**self).texture()
             }
 
@@ -116,9 +116,9 @@ impl Source for Scene {
         individual.flat_map(|indices: Vec<u32>| indices.chunks(most).map(of).collect::<Vec<_>>()).collect()
     }
 
-    fn texture(&self) -> Option<&Texture> {
+    fn texture(&self) -> Option<&Mipmap> {
         match &self.colors {
-            Colors::Textured(textured) => Some(textured.texture()),
+            Colors::Textured(textured) => Some(textured.mipmap()),
             _ => None,
         }
     }

@@ -282,11 +282,13 @@ pub const PASS: Pass = Pass {
             (None, false) => &["triangles_visibility.wgsl", "triangles_named.wgsl", "triangles_twice.wgsl"],
         };
         let texture = if mesh.textured { "triangles_texture.wgsl" } else { "triangles_texture_absent.wgsl" };
-        // Else surfels' colours need it.
-        let decodes = mesh.textured && !matches!(needs.color, ColorNeed::Srgb8 | ColorNeed::Textured);
+        // Else surfels' colours need them.
+        let looks_up = mesh.textured && needs.color != ColorNeed::Textured;
+        let decodes = looks_up && needs.color != ColorNeed::Srgb8;
+        let own = looks_up.then_some("textures.wgsl").into_iter().chain(decodes.then_some("srgb.wgsl"));
         let all =
             ["corners.wgsl", "triangles.wgsl", "triangles_tiles.wgsl", "triangles_attributes.wgsl", corner, texture];
-        all.into_iter().chain(visibility.iter().copied()).chain(decodes.then_some("srgb.wgsl")).collect()
+        all.into_iter().chain(visibility.iter().copied()).chain(own).collect()
     },
     kernels: |needs| match needs.mesh {
         None => Vec::new(),

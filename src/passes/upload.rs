@@ -3,15 +3,15 @@
 use std::ops::Range;
 
 use super::source::{self, Source};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::layout::QUEUE_START;
 use crate::passes::triangles::CORNER_WORDS;
 use crate::plan::{ColorNeed, Facts, MeshNeeds, SceneNeeds, SurfelLayout, page_surfels, texture_words};
 use crate::progress::Progress;
-use crate::scene::Triangles;
 use crate::scene::color::SRGB8_TO_LINEAR;
+use crate::scene::{Mipmap, Triangles};
 
 /// Buffers by their names in WGSL.
 pub type Named = Vec<(&'static str, Buffer<u32>)>;
@@ -83,11 +83,11 @@ pub fn shared(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds) -> Result<Name
         let table: [[f32; 4]; 64] = std::array::from_fn(|row| std::array::from_fn(|k| SRGB8_TO_LINEAR[4 * row + k]));
         shared.push(("srgb_to_linear", Buffer::uniform(gpu, "sRGB table", &table)?.words()));
     }
-    if let Some(texture) = source.texture() {
-        let texels = texture.texels();
-        let buffer = Buffer::storage(gpu, "the texture", texels.len() as u64)?;
-        buffer.write(gpu, texels.len(), |range| texels[range].into(), &())?;
-        shared.push(("texels", buffer.words()));
+    let paint = source.triangles().filter(|_| textured).map_or(&[][..], |triangles| triangles.textures());
+    if source.texture().is_some() || !paint.is_empty() {
+        let none = Mipmap::one_texel();
+        let all: Vec<&Mipmap> = [source.texture().unwrap_or(&none)].into_iter().chain(paint).collect();
+        shared.push(("textures", filled(gpu, "textures", &texture_words(&all))?));
     }
     if let (Some(triangles), Some(mesh)) = (source.triangles(), needs.mesh) {
         shared.extend(of_triangles(gpu, triangles, &mesh)?);
@@ -97,24 +97,25 @@ pub fn shared(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds) -> Result<Name
 
 /// The buffers of triangles: what they are, and room for their corners and for the large and the rare ones.
 fn of_triangles(gpu: &Gpu, triangles: &Triangles, mesh: &MeshNeeds) -> Result<Named> {
-    let filled = |what: &str, words: &[u32]| {
-        let buffer = Buffer::storage(gpu, what, words.len() as u64)?;
-        buffer.write(gpu, words.len(), |range| words[range].into(), &())?;
-        Ok::<_, Error>(buffer)
-    };
     let (vertices, corners) = (triangles.vertices(), triangles.corners());
     let queue = corners.len() as u64 + u64::from(QUEUE_START);
     let seen = vertices.len() as u64 * u64::from(CORNER_WORDS);
-    let mut buffers = vec![
-        ("vertices", filled("vertices of triangles", bytemuck::cast_slice(vertices))?),
-        ("triangles", filled("triangles", bytemuck::cast_slice(corners))?),
-        ("triangle_attributes", filled("attributes of triangles", bytemuck::cast_slice(&mesh.records(triangles)))?),
+    Ok(vec![
+        ("vertices", filled(gpu, "vertices of triangles", bytemuck::cast_slice(vertices))?),
+        ("triangles", filled(gpu, "triangles", bytemuck::cast_slice(corners))?),
+        (
+            "triangle_attributes",
+            filled(gpu, "attributes of triangles", bytemuck::cast_slice(&mesh.records(triangles)))?,
+        ),
         ("corners", Buffer::storage(gpu, "corners of triangles", seen)?),
         ("large_triangles", Buffer::indirect(gpu, "queue of large triangles", queue)?),
         ("rare_triangles", Buffer::indirect(gpu, "list of rare triangles", queue)?),
-    ];
-    if mesh.textured {
-        buffers.push(("triangle_textures", filled("textures of triangles", &texture_words(triangles.textures()))?));
-    }
-    Ok(buffers)
+    ])
+}
+
+/// A buffer that is `what`, of `words`.
+fn filled(gpu: &Gpu, what: &str, words: &[u32]) -> Result<Buffer<u32>> {
+    let buffer = Buffer::storage(gpu, what, words.len() as u64)?;
+    buffer.write(gpu, words.len(), |range| words[range].into(), &())?;
+    Ok(buffer)
 }

@@ -47,8 +47,8 @@ pub struct Facts {
     pub encoded: bool,
     /// Where the colours come from.
     pub colors: ColorNeed,
-    /// The texture's width and height, and the range of places in it.
-    pub texture: Option<([u32; 2], PlaceRange)>,
+    /// The range of places in the texture.
+    pub texture: Option<PlaceRange>,
     /// [`Scene::largest_radius`].
     pub largest_radius: f32,
     /// [`Scene::largest_shorter`].
@@ -95,7 +95,7 @@ impl Facts {
                 Colors::Harmonics(harmonics) => ColorNeed::Harmonics(harmonics.degree()),
             },
             texture: match &scene.colors {
-                Colors::Textured(textured) => Some((textured.texture().size(), textured.range())),
+                Colors::Textured(textured) => Some(textured.range()),
                 _ => None,
             },
             largest_radius: scene.largest_radius(),

@@ -80,7 +80,7 @@ impl MeshNeeds {
 
 /// The words of textures on a device: where each one's head is, then the heads, the number of levels and of each its width, its height and where
 /// its texels are, then the texels.
-pub fn texture_words(textures: &[Mipmap]) -> Vec<u32> {
+pub fn texture_words(textures: &[&Mipmap]) -> Vec<u32> {
     let mut words = vec![0; textures.len()];
     for (number, mipmap) in textures.iter().enumerate() {
         words[number] = words.len() as u32;

@@ -18,7 +18,7 @@ pub struct PixelLayout {
     pub count_channel: u32,
     /// The channel of what is held back, where that is summed ([`oit`](crate::passes::oit)).
     pub held_back_channel: u32,
-    /// The first of the four channels of places in a texture.
+    /// The first of the five channels of places in a texture.
     pub place_channel: u32,
     /// Words of a pixel in the image; the colour's four come first.
     pub image_words: u32,
@@ -50,7 +50,7 @@ impl PixelLayout {
             first
         });
         Self {
-            channels: place_channel + channels(needs.color == ColorNeed::Textured, 4),
+            channels: (place_channel + channels(needs.color == ColorNeed::Textured, 5)).next_multiple_of(2),
             normal_channel,
             depth_channel,
             middles_channel,

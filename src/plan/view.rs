@@ -59,9 +59,9 @@ impl View {
         };
         let (intrinsics, intrinsics_low) =
             split_all([camera.fx * per_unit, camera.fy * per_unit, camera.cx, camera.cy]);
-        let ([texture_width, texture_height], place) = match facts.texture {
-            Some((size, PlaceRange { middle: [u, v], span, most_reach_2 })) => (size, [u, v, span, most_reach_2]),
-            None => ([0; 2], [0.0; 4]),
+        let place = match facts.texture {
+            Some(PlaceRange { middle: [u, v], span, most_reach_2 }) => [u, v, span, most_reach_2],
+            None => [0.0; 4],
         };
         let (relative, absolute, of_radius) = options.epsilon.parts();
         let [first, last] = depths(facts, camera);
@@ -90,14 +90,10 @@ impl View {
             epsilon_deepest: (of_radius * f64::from(facts.largest_shorter) * unit) as f32,
             farthest: (farthest(facts, camera) * unit) as f32,
             middle: (camera.rotation.row(2).dot(core.center() - eye_relative) * unit) as f32,
-            texture_width,
-            texture_height,
             epsilon_most: options.epsilon.most().min(LARGEST_FRACTION) as f32,
             first: (first * unit) as f32,
             last: (last * unit) as f32,
             padding_0: 0,
-            padding_1: 0,
-            padding_2: 0,
             place,
         }
     }

@@ -21,6 +21,11 @@ impl Mipmap {
         Self { levels }
     }
 
+    /// The halvings of a white texel.
+    pub(crate) fn one_texel() -> Self {
+        Self::new(Arc::new(Texture::one_texel()))
+    }
+
     /// From the whole image on, each half as wide and high.
     pub fn levels(&self) -> &[Arc<Texture>] {
         &self.levels
@@ -28,7 +33,7 @@ impl Mipmap {
 
     /// The colour at texture coordinates, linear RGB premultiplied by alpha, and alpha, as a pixel sees it that covers so many texels of the
     /// whole image: between the two levels whose texels are the next smaller and larger ones. The twin of `seen_texture` in
-    /// `wgsl/triangles_texture.wgsl`.
+    /// `wgsl/textures.wgsl`.
     pub fn seen_at(&self, place: [f64; 2], texels: f64) -> [f64; 4] {
         let level = (0.5 * texels.max(1.0).log2()).min((self.levels.len() - 1) as f64);
         let (low, share) = (level.floor() as usize, level - level.floor());

@@ -6,6 +6,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::srgb::SRGB8_TO_LINEAR;
+use super::{Camera, Mipmap, Projection};
 use crate::error::{Error, Result};
 
 /// An image of 8-bit sRGB colours with straight alpha.
@@ -24,6 +25,11 @@ impl Texture {
         (count > 0 && count == texels.len() as u64).then_some(Self { width, height, texels })
     }
 
+    /// A white one.
+    pub(super) fn one_texel() -> Self {
+        Self { width: 1, height: 1, texels: vec![[255; 4]] }
+    }
+
     /// Width and height, texels.
     pub fn size(&self) -> [u32; 2] {
         [self.width, self.height]
@@ -35,7 +41,7 @@ impl Texture {
     }
 
     /// The colour at texture coordinates (u, v), origin bottom left: linear RGB premultiplied by alpha, and alpha. Between the
-    /// middles of texels it is interpolated; beyond [0, 1] the image is repeated. The twin of `texture_at` in `wgsl/texture.wgsl`.
+    /// middles of texels it is interpolated; beyond [0, 1] the image is repeated. The twin of `level_color` in `wgsl/textures.wgsl`.
     pub fn premultiplied_at(&self, [u, v]: [f64; 2]) -> [f64; 4] {
         // What is not a number has no place; that of 0 serves.
         let place = |turns: f64, size: u32| {
@@ -106,7 +112,8 @@ pub struct Place {
 /// repeated, and where one surface ends in front of another. Their mean is then a place that has nothing to do with
 /// either. So each surfel also has the texture's mean over its disk, and its *reach*. Where the coordinates of a pixel's
 /// fragments vary by no more than `mean of reach^2`, the pixel has the texture's colour; where by more than twice that, the
-/// blended means; in between there is a linear passage.
+/// blended means; in between there is a linear passage. The texture is looked up as a pixel sees it that covers so much of it
+/// ([`Mipmap`]), the mean over its fragments, so that what is seen from afar is averaged.
 ///
 /// **Error.** Let e be the bound of [`crate::passes::accumulate`] on a mean, as a fraction of its range. Coordinates err by e times
 /// their span, so a colour by that times the steepest slope of the interpolated texture (the largest difference of
@@ -114,7 +121,7 @@ pub struct Place {
 /// passage the share of the texture errs by `3 e span^2 / mean of reach^2`, which the least reach keeps below `5e4 e`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Textured {
-    texture: Arc<Texture>,
+    mipmap: Arc<Mipmap>,
     places: Vec<Place>,
     colors: Vec<[f32; 4]>,
     range: PlaceRange,
@@ -162,12 +169,17 @@ impl Textured {
             return Err(Error::Usage("surfels in a texture have a place and a colour each".into()));
         }
         let range = PlaceRange::of(&places);
-        Ok(Self { texture, places, colors, range })
+        Ok(Self { mipmap: Arc::new(Mipmap::new(texture)), places, colors, range })
     }
 
     /// The image.
     pub fn texture(&self) -> &Texture {
-        &self.texture
+        &self.mipmap.levels()[0]
+    }
+
+    /// The image at all scales.
+    pub fn mipmap(&self) -> &Mipmap {
+        &self.mipmap
     }
 
     /// Where each surfel lies.
@@ -190,12 +202,13 @@ impl Textured {
         let places: Vec<_> = indices.iter().map(|&index| self.places[index]).collect();
         let colors = indices.iter().map(|&index| self.colors[index]).collect();
         let range = PlaceRange::of(&places);
-        Self { texture: Arc::clone(&self.texture), places, colors, range }
+        Self { mipmap: Arc::clone(&self.mipmap), places, colors, range }
     }
 
     /// What is summed of surfel `index` at the world offset `step` from its centre: the coordinates relative to the middle of their
-    /// range, the squared length of these, and the squared reach; in units of the range's span.
-    pub fn terms(&self, index: usize, step: DVec3) -> [f64; 4] {
+    /// range, the squared length of these, and the squared reach; in units of the range's span. And the `part` of the texture that a pixel has
+    /// there, as it is.
+    pub fn terms(&self, index: usize, step: DVec3, part: f64) -> [f64; 5] {
         let PlaceRange { middle, span, .. } = self.range;
         let Place { center, slopes, reach, .. } = self.places[index];
         let [u, v] = [0, 1].map(|k| {
@@ -203,13 +216,24 @@ impl Textured {
             (f64::from(center[k]) - f64::from(middle[k]) + gain) / f64::from(span)
         });
         let reach = (f64::from(reach) / f64::from(span)).max(LEAST_REACH);
-        [u, v, u * u + v * v, reach * reach]
+        [u, v, u * u + v * v, reach * reach, part]
+    }
+
+    /// The part of the whole texture that a pixel has of the plane of surfel `index`, at `depth` along its ray, which is as long as a unit of depth:
+    /// at most all of it. The twin of `area_in_pixel` in `wgsl/camera_pinhole.wgsl` and `wgsl/camera_orthographic.wgsl`.
+    pub fn part_in_pixel(&self, index: usize, camera: &Camera, ray: DVec3, depth: f64) -> f64 {
+        let [u, v] = self.places[index].slopes.map(|slope| DVec3::from_array(slope.map(f64::from)));
+        // As long as the texture's area is for a unit of the plane's.
+        let normal = u.cross(v);
+        let scale = if camera.projection == Projection::Pinhole { depth * depth } else { 1.0 };
+        let facing = normal.dot(ray).abs();
+        if facing > 0.0 { (normal.length_squared() / facing * scale / (camera.fx * camera.fy)).min(1.0) } else { 0.0 }
     }
 
     /// What the device has of surfel `index`: the coordinates of its centre and its squared reach, each mapped to [0, 1]; and the
     /// slopes of u and of v in units of the span. A coordinate of what the surfel's centre leaves out, `low`, comes last in each.
     pub(crate) fn mapped(&self, index: usize, low: Option<&[f32; 3]>) -> [[f32; 4]; 3] {
-        let [u, v, _, reach_2] = self.terms(index, DVec3::ZERO);
+        let [u, v, _, reach_2, _] = self.terms(index, DVec3::ZERO, 0.0);
         let slope = |k: usize| self.places[index].slopes[k].map(|gain| f64::from(gain) / f64::from(self.range.span));
         let [[ux, uy, uz], [vx, vy, vz]] = [0, 1].map(slope);
         let [x, y, z] = low.map_or([0.0; 3], |low| low.map(f64::from));
@@ -218,7 +242,7 @@ impl Textured {
     }
 
     /// The texture coordinates of a pixel from the means of [`Self::terms`].
-    pub fn place_at(&self, [u, v, ..]: [f64; 4]) -> [f64; 2] {
+    pub fn place_at(&self, [u, v, ..]: [f64; 5]) -> [f64; 2] {
         let PlaceRange { middle, span, .. } = self.range;
         let at = |k: usize, offset: f64| f64::from(middle[k]) + f64::from(span) * offset;
         [at(0, u), at(1, v)]
@@ -226,9 +250,11 @@ impl Textured {
 
     /// The premultiplied colour of a pixel from the means of [`Self::terms`] and the blended premultiplied colour: by the texture
     /// where the coordinates agree, else blended. The twin of `textured` in `wgsl/texture.wgsl`.
-    pub fn resolve(&self, [u, v, squared, reach_2]: [f64; 4], blended: [f64; 4]) -> [f64; 4] {
+    pub fn resolve(&self, means: [f64; 5], blended: [f64; 4]) -> [f64; 4] {
+        let [u, v, squared, reach_2, part] = means;
         let share = (2.0 - (squared - u * u - v * v) / reach_2).clamp(0.0, 1.0);
-        let texel = self.texture.premultiplied_at(self.place_at([u, v, squared, reach_2]));
+        let [width, height] = self.texture().size();
+        let texel = self.mipmap.seen_at(self.place_at(means), part * f64::from(width) * f64::from(height));
         std::array::from_fn(|k| blended[k] + share * (texel[k] - blended[k]))
     }
 }

@@ -1,0 +1,47 @@
+// Textures at all scales, looked up as a pixel sees them that covers so many of their texels. Twin: src/scene/mipmap.rs.
+
+// Where each texture's head is, the surfels' first and then the triangles'; a head has the number of its levels, and of each its width, its
+// height and where its texels are: rows from the top, four bytes of sRGB and straight alpha each.
+@group(0) @binding(65) var<storage, read> textures: array<u32>;
+
+struct Level {
+    size: vec2<i32>,
+    texels: u32,
+}
+
+fn level_at(head: u32, level: u32) -> Level {
+    let first = head + 1u + 3u * level;
+    let size = vec2<i32>(i32(textures[first]), i32(textures[first + 1u]));
+    return Level(size, textures[first + 2u]);
+}
+
+fn level_texel(level: Level, column: i32, row: i32) -> vec4<f32> {
+    // Both are at least -1 and at most the size.
+    let at = (vec2<i32>(column, row) + level.size) % level.size;
+    return premultiplied_of(textures[level.texels + u32(at.y * level.size.x + at.x)]);
+}
+
+// Premultiplied linear colour. Between the middles of texels interpolated, beyond [0, 1] repeated; origin bottom left.
+fn level_color(level: Level, place: vec2<f32>) -> vec4<f32> {
+    let at = fract(vec2<f32>(place.x, 1.0 - place.y)) * vec2<f32>(level.size) - 0.5;
+    let low = floor(at);
+    let share = at - low;
+    let column = i32(low.x);
+    let row = i32(low.y);
+    let above = mix(level_texel(level, column, row), level_texel(level, column + 1, row), share.x);
+    let below = mix(level_texel(level, column, row + 1), level_texel(level, column + 1, row + 1), share.x);
+    return mix(above, below, share.y);
+}
+
+// Of a texture by its number, where a pixel covers a `part` of it: between the two levels whose texels are the next smaller and larger ones.
+fn seen_texture(number: u32, place: vec2<f32>, part: f32) -> vec4<f32> {
+    let head = textures[number];
+    let whole = level_at(head, 0u);
+    let texels = part * f32(whole.size.x) * f32(whole.size.y);
+    let last = f32(textures[head] - 1u);
+    let level = min(0.5 * log2(max(texels, 1.0)), last);
+    let low = floor(level);
+    let near = level_color(level_at(head, u32(low)), place);
+    let far = level_color(level_at(head, u32(min(low + 1.0, last))), place);
+    return mix(near, far, level - low);
+}

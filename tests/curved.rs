@@ -191,7 +191,7 @@ fn points_of_a_curved_surface_become_caps_of_it() {
     };
     for (points, better) in [(points, 10.0), (alone, 3.0)] {
         let flat = Limits { curved: false, ..Limits::default() };
-        let of = |limits: &Limits| build_within(vec![points.clone()], None, limits, &()).unwrap().0;
+        let of = |limits: &Limits| build_within(vec![points.clone()], vec![], limits, &()).unwrap().0;
         let (caps, disks) = (of(&Limits::default()), of(&flat));
         assert!(disks.caps.is_empty() && caps.caps.iter().filter(|cap| !cap.is_flat()).count() > 2990);
         assert!(better * off(&caps) < off(&disks), "{} {}", off(&caps), off(&disks));
@@ -230,7 +230,7 @@ fn the_outline_of_a_few_caps_is_that_of_their_sphere() {
         let (positions, normals) =
             sphere(1000, 1.0).surfels.iter().map(|surfel| (surfel.center.map(f64::from), surfel.center)).unzip();
         let points = Points { positions, normals: Some(normals), ..Points::default() };
-        build_within(vec![points], None, &limits, &()).unwrap().0
+        build_within(vec![points], vec![], &limits, &()).unwrap().0
     };
     let surface = Surface::mesh(&common::meshes::sphere(6, true)).unwrap();
     let scene = of(true);
@@ -266,7 +266,7 @@ fn what_normals_across_a_splat_are_worth_alone() {
         let on_sphere = sphere(count, 1.0).surfels;
         let (positions, normals) = on_sphere.iter().map(|surfel| (surfel.center.map(f64::from), surfel.center)).unzip();
         let points = Points { positions, normals: Some(normals), ..Points::default() };
-        let scene = build_within(vec![points], None, &Limits::default(), &()).unwrap().0;
+        let scene = build_within(vec![points], vec![], &Limits::default(), &()).unwrap().0;
         let flat = Scene { caps: Vec::new(), ..scene.clone() };
         let camera = Camera::framing((256, 256), Lens::Fov(30.0), &scene, 1e-3).unwrap();
         let options = RenderOptions {

@@ -16,14 +16,12 @@ use std::fmt::Write;
 use std::sync::Arc;
 
 use common::bits;
-use common::scenes::{Case, cases, crowded, sphere, sphere_camera};
+use common::scenes::{Case, cases, crowded, painted, sphere, sphere_camera};
 use epsplat::frame::Frame;
 use epsplat::gpu::Gpu;
-use epsplat::io::{Points, Texture};
 use epsplat::plan::{Accumulator, Features, Optimisation, Organisation, RenderOptions};
 use epsplat::render::{Backend, Renderer, render};
 use epsplat::scene::{Camera, Colors, Epsilon, Light, LowPass, Maps, Projection, Scene, Shading, Surfel};
-use epsplat::surfels::build_textured;
 use glam::{DVec3, Vec3};
 
 /// A scene and a view of it.
@@ -69,7 +67,7 @@ fn scenes() -> Scenes {
         near: case("pinhole, across the near depth"),
         far: doubled(),
         copies: (copies(), sphere_camera(72, Projection::Pinhole)),
-        textured: (textured(), sphere_camera(72, Projection::Pinhole)),
+        textured: (painted(1), sphere_camera(72, Projection::Pinhole)),
         plain: (plain, sphere_camera(72, Projection::Orthographic)),
     }
 }
@@ -96,22 +94,6 @@ fn copies() -> Scene {
     scene.surfels.extend(vec![disk; 2000]);
     codes.extend(vec![[200, 30, 40, 255]; 2000]);
     scene
-}
-
-/// A sphere with a picture on it.
-fn textured() -> Scene {
-    let scene = sphere(2000, 1.7);
-    let centers: Vec<[f32; 3]> = scene.surfels.iter().map(|surfel| surfel.center).collect();
-    let code = |k: u32, step: u32| (40 + k * step % 200) as u8;
-    let texels = (0..32 * 16).map(|k| [code(k, 7), code(k, 13), code(k / 32, 29), 255]).collect();
-    let points = Points {
-        positions: centers.iter().map(|center| center.map(f64::from)).collect(),
-        normals: Some(centers.clone()),
-        radii: Some(vec![scene.surfels[0].radius(); centers.len()]),
-        texture: Some(centers.iter().map(|[x, y, _]| [0.5 + 0.4 * x, 0.5 + 0.4 * y]).collect()),
-        ..Points::default()
-    };
-    build_textured(vec![points], Texture::new(32, 16, texels).unwrap(), &()).unwrap().0
 }
 
 fn unlit() -> RenderOptions {

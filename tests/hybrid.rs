@@ -24,8 +24,12 @@ fn scene(mesh: &Mesh) -> Scene {
 fn rich() -> Mesh {
     let texel = |k: u8| [40 * k, 255 - 30 * k, 7, 255];
     let image = Arc::new(Texture::new(2, 3, (0..6).map(texel).collect()).unwrap());
-    let material =
-        |texture: Option<&Arc<Texture>>| Material { name: "m".into(), diffuse: [1.0; 4], texture: texture.cloned() };
+    let material = |texture: Option<&Arc<Texture>>| Material {
+        name: "m".into(),
+        diffuse: [1.0; 4],
+        texture: texture.cloned(),
+        image: None,
+    };
     Mesh {
         positions: vec![[1e6 + 0.001, 0.0, 0.0], [1e6 + 1.0, 0.0, 0.5], [1e6, 1.0, 0.0], [1e6 + 1.0, 1.0, -0.25]],
         triangles: vec![[0, 1, 2], [2, 1, 3]],
@@ -159,7 +163,8 @@ fn normals_and_materials_stay_what_they_are() {
     assert!(ball.normals.is_some() && !closed(&ball));
 
     let image = Arc::new(Texture::new(1, 1, vec![[188, 255, 0, 200]]).unwrap());
-    let dim = Material { name: String::new(), diffuse: [0.5, 1.0, 1.0, 0.5], texture: Some(image.clone()) };
+    let dim =
+        Material { name: String::new(), diffuse: [0.5, 1.0, 1.0, 0.5], texture: Some(image.clone()), image: None };
     // Half the light of 188 is the code 137.
     assert_eq!(dim.painted().unwrap().texels(), [[137, 255, 0, 100]]);
     assert!(Arc::ptr_eq(&Material { diffuse: [1.0; 4], ..dim }.painted().unwrap(), &image));

@@ -334,7 +334,7 @@ fn a_scene_of_points_has_the_same_limits() {
     // A sparse strip beside the dense square, nine points of which would see one another across it.
     positions.extend((0..40).map(|k| [1.15 + 0.1 * f64::from(k % 2), -0.9 + 0.045 * f64::from(k), 0.0]));
     positions.push([0.0, 0.0, 0.6]);
-    let scene = |points: Points, limits: Limits| build_within(vec![points], None, &limits, &()).unwrap();
+    let scene = |points: Points, limits: Limits| build_within(vec![points], vec![], &limits, &()).unwrap();
     let radii = |made: &(Scene, Preparation)| made.0.surfels.iter().map(|s| s.radius()).collect::<Vec<_>>();
     let free = scene(cloud(positions.clone()), Limits { largest_ratio: f64::INFINITY, ..Limits::default() });
     let limited = scene(cloud(positions.clone()), Limits::default());

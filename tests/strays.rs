@@ -153,7 +153,7 @@ fn a_texture_far_away_is_where_it_is_near_zero() {
     let backend = Backend::gpu(gpu);
     let texels = (0..64 * 64).map(|k: u32| [(k % 64 * 4) as u8, (k / 64 * 4) as u8, 128, 255]).collect();
     let texture = Texture::new(64, 64, texels).unwrap();
-    let painted = |centers: &[DVec3]| build_textured(vec![points(centers, &[])], texture.clone(), &()).unwrap().0;
+    let painted = |centers: &[DVec3]| build_textured(vec![points(centers, &[])], vec![texture.clone()], &()).unwrap().0;
     let options = RenderOptions { maps: Maps::of(&[Map::Decision]), ..RenderOptions::default() };
     let expected =
         render(&painted(&[DVec3::ZERO]), &camera(DVec3::ZERO, 1.0), &options, &Backend::Reference, &()).unwrap().0;

@@ -5,7 +5,7 @@
 mod common;
 
 use common::bits;
-use common::scenes::{cases, crowded, front, sphere, stack};
+use common::scenes::{cases, crowded, front, painted, sphere, stack};
 use epsplat::frame::Frame;
 use epsplat::gpu::{Gpu, Sources};
 use epsplat::plan::{Optimisation, Organisation, RenderOptions};
@@ -47,7 +47,10 @@ fn drawn() -> Vec<(&'static str, Scene, Camera, RenderOptions)> {
     all.push(("radius", globe.clone(), camera.clone(), of_radius));
     // Weights that fall to nothing take wide sums.
     let wide = RenderOptions { kernel: Kernel::Gaussian { sigma: 0.2 }, ..plain.clone() };
-    all.push(("wide", globe, camera, wide));
+    all.push(("wide", globe, camera.clone(), wide));
+    let placed = RenderOptions { maps: plain.maps.and(&[Map::TexZ]), ..plain.clone() };
+    all.push(("painted", painted(1), camera.clone(), placed.clone()));
+    all.push(("pictures", painted(2), camera, placed));
     for case in cases().into_iter().filter(|case| case.name.contains("near depth")) {
         all.push((case.name, case.scene, case.camera, plain.clone()));
     }
@@ -86,13 +89,13 @@ fn no_threshold_between_scatter_and_tiles_shows() {
 #[test]
 fn every_form_of_the_kernels_draws_the_same_by_tiles() {
     let names: Vec<_> = drawn().iter().map(|(name, ..)| *name).collect();
-    assert!(names.len() >= 9);
+    assert!(names.len() >= 11);
     compare(&names, &[0], |_| {});
 }
 
 #[test]
 fn adapters_without_64_bit_atomics_and_subgroups_draw_the_same_by_tiles() {
-    compare(&["unlit", "wide", "max"], &[0], |gpu| {
+    compare(&["unlit", "wide", "max", "pictures"], &[0], |gpu| {
         (gpu.adapter.atomics_u64, gpu.adapter.subgroups) = (false, false);
     });
 }

@@ -21,7 +21,7 @@ fn attributes_of(index: u32, splat: Splat) -> Attributes {
     return Attributes(color_of(index, splat), normal_of(index, splat), bend_of(index), radius_of(index), place_of(index));
 }
 
-// Those that a tile's list or the rasteriser hands on, neither of which draws textures.
+// Those that a list of fragments or the rasteriser hands on, neither of which draws textures.
 fn attributes_without_place(color: vec4<f32>, normal: vec3<f32>, bend: Bend, radius: f32) -> Attributes {
     var nowhere: Place;
     return Attributes(color, normal, bend, radius, nowhere);
@@ -40,10 +40,11 @@ fn blend(pixel: u32, fragment: Fragment, front: f32, attributes: Attributes) {
     let weight = fragment_weight(fragment);
     accumulate_held_back(pixel, weight, attributes.color);
     let weighed = quantise(weight_before(pixel, fragment.depth, weight));
+    accumulate_stored_place(pixel, weighed, attributes.place, fragment.depth);
     blend_weighted(pixel, weighed, fragment.depth, front, normal_at(attributes, fragment.spot), attributes);
 }
 
-// A weight of 0 adds nothing to any sum.
+// All but places in a texture. A weight of 0 adds nothing to any sum.
 fn blend_weighted(
     pixel: u32,
     weight: Term,
@@ -56,6 +57,5 @@ fn blend_weighted(
     accumulate_normal(pixel, weight, normal);
     accumulate_depth(pixel, weight, depth, front);
     accumulate_count(pixel, weight);
-    accumulate_place(pixel, weight, attributes.place, depth);
     settle(pixel);
 }

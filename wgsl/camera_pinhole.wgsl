@@ -1,6 +1,6 @@
 // The pinhole camera x = fx X/Z + cx: homography and bounds of a disk, and the evaluation at a pixel.
 // Twin: src/passes/homography.rs and src/passes/footprint.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xfd5bb64a53685c1f
+// All loops end, by 1 of src/gpu/loops.rs: 0x13b66c782bccfe75
 
 fn image_of(position: Double, depth: Double, axis: u32) -> Double {
     let focal = Double(held.intrinsics[axis], held.intrinsics_low[axis]);
@@ -280,9 +280,9 @@ fn seen_at(x: u32, y: u32, depth: f32) -> vec3<f32> {
 }
 
 // What a pixel has of a measure of the plane through `point`, relative to the eye: the measure's normal is as long as what a unit of area has
-// of it. Device units.
+// of it. Device units; at depth 0, where nothing is, 0.
 fn area_in_pixel(normal: vec3<f32>, point: vec3<f32>, depth: f32) -> f32 {
-    let facing = max(abs(dot(normal, point / depth)), 1e-30);
+    let facing = max(abs(dot(normal, point / max(depth, held.near))), 1e-30);
     return dot(normal, normal) / facing * (depth / held.intrinsics.x) * (depth / held.intrinsics.y);
 }
 

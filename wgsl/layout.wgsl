@@ -44,9 +44,12 @@ struct View {
     // The depths at which the scene's body starts and ends, device units.
     first: f32,
     last: f32,
-    padding_0: u32,
+    // Those of surfels.
+    textures: u32,
     // The middle of the range of texture coordinates, its span, and the largest squared reach in units of the span.
     place: vec4<f32>,
+    // Where textures lie in the plane of coordinates (src/scene/atlas.rs): its corner, the side of a cell, cells in a row.
+    atlas: vec4<f32>,
 }
 
 // The rows of the image that the visibility and attribute buffers hold.

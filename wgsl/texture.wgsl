@@ -1,11 +1,8 @@
-// Surfels that are painted by a texture: what is summed of their places in it, and its lookup (textures.wgsl) at the mean of these.
+// Surfels that are painted by textures: what is summed of their places in them, and the lookup (textures.wgsl) at the mean of these.
 // Twin: src/scene/texture.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x163d10f45b231635
+// All loops end, by 1 of src/gpu/loops.rs: 0x65ded473bf293722
 
 override PLACE_CHANNEL: u32;
-
-// The surfels' among textures.
-const OF_SURFELS: u32 = 0u;
 
 // Texture coordinates are in units of their range.
 struct Place {
@@ -31,12 +28,13 @@ fn place_of(index: u32) -> Place {
     return Place(at.xy, at.z, position, u_slope.xyz, v_slope.xyz);
 }
 
-fn accumulate_place(pixel: u32, weight: Term, place: Place, depth: f32) {
-    let point = seen_at(pixel % held.width, pixel / held.width + held_band.first_row, depth);
+// A fragment of the image's pixel `at`, whose sums are `pixel`.
+fn accumulate_place(pixel: u32, weight: Term, place: Place, at: vec2<u32>, depth: f32) {
+    let point = seen_at(at.x, at.y, depth);
     let step = (point - place.position) * held.world;
-    let at = place.center + vec2<f32>(dot(step, place.u_slope), dot(step, place.v_slope));
-    let offset = at - 0.5;
-    add_pair(pixel, PLACE_CHANNEL, term(weight, at.x), term(weight, at.y));
+    let seen = place.center + vec2<f32>(dot(step, place.u_slope), dot(step, place.v_slope));
+    let offset = seen - 0.5;
+    add_pair(pixel, PLACE_CHANNEL, term(weight, seen.x), term(weight, seen.y));
     // Of coordinates in [0, 1] the squared distance from the middle is at most 1/2.
     add_pair(pixel, PLACE_CHANNEL + 2u, term(weight, 2.0 * dot(offset, offset)), term(weight, place.reach_2));
     // Of the whole texture what a pixel covers; with slopes for a device unit, so that no square overflows.
@@ -45,13 +43,25 @@ fn accumulate_place(pixel: u32, weight: Term, place: Place, depth: f32) {
     add(pixel, PLACE_CHANNEL + 4u, term(weight, covered_part));
 }
 
+// Of a pixel of the band, whose sums are stored.
+fn accumulate_stored_place(pixel: u32, weight: Term, place: Place, depth: f32) {
+    let at = vec2<u32>(pixel % held.width, pixel / held.width + held_band.first_row);
+    accumulate_place(pixel, weight, place, at, depth);
+}
+
+// The column and row of the texture that a place of their plane lies in. Twin: src/scene/atlas.rs.
+fn cell_of(place: vec2<f32>) -> vec2<f32> {
+    return clamp(floor((place - held.atlas.xy) / held.atlas.z), vec2<f32>(0.0), vec2<f32>(held.atlas.w - 1.0));
+}
+
 // The mean texture coordinates of a pixel.
 fn mean_place(pixel: u32, weight: f32) -> vec2<f32> {
     let mean = vec2<f32>(sum_at(pixel, PLACE_CHANNEL), sum_at(pixel, PLACE_CHANNEL + 1u)) / weight;
-    return held.place.xy + (mean - 0.5) * held.place.z;
+    let place = held.place.xy + (mean - 0.5) * held.place.z;
+    return place - cell_of(place) * held.atlas.z;
 }
 
-// The premultiplied colour of a pixel: by the texture where the places agree, else as blended.
+// The premultiplied colour of a pixel: by the texture where the places agree and have one, else as blended.
 fn textured(pixel: u32, weight: f32, blended: vec4<f32>) -> vec4<f32> {
     var mean: vec4<f32>;
     for (var k = 0u; k < 4u; k++) {
@@ -62,5 +72,10 @@ fn textured(pixel: u32, weight: f32, blended: vec4<f32>) -> vec4<f32> {
     let share = clamp(2.0 - variance / (mean.w * held.place.w), 0.0, 1.0);
     let place = held.place.xy + offset * held.place.z;
     let covered_part = sum_at(pixel, PLACE_CHANNEL + 4u) / weight;
-    return blended + share * (seen_texture(OF_SURFELS, place, covered_part) - blended);
+    let cell = cell_of(place);
+    let number = u32(cell.y * held.atlas.w + cell.x);
+    let exists = number < held.textures;
+    // A cell is a whole number of turns wide.
+    let seen = seen_texture(select(0u, number, exists), place, covered_part);
+    return blended + select(0.0, share, exists) * (seen - blended);
 }

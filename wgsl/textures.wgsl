@@ -1,6 +1,6 @@
 // Textures at all scales, looked up as a pixel sees them that covers so many of their texels. Twin: src/scene/mipmap.rs.
 
-// Where each texture's head is, the surfels' first and then the triangles'; a head has the number of its levels, and of each its width, its
+// Where each texture's head is, those of surfels first and then those of triangles; a head has the number of its levels, and of each its width, its
 // height and where its texels are: rows from the top, four bytes of sRGB and straight alpha each.
 @group(0) @binding(65) var<storage, read> textures: array<u32>;
 

@@ -3,7 +3,7 @@
 // eight rows are drawn apart, each by the splats that reach them. The footprint, and so every bit, is that of visibility.wgsl
 // and accumulate.wgsl.
 // Host side: src/passes/tiles.rs.
-// All loops end, by 1, 3 of src/gpu/loops.rs: 0x82fd9beaaba5b075
+// All loops end, by 1, 3 of src/gpu/loops.rs: 0x470f5589b2a130cf
 
 // The lists of the large splats.
 @group(0) @binding(27) var<storage, read> large_lists: array<u32>;
@@ -103,7 +103,7 @@ fn handed_splat(from_: u32) -> Splat {
 
 fn handed_attributes(own: Attributes, from_: u32) -> Attributes {
     let c = own.color;
-    return attributes_without_place(
+    return Attributes(
         vec4<f32>(
             handed_number(c.x, from_),
             handed_number(c.y, from_),
@@ -113,6 +113,7 @@ fn handed_attributes(own: Attributes, from_: u32) -> Attributes {
         handed_vector(own.normal, from_),
         handed_bend(own.bend, from_),
         handed_number(own.radius, from_),
+        handed_place(own.place, from_),
     );
 }
 
@@ -208,10 +209,13 @@ fn fronts_of(column: Column, k: u32) -> vec4<f32> {
 fn gather(slot: u32, splat: Splat, filter_: Filter, attributes: Attributes, front: f32, column: Column) {
     let fragment = footprint(splat, filter_, column.x, column.y + slot);
     // Selected, as a branch would select what is stored of each sum.
-    let accepted = is_shown(fragment, front, attributes.radius, vec2<u32>(column.x, column.y + slot));
+    let at = vec2<u32>(column.x, column.y + slot);
+    let accepted = is_shown(fragment, front, attributes.radius, at);
     let weight = select(Term(0), weight_of(fragment), accepted);
+    let depth = select(front, fragment.depth, accepted);
     let normal = normal_at(attributes, fragment.spot);
-    blend_weighted(slot, weight, select(front, fragment.depth, accepted), front, normal, attributes);
+    accumulate_place(slot, weight, attributes.place, at, depth);
+    blend_weighted(slot, weight, depth, front, normal, attributes);
 }
 
 // The column's pixels from `slot` on, four with each of `a` and `b`. Written out, so that no register is indexed by a number

@@ -1,11 +1,11 @@
-// The registers of tile.wgsl's sums: of sixteen pixels and at most twelve channels, low and high word.
-// All loops end, by 1 of src/gpu/loops.rs: 0xa79ad67f78e78da1
+// The registers of tile.wgsl's sums: of sixteen pixels and at most as many channels as tile_plain.wgsl or tile_texture.wgsl say, low and high
+// word.
+// All loops end, by 1 of src/gpu/loops.rs: 0x341f38aad74f5326
 
 override CHANNELS: u32;
 
-const MOST_CHANNELS: u32 = 12u;
-var<private> kept_low: array<u32, 192>;
-var<private> kept_high: array<u32, 192>;
+var<private> kept_low: array<u32, 16u * MOST_CHANNELS>;
+var<private> kept_high: array<u32, 16u * MOST_CHANNELS>;
 
 fn add_words(pixel: u32, channel: u32, low: u32, high: u32) {
     let at = pixel * MOST_CHANNELS + channel;
@@ -22,27 +22,27 @@ fn add_pair(pixel: u32, channel: u32, first: Term, second: Term) {
 fn settle(pixel: u32) {}
 
 // The sums of the pixel that is shown.
-var<private> shown_low: array<u32, 12>;
-var<private> shown_high: array<u32, 12>;
+var<private> shown_low: array<u32, MOST_CHANNELS>;
+var<private> shown_high: array<u32, MOST_CHANNELS>;
 
 fn show_channel(slot: u32, channel: u32) {
     var low = kept_low[channel];
     var high = kept_high[channel];
-    if (slot == 1u) { low = kept_low[12u + channel]; high = kept_high[12u + channel]; }
-    if (slot == 2u) { low = kept_low[24u + channel]; high = kept_high[24u + channel]; }
-    if (slot == 3u) { low = kept_low[36u + channel]; high = kept_high[36u + channel]; }
-    if (slot == 4u) { low = kept_low[48u + channel]; high = kept_high[48u + channel]; }
-    if (slot == 5u) { low = kept_low[60u + channel]; high = kept_high[60u + channel]; }
-    if (slot == 6u) { low = kept_low[72u + channel]; high = kept_high[72u + channel]; }
-    if (slot == 7u) { low = kept_low[84u + channel]; high = kept_high[84u + channel]; }
-    if (slot == 8u) { low = kept_low[96u + channel]; high = kept_high[96u + channel]; }
-    if (slot == 9u) { low = kept_low[108u + channel]; high = kept_high[108u + channel]; }
-    if (slot == 10u) { low = kept_low[120u + channel]; high = kept_high[120u + channel]; }
-    if (slot == 11u) { low = kept_low[132u + channel]; high = kept_high[132u + channel]; }
-    if (slot == 12u) { low = kept_low[144u + channel]; high = kept_high[144u + channel]; }
-    if (slot == 13u) { low = kept_low[156u + channel]; high = kept_high[156u + channel]; }
-    if (slot == 14u) { low = kept_low[168u + channel]; high = kept_high[168u + channel]; }
-    if (slot == 15u) { low = kept_low[180u + channel]; high = kept_high[180u + channel]; }
+    if (slot == 1u) { low = kept_low[MOST_CHANNELS + channel]; high = kept_high[MOST_CHANNELS + channel]; }
+    if (slot == 2u) { low = kept_low[2u * MOST_CHANNELS + channel]; high = kept_high[2u * MOST_CHANNELS + channel]; }
+    if (slot == 3u) { low = kept_low[3u * MOST_CHANNELS + channel]; high = kept_high[3u * MOST_CHANNELS + channel]; }
+    if (slot == 4u) { low = kept_low[4u * MOST_CHANNELS + channel]; high = kept_high[4u * MOST_CHANNELS + channel]; }
+    if (slot == 5u) { low = kept_low[5u * MOST_CHANNELS + channel]; high = kept_high[5u * MOST_CHANNELS + channel]; }
+    if (slot == 6u) { low = kept_low[6u * MOST_CHANNELS + channel]; high = kept_high[6u * MOST_CHANNELS + channel]; }
+    if (slot == 7u) { low = kept_low[7u * MOST_CHANNELS + channel]; high = kept_high[7u * MOST_CHANNELS + channel]; }
+    if (slot == 8u) { low = kept_low[8u * MOST_CHANNELS + channel]; high = kept_high[8u * MOST_CHANNELS + channel]; }
+    if (slot == 9u) { low = kept_low[9u * MOST_CHANNELS + channel]; high = kept_high[9u * MOST_CHANNELS + channel]; }
+    if (slot == 10u) { low = kept_low[10u * MOST_CHANNELS + channel]; high = kept_high[10u * MOST_CHANNELS + channel]; }
+    if (slot == 11u) { low = kept_low[11u * MOST_CHANNELS + channel]; high = kept_high[11u * MOST_CHANNELS + channel]; }
+    if (slot == 12u) { low = kept_low[12u * MOST_CHANNELS + channel]; high = kept_high[12u * MOST_CHANNELS + channel]; }
+    if (slot == 13u) { low = kept_low[13u * MOST_CHANNELS + channel]; high = kept_high[13u * MOST_CHANNELS + channel]; }
+    if (slot == 14u) { low = kept_low[14u * MOST_CHANNELS + channel]; high = kept_high[14u * MOST_CHANNELS + channel]; }
+    if (slot == 15u) { low = kept_low[15u * MOST_CHANNELS + channel]; high = kept_high[15u * MOST_CHANNELS + channel]; }
     shown_low[channel] = low;
     shown_high[channel] = high;
 }
@@ -61,6 +61,7 @@ fn show(slot: u32) {
     if (CHANNELS > 6u) { show_pair(slot, 6u); }
     if (CHANNELS > 8u) { show_pair(slot, 8u); }
     if (CHANNELS > 10u) { show_pair(slot, 10u); }
+    show_rest(slot);
 }
 
 // A sum of the shown pixel, in the units of the terms.

@@ -9,9 +9,10 @@ fn triangle_texture(record: u32, parts: vec3<f32>, spread: f32) -> vec4<f32> {
     let a = vec2<f32>(triangle_attributes[first], triangle_attributes[first + 1u]);
     let b = vec2<f32>(triangle_attributes[first + 2u], triangle_attributes[first + 3u]);
     let c = vec2<f32>(triangle_attributes[first + 4u], triangle_attributes[first + 5u]);
-    // One more than the texture's among triangles, 0 of none.
+    // One more than the texture's, 0 of none.
     let number = u32(triangle_attributes[first + 6u]);
     let doubled_area = abs((b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x));
     let place = a + parts.y * (b - a) + parts.z * (c - a);
-    return select(seen_texture(number, place, spread * doubled_area), vec4<f32>(1.0), number == 0u);
+    let seen = seen_texture(max(number, 1u) - 1u, place, spread * doubled_area);
+    return select(seen, vec4<f32>(1.0), number == 0u);
 }

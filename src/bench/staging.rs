@@ -105,7 +105,7 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
         None => points,
     };
     let mut scene = match texture.filter(|_| entry.lookup) {
-        Some(texture) => build_textured(vec![points], texture, progress)?.0,
+        Some(texture) => build_textured(vec![points], vec![texture], progress)?.0,
         None if points.positions.is_empty() && left.is_some() => Scene { oriented: true, ..Scene::default() },
         None => build(dressed(points, entry.shirt), progress)?.0,
     };

@@ -197,9 +197,9 @@ pub struct Arguments {
     #[arg(long, value_name = "EXPONENT")]
     shininess: Option<f32>,
     /// An image to paint the surfels with, by their texture coordinates (`epsplat sample` writes them), in place of their own
-    /// colours: .png or .jpg
-    #[arg(long, value_name = "IMAGE")]
-    texture: Option<PathBuf>,
+    /// colours: .png or .jpg. Given again it is the next input's, or that of the next number (texnumber) of an input's points
+    #[arg(long = "texture", value_name = "IMAGE")]
+    textures: Vec<PathBuf>,
     /// A light, instead of the headlight: headlight[:INTENSITY] or the direction toward it, x,y,z[:INTENSITY]
     #[arg(long = "light", value_name = "LIGHT", allow_hyphen_values = true)]
     lights: Vec<Light>,
@@ -266,7 +266,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 impl Arguments {
     /// The files that are read, but those of `--cameras`.
     fn files(&self) -> impl Iterator<Item = &PathBuf> {
-        self.inputs.iter().chain(&self.triangles).chain(&self.triangle_texture).chain(&self.camera).chain(&self.texture)
+        self.inputs
+            .iter()
+            .chain(&self.triangles)
+            .chain(&self.triangle_texture)
+            .chain(&self.camera)
+            .chain(&self.textures)
     }
 }
 
@@ -362,9 +367,9 @@ fn painted(mut meshes: Vec<Mesh>, paths: &[PathBuf], arguments: &Arguments) -> R
 
 /// The surfels of all inputs.
 fn surfels_of(arguments: &Arguments, inputs: Vec<Points>, bars: &Bars) -> Result<(Scene, Preparation)> {
-    let texture = arguments.texture.as_deref().map(Texture::read).transpose()?;
+    let textures = arguments.textures.iter().map(|image| Texture::read(image)).collect::<Result<Vec<_>>>()?;
     let mut read = arguments.inputs.iter().zip(&inputs);
-    if texture.is_some()
+    if !textures.is_empty()
         && let Some((path, _)) = read.find(|(_, points)| points.texture.is_none() && !points.positions.is_empty())
     {
         let what = "its points have no texture coordinates, so they cannot be textured; `epsplat sample` gives surfels of a mesh some";
@@ -373,7 +378,7 @@ fn surfels_of(arguments: &Arguments, inputs: Vec<Points>, bars: &Bars) -> Result
     let limits = arguments.limits.limits();
     let built = match arguments.facing {
         Some(_) => surfels::build_facing(inputs, arguments.point_size, &limits, bars),
-        None => surfels::build_within(inputs, texture, &limits, bars),
+        None => surfels::build_within(inputs, textures, &limits, bars),
     };
     let (scene, preparation) = built.map_err(|error| named(error, &arguments.inputs))?;
     for line in preparation.notes() {

@@ -1,9 +1,10 @@
 //! `epsplat sample`: surfels from the triangles of a mesh.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::{Args, ValueEnum};
-use epsplat::io::{self, Texture};
+use epsplat::io::{self, Mesh, Texture};
 use epsplat::surfels::curve;
 use epsplat::surfels::sampling::{MOST, MeshSurface, Method, Priority, sample, voxels::Voxel};
 use epsplat::{Error, Result};
@@ -93,8 +94,23 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let points = if arguments.shape == Shape::Cap { curve(points, &bars)? } else { points };
     sampling.notes().iter().for_each(|line| note(line));
     io::ply::write_points(&arguments.output, &points, &bars)?;
+    let images = if points.texture_numbers.is_some() { images(&mesh) } else { Vec::new() };
     let voxels = if sampling.voxels > 0 { format!(" in {} voxels", sampling.voxels) } else { String::new() };
     let (samples, triangles) = (sampling.samples, sampling.triangles);
     note(&format!("{}: {samples} surfels from {triangles} triangles{voxels}", arguments.output.display()));
+    if !images.is_empty() {
+        let painted: String = images.iter().map(|image| format!(" --texture {}", image.display())).collect();
+        note(&format!("to paint them by their images: epsplat render {}{painted}", arguments.output.display()));
+    }
     Ok(())
+}
+
+/// The files of a mesh's textures, by their numbers.
+fn images(mesh: &Mesh) -> Vec<PathBuf> {
+    let (textures, _) = mesh.textures();
+    let image = |texture: &Arc<Texture>| {
+        let own = mesh.materials.iter().find(|material| material.texture.as_ref() == Some(texture));
+        own.and_then(|material| material.image.clone())
+    };
+    textures.iter().filter_map(image).collect()
 }

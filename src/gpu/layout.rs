@@ -102,8 +102,9 @@ pub struct View {
     pub epsilon_most: f32,
     pub first: f32,
     pub last: f32,
-    pub padding_0: u32,
+    pub textures: u32,
     pub place: [f32; 4],
+    pub atlas: [f32; 4],
 }
 
 /// The rows of the image that the per-pixel buffers hold at a time.

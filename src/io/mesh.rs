@@ -1,5 +1,6 @@
 //! The triangles of one input file, as they are.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
@@ -43,9 +44,22 @@ pub struct Material {
     pub diffuse: [f32; 4],
     /// An image that `diffuse` is multiplied by.
     pub texture: Option<Arc<Texture>>,
+    /// The file of that image.
+    pub image: Option<PathBuf>,
 }
 
 impl Material {
+    /// The number of its texture among `textures`, where it is put if it is not there; if there is one.
+    pub(crate) fn number_among(&self, textures: &mut Vec<Arc<Texture>>) -> Option<u32> {
+        let texture = self.texture.as_ref()?;
+        let known = textures.iter().position(|known| Arc::ptr_eq(known, texture) || known == texture);
+        let number = known.unwrap_or(textures.len());
+        if known.is_none() {
+            textures.push(texture.clone());
+        }
+        u32::try_from(number).ok()
+    }
+
     /// The image times the diffuse colour, in linear light and codes of 8 bits; if there is an image.
     pub fn painted(&self) -> Option<Arc<Texture>> {
         let texture = self.texture.as_ref()?;
@@ -143,8 +157,18 @@ impl Mesh {
     /// Gives every triangle one material, which is `texture` alone.
     pub fn paint(&mut self, texture: Texture) {
         let name = "texture".to_owned();
-        self.materials = vec![Material { name, diffuse: [1.0; 4], texture: Some(Arc::new(texture)) }];
+        self.materials = vec![Material { name, diffuse: [1.0; 4], texture: Some(Arc::new(texture)), image: None }];
         self.material = Some(vec![0; self.triangles.len()]);
+    }
+
+    /// The textures that triangles are painted with, each once, and which of them each triangle has.
+    pub fn textures(&self) -> (Vec<Arc<Texture>>, Vec<Option<u32>>) {
+        let mut textures = Vec::new();
+        let of_material: Vec<Option<u32>> =
+            self.materials.iter().map(|material| material.number_among(&mut textures)).collect();
+        let of_triangle = |index: &u32| *of_material.get(*index as usize)?;
+        let numbers = self.material.iter().flatten().map(of_triangle).collect();
+        (textures, numbers)
     }
 
     /// Texture coordinates on a triangle, by its index, at the point with these corner weights, whose sum is 1; if the mesh has any.

@@ -34,6 +34,8 @@ pub struct Points {
     pub flattened: Option<Flattened>,
     /// Texture coordinates (u, v), origin bottom left as in OBJ.
     pub texture: Option<Vec<[f32; 2]>>,
+    /// Which of several textures the coordinates are in; one past their number means none.
+    pub texture_numbers: Option<Vec<u32>>,
     /// What u and v gain for a world unit along x, y and z; all zero where it is not known.
     pub texture_slopes: Option<Vec<[[f32; 3]; 2]>>,
     /// The direction that the format, by convention, calls up.
@@ -128,6 +130,7 @@ impl Points {
         self.clips.iter_mut().for_each(|all| retain(all, keep));
         self.caps.iter_mut().for_each(|all| retain(all, keep));
         self.texture.iter_mut().for_each(|all| retain(all, keep));
+        self.texture_numbers.iter_mut().for_each(|all| retain(all, keep));
         self.texture_slopes.iter_mut().for_each(|all| retain(all, keep));
         self.colors.iter_mut().for_each(|all| retain_colors(all, keep));
     }
@@ -147,6 +150,7 @@ pub(crate) fn taken(points: Points, of: Vec<u32>) -> Points {
         positions: each(&points.positions, &of),
         colors,
         texture: points.texture.map(|texture| each(&texture, &of)),
+        texture_numbers: points.texture_numbers.map(|numbers| each(&numbers, &of)),
         texture_slopes: points.texture_slopes.map(|slopes| each(&slopes, &of)),
         numbers: Some(of),
         ..points

@@ -22,8 +22,8 @@ pub trait Source: Send + Sync {
     /// Where a surfel stands for its copies these are left out.
     fn pages<'a>(&'a self, needs: &SceneNeeds, most: usize, ordered: Option<&Facts>) -> Vec<Box<dyn Page + 'a>>;
 
-    /// What paints them.
-    fn texture(&self) -> Option<&Mipmap>;
+    /// What paints them, by the numbers of an [`Atlas`](crate::scene::Atlas).
+    fn textures(&self) -> &[Mipmap];
 
     /// The triangles beside them.
     fn triangles(&self) -> Option<&Triangles> {
@@ -67,8 +67,8 @@ macro_rules! leads_to_source {
                 (**self).pages(needs, most, ordered)
             }
 
-            fn texture(&self) -> Option<&Mipmap> {
-                (**self).texture()
+            fn textures(&self) -> &[Mipmap] {
+                (**self).textures()
             }
 
             fn triangles(&self) -> Option<&Triangles> {
@@ -116,10 +116,10 @@ impl Source for Scene {
         individual.flat_map(|indices: Vec<u32>| indices.chunks(most).map(of).collect::<Vec<_>>()).collect()
     }
 
-    fn texture(&self) -> Option<&Mipmap> {
+    fn textures(&self) -> &[Mipmap] {
         match &self.colors {
-            Colors::Textured(textured) => Some(textured.mipmap()),
-            _ => None,
+            Colors::Textured(textured) => textured.mipmaps(),
+            _ => &[],
         }
     }
 

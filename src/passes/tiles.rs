@@ -20,7 +20,7 @@ use crate::gpu::layout::{BLOCK_SIDE, LIST_ENDS, TILE_ROWS_PLAIN, TILE_ROWS_SHARE
 use crate::plan::known::Listed;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Look, Over, Part, Run, Stage, Step};
-use crate::plan::{Band, Facts, Plan, RenderOptions, SceneNeeds};
+use crate::plan::{Band, ColorNeed, Facts, Plan, RenderOptions, SceneNeeds};
 use crate::scene::{Camera, LowPass, Samples};
 
 /// The kernels and files of the tiles' module, beside those of others.
@@ -34,6 +34,7 @@ pub const PASS: Pass = Pass {
             "tile_reach.wgsl",
             pick(needs.low_pass == LowPass::None, "tile_filter_absent.wgsl", "tile_filter.wgsl"),
             pick(needs.clips, "tile_clip.wgsl", "tile_clip_absent.wgsl"),
+            pick(needs.color == ColorNeed::Textured, "tile_texture.wgsl", "tile_plain.wgsl"),
             pick(needs.facing.is_some(), "tile_facing.wgsl", pick(needs.curved, "tile_curved.wgsl", "tile_flat.wgsl")),
             pick(needs.gather, "tile_small.wgsl", "tile_small_absent.wgsl"),
             match needs.separate {

@@ -84,19 +84,20 @@ pub fn shared(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds) -> Result<Name
         shared.push(("srgb_to_linear", Buffer::uniform(gpu, "sRGB table", &table)?.words()));
     }
     let paint = source.triangles().filter(|_| textured).map_or(&[][..], |triangles| triangles.textures());
-    if source.texture().is_some() || !paint.is_empty() {
-        let none = Mipmap::one_texel();
-        let all: Vec<&Mipmap> = [source.texture().unwrap_or(&none)].into_iter().chain(paint).collect();
+    let own = source.textures();
+    if !own.is_empty() || !paint.is_empty() {
+        let all: Vec<&Mipmap> = own.iter().chain(paint).collect();
         shared.push(("textures", filled(gpu, "textures", &texture_words(&all))?));
     }
     if let (Some(triangles), Some(mesh)) = (source.triangles(), needs.mesh) {
-        shared.extend(of_triangles(gpu, triangles, &mesh)?);
+        shared.extend(of_triangles(gpu, triangles, &mesh, own.len() as u32)?);
     }
     Ok(shared)
 }
 
-/// The buffers of triangles: what they are, and room for their corners and for the large and the rare ones.
-fn of_triangles(gpu: &Gpu, triangles: &Triangles, mesh: &MeshNeeds) -> Result<Named> {
+/// The buffers of triangles: what they are, and room for their corners and for the large and the rare ones. Before their textures are so many
+/// others.
+fn of_triangles(gpu: &Gpu, triangles: &Triangles, mesh: &MeshNeeds, textures: u32) -> Result<Named> {
     let (vertices, corners) = (triangles.vertices(), triangles.corners());
     let queue = corners.len() as u64 + u64::from(QUEUE_START);
     let seen = vertices.len() as u64 * u64::from(CORNER_WORDS);
@@ -105,7 +106,7 @@ fn of_triangles(gpu: &Gpu, triangles: &Triangles, mesh: &MeshNeeds) -> Result<Na
         ("triangles", filled(gpu, "triangles", bytemuck::cast_slice(corners))?),
         (
             "triangle_attributes",
-            filled(gpu, "attributes of triangles", bytemuck::cast_slice(&mesh.records(triangles)))?,
+            filled(gpu, "attributes of triangles", bytemuck::cast_slice(&mesh.records(triangles, textures)))?,
         ),
         ("corners", Buffer::storage(gpu, "corners of triangles", seen)?),
         ("large_triangles", Buffer::indirect(gpu, "queue of large triangles", queue)?),

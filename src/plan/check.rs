@@ -232,9 +232,6 @@ pub fn textured(options: &RenderOptions, reference: bool) -> Result<()> {
     if options.raster.is_some() && !reference {
         return usage("the rasteriser blends no texture coordinates: leave the texture out, or render by compute");
     }
-    if options.organisation == Organisation::Tile && !reference {
-        return usage("the organisation tile draws no textures: leave one of them out");
-    }
     Ok(())
 }
 

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::MeshFacts;
 use crate::scene::texture::PlaceRange;
-use crate::scene::{Bounds, Colors, Scene, Surfel, has_copies};
+use crate::scene::{Atlas, Bounds, Colors, Scene, Surfel, has_copies};
 
 /// Where a surfel's colour comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -47,8 +47,8 @@ pub struct Facts {
     pub encoded: bool,
     /// Where the colours come from.
     pub colors: ColorNeed,
-    /// The range of places in the texture.
-    pub texture: Option<PlaceRange>,
+    /// The range of places in the textures, and how these lie.
+    pub texture: Option<(PlaceRange, Atlas)>,
     /// [`Scene::largest_radius`].
     pub largest_radius: f32,
     /// [`Scene::largest_shorter`].
@@ -95,7 +95,7 @@ impl Facts {
                 Colors::Harmonics(harmonics) => ColorNeed::Harmonics(harmonics.degree()),
             },
             texture: match &scene.colors {
-                Colors::Textured(textured) => Some(textured.range()),
+                Colors::Textured(textured) => Some((textured.range(), textured.atlas())),
                 _ => None,
             },
             largest_radius: scene.largest_radius(),

@@ -61,8 +61,9 @@ impl MeshNeeds {
         self.places_at() + if self.textured { 7 } else { 0 }
     }
 
-    /// The attributes of `triangles`, a record each; before them, if all have one colour, the twelve words of that.
-    pub fn records(&self, triangles: &Triangles) -> Vec<f32> {
+    /// The attributes of `triangles`, a record each; before them, if all have one colour, the twelve words of that. Before their textures
+    /// are so many others.
+    pub fn records(&self, triangles: &Triangles, others: u32) -> Vec<f32> {
         let common = triangles.colors().first().filter(|_| !self.colored).into_iter().flatten().flatten().copied();
         let mut words: Vec<f32> = common.collect();
         for triangle in 0..if self.words() > 0 { triangles.len() } else { 0 } {
@@ -71,7 +72,7 @@ impl MeshNeeds {
             if let Some(painted) = triangles.paint().get(triangle) {
                 words.extend(painted.places.as_flattened());
                 // One more, and 0 of none: as a number, not as bits, which no f32 need keep.
-                words.push(painted.texture.wrapping_add(1) as f32);
+                words.push(painted.texture.checked_add(others + 1).unwrap_or(0) as f32);
             }
         }
         words

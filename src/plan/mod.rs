@@ -111,6 +111,28 @@ fn pages_of(individuals: &[u64], most: u64) -> Vec<Range<usize>> {
     pages.collect()
 }
 
+/// Whether tiles sum the splats of a page, if all that blend are in one.
+fn gathers(needs: &SceneNeeds, options: &RenderOptions, known: &Known) -> bool {
+    let pays = match options.organisation {
+        Organisation::Auto => needs.subgroups && known.touched_tiles >= tuning::GATHERED_TOUCHED_TILES,
+        Organisation::Tile => true,
+        Organisation::Scatter => false,
+    };
+    needs.may_gather() && pays && !known.crowded && options.has(Optimisation::Gathering)
+}
+
+/// Whether batches that are hidden or out of view are left out.
+fn culls(facts: &Facts, needs: &SceneNeeds, camera: &Camera, options: &RenderOptions) -> bool {
+    // The rasteriser draws every splat.
+    options.has(Optimisation::Culling)
+        && tuning::PIXELS_A_CULLED_SURFEL * facts.surfels > camera.pixels() as u64
+        && !needs.copies
+        && needs.lists.is_none()
+        && needs.oit.is_none()
+        && !needs.separate
+        && needs.raster.is_none()
+}
+
 impl Plan {
     /// The plan for a view by `camera`, whose pixels are the samples ([`Camera::sampled`]), of the scene that `facts` are of.
     ///
@@ -129,25 +151,8 @@ impl Plan {
         check::on_adapter(adapter, &needs, camera)?;
         let pixel = PixelLayout::of(&needs);
         let page = page_surfels(adapter, &needs);
-        let gathers = match options.organisation {
-            Organisation::Auto => needs.subgroups && known.touched_tiles >= tuning::GATHERED_TOUCHED_TILES,
-            Organisation::Tile => true,
-            Organisation::Scatter => false,
-        };
-        let gather = needs.tiles
-            && gathers
-            && (1..=page).contains(&most_together(facts, &needs))
-            && !known.crowded
-            && options.has(Optimisation::Gathering);
-        // The rasteriser draws every splat.
-        let cull = options.has(Optimisation::Culling)
-            && tuning::PIXELS_A_CULLED_SURFEL * facts.surfels > camera.pixels() as u64
-            && page >= BATCH.into()
-            && !needs.copies
-            && needs.lists.is_none()
-            && needs.oit.is_none()
-            && !needs.separate
-            && needs.raster.is_none();
+        let gather = (1..=page).contains(&most_together(facts, &needs)) && gathers(&needs, options, known);
+        let cull = page >= BATCH.into() && culls(facts, &needs, camera, options);
         let individuals = if needs.separate { pages_of(&facts.individuals, page) } else { Vec::new() };
         let veils = needs.lists == Some(Lists::Sorted) && known.veiled;
         let long_lists = needs.lists.is_some() && known.longest_list > 0;

@@ -32,8 +32,7 @@ pub struct SceneNeeds {
     pub copies: bool,
     /// Batches of surfels that are out of view or hidden are left out: there are enough surfels for the image's pixels, all of which are looked at for what hides ([`tuning::PIXELS_A_CULLED_SURFEL`]).
     pub cull: bool,
-    /// Large splats, at least, are drawn by tiles: the accumulator is `fixed`, the options do not say scatter, and there is no
-    /// texture, whose sums are more than a tile's registers hold.
+    /// Large splats, at least, are drawn by tiles: the accumulator is `fixed`, and the options do not say scatter.
     pub tiles: bool,
     /// Tiles sum all splats, large and small, and resolve their pixels at once, or keep what an input shows: no sum is stored.
     pub gather: bool,
@@ -257,11 +256,7 @@ impl SceneNeeds {
             doubled: facts.doubled,
             copies: false,
             cull: false,
-            tiles: fixed
-                && lists.is_none()
-                && oit.is_none()
-                && facts.colors != ColorNeed::Textured
-                && options.organisation != Organisation::Scatter,
+            tiles: fixed && lists.is_none() && oit.is_none() && options.organisation != Organisation::Scatter,
             gather: false,
             subgroups: false,
             raster: options.raster,
@@ -338,6 +333,11 @@ impl SceneNeeds {
     /// Weighted sums are kept by compute kernels, in storage or in a tile's registers.
     pub fn sums_by_compute(&self) -> bool {
         self.raster.is_none() && self.winner.is_none() && self.lists.is_none()
+    }
+
+    /// Tiles may sum all splats: with textures and triangles they would bind more buffers than core WebGPU has.
+    pub fn may_gather(&self) -> bool {
+        self.tiles && !(self.color == ColorNeed::Textured && self.mesh.is_some())
     }
 
     /// Surfaces are told apart by the depth that they blend to.

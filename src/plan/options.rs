@@ -96,7 +96,7 @@ pub struct RenderOptions {
     pub low_pass: LowPass,
     /// How the device keeps sums.
     pub accumulator: Accumulator,
-    /// How the device draws splats; other accumulators than `fixed`, and textures, are scattered.
+    /// How the device draws splats; other accumulators than `fixed` are scattered.
     pub organisation: Organisation,
     /// Sums by the rasteriser instead, on a GPU.
     pub raster: Option<Raster>,

@@ -7,7 +7,7 @@ use crate::gpu::layout::View;
 use crate::scene::light::MAX_LIGHTS;
 use crate::scene::options::HIGHLIGHT;
 use crate::scene::texture::PlaceRange;
-use crate::scene::{Bounds, Camera, Composite, Light, Projection, Shading};
+use crate::scene::{Atlas, Bounds, Camera, Composite, Light, Projection, Shading};
 
 /// x as the nearest f32 and the nearest f32 to what that leaves.
 fn split(x: f64) -> (f32, f32) {
@@ -59,9 +59,12 @@ impl View {
         };
         let (intrinsics, intrinsics_low) =
             split_all([camera.fx * per_unit, camera.fy * per_unit, camera.cx, camera.cy]);
-        let place = match facts.texture {
-            Some(PlaceRange { middle: [u, v], span, most_reach_2 }) => [u, v, span, most_reach_2],
-            None => [0.0; 4],
+        let (place, atlas, textures) = match facts.texture {
+            Some((PlaceRange { middle: [u, v], span, most_reach_2 }, atlas)) => {
+                let Atlas { corner: [left, bottom], cell, columns, textures } = atlas;
+                ([u, v, span, most_reach_2], [left, bottom, cell, columns as f32], textures)
+            }
+            None => ([0.0; 4], [0.0; 4], 0),
         };
         let (relative, absolute, of_radius) = options.epsilon.parts();
         let [first, last] = depths(facts, camera);
@@ -93,8 +96,9 @@ impl View {
             epsilon_most: options.epsilon.most().min(LARGEST_FRACTION) as f32,
             first: (first * unit) as f32,
             last: (last * unit) as f32,
-            padding_0: 0,
+            textures,
             place,
+            atlas,
         }
     }
 }

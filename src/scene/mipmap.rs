@@ -21,11 +21,6 @@ impl Mipmap {
         Self { levels }
     }
 
-    /// The halvings of a white texel.
-    pub(crate) fn one_texel() -> Self {
-        Self::new(Arc::new(Texture::one_texel()))
-    }
-
     /// From the whole image on, each half as wide and high.
     pub fn levels(&self) -> &[Arc<Texture>] {
         &self.levels

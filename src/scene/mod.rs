@@ -1,6 +1,7 @@
 //! What is rendered: surfels, camera, lights, options. Knows no GPU and no file.
 
 mod apart;
+mod atlas;
 mod body;
 pub mod camera;
 pub mod cap;
@@ -27,6 +28,7 @@ pub mod surfel;
 pub mod texture;
 pub mod triangles;
 
+pub use atlas::Atlas;
 pub(crate) use body::{SMALLEST_SCENE, body, framed};
 pub use camera::{Camera, Lens, Projection};
 pub use cap::Cap;

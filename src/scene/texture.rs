@@ -1,4 +1,4 @@
-//! Images that surfaces are painted with, and surfels that know their place in one.
+//! Images that surfaces are painted with, and surfels that know their places in them.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::srgb::SRGB8_TO_LINEAR;
-use super::{Camera, Mipmap, Projection};
+use super::{Atlas, Camera, Mipmap, Projection};
 use crate::error::{Error, Result};
 
 /// An image of 8-bit sRGB colours with straight alpha.
@@ -23,11 +23,6 @@ impl Texture {
     pub fn new(width: u32, height: u32, texels: Vec<[u8; 4]>) -> Option<Self> {
         let count = u64::from(width) * u64::from(height);
         (count > 0 && count == texels.len() as u64).then_some(Self { width, height, texels })
-    }
-
-    /// A white one.
-    pub(super) fn one_texel() -> Self {
-        Self { width: 1, height: 1, texels: vec![[255; 4]] }
     }
 
     /// Width and height, texels.
@@ -89,7 +84,7 @@ fn straight([r, g, b, a]: [f64; 4]) -> [f32; 4] {
 /// means.
 const LEAST_REACH: f64 = 1.0 / 128.0;
 
-/// Where a surfel lies in a texture.
+/// Where a surfel lies in a texture, or in the plane of several ([`Atlas`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Place {
     /// Texture coordinates (u, v) of its centre, origin bottom left.
@@ -102,14 +97,14 @@ pub struct Place {
     pub reach: f32,
 }
 
-/// Surfels that are painted by a texture: it is looked up once a pixel, at the mean coordinates of the fragments that are blended
+/// Surfels that are painted by textures: one is looked up once a pixel, at the mean coordinates of the fragments that are blended
 /// there (the TexZ map of paper 002, section 5), so it shows what is finer than surfels.
 ///
 /// A fragment has the coordinates of its point of the disk. With those of the centre, as the paper has them, the mean
 /// stays near them around each centre and changes fast in between.
 ///
 /// Coordinates of surfels that meet at a pixel may come from different parts of the image: at its seams, where it is
-/// repeated, and where one surface ends in front of another. Their mean is then a place that has nothing to do with
+/// repeated, and where one surface ends in front of another; and from two images ([`Atlas`]). Their mean is then a place that has nothing to do with
 /// either. So each surfel also has the texture's mean over its disk, and its *reach*. Where the coordinates of a pixel's
 /// fragments vary by no more than `mean of reach^2`, the pixel has the texture's colour; where by more than twice that, the
 /// blended means; in between there is a linear passage. The texture is looked up as a pixel sees it that covers so much of it
@@ -121,7 +116,8 @@ pub struct Place {
 /// passage the share of the texture errs by `3 e span^2 / mean of reach^2`, which the least reach keeps below `5e4 e`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Textured {
-    mipmap: Arc<Mipmap>,
+    mipmaps: Arc<[Mipmap]>,
+    atlas: Atlas,
     places: Vec<Place>,
     colors: Vec<[f32; 4]>,
     range: PlaceRange,
@@ -159,27 +155,31 @@ impl PlaceRange {
 }
 
 impl Textured {
-    /// Surfels at `places`, over whose disks the texture has the mean `colors` (linear, straight alpha).
+    /// Surfels at `places` of the plane in which the textures lie as the `atlas` says, over whose disks these have the mean `colors` (linear,
+    /// straight alpha); those of no texture have these colours.
     ///
     /// # Errors
     ///
-    /// [`Error::Usage`] if these are not as many.
-    pub fn new(texture: Arc<Texture>, places: Vec<Place>, colors: Vec<[f32; 4]>) -> Result<Self> {
+    /// [`Error::Usage`] if places and colours are not as many, or the textures not as many as the atlas says.
+    pub fn new(textures: Vec<Arc<Texture>>, atlas: Atlas, places: Vec<Place>, colors: Vec<[f32; 4]>) -> Result<Self> {
         if places.len() != colors.len() {
             return Err(Error::Usage("surfels in a texture have a place and a colour each".into()));
         }
+        if textures.is_empty() || textures.len() as u64 != u64::from(atlas.textures) {
+            return Err(Error::Usage("a plane of textures has as many as there are, and one at least".into()));
+        }
         let range = PlaceRange::of(&places);
-        Ok(Self { mipmap: Arc::new(Mipmap::new(texture)), places, colors, range })
+        Ok(Self { mipmaps: textures.into_par_iter().map(Mipmap::new).collect(), atlas, places, colors, range })
     }
 
-    /// The image.
-    pub fn texture(&self) -> &Texture {
-        &self.mipmap.levels()[0]
+    /// The images at all scales, by their numbers.
+    pub fn mipmaps(&self) -> &[Mipmap] {
+        &self.mipmaps
     }
 
-    /// The image at all scales.
-    pub fn mipmap(&self) -> &Mipmap {
-        &self.mipmap
+    /// Where they lie.
+    pub fn atlas(&self) -> Atlas {
+        self.atlas
     }
 
     /// Where each surfel lies.
@@ -187,7 +187,7 @@ impl Textured {
         &self.places
     }
 
-    /// The texture's mean over each disk.
+    /// The mean of its texture over each disk.
     pub fn colors(&self) -> &[[f32; 4]] {
         &self.colors
     }
@@ -202,7 +202,7 @@ impl Textured {
         let places: Vec<_> = indices.iter().map(|&index| self.places[index]).collect();
         let colors = indices.iter().map(|&index| self.colors[index]).collect();
         let range = PlaceRange::of(&places);
-        Self { mipmap: Arc::clone(&self.mipmap), places, colors, range }
+        Self { mipmaps: Arc::clone(&self.mipmaps), atlas: self.atlas, places, colors, range }
     }
 
     /// What is summed of surfel `index` at the world offset `step` from its centre: the coordinates relative to the middle of their
@@ -241,11 +241,16 @@ impl Textured {
         [center, [ux, uy, uz, y], [vx, vy, vz, z]].map(|values| values.map(|value| value as f32))
     }
 
-    /// The texture coordinates of a pixel from the means of [`Self::terms`].
-    pub fn place_at(&self, [u, v, ..]: [f64; 5]) -> [f64; 2] {
+    /// The place of a pixel in the plane of textures, from the means of [`Self::terms`].
+    fn joint_at(&self, [u, v, ..]: [f64; 5]) -> [f64; 2] {
         let PlaceRange { middle, span, .. } = self.range;
         let at = |k: usize, offset: f64| f64::from(middle[k]) + f64::from(span) * offset;
         [at(0, u), at(1, v)]
+    }
+
+    /// The texture coordinates of a pixel from the means of [`Self::terms`].
+    pub fn place_at(&self, means: [f64; 5]) -> [f64; 2] {
+        self.atlas.own(self.joint_at(means))
     }
 
     /// The premultiplied colour of a pixel from the means of [`Self::terms`] and the blended premultiplied colour: by the texture
@@ -253,8 +258,10 @@ impl Textured {
     pub fn resolve(&self, means: [f64; 5], blended: [f64; 4]) -> [f64; 4] {
         let [u, v, squared, reach_2, part] = means;
         let share = (2.0 - (squared - u * u - v * v) / reach_2).clamp(0.0, 1.0);
-        let [width, height] = self.texture().size();
-        let texel = self.mipmap.seen_at(self.place_at(means), part * f64::from(width) * f64::from(height));
+        let place = self.joint_at(means);
+        let Some(mipmap) = self.mipmaps.get(self.atlas.number(place) as usize) else { return blended };
+        let [width, height] = mipmap.levels()[0].size();
+        let texel = mipmap.seen_at(place, part * f64::from(width) * f64::from(height));
         std::array::from_fn(|k| blended[k] + share * (texel[k] - blended[k]))
     }
 }

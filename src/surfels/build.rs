@@ -12,12 +12,12 @@ use super::orient::opposed;
 use super::outliers::drop_outliers;
 use super::positions::DistinctPositions;
 use super::{
-    LARGEST_COORDINATE, Limits, Preparation, colors, guess_up, mesh, origin_for, texture, unit, usable_axes,
+    LARGEST_COORDINATE, Limits, Preparation, colors, guess_up, mesh, origin_for, painting, texture, unit, usable_axes,
     usable_radius,
 };
 use crate::io::Points;
 use crate::scene::scene::{low_parts, shows};
-use crate::scene::{Bounds, Cap, Clip, Colors, SMALLEST_SCENE, Scene, Surfel, Texture, body};
+use crate::scene::{Atlas, Bounds, Cap, Clip, Colors, SMALLEST_SCENE, Scene, Surfel, Texture, body};
 use crate::{Error, Progress, Result};
 
 /// The largest radius of a disk, in extents of the scene: from anywhere near the scene it is a plane without an end, and depths
@@ -38,19 +38,24 @@ pub(super) const LARGEST_PLACE: f32 = 1e4;
 /// [`Error::EmptyScene`] if no input holds a usable point, and
 /// [`Error::Usage`] if normals or radii are missing and there are more than 2^32 - 1 points.
 pub fn build(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Preparation)> {
-    build_within(inputs, None, &Limits::default(), progress)
+    build_within(inputs, Vec::new(), &Limits::default(), progress)
 }
 
-/// Makes one scene of the points of all inputs, painted with `texture` at the points' texture coordinates, instead of their colours.
+/// Makes one scene of the points of all inputs, painted with `textures` at the points' texture coordinates, instead of their colours: one
+/// for all, or in the order of the inputs one for each, or as many as its [`Points::texture_numbers`] name.
 ///
 /// # Errors
 ///
-/// Those of [`build`], and [`Error::Usage`] if an input has no texture coordinates.
-pub fn build_textured(inputs: Vec<Points>, texture: Texture, progress: &dyn Progress) -> Result<(Scene, Preparation)> {
-    build_within(inputs, Some(texture), &Limits::default(), progress)
+/// Those of [`build`], and [`Error::Usage`] if an input has no texture coordinates, or there are more or fewer textures.
+pub fn build_textured(
+    inputs: Vec<Points>,
+    textures: Vec<Texture>,
+    progress: &dyn Progress,
+) -> Result<(Scene, Preparation)> {
+    build_within(inputs, textures, &Limits::default(), progress)
 }
 
-/// [`build`], or with a texture [`build_textured`], within other limits than the default ones. Radii and half-axes that are given,
+/// [`build`], or with textures [`build_textured`], within other limits than the default ones. Radii and half-axes that are given,
 /// those of a mesh's vertices too, are no matter of [`Limits::largest_ratio`].
 ///
 /// # Errors
@@ -58,24 +63,29 @@ pub fn build_textured(inputs: Vec<Points>, texture: Texture, progress: &dyn Prog
 /// Those of [`build`] and [`build_textured`], and [`Error::Usage`] for limits out of range.
 pub fn build_within(
     inputs: Vec<Points>,
-    texture: Option<Texture>,
+    textures: Vec<Texture>,
     limits: &Limits,
     progress: &dyn Progress,
 ) -> Result<(Scene, Preparation)> {
     limits.check()?;
-    let inputs: Vec<Points> = inputs.into_iter().map(|input| mesh::of_mesh(input, By::Looks)).collect();
-    let Some(texture) = texture else { return built(gather::gather(inputs)?, limits, progress).map(|(made, _)| made) };
+    let mut inputs: Vec<Points> = inputs.into_iter().map(|input| mesh::of_mesh(input, By::Looks)).collect();
+    if textures.is_empty() {
+        return built(gather::gather(inputs)?, limits, progress).map(|(made, _)| made);
+    }
     if inputs.iter().any(|input| input.texture.is_none() && !input.positions.is_empty()) {
         return Err(Error::Usage("a texture paints points that have texture coordinates, and some have none".into()));
     }
-    let (mut scene, preparation, places) = built_in_texture(gather::gather(inputs)?, limits, progress)?;
-    scene.colors = Colors::Textured(texture::painted(&scene, texture.into(), &places, progress)?);
+    painting::number(&mut inputs, textures.len())?;
+    let gathered = gather::gather(inputs)?;
+    let (mut scene, preparation, places) = built_in_texture(gathered, textures.len() as u32, limits, progress)?;
+    scene.colors = Colors::Textured(texture::painted(&scene, textures, &places, progress)?);
     Ok((scene, preparation))
 }
 
-/// The scene of points with texture coordinates, and these, of which unusable ones are replaced.
+/// The scene of points with texture coordinates, and these, of which unusable ones are replaced, in the plane of so many textures at least.
 fn built_in_texture(
     mut gathered: Gathered,
+    textures: u32,
     limits: &Limits,
     progress: &dyn Progress,
 ) -> Result<(Scene, Preparation, Coordinates)> {
@@ -84,8 +94,9 @@ fn built_in_texture(
         *place = [0.0; 2];
         gathered.preparation.replaced_places += 1;
     }
+    let atlas = painting::join(&mut gathered.points, textures);
     let ((scene, preparation), places) = built(gathered, limits, progress)?;
-    Ok((scene, preparation, places))
+    Ok((scene, preparation, Coordinates { atlas, ..places }))
 }
 
 /// [`build`], where the surfels of a mesh are at its vertices however it looks, for what takes surfels as samples of a surface. With the
@@ -104,16 +115,18 @@ pub fn build_at_vertices(inputs: Vec<Points>, progress: &dyn Progress) -> Result
     gathered.points = std::mem::take(&mut gathered.points).in_light();
     // Samples are where the surfels are, however those curve.
     let flat = Limits { curved: false, ..Limits::default() };
-    built_in_texture(gathered, &flat, progress)
+    built_in_texture(gathered, 1, &flat, progress)
 }
 
 /// The texture coordinates of surfels.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Coordinates {
-    /// At their centres, origin bottom left; none of a scene without any.
+    /// At their centres, origin bottom left, in the plane of their textures; none of a scene without any.
     pub centers: Vec<[f32; 2]>,
     /// What they gain for a world unit along x, y and z, where the points say it; all zero of those that do not.
     pub slopes: Vec<[[f32; 3]; 2]>,
+    /// How their textures lie in that plane.
+    pub atlas: Atlas,
 }
 
 /// The scene, and the texture coordinates of its surfels.
@@ -177,7 +190,7 @@ pub(super) fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Prog
     let scene = Scene { origin, surfels, colors, encoded, oriented, closed, up, provenance, ..of_disks };
     // As the default view sees it.
     preparation.strays = scene.framed().1;
-    Ok(((scene, preparation), Coordinates { centers, slopes }))
+    Ok(((scene, preparation), Coordinates { centers, slopes, atlas: Atlas::ONE }))
 }
 
 /// The caps of these surfels; none where all are flat, as they are in most scenes.

@@ -72,6 +72,7 @@ fn join(all: &mut Points, mut input: Points) {
     append(&mut all.clips, before, input.clips, count);
     append(&mut all.caps, before, input.caps, count);
     append(&mut all.texture, before, input.texture, count);
+    append(&mut all.texture_numbers, before, input.texture_numbers, count);
     append(&mut all.texture_slopes, before, input.texture_slopes, count);
     all.closed &= input.closed || count == 0;
     if before == 0 {

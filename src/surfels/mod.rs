@@ -23,6 +23,7 @@ mod mesh;
 mod neighbours;
 mod orient;
 mod outliers;
+mod painting;
 mod positions;
 mod preparation;
 pub mod sampling;

@@ -24,10 +24,10 @@ const STRETCH: f64 = 3.0;
 /// Least squares with a smaller ratio of determinant to squared trace say nothing of one direction.
 const LEAST_SPREAD: f64 = 1e-3;
 
-/// Paints the surfels of `scene` with `texture` at their coordinates.
+/// Paints the surfels of `scene` with `textures` at their coordinates.
 pub(super) fn painted(
     scene: &Scene,
-    texture: Arc<Texture>,
+    textures: Vec<Texture>,
     coordinates: &Coordinates,
     progress: &dyn Progress,
 ) -> Result<Textured> {
@@ -40,9 +40,16 @@ pub(super) fn painted(
         places[index] = of_slopes(surfel, coordinates.centers[index], *slopes);
     }
     // Disks overlap: half of one at each side is about the surfel's own part of the surface.
-    let color = |place: &Place| texture.mean_about(place.center.map(f64::from), 0.5 * f64::from(place.reach));
-    let colors = places.par_iter().map(color).collect();
-    Textured::new(texture, places, colors)
+    let color = |(index, place): (usize, &Place)| {
+        let center = place.center.map(f64::from);
+        let texture = textures.get(coordinates.atlas.number(center) as usize);
+        texture.map_or_else(
+            || scene.colors.linear(index),
+            |texture| texture.mean_about(center, 0.5 * f64::from(place.reach)),
+        )
+    };
+    let colors = places.par_iter().enumerate().map(color).collect();
+    Textured::new(textures.into_iter().map(Arc::new).collect(), coordinates.atlas, places, colors)
 }
 
 /// Whether the slopes of a surfel were given and can be used: over its disk they gain no more than coordinates may be.

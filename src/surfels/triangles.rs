@@ -1,13 +1,11 @@
 //! From meshes to the triangles of a scene, as they are.
 
-use std::sync::Arc;
-
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::build::LARGEST_PLACE;
 use super::{LARGEST_COORDINATE, guess_up, origin_for, unit};
-use crate::io::{Material, Mesh, Texture};
+use crate::io::Mesh;
 use crate::scene::color::DEFAULT_COLOR;
 use crate::scene::{Bounds, SMALLEST_SCENE, Scene, Triangle, Triangles};
 use crate::{Error, Result};
@@ -77,7 +75,7 @@ pub fn with_triangles(scene: Option<Scene>, meshes: &[Mesh]) -> Result<(Scene, M
     for mesh in meshes {
         preparation.given += mesh.triangles.len() as u64;
         // The number of each material's texture, whatever meshes share it.
-        let numbers: Vec<Option<u32>> = mesh.materials.iter().map(|of| numbered(&mut textures, of)).collect();
+        let numbers: Vec<Option<u32>> = mesh.materials.iter().map(|of| of.number_among(&mut textures)).collect();
         let of = mesh.triangles.par_iter().enumerate().filter(|(_, corners)| usable(mesh, corners));
         let made: Vec<(Triangle, bool)> = of.map(|(index, _)| triangle(mesh, index, scene.origin, &numbers)).collect();
         preparation.dropped_non_finite += (mesh.triangles.len() - made.len()) as u64;
@@ -100,17 +98,6 @@ pub fn with_triangles(scene: Option<Scene>, meshes: &[Mesh]) -> Result<(Scene, M
         )));
     }
     Ok((scene, preparation))
-}
-
-/// The number of a material's texture among `textures`, where it is put if it is not there.
-fn numbered(textures: &mut Vec<Arc<Texture>>, of: &Material) -> Option<u32> {
-    let texture = of.texture.as_ref()?;
-    let known = textures.iter().position(|known| Arc::ptr_eq(known, texture) || known == texture);
-    let number = known.unwrap_or(textures.len());
-    if known.is_none() {
-        textures.push(texture.clone());
-    }
-    u32::try_from(number).ok()
 }
 
 /// A triangle relative to `origin`, and whether a colour of it was replaced; the textures of materials have these `numbers`.

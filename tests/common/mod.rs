@@ -91,7 +91,7 @@ pub fn all_needs() -> Vec<SceneNeeds> {
                     next = (next + 101) % base.len();
                     let low_pass = [LowPass::None, LowPass::Max, LowPass::Ewa][next % 3];
                     let accumulator = row.of;
-                    let tiles = accumulator == Accumulator::Fixed && base[next].color != ColorNeed::Textured;
+                    let tiles = accumulator == Accumulator::Fixed;
                     let gather = tiles && next % 2 == 0;
                     all.push(SceneNeeds { accumulator, tiles, gather, kernel, epsilon, low_pass, ..base[next] });
                     if accumulator == Accumulator::Fixed {
@@ -182,6 +182,7 @@ pub fn all_needs() -> Vec<SceneNeeds> {
     all.extend(kept_apart(&all));
     for needs in &mut all {
         needs.outline &= needs.low_pass == LowPass::None;
+        needs.gather &= needs.may_gather();
     }
     all
 }
@@ -342,8 +343,8 @@ fn base_needs() -> Vec<SceneNeeds> {
                 atomics_u64: false,
                 long_words: bits.count_ones() % 4 < 2,
                 doubled: bits.count_ones() % 5 < 2,
-                tiles: bits * 37 / 8 % 4 == 0 && color != ColorNeed::Textured,
-                gather: bits * 37 / 8 % 8 == 0 && color != ColorNeed::Textured,
+                tiles: bits * 37 / 8 % 4 == 0,
+                gather: bits * 37 / 8 % 8 == 0,
                 // Both, of each of the others.
                 subgroups: bits.count_ones() % 3 == 0,
                 cull: bits * 29 / 16 % 2 == 0,

@@ -1,10 +1,10 @@
 //! Seeded scenes of surfels of many kinds, made in camera space so that each kind is what its name says.
 
-use epsplat::io::Points;
+use epsplat::io::{Points, Texture};
 use epsplat::scene::camera::Lens;
 use epsplat::scene::{Camera, Colors, Projection, Scene, Surfel, Up};
 use epsplat::surfels::analytic::{Sample, Shape, generate};
-use epsplat::surfels::build;
+use epsplat::surfels::{build, build_textured};
 use glam::{DMat3, DVec2, DVec3, Vec3};
 
 use super::Random;
@@ -268,4 +268,25 @@ pub fn generated(shape: Shape, count: u64, keep: impl Fn(&Sample) -> bool) -> Sc
         ..Points::default()
     };
     build(vec![points], &()).unwrap().0
+}
+
+/// A sphere with a picture on it, or several, of which the second lets through.
+pub fn painted(pictures: u32) -> Scene {
+    let scene = sphere(2000, 1.7);
+    let centers: Vec<[f32; 3]> = scene.surfels.iter().map(|surfel| surfel.center).collect();
+    let code = |k: u32, step: u32| (40 + k * step % 200) as u8;
+    let picture = |number: u32| {
+        let texel =
+            |k: u32| [code(k, 7 + number), code(k, 13), code(k / 32, 29), if number == 1 { code(k, 3) } else { 255 }];
+        Texture::new(32, 16, (0..32 * 16).map(texel).collect()).unwrap()
+    };
+    let points = Points {
+        positions: centers.iter().map(|center| center.map(f64::from)).collect(),
+        normals: Some(centers.clone()),
+        radii: Some(vec![scene.surfels[0].radius(); centers.len()]),
+        texture: Some(centers.iter().map(|[x, y, _]| [0.5 + 0.4 * x, 0.5 + 0.4 * y]).collect()),
+        texture_numbers: Some(centers.iter().map(|[.., z]| ((z.abs() * 7.0) as u32) % pictures).collect()),
+        ..Points::default()
+    };
+    build_textured(vec![points], (0..pictures).map(picture).collect(), &()).unwrap().0
 }

@@ -83,10 +83,10 @@ pub(super) fn options(arguments: &Arguments, format: Format) -> Result<RenderOpt
         without: default.without,
     };
     check::options(&options, arguments.backend.0 == Some(BackendName::Reference))?;
-    if arguments.texture.is_some() && arguments.facing.is_some() {
+    if !arguments.textures.is_empty() && arguments.facing.is_some() {
         return Err(Error::Usage("points that face the camera have no plane to paint: leave --texture out".into()));
     }
-    if arguments.texture.is_some() {
+    if !arguments.textures.is_empty() {
         check::textured(&options, arguments.backend.0 == Some(BackendName::Reference))?;
     }
     Ok(options)

@@ -39,12 +39,14 @@ pub(super) fn read(path: &Path, libraries: &[String], names: &[String], notes: &
     };
     let material = |name: &String| {
         let Some(found) = defined.iter().find(|material| material.name == *name) else {
-            return Material { name: name.clone(), diffuse: [1.0; 4], texture: None };
+            return Material { name: name.clone(), diffuse: [1.0; 4], texture: None, image: None };
         };
         let [r, g, b] = found.diffuse.unwrap_or([1.0; 3]).map(finite);
         let alpha = finite(found.dissolve.unwrap_or(1.0)).clamp(0.0, 1.0);
-        let texture = found.diffuse_texture.as_deref().and_then(|map| image(file_of(map), notes));
-        Material { name: name.clone(), diffuse: [r, g, b, alpha], texture }
+        let map = found.diffuse_texture.as_deref().map(file_of);
+        let texture = map.and_then(|map| image(map, notes));
+        let image = map.map(|map| beside(folder, map)).filter(|_| texture.is_some());
+        Material { name: name.clone(), diffuse: [r, g, b, alpha], texture, image }
     };
     names.iter().map(material).collect()
 }

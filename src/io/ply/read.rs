@@ -82,9 +82,10 @@ pub fn read_mesh(input: Input, progress: &dyn Progress) -> Result<Mesh> {
     let texture = texture.or_else(|| points.texture.map(|texture| corners(&triangles, &texture)));
     let mut notes = Vec::new();
     let mut material = |name: String| {
-        let read = Texture::read(&beside(&folder, &name));
-        let image = read.map(Arc::new).map_err(|error| notes.push(format!("a texture is left out: {error}"))).ok();
-        Material { name, diffuse: [1.0; 4], texture: image }
+        let path = beside(&folder, &name);
+        let read = Texture::read(&path);
+        let texture = read.map(Arc::new).map_err(|error| notes.push(format!("a texture is left out: {error}"))).ok();
+        Material { image: texture.is_some().then_some(path), name, diffuse: [1.0; 4], texture }
     };
     let materials: Vec<_> = textures.into_iter().map(&mut material).collect();
     // Where an image is missing the colours of the vertices are what is left.

@@ -72,6 +72,7 @@ pub(super) struct Layout {
     color: Option<[(usize, Coding); 3]>,
     alpha: Option<(usize, Coding)>,
     texture: Option<[usize; 2]>,
+    texture_number: Option<usize>,
     texture_slopes: Option<[[usize; 3]; 2]>,
     gaussian: Option<GaussianLayout>,
 }
@@ -85,6 +86,9 @@ pub(super) const CAP_NAMES: [&str; 3] = ["cap_uu", "cap_uv", "cap_vv"];
 /// What texture coordinates gain for a world unit along each axis.
 pub(super) const SLOPE_NAMES: [[&str; 3]; 2] =
     [["texture_u_x", "texture_u_y", "texture_u_z"], ["texture_v_x", "texture_v_y", "texture_v_z"]];
+
+/// Which texture they are in; a negative one means none. MeshLab's faces have it too.
+pub(super) const NUMBER_NAME: &str = "texnumber";
 
 /// What programs call texture coordinates, the most telling names first.
 const TEXTURE_NAMES: [[&str; 2]; 5] =
@@ -140,6 +144,7 @@ impl Layout {
             <[usize; 6]>::try_from(found).ok()
         });
         let texture = TEXTURE_NAMES.iter().find_map(|[u, v]| Some([column(&[u])?, column(&[v])?]));
+        let texture_number = texture.and_then(|_| column(&[NUMBER_NAME]));
         let coded = |index: usize| (index, Coding::of(columns[index].scalar));
         let (color, alpha) = (color.map(|color| color.map(coded)), alpha.map(coded));
         Ok(Self {
@@ -155,6 +160,7 @@ impl Layout {
             color,
             alpha,
             texture,
+            texture_number,
             texture_slopes: texture_slopes.filter(|_| texture.is_some()),
             gaussian: None,
         })
@@ -177,6 +183,7 @@ pub(super) struct Vertices<'a> {
     clips: Vec<Clip>,
     caps: Vec<Cap>,
     texture: Vec<[f32; 2]>,
+    texture_numbers: Vec<u32>,
     texture_slopes: Vec<[[f32; 3]; 2]>,
     srgb8: Vec<[u8; 4]>,
     linear: Vec<[f32; 4]>,
@@ -188,7 +195,8 @@ impl<'a> Vertices<'a> {
     pub(super) fn with_capacity(layout: &'a Layout, rows: u64) -> Result<Self, Fault> {
         let (mut positions, mut normals, mut radii) = (Vec::new(), Vec::new(), Vec::new());
         let (mut axes, mut clips, mut caps, mut texture) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        let (mut texture_slopes, mut srgb8, mut linear) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut texture_numbers, mut texture_slopes) = (Vec::new(), Vec::new());
+        let (mut srgb8, mut linear) = (Vec::new(), Vec::new());
         reserve(&mut positions, rows)?;
         reserve(&mut normals, if layout.normal.is_some() { rows } else { 0 })?;
         reserve(&mut radii, if layout.radius.is_some() { rows } else { 0 })?;
@@ -196,6 +204,7 @@ impl<'a> Vertices<'a> {
         reserve(&mut clips, if layout.clip.is_some() { rows } else { 0 })?;
         reserve(&mut caps, if layout.cap.is_some() { rows } else { 0 })?;
         reserve(&mut texture, if layout.texture.is_some() { rows } else { 0 })?;
+        reserve(&mut texture_numbers, if layout.texture_number.is_some() { rows } else { 0 })?;
         reserve(&mut texture_slopes, if layout.texture_slopes.is_some() { rows } else { 0 })?;
         let (codes, lights) = match (layout.color.is_some(), layout.is_srgb8()) {
             (false, _) => (0, 0),
@@ -214,6 +223,7 @@ impl<'a> Vertices<'a> {
             clips,
             caps,
             texture,
+            texture_numbers,
             texture_slopes,
             srgb8,
             linear,
@@ -254,6 +264,11 @@ impl<'a> Vertices<'a> {
         if let Some(texture) = layout.texture {
             self.texture.extend((0..rows).map(|row| texture.map(|column| value(column, row) as f32)));
         }
+        if let Some(column) = layout.texture_number {
+            // A cast takes what is no number for 0.
+            let number = |number: f64| if number < 0.0 { u32::MAX } else { number as u32 };
+            self.texture_numbers.extend((0..rows).map(|row| number(value(column, row))));
+        }
         if let Some(slopes) = layout.texture_slopes {
             let slopes = |row: usize| slopes.map(|slope| slope.map(|column| value(column, row) as f32));
             self.texture_slopes.extend((0..rows).map(slopes));
@@ -289,6 +304,7 @@ impl<'a> Vertices<'a> {
             caps: layout.cap.map(|_| self.caps),
             colors,
             texture: layout.texture.map(|_| self.texture),
+            texture_numbers: layout.texture_number.map(|_| self.texture_numbers),
             texture_slopes: layout.texture_slopes.map(|_| self.texture_slopes),
             up: None,
             ..Points::default()

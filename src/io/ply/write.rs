@@ -1,6 +1,6 @@
 //! From surfels to PLY bytes.
 
-use super::vertex::{CAP_NAMES, CLIP_NAMES, SLOPE_NAMES};
+use super::vertex::{CAP_NAMES, CLIP_NAMES, NUMBER_NAME, SLOPE_NAMES};
 use super::write_gaussians;
 use crate::io::atomic::{Output, write_whole};
 use crate::io::{Points, Up};
@@ -29,6 +29,8 @@ pub struct Vertex {
     pub color: Option<Color>,
     /// Texture coordinates (u, v), origin bottom left.
     pub texture: [f32; 2],
+    /// Which texture they are in; a negative one means none.
+    pub texture_number: i32,
     /// What they gain for a world unit along x, y and z.
     pub texture_slopes: [[f32; 3]; 2],
 }
@@ -98,6 +100,8 @@ pub struct Properties {
     pub colors: ColorProperties,
     /// `float texture_u texture_v` are written.
     pub texture: bool,
+    /// `int texnumber` is written.
+    pub texture_number: bool,
     /// `float texture_u_x` to `texture_v_z` are written.
     pub texture_slopes: bool,
     /// `comment up y` or `comment up z` says which way is up.
@@ -124,6 +128,7 @@ impl Properties {
                 Some(_) => ColorProperties::Linear,
             },
             texture: points.texture.is_some(),
+            texture_number: points.texture.is_some() && points.texture_numbers.is_some(),
             texture_slopes: points.texture.is_some() && points.texture_slopes.is_some(),
             up: points.up,
             closed: points.closed,
@@ -162,6 +167,9 @@ impl Properties {
         }
         if self.texture {
             scalars("float", &["texture_u", "texture_v"])?;
+        }
+        if self.texture_number {
+            scalars("int", &[NUMBER_NAME])?;
         }
         if self.texture_slopes {
             scalars("float", SLOPE_NAMES.as_flattened())?;
@@ -203,6 +211,9 @@ impl Properties {
         }
         if self.texture {
             vertex.texture.iter().for_each(|value| row.extend(value.to_le_bytes()));
+        }
+        if self.texture_number {
+            row.extend(vertex.texture_number.to_le_bytes());
         }
         if self.texture_slopes {
             vertex.texture_slopes.as_flattened().iter().for_each(|value| row.extend(value.to_le_bytes()));
@@ -290,6 +301,7 @@ pub fn write_points(path: &Path, points: &Points, progress: &dyn Progress) -> Re
                 None => None,
             },
             texture: of(&points.texture, index).unwrap_or_default(),
+            texture_number: of(&points.texture_numbers, index).map_or(-1, |number| i32::try_from(number).unwrap_or(-1)),
             texture_slopes: of(&points.texture_slopes, index).unwrap_or_default(),
         }
     });

@@ -224,7 +224,8 @@ fn points(surface: &MeshSurface<'_>, places: &[Place], normals: Vec<DVec3>, colo
         positions: places.clone().map(|place| (surface.center + surface.point(*place)).to_array()).collect(),
         normals: Some(normals.into_iter().map(|normal| normal.as_vec3().to_array()).collect()),
         colors: colors.map(Colors::Linear),
-        texture: places.map(|place| surface.texture(*place)).collect(),
+        texture: places.clone().map(|place| surface.texture(*place)).collect(),
+        texture_numbers: surface.texture_numbers().map(|of| places.map(|place| of[surface.index(*place)]).collect()),
         up: Some(surface.mesh.up.unwrap_or_else(|| guessed_up(surface.mesh))),
         ..Points::default()
     }

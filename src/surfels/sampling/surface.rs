@@ -102,6 +102,19 @@ impl<'a> MeshSurface<'a> {
         self.mesh.texture_at(self.triangles[at.triangle as usize].index, at.weights)
     }
 
+    /// Which of the mesh's triangles a point is on.
+    pub(super) fn index(&self, at: Place) -> usize {
+        self.triangles[at.triangle as usize].index
+    }
+
+    /// The number of each of the mesh's triangles' texture, if there are several, or some have none; one past all of them means none.
+    pub(super) fn texture_numbers(&self) -> Option<Vec<u32>> {
+        let (textures, numbers) = self.mesh.textures();
+        let alike = textures.len() < 2 && (textures.is_empty() || numbers.iter().all(Option::is_some));
+        (self.mesh.texture.is_some() && !alike)
+            .then(|| numbers.into_iter().map(|number| number.unwrap_or(u32::MAX)).collect())
+    }
+
     /// Whether the mesh says anything of colours.
     pub fn is_colored(&self) -> bool {
         self.mesh.colors.is_some() || self.mesh.material.is_some()

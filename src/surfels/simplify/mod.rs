@@ -180,5 +180,5 @@ pub fn simplify_in_texture(
         mean_deviation: deviations.mean.min(deviations.max),
         beyond_tolerance,
     };
-    Ok((simplified, left, report))
+    Ok((simplified, Coordinates { atlas: coordinates.atlas, ..left }, report))
 }

@@ -2,12 +2,16 @@
 
 use super::SplatShape;
 use crate::io::Points;
-use crate::scene::{Colors, Scene, Surfel};
+use crate::scene::{Atlas, Colors, Scene, Surfel};
 use crate::surfels::Coordinates;
 
 /// The surfels of a scene that is simplified to this shape as points, with these texture coordinates.
 pub fn points(scene: &Scene, coordinates: Coordinates, shape: SplatShape) -> Points {
     let surfels = &scene.surfels;
+    let Coordinates { centers, slopes, atlas } = coordinates;
+    let exact = || centers.iter().map(|center| center.map(f64::from));
+    let own = |place: [f64; 2]| atlas.own(place).map(|turns| turns as f32);
+    let number = |place: [f64; 2]| Some(atlas.number(place)).filter(|number| *number < atlas.textures);
     let normal = |surfel: &Surfel| surfel.normal().normalize_or_zero().to_array();
     // Lines and caps are by half-axes.
     let half_axes = shape != SplatShape::Disk || !scene.clips.is_empty();
@@ -22,8 +26,10 @@ pub fn points(scene: &Scene, coordinates: Coordinates, shape: SplatShape) -> Poi
             Colors::Constant(color) => Some(Colors::Linear(vec![*color; surfels.len()])),
             colors => Some(colors.clone()),
         },
-        texture: Some(coordinates.centers).filter(|centers| !centers.is_empty()),
-        texture_slopes: Some(coordinates.slopes).filter(|slopes| !slopes.is_empty()),
+        texture: (!centers.is_empty()).then(|| exact().map(own).collect()),
+        texture_numbers: (atlas != Atlas::ONE)
+            .then(|| exact().map(|place| number(place).unwrap_or(u32::MAX)).collect()),
+        texture_slopes: Some(slopes).filter(|slopes| !slopes.is_empty()),
         up: Some(scene.up),
         closed: scene.closed,
         ..Points::default()

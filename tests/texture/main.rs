@@ -2,7 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+#[path = "../common/mod.rs"]
 mod common;
+mod several;
 
 use std::f64::consts::{PI, TAU};
 use std::process::Command;
@@ -39,18 +41,21 @@ const STEEPEST: f64 = 30.0 * 0.0086;
 
 /// The belt of a sphere whose texture goes around it once, with a seam from end to end.
 fn globe(count: usize, radius: f64, texture: Texture) -> Scene {
+    build_textured(vec![belt(count, radius)], vec![texture], &()).unwrap().0
+}
+
+fn belt(count: usize, radius: f64) -> Points {
     let whole = sphere(count, radius);
     let centers = whole.surfels.iter().map(|surfel| Vec3::from_array(surfel.center));
     let belt: Vec<Vec3> = centers.filter(|center| center.y.abs() < 0.8).collect();
     let around = |p: &Vec3| [(0.5 + f64::from(p.z).atan2(p.x.into()) / TAU) as f32, 1.0 - p.y.acos() / PI as f32];
-    let points = Points {
+    Points {
         positions: belt.iter().map(|center| center.as_dvec3().to_array()).collect(),
         normals: Some(belt.iter().map(Vec3::to_array).collect()),
         radii: Some(vec![whole.surfels[0].radius(); belt.len()]),
         texture: Some(belt.iter().map(around).collect()),
         ..Points::default()
-    };
-    build_textured(vec![points], texture, &()).unwrap().0
+    }
 }
 
 fn textured(scene: &Scene) -> &Textured {
@@ -84,7 +89,7 @@ fn beyond_bounds(scene: &Scene, camera: &Camera, accumulator: Accumulator, sourc
     let nearest = visibility::reference(splats.iter(), camera, LowPass::None, 0, camera.height);
     let sums = accumulate::reference(splats.iter(), scene, camera, &exact, 0, &nearest);
     let range = textured(scene).range();
-    let [width, height] = textured(scene).texture().size().map(f64::from);
+    let [width, height] = textured(scene).mipmaps()[0].levels()[0].size().map(f64::from);
     // Colour for a step in the texture, of one in u or in v.
     let slope = STEEPEST * width.hypot(height);
     let (mut found, mut worst) = ([0; 4], 0f64);
@@ -186,7 +191,7 @@ fn board() -> Scene {
         positions,
         ..Points::default()
     };
-    build_textured(vec![points], texture, &()).unwrap().0
+    build_textured(vec![points], vec![texture], &()).unwrap().0
 }
 
 /// Of many texels a pixel shows their mean, of few the texels; the device as the twin does. A kernel that knows no halvings picks some.
@@ -232,7 +237,8 @@ fn what_is_seen_from_afar_is_averaged() {
 fn with_places(scene: &Scene, other: impl Fn(&Place) -> Place) -> Scene {
     let painted = textured(scene);
     let places = painted.places().iter().map(other).collect();
-    let again = Textured::new(painted.texture().clone().into(), places, painted.colors().to_vec()).unwrap();
+    let textures = painted.mipmaps().iter().map(|mipmap| mipmap.levels()[0].clone()).collect();
+    let again = Textured::new(textures, painted.atlas(), places, painted.colors().to_vec()).unwrap();
     Scene { colors: Colors::Textured(again), ..scene.clone() }
 }
 
@@ -339,7 +345,7 @@ fn simplified_surfels_keep_their_place_in_a_texture() {
     io::ply::write_points(&path, &left, &()).unwrap();
     let read = io::read(&path, &()).unwrap();
     assert_eq!(read.texture_slopes.as_ref().unwrap().len() as u64, report.selected);
-    let (painted, _) = build_textured(vec![read], waves(true), &()).unwrap();
+    let (painted, _) = build_textured(vec![read], vec![waves(true)], &()).unwrap();
     for (index, place) in textured(&painted).places().iter().enumerate() {
         let center = (painted.origin + painted.center(index)).to_array();
         let expected = coordinates(center);
@@ -355,14 +361,14 @@ fn a_texture_survives_simplification() {
     let texture = waves(true);
     let dense = globe(20_000, 1.3, texture.clone());
     let centers = textured(&dense).places().iter().map(|place| place.center).collect();
-    let own = Coordinates { centers, slopes: Vec::new() };
+    let own = Coordinates { centers, ..Coordinates::default() };
     let options = within(0.0005, SplatShape::Cap);
     let (simplified, left, _) = simplify_in_texture(&dense, &own, &options, &()).unwrap();
     let left = points(&simplified, left, SplatShape::Cap);
     assert!(3 * left.positions.len() < dense.surfels.len(), "{}", left.positions.len());
     let refitted = Points { texture_slopes: None, ..left.clone() };
     let [painted, refitted] =
-        [left, refitted].map(|points| build_textured(vec![points], texture.clone(), &()).unwrap().0);
+        [left, refitted].map(|points| build_textured(vec![points], vec![texture.clone()], &()).unwrap().0);
     let spacing = (4.0 * PI / 20_000.0).sqrt();
     let [before, after, refitted] =
         [&dense, &painted, &refitted].map(|scene| apart_from_the_sphere(scene, &texture, 4.0 * spacing));
@@ -431,7 +437,6 @@ fn what_cannot_be_painted_is_told() {
         ([&[bunny, "--texture", bunny][..], &reference].concat(), 1, ["bunny.obj", "PNG"]),
         ([&[bunny, "--texture", "none.png"][..], &reference].concat(), 1, ["none.png", "No such file"]),
         (vec![bunny, "--texture", cube, "--backend", "raster"], 2, ["rasteriser", "leave the texture out"]),
-        (vec![bunny, "--texture", cube, "--organisation", "tile"], 2, ["organisation tile", "textures"]),
         (vec![bunny, "--shininess", "5"], 2, ["--shininess", "phong"]),
         (vec![bunny, "--shading", "phong", "--shininess", "0"], 2, ["shininess is 1", "1000"]),
     ] {
@@ -439,7 +444,9 @@ fn what_cannot_be_painted_is_told() {
         assert!(status == code && words.iter().all(|word| told.contains(word)), "{arguments:?}: {status} {told}");
     }
     let bare = Points { positions: vec![[0.0; 3]; 3], ..Points::default() };
-    assert!(build_textured(vec![bare], waves(true), &()).unwrap_err().to_string().contains("texture coordinates"));
+    assert!(
+        build_textured(vec![bare], vec![waves(true)], &()).unwrap_err().to_string().contains("texture coordinates")
+    );
 }
 
 #[test]
@@ -449,7 +456,7 @@ fn places_that_are_no_numbers_are_counted() {
         texture: Some((0..25).map(|k| [0.1 * (k % 5) as f32, if k == 12 { f32::NAN } else { 0.5 }]).collect()),
         ..Points::default()
     };
-    let (scene, preparation) = build_textured(vec![points], waves(true), &()).unwrap();
+    let (scene, preparation) = build_textured(vec![points], vec![waves(true)], &()).unwrap();
     assert_eq!(preparation.replaced_places, 1);
     assert!(preparation.notes().iter().any(|note| note.contains("1 points had texture coordinates")));
     assert_eq!(textured(&scene).places()[12].center, [0.0; 2]);

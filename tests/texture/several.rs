@@ -1,0 +1,196 @@
+//! Several textures in a scene.
+
+use super::*;
+use epsplat::io::ply;
+
+const BARE: [f32; 4] = [0.2, 0.5, 0.1, 1.0];
+
+/// As steep as [`waves`], and others.
+fn other_waves() -> Texture {
+    let first = waves(true);
+    let [width, height] = first.size();
+    let turned = first.texels().iter().map(|[r, g, b, a]| [255 - *b, *r, *g, *a]);
+    Texture::new(width, height, turned.collect()).unwrap()
+}
+
+/// The belt of a sphere: upper parts in the first texture, lower ones in the second, and below these none.
+fn parted(count: usize, radius: f64) -> Points {
+    let mut points = belt(count, radius);
+    let number = |[_, y, _]: &[f64; 3]| if *y > 0.2 { 0 } else { [1, u32::MAX][usize::from(*y < -0.3)] };
+    points.texture_numbers = Some(points.positions.iter().map(number).collect());
+    points.colors = Some(Colors::Linear(vec![BARE; points.positions.len()]));
+    points
+}
+
+fn both() -> Vec<Texture> {
+    vec![waves(true), other_waves()]
+}
+
+/// The device as the twin, where two of them meet too.
+#[test]
+fn the_device_paints_several_as_its_twin_does() {
+    if common::gpu().is_none() {
+        return;
+    }
+    let scene = build_textured(vec![parted(3000, 1.5)], both(), &()).unwrap().0;
+    for projection in [Projection::Pinhole, Projection::Orthographic] {
+        let found = |sources| beyond_bounds(&scene, &camera(160, projection), Accumulator::Fixed, &sources).unwrap();
+        let [wrong, covered, open, passing] = found(Sources::default());
+        assert!(
+            wrong == 0 && covered > 8000 && open < covered / 50 && passing > 0,
+            "{wrong} {covered} {open} {passing}"
+        );
+        for (from, to) in [
+            ("cell.y * held.atlas.w + cell.x", "cell.y * held.atlas.w"),
+            ("number < held.textures", "number <= held.textures"),
+            ("select(0.0, share, exists)", "share"),
+        ] {
+            let broken = found(Sources::default().replace("texture.wgsl", from, to).unwrap());
+            assert!(broken[0] >= 20, "{from} became {to}, and {broken:?}");
+        }
+    }
+}
+
+/// Where one alone shows it is as if there were no other, but for the digits that a wider plane takes; where none is, colours are as blended.
+#[test]
+fn each_texture_shows_as_if_it_were_alone() {
+    let camera = camera(96, Projection::Pinhole);
+    let picture = |points: Points, textures: Vec<Texture>| {
+        let scene = build_textured(vec![points], textures, &()).unwrap().0;
+        render(&scene, &camera, &unlit(), &Backend::Reference, &()).unwrap().0
+    };
+    let points = parted(3000, 1.5);
+    let alone = || Points { texture_numbers: None, ..points.clone() };
+    let (first, second) = (picture(alone(), vec![waves(true)]), picture(alone(), vec![other_waves()]));
+    let joint = picture(points.clone(), both());
+    let swapped = picture(points.clone(), both().into_iter().rev().collect());
+    let depths = |frame: &Frame| frame.color.iter().map(|color| color[3] > 0.0).collect::<Vec<_>>();
+    assert_eq!(depths(&joint), depths(&first));
+    let (mut compared, mut differs) = ([0; 3], 0);
+    for (pixel, color) in joint.color.iter().enumerate().filter(|(_, color)| color[3] > 0.0) {
+        let (x, y) = ((pixel % 96) as f64 + 0.5, (pixel / 96) as f64 + 0.5);
+        let ray = camera.ray(x, y).normalize();
+        let along = -camera.eye.dot(ray);
+        let off = (camera.eye.length_squared() - along * along).min(1.0);
+        let point = camera.eye + ray * (along - (1.0 - off).sqrt());
+        let height = point.y;
+        // Two radii from where they meet, and away from the seam of each, which is told less sharply in a wider plane.
+        let part =
+            [(0.35, 0.9), (-0.15, 0.05), (-0.9, -0.45)].iter().position(|(low, high)| height > *low && height < *high);
+        let Some(part) = part.filter(|_| off < 0.9 && point.z.abs() > 0.2) else { continue };
+        let expected = [first.color[pixel], second.color[pixel], BARE][part];
+        let far = |a: &[f32; 4], b: &[f32; 4]| (0..4).any(|k| (a[k] - b[k]).abs() > 1e-4);
+        assert!(!far(color, &expected), "{x} {y}: {color:?} and {expected:?}");
+        compared[part] += 1;
+        differs += usize::from(far(&swapped.color[pixel], &expected));
+    }
+    assert!(compared.iter().all(|count| *count > 100) && differs > 1000, "{compared:?} {differs}");
+}
+
+/// Numbers survive a file and [`simplify_in_texture`], with the coordinates that belong to them.
+#[test]
+fn numbers_survive_files_and_simplification() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("several.ply");
+    let points = parted(12_000, 1.3);
+    ply::write_points(&path, &points, &()).unwrap();
+    let read = io::read(&path, &()).unwrap();
+    assert_eq!((&read.texture, &read.texture_numbers), (&points.texture, &points.texture_numbers));
+    let (scene, _, coordinates) = build_at_vertices(vec![read], &()).unwrap();
+    let (simplified, left, report) =
+        simplify_in_texture(&scene, &coordinates, &within(0.0005, SplatShape::Cap), &()).unwrap();
+    assert!(report.selected * 3 < report.surfels, "{report:?}");
+    let left = super::points(&simplified, left, SplatShape::Cap);
+    ply::write_points(&path, &left, &()).unwrap();
+    let left = io::read(&path, &()).unwrap();
+    let mut seen = [0; 3];
+    let all = left.positions.iter().zip(left.texture.as_ref().unwrap()).zip(left.texture_numbers.as_ref().unwrap());
+    for (([x, y, z], [u, v]), number) in all {
+        let expected = if *y > 0.2 { 0 } else { [1, u32::MAX][usize::from(*y < -0.3)] };
+        assert_eq!(*number, expected, "{y}");
+        seen[(*number).min(2) as usize] += 1;
+        let around = [0.5 + z.atan2(*x) / TAU, 1.0 - y.acos() / PI];
+        let seam = *x < 0.0 && z.abs() < 0.2;
+        let off = (f64::from(*u) - around[0]).abs().max((f64::from(*v) - around[1]).abs());
+        assert!(seam || off < 2e-3, "{u} {v} and {around:?}");
+    }
+    assert!(seen.iter().all(|count| *count > 50), "{seen:?}");
+}
+
+/// One for all inputs, one for each, or as many as the numbers of points name.
+#[test]
+fn textures_are_as_many_as_are_named() {
+    let plain = || belt(300, 1.5);
+    let several = || parted(300, 1.5);
+    let made =
+        |inputs: Vec<Points>, textures: Vec<Texture>| build_textured(inputs, textures, &()).map(|(scene, _)| scene);
+    let count = |scene: Scene| textured(&scene).mipmaps().len();
+    assert_eq!(count(made(vec![plain(), plain()], vec![waves(true)]).unwrap()), 1);
+    assert_eq!(count(made(vec![plain(), plain()], both()).unwrap()), 2);
+    assert_eq!(count(made(vec![several()], both()).unwrap()), 2);
+    assert_eq!(count(made(vec![plain(), several()], [both(), both()[..1].to_vec()].concat()).unwrap()), 3);
+    for (inputs, textures, told) in [
+        (vec![plain()], both(), "2 textures are given, and one is needed"),
+        (vec![several()], vec![waves(true)], "1 texture is given, and 2 are needed"),
+        (vec![plain(), several()], both(), "2 textures are given, and 3 are needed"),
+    ] {
+        let error = made(inputs, textures).unwrap_err();
+        assert!(error.to_string().contains(told), "{error}");
+    }
+    // The second input's are the second texture's.
+    let scene = made(vec![plain(), plain()], both()).unwrap();
+    let first = textured(&scene).places().len() / 2;
+    let number = |place: &Place| textured(&scene).atlas().number(place.center.map(f64::from));
+    assert!(textured(&scene).places().iter().enumerate().all(|(k, place)| number(place) == u32::from(k >= first)));
+}
+
+/// The way of a user: a mesh of two images and a plain colour, sampled, and painted as `sample` says.
+#[test]
+fn samples_of_a_mesh_with_several_images_are_painted_by_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    for (name, code) in [("red.png", [255, 0, 0, 255]), ("blue.png", [0, 0, 255, 255])] {
+        let texels = vec![code; 16];
+        io::png::write_texture(path(name).as_ref(), &Texture::new(4, 4, texels).unwrap()).unwrap();
+    }
+    let materials = "newmtl a\nmap_Kd red.png\nnewmtl b\nmap_Kd blue.png\nnewmtl c\nKd 0 1 0\n";
+    std::fs::write(path("three.mtl"), materials).unwrap();
+    let mut mesh = "mtllib three.mtl\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n".to_owned();
+    for (k, material) in ["a", "b", "c"].iter().enumerate() {
+        let (left, right) = (2 * k, 2 * k + 2);
+        mesh += &format!(
+            "v {left} 0 0\nv {right} 0 0\nv {right} 2 0\nv {left} 2 0\nusemtl {material}\nf -4/1 -3/2 -2/3 -1/4\n"
+        );
+    }
+    std::fs::write(path("three.obj"), mesh).unwrap();
+    let run = |arguments: &[&str]| {
+        let run =
+            Command::new(env!("CARGO_BIN_EXE_epsplat")).args(arguments).current_dir(folder.path()).output().unwrap();
+        assert!(run.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&run.stderr));
+        String::from_utf8(run.stderr).unwrap()
+    };
+    let told = run(&["sample", "three.obj", "-o", "three.ply", "--count", "3000"]);
+    let command = told.lines().find_map(|line| line.split("epsplat render ").nth(1)).unwrap();
+    assert_eq!(command, "three.ply --texture red.png --texture blue.png");
+    let view = [
+        "--shading",
+        "unlit",
+        "--eye",
+        "3,1,9",
+        "--target",
+        "3,1,0",
+        "--ortho",
+        "3",
+        "--size",
+        "96x48",
+        "-o",
+        "three.png",
+    ];
+    let all: Vec<&str> = ["render"].into_iter().chain(command.split(' ')).chain(view).collect();
+    run(&all);
+    let picture = image::open(path("three.png")).unwrap().to_rgba8();
+    // A unit is 16 pixels: the parts have their middles a third of the width apart.
+    for (x, code) in [(16, [255, 0, 0, 255]), (48, [0, 0, 255, 255]), (80, [0, 255, 0, 255])] {
+        assert_eq!(picture.get_pixel(x, 24).0, code, "{x}");
+    }
+}

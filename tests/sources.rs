@@ -48,8 +48,8 @@ impl Source for Made {
         (0..COUNT).step_by(most).map(|first| Box::new(part(first)) as Box<dyn Page>).collect()
     }
 
-    fn texture(&self) -> Option<&Mipmap> {
-        None
+    fn textures(&self) -> &[Mipmap] {
+        &[]
     }
 
     fn provenance(&self) -> Cow<'_, Provenance> {

@@ -378,8 +378,18 @@ impl SceneNeeds {
             RasterDepth::Exact => "raster-exact",
             RasterDepth::Offset => "raster-offset",
         });
+        [projection, kernel, color]
+            .into_iter()
+            .chain(raster)
+            .chain(self.flags().into_iter().filter(|(on, _)| *on).map(|(_, name)| name))
+            .chain(self.maps.iter().map(|map| map.row().need))
+            .collect()
+    }
+
+    /// What may be there and has a name.
+    fn flags(&self) -> Vec<(bool, &'static str)> {
         let joins = |join| self.mesh.is_some_and(|mesh| mesh.join == join);
-        let flags = [
+        vec![
             (self.low_pass == LowPass::Max, "lowpass-max"),
             (self.low_pass == LowPass::Ewa, "lowpass-ewa"),
             (self.low_pass == LowPass::Gaussians, "lowpass-gaussians"),
@@ -419,12 +429,6 @@ impl SceneNeeds {
             (self.shading == Shading::Lambert, "lambert"),
             (self.shading == Shading::Phong, "phong"),
             (self.lit_splats, "lit-splats"),
-        ];
-        [projection, kernel, color]
-            .into_iter()
-            .chain(raster)
-            .chain(flags.into_iter().filter(|(on, _)| *on).map(|(_, name)| name))
-            .chain(self.maps.iter().map(|map| map.row().need))
-            .collect()
+        ]
     }
 }

@@ -8,11 +8,14 @@ use rayon::prelude::*;
 use super::build::{Coordinates, LARGEST_PLACE};
 use super::neighbours::{Neighbour, NeighbourSearch};
 use super::positions::DistinctPositions;
-use crate::scene::{Place, Scene, Surfel, Texture, Textured};
+use crate::scene::{Atlas, Place, Scene, Surfel, Texture, Textured};
 use crate::{Progress, Result};
 
 /// Neighbours that tell how fast coordinates change: the first two rings of a square grid.
-pub(super) const NEIGHBOURS: usize = 8;
+const NEIGHBOURS: usize = 8;
+
+/// Those that are looked at where some may be in other textures, which tell nothing.
+const AMONG_OTHERS: usize = 3 * NEIGHBOURS;
 
 /// The change for each length, of those to the neighbours in order, that is typical. At a straight seam three of the first ring
 /// lie on the other side, and five at its corner.
@@ -33,7 +36,7 @@ pub(super) fn painted(
 ) -> Result<Textured> {
     let mut places = match given(scene, coordinates) {
         Some(places) => places,
-        None => places(scene, &coordinates.centers, progress)?,
+        None => places(scene, coordinates, progress)?,
     };
     let given = scene.surfels.iter().zip(&coordinates.slopes).enumerate();
     for (index, (surfel, slopes)) in given.filter(|(_, given)| are_known(*given)) {
@@ -79,7 +82,7 @@ fn of_slopes(surfel: &Surfel, center: [f32; 2], slopes: [[f32; 3]; 2]) -> Place 
 
 /// The change of coordinates for each length that is typical around a point, from steps to its neighbours in the order of their distance:
 /// in space, and in the texture.
-pub(super) fn typical_change(steps: &[(DVec3, DVec2)]) -> f64 {
+fn typical_change(steps: &[(DVec3, DVec2)]) -> f64 {
     let mut changes: Vec<f64> = steps.iter().map(|(offset, gain)| gain.length() / offset.length()).collect();
     changes.sort_by(f64::total_cmp);
     changes.get(RANK.min(changes.len().saturating_sub(1))).copied().unwrap_or(0.0)
@@ -110,35 +113,85 @@ pub(super) fn in_world(slopes: DMat2, [s, t]: [DVec3; 2]) -> [[f32; 3]; 2] {
     [0, 1].map(|k| (slopes.x_axis[k] * along_s + slopes.y_axis[k] * along_t).as_vec3().to_array())
 }
 
+/// The texture coordinates of positions, in the plane of their textures: of several surfels at one the smallest, which any order gives. None
+/// where surfels have none.
+pub(super) struct Placed {
+    pub(super) places: Vec<DVec2>,
+    atlas: Atlas,
+}
+
+impl Placed {
+    pub(super) fn new(positions: &DistinctPositions, coordinates: &Coordinates) -> Self {
+        let Coordinates { centers, atlas, .. } = coordinates;
+        let mut places = vec![[f32::INFINITY; 2]; if centers.is_empty() { 0 } else { positions.len() }];
+        for (own, &position) in centers.iter().zip(positions.of_point()) {
+            let known = &mut places[position as usize];
+            if own[0].total_cmp(&known[0]).then(own[1].total_cmp(&known[1])).is_lt() {
+                *known = *own;
+            }
+        }
+        let places = places.into_iter().map(|place| DVec2::from_array(place.map(f64::from))).collect();
+        Self { places, atlas: *atlas }
+    }
+
+    /// Whether two places are in one texture, or both in none.
+    pub(super) fn are_in_one(&self, a: DVec2, b: DVec2) -> bool {
+        self.atlas.number(a.to_array()) == self.atlas.number(b.to_array())
+    }
+
+    /// For the neighbours of [`Self::steps`].
+    fn search<'a>(&self, positions: &'a DistinctPositions) -> NeighbourSearch<'a> {
+        let several = self.atlas != Atlas::ONE;
+        NeighbourSearch::new(positions, if several { AMONG_OTHERS } else { NEIGHBOURS })
+    }
+
+    /// The steps from a surfel at a position, whose place is `at`, to the nearest neighbours that are in the same texture: in space, scaled, and in
+    /// the texture.
+    fn steps(
+        &self,
+        positions: &DistinctPositions,
+        found: &[Neighbour],
+        (from, at): (u32, DVec2),
+    ) -> Vec<(DVec3, DVec2)> {
+        let others = found.iter().map(|other| (other.index, self.places[other.index as usize]));
+        let step = |(other, place)| (positions.position(other) - positions.position(from), place - at);
+        others.filter(|(_, place)| self.are_in_one(*place, at)).take(NEIGHBOURS).map(step).collect()
+    }
+
+    /// The typical change around each position, for a scaled unit.
+    pub(super) fn changes(&self, positions: &DistinctPositions) -> Vec<f64> {
+        if self.places.is_empty() {
+            return Vec::new();
+        }
+        let search = self.search(positions);
+        let change = |found: &mut Vec<Neighbour>, (index, at): (usize, &DVec2)| {
+            search.nearest(index as u32, found);
+            typical_change(&self.steps(positions, found, (index as u32, *at)))
+        };
+        self.places.par_iter().enumerate().map_init(Vec::new, change).collect()
+    }
+}
+
 /// The change of coordinates over each disk, by least squares over those neighbours that no jump lies before. The reach is that of
 /// the typical change over the radius.
-fn places(scene: &Scene, centers: &[[f32; 2]], progress: &dyn Progress) -> Result<Vec<Place>> {
+fn places(scene: &Scene, coordinates: &Coordinates, progress: &dyn Progress) -> Result<Vec<Place>> {
     let surfels = &scene.surfels;
     let positions: Vec<[f64; 3]> =
         (0..surfels.len()).into_par_iter().map(|index| scene.center(index).to_array()).collect();
     let distinct = DistinctPositions::new(&positions, &scene.bounds(), DVec3::ZERO)?;
-    // Of surfels at one position, which may lie on both sides of a seam, the smallest coordinates: any order gives the same.
-    let mut of_position = vec![[f32::INFINITY; 2]; distinct.len()];
-    for (center, &position) in centers.iter().zip(distinct.of_point()) {
-        let known = &mut of_position[position as usize];
-        if center[0].total_cmp(&known[0]).then(center[1].total_cmp(&known[1])).is_lt() {
-            *known = *center;
-        }
-    }
+    let placed = Placed::new(&distinct, coordinates);
     progress.begin("measuring texture coordinates", surfels.len() as u64);
-    let search = NeighbourSearch::new(&distinct, NEIGHBOURS);
+    let search = placed.search(&distinct);
     let of_surfel = |found: &mut Vec<Neighbour>, ((surfel, center), &position): ((&Surfel, &[f32; 2]), &u32)| {
         search.nearest(position, found);
         let at = DVec2::from_array(center.map(f64::from));
-        let steps = found.iter().map(|other| {
-            let offset = (distinct.position(other.index) - distinct.position(position)) / distinct.scale();
-            (offset, DVec2::from_array(of_position[other.index as usize].map(f64::from)) - at)
-        });
-        let steps: Vec<(DVec3, DVec2)> = steps.collect();
+        let steps = placed.steps(&distinct, found, (position, at)).into_iter();
+        let steps: Vec<_> = steps.map(|(offset, gain)| (offset / distinct.scale(), gain)).collect();
         progress.advance(1);
         place(surfel, *center, &steps)
     };
-    let all = surfels.par_iter().zip(centers).zip(distinct.of_point()).map_init(Vec::new, of_surfel).collect();
+    let all =
+        surfels.par_iter().zip(&coordinates.centers).zip(distinct.of_point()).map_init(Vec::new, of_surfel).collect();
     progress.end();
     Ok(all)
 }
@@ -175,7 +228,7 @@ mod tests {
         let of = |jump: f32| {
             let centers: Vec<_> =
                 (0..144).map(|k| [0.01 * at(k).x + if at(k).x > 5.5 { jump } else { 0.0 }, 0.02 * at(k).y]).collect();
-            places(&scene, &centers, &()).unwrap()
+            places(&scene, &Coordinates { centers, ..Coordinates::default() }, &()).unwrap()
         };
         for (k, place) in of(0.4).iter().enumerate() {
             let [u, v] = place.slopes.map(Vec3::from_array);

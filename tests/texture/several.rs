@@ -194,3 +194,30 @@ fn samples_of_a_mesh_with_several_images_are_painted_by_them() {
         assert_eq!(picture.get_pixel(x, 24).0, code, "{x}");
     }
 }
+
+/// Surfels of two textures that lie among each other: how fast coordinates change is told by those of one texture alone. Had one texture both
+/// places, some would be taken to change as fast as from one to the other.
+#[test]
+fn neighbours_in_another_texture_tell_nothing() {
+    let first = belt(2000, 1.5);
+    let moved = |place: &[f32; 2], by: f32| [place[0] + by, place[1]];
+    let others: Vec<[f64; 3]> = first.positions.iter().map(|[x, y, z]| [x + 0.01 * z, *y, z - 0.01 * x]).collect();
+    let second = |by: f32| Points {
+        positions: [&others[..200], &others[400..]].concat(),
+        texture: first
+            .texture
+            .as_ref()
+            .map(|all| all[..200].iter().chain(&all[400..]).map(|at| moved(at, by)).collect()),
+        normals: first.normals.as_ref().map(|all| [&all[..200], &all[400..]].concat()),
+        radii: first.radii.as_ref().map(|all| all[200..].to_vec()),
+        ..Points::default()
+    };
+    let largest = |inputs: Vec<Points>, textures: Vec<Texture>| {
+        let scene = build_textured(inputs, textures, &()).unwrap().0;
+        textured(&scene).places().iter().map(|place| place.reach).fold(0.0, f32::max)
+    };
+    let alone = largest(vec![first.clone()], vec![waves(true)]);
+    let two = largest(vec![first.clone(), second(0.0)], both());
+    let one = largest(vec![first.clone(), second(3.0)], vec![waves(true)]);
+    assert!(two < 2.0 * alone && one > 10.0 * alone, "{alone} {two} {one}");
+}

@@ -154,7 +154,7 @@ pub fn simplify_in_texture(
         return Err(Error::Usage(format!("a tolerance is finite and not negative, {tolerance} is not")));
     }
     progress.begin("sorting points", 0);
-    let samples = Samples::new(scene, &coordinates.centers)?;
+    let samples = Samples::new(scene, coordinates)?;
     progress.end();
     let scaled = tolerance * samples.positions.scale();
     let cells = Cells::new(&samples, scaled, progress);

@@ -5,10 +5,10 @@ use rayon::prelude::*;
 
 use crate::Result;
 use crate::scene::{Clip, Scene, Surfel};
+use crate::surfels::Coordinates;
 use crate::surfels::creases::SMOOTH;
-use crate::surfels::neighbours::{Neighbour, NeighbourSearch};
 use crate::surfels::positions::DistinctPositions;
-use crate::surfels::texture::{self, jumps};
+use crate::surfels::texture::{Placed, jumps};
 
 /// The surfels of a scene, one for each distinct position, in an order that depends on the set of positions alone.
 /// Lengths are in scaled units: see [`DistinctPositions::scale`].
@@ -24,8 +24,8 @@ pub(super) struct Samples {
     pub lines: Vec<Vec<End>>,
     /// Mean linear colour of the surfels at a position, premultiplied by alpha.
     pub colors: Vec<[f64; 4]>,
-    /// Texture coordinates, of several surfels at a position the smallest; none where surfels have none.
-    pub places: Vec<DVec2>,
+    /// Texture coordinates.
+    pub placed: Placed,
     /// How far those change for a scaled unit, typically, from each point to the next.
     changes: Vec<f64>,
     /// Whether the side that a normal points to means something.
@@ -34,7 +34,7 @@ pub(super) struct Samples {
 
 impl Samples {
     /// With the texture coordinates of the surfels, if they have any.
-    pub fn new(scene: &Scene, coordinates: &[[f32; 2]]) -> Result<Self> {
+    pub fn new(scene: &Scene, coordinates: &Coordinates) -> Result<Self> {
         let center = |index: usize| scene.center(index).to_array();
         let centers: Vec<[f64; 3]> = (0..scene.surfels.len()).into_par_iter().map(center).collect();
         let positions = DistinctPositions::new(&centers, &scene.bounds(), DVec3::ZERO)?;
@@ -84,21 +84,22 @@ impl Samples {
                 _ => Vec::new(),
             });
         }
-        let places = places(&positions, coordinates);
-        let changes = if places.is_empty() { Vec::new() } else { changes(&positions, &places) };
-        Ok(Self { positions, normals, only, radii, lines, colors, places, changes, oriented: scene.oriented })
+        let placed = Placed::new(&positions, coordinates);
+        let changes = placed.changes(&positions);
+        Ok(Self { positions, normals, only, radii, lines, colors, placed, changes, oriented: scene.oriented })
     }
 
     /// The way from one point to another, in space and in the texture.
     pub fn step(&self, from: u32, to: u32) -> (DVec3, DVec2) {
         let offset = self.positions.position(to) - self.positions.position(from);
-        (offset, self.places[to as usize] - self.places[from as usize])
+        (offset, self.placed.places[to as usize] - self.placed.places[from as usize])
     }
 
     /// Whether a seam of the texture lies between two points that are near each other.
     pub fn has_seam(&self, a: u32, b: u32) -> bool {
         let [Some(of_a), Some(of_b)] = [a, b].map(|point| self.changes.get(point as usize)) else { return false };
-        jumps(&self.step(a, b), of_a.max(*of_b))
+        let [place_a, place_b] = [a, b].map(|point| self.placed.places[point as usize]);
+        !self.placed.are_in_one(place_a, place_b) || jumps(&self.step(a, b), of_a.max(*of_b))
     }
 
     pub fn len(&self) -> usize {
@@ -115,32 +116,6 @@ impl Samples {
     pub fn same_side(&self, a: u32, b: u32) -> bool {
         !self.oriented || self.normals[a as usize].dot(self.normals[b as usize]) > 0.0
     }
-}
-
-/// The texture coordinates of positions.
-fn places(positions: &DistinctPositions, coordinates: &[[f32; 2]]) -> Vec<DVec2> {
-    let mut places = vec![[f32::INFINITY; 2]; if coordinates.is_empty() { 0 } else { positions.len() }];
-    for (own, &position) in coordinates.iter().zip(positions.of_point()) {
-        let known = &mut places[position as usize];
-        if own[0].total_cmp(&known[0]).then(own[1].total_cmp(&known[1])).is_lt() {
-            *known = *own;
-        }
-    }
-    places.into_iter().map(|place| DVec2::from_array(place.map(f64::from))).collect()
-}
-
-/// The typical change of texture coordinates around each position.
-fn changes(positions: &DistinctPositions, places: &[DVec2]) -> Vec<f64> {
-    let search = NeighbourSearch::new(positions, texture::NEIGHBOURS);
-    let change = |found: &mut Vec<Neighbour>, index: u32| {
-        search.nearest(index, found);
-        let step = |other: &Neighbour| {
-            let offset = positions.position(other.index) - positions.position(index);
-            (offset, places[other.index as usize] - places[index as usize])
-        };
-        texture::typical_change(&found.iter().map(step).collect::<Vec<_>>())
-    };
-    (0..positions.len() as u32).into_par_iter().map_init(Vec::new, change).collect()
 }
 
 /// Where the surface ends at a line in a surfel's plane.

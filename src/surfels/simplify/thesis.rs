@@ -21,6 +21,7 @@ use super::samples::Samples;
 use crate::progress::Progress;
 use crate::scene::scene::low_parts;
 use crate::scene::{Colors, Scene, Surfel};
+use crate::surfels::Coordinates;
 use crate::surfels::neighbours::{Neighbour, NeighbourSearch};
 
 /// K of the thesis.
@@ -185,7 +186,7 @@ pub fn as_in_the_thesis(
     ratio: f64,
     progress: &dyn Progress,
 ) -> crate::Result<(Scene, Report)> {
-    let samples = Samples::new(scene, &[])?;
+    let samples = Samples::new(scene, &Coordinates::default())?;
     let scale = samples.positions.scale();
     let Selection { splats: selected, largest, sums: [off, area] } =
         select(&samples, tolerance * scale, ratio, progress);

@@ -41,8 +41,12 @@ struct Info {
     gaussians: Option<Gaussians>,
     /// Points of each class of a laser scan.
     classes: BTreeMap<u8, u64>,
+    /// Nodes and levels, of a file with levels of detail.
+    levels_of_detail: Option<LevelsOfDetail>,
     /// Texture coordinates, by which `render --texture` paints.
     texture: bool,
+    /// In so many images.
+    images: u64,
     /// The mesh whose triangles are drawn beside them.
     #[serde(skip_serializing_if = "Option::is_none")]
     triangles: Option<PathBuf>,
@@ -70,6 +74,20 @@ struct Info {
 struct TrianglesAlone {
     points: u64,
     triangles: PathBuf,
+}
+
+/// What a file with levels of detail holds.
+#[derive(Serialize)]
+struct LevelsOfDetail {
+    nodes: u64,
+    levels: u64,
+}
+
+impl LevelsOfDetail {
+    fn of(scene: &Scene) -> Option<Self> {
+        let hierarchy = scene.hierarchy.as_ref()?;
+        Some(Self { nodes: hierarchy.nodes.len() as u64, levels: hierarchy.levels() as u64 })
+    }
 }
 
 /// What a file of Gaussians holds.
@@ -125,6 +143,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let bounds = surfels::bounds(&points);
     let is_mesh = points.faces.is_some();
     let (texture, classes) = (points.texture.is_some(), points.classes.clone());
+    let numbers = points.texture_numbers.iter().flatten().filter(|number| **number != u32::MAX);
+    let images = numbers.max().map_or(u64::from(texture), |last| u64::from(*last) + 1);
     let held = (points.positions.len() as u64, points.normals.is_some(), points.radii.is_some(), colors(&points));
     let (scene, preparation) =
         surfels::build(vec![points], &bars).map_err(|error| named(error, std::slice::from_ref(&arguments.input)))?;
@@ -147,7 +167,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         colors: held.3,
         gaussians,
         classes,
+        levels_of_detail: LevelsOfDetail::of(&scene),
         texture,
+        images,
         triangles: beside,
         is_mesh,
         up: scene.up.name(),
@@ -213,8 +235,15 @@ fn table(input: &std::path::Path, info: &Info) -> String {
         };
         let _ = writeln!(text, "  classes   {}", info.classes.iter().map(named).collect::<Vec<_>>().join(", "));
     }
+    if let Some(LevelsOfDetail { nodes, levels }) = &info.levels_of_detail {
+        let _ = writeln!(text, "  detail    {nodes} nodes in {levels} levels");
+    }
     if info.texture {
-        let _ = writeln!(text, "  texture   coordinates given: `epsplat render --texture IMAGE.png` paints by them");
+        let images = match info.images {
+            0 | 1 => "--texture IMAGE.png".to_owned(),
+            several => format!("--texture IMAGE.png {several} times, an image each,"),
+        };
+        let _ = writeln!(text, "  texture   coordinates given: `epsplat render` with {images} paints by them");
     }
     if let Some(triangles) = &info.triangles {
         let _ = writeln!(text, "  triangles those of {} are drawn beside them", triangles.display());

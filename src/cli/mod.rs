@@ -9,6 +9,7 @@ mod generate;
 mod hardcases;
 mod hybrid;
 mod info;
+mod lod;
 mod outputs;
 mod parse;
 mod progress;
@@ -52,6 +53,7 @@ enum Command {
     Card(card::Arguments),
     Simplify(simplify::Arguments),
     Hybrid(hybrid::Arguments),
+    Lod(lod::Arguments),
 }
 
 /// Runs the command line and says how it ended.
@@ -71,6 +73,7 @@ pub fn run() -> ExitCode {
         Command::Card(arguments) => card::run(&arguments),
         Command::Simplify(arguments) => simplify::run(&arguments),
         Command::Hybrid(arguments) => hybrid::run(&arguments),
+        Command::Lod(arguments) => lod::run(&arguments),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -318,6 +318,10 @@ struct Outcome<'a> {
 fn scene(arguments: &Arguments, bars: &Bars) -> Result<(Scene, Preparation)> {
     let inputs =
         if arguments.inputs.is_empty() { Vec::new() } else { arguments.reading.all(&arguments.inputs, bars)? };
+    if arguments.inputs.is_empty() && !arguments.textures.is_empty() {
+        let what = "--texture paints surfels, and there are none: take --triangle-texture for triangles";
+        return Err(Error::Usage(what.into()));
+    }
     if arguments.separate && arguments.inputs.len() < 2 {
         note(
             "--separate keeps the surfels of several files apart, and here is one of them at most: it changes nothing",

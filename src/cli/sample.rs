@@ -1,10 +1,10 @@
 //! `epsplat sample`: surfels from the triangles of a mesh.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::{Args, ValueEnum};
-use epsplat::io::{self, Mesh, Texture};
+use epsplat::io::{self, Material, Mesh, Texture};
 use epsplat::surfels::curve;
 use epsplat::surfels::sampling::{MOST, MeshSurface, Method, Priority, sample, voxels::Voxel};
 use epsplat::{Error, Result};
@@ -99,10 +99,20 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let (samples, triangles) = (sampling.samples, sampling.triangles);
     note(&format!("{}: {samples} surfels from {triangles} triangles{voxels}", arguments.output.display()));
     if !images.is_empty() {
-        let painted: String = images.iter().map(|image| format!(" --texture {}", image.display())).collect();
-        note(&format!("to paint them by their images: epsplat render {}{painted}", arguments.output.display()));
+        let painted: String = images.iter().map(|image| format!(" --texture {}", quoted(image))).collect();
+        note(&format!("to paint them by their images: epsplat render {}{painted}", quoted(&arguments.output)));
+        let dyed = |material: &Material| material.texture.is_some() && material.diffuse != [1.0; 4];
+        if mesh.materials.iter().any(dyed) {
+            note("their own colours are those of the images times the materials' colours, which --texture leaves out");
+        }
     }
     Ok(())
+}
+
+/// A path as a shell reads it.
+fn quoted(path: &Path) -> String {
+    let path = path.display().to_string();
+    if path.contains([' ', '(', ')', '&', '$']) { format!("'{path}'") } else { path }
 }
 
 /// The files of a mesh's textures, by their numbers.

@@ -166,8 +166,9 @@ impl Mesh {
         let mut textures = Vec::new();
         let of_material: Vec<Option<u32>> =
             self.materials.iter().map(|material| material.number_among(&mut textures)).collect();
-        let of_triangle = |index: &u32| *of_material.get(*index as usize)?;
-        let numbers = self.material.iter().flatten().map(of_triangle).collect();
+        let material = |triangle: usize| self.material.as_ref()?.get(triangle).copied();
+        let of_triangle = |triangle: usize| *of_material.get(material(triangle)? as usize)?;
+        let numbers = (0..self.triangles.len()).map(of_triangle).collect();
         (textures, numbers)
     }
 

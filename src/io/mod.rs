@@ -24,6 +24,7 @@ pub mod png;
 pub mod points;
 mod polygon;
 pub mod texture;
+mod tree;
 pub(crate) mod triangles;
 mod values;
 pub mod write_behind;
@@ -35,6 +36,7 @@ pub use input::Input;
 pub use mesh::{Material, Mesh};
 pub use points::{Points, Up};
 pub use texture::Texture;
+pub use tree::{Tree, TreeRow};
 
 use crate::{Error, Progress, Result};
 use std::path::Path;

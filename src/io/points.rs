@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use super::Tree;
 pub use crate::scene::Up;
 use crate::scene::color::srgb_to_linear;
 use crate::scene::{Cap, Clip, Colors};
@@ -34,7 +35,7 @@ pub struct Points {
     pub flattened: Option<Flattened>,
     /// Texture coordinates (u, v), origin bottom left as in OBJ.
     pub texture: Option<Vec<[f32; 2]>>,
-    /// Which of several textures the coordinates are in; one past their number means none.
+    /// Which of several textures the coordinates are in; [`u32::MAX`] means none.
     pub texture_numbers: Option<Vec<u32>>,
     /// What u and v gain for a world unit along x, y and z; all zero where it is not known.
     pub texture_slopes: Option<Vec<[[f32; 3]; 2]>>,
@@ -44,6 +45,10 @@ pub struct Points {
     pub of_mesh: bool,
     /// The triangles that the points are the vertices of.
     pub faces: Option<Faces>,
+    /// Their levels of detail; they are in the order of the tree.
+    pub tree: Option<Tree>,
+    /// They have normals that tell no sides.
+    pub unsided: bool,
     /// A mesh that they are drawn beside: what is left of the one that they were made of.
     pub beside: Option<PathBuf>,
     /// They are the vertices of a mesh that is closed and faces outward, or surfels that cover one: nobody sees its back who is not
@@ -123,6 +128,7 @@ impl Points {
     /// keeps.
     pub(crate) fn retain(&mut self, keep: &[bool]) {
         self.closed &= keep.iter().all(|keep| *keep);
+        self.tree = self.tree.take().filter(|_| keep.iter().all(|keep| *keep));
         retain(&mut self.positions, keep);
         self.normals.iter_mut().for_each(|all| retain(all, keep));
         self.radii.iter_mut().for_each(|all| retain(all, keep));
@@ -153,6 +159,7 @@ pub(crate) fn taken(points: Points, of: Vec<u32>) -> Points {
         texture_numbers: points.texture_numbers.map(|numbers| each(&numbers, &of)),
         texture_slopes: points.texture_slopes.map(|slopes| each(&slopes, &of)),
         numbers: Some(of),
+        tree: None,
         ..points
     }
 }

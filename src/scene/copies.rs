@@ -43,8 +43,8 @@ pub(crate) fn copies(scene: &Scene) -> Vec<u32> {
     copies
 }
 
-/// By all that is drawn of two surfels.
-fn by_content(scene: &Scene, a: usize, b: usize) -> Ordering {
+/// By all that is drawn of two surfels without harmonics or a place in a texture.
+pub(crate) fn by_content(scene: &Scene, a: usize, b: usize) -> Ordering {
     let bits = |index: usize| {
         let surfel = &scene.surfels[index];
         let low = scene.low.get(index).copied().unwrap_or_default();

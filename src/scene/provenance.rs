@@ -5,7 +5,11 @@ use std::ops::Range;
 /// Where the surfels of a scene come from: inputs one after the other, each without the points that were left out. A scene that nobody
 /// read says nothing and counts as one input.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Provenance(Vec<Input>);
+pub struct Provenance {
+    inputs: Vec<Input>,
+    /// The number that each surfel had before the scene was put into another order.
+    order: Option<Vec<u32>>,
+}
 
 #[derive(Clone, Debug, PartialEq)]
 struct Input {
@@ -21,12 +25,12 @@ impl Provenance {
     /// Another input follows, whose first surfel would be number `first` of the scene; `left_out` are the numbers, in order, of those of
     /// its points that become none. Where one point becomes several surfels, `numbers` are those of each surfel's point among those that are kept.
     pub fn push(&mut self, first: u64, left_out: Vec<u64>, numbers: Option<Vec<u32>>) {
-        self.0.push(Input { first, left_out, numbers });
+        self.inputs.push(Input { first, left_out, numbers });
     }
 
     /// Only those surfels remain whose flag in `keep`, one for each, is set.
     pub(crate) fn retain(&mut self, keep: &[bool]) {
-        let mut inputs = std::mem::take(&mut self.0).into_iter().peekable();
+        let mut inputs = std::mem::take(&mut self.inputs).into_iter().peekable();
         let mut kept = 0;
         while let Some(Input { first, mut left_out, mut numbers }) = inputs.next() {
             let end = inputs.peek().map_or(keep.len() as u64, |next| next.first);
@@ -48,17 +52,25 @@ impl Provenance {
         }
     }
 
-    /// The surfels of each input that has some, of `surfels` in all.
+    /// The surfels of each input that has some, of `surfels` in all; all together where they are in an order that is not the inputs'.
     pub fn ranges(&self, surfels: u64) -> impl Iterator<Item = Range<u64>> {
-        let firsts = self.0.iter().skip(1).map(|input| input.first);
+        let inputs = if self.order.is_some() { &[][..] } else { &self.inputs };
+        let firsts = inputs.iter().skip(1).map(|input| input.first);
         let ends = firsts.clone().chain([surfels]);
         [0].into_iter().chain(firsts).zip(ends).map(|(first, end)| first..end).filter(|own| !own.is_empty())
     }
 
+    /// Surfel k becomes what number `order[k]` was.
+    pub(crate) fn reorder(&mut self, order: &[u32]) {
+        let before = |index: u32| self.order.as_ref().map_or(index, |before| before[index as usize]);
+        self.order = Some(order.iter().map(|&index| before(index)).collect());
+    }
+
     /// The number of the input that surfel `index` comes from, and of the point in it; both start at 0.
     pub fn of(&self, index: u64) -> (u64, u64) {
-        let after = self.0.partition_point(|input| input.first <= index);
-        let Some(input) = after.checked_sub(1).and_then(|input| self.0.get(input)) else { return (0, index) };
+        let index = self.order.as_ref().map_or(index, |order| order[index as usize].into());
+        let after = self.inputs.partition_point(|input| input.first <= index);
+        let Some(input) = after.checked_sub(1).and_then(|input| self.inputs.get(input)) else { return (0, index) };
         let kept = index - input.first;
         let of = input.numbers.as_ref().and_then(|numbers| numbers.get(kept as usize)).map(|&number| number.into());
         (after as u64 - 1, number(&input.left_out, of.unwrap_or(kept)))

@@ -1,9 +1,11 @@
 //! The scene: surfels around an origin, their colours, and which way is up.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{Cap, Clip, Colors, Provenance, Surfel, Triangles};
+use super::{Cap, Clip, Colors, Hierarchy, Provenance, Surfel, Triangles};
 
 /// The world axis that points up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -69,6 +71,8 @@ pub struct Scene {
     pub oriented: bool,
     /// The surfels close their surfaces and face outward, so that their backs are seen from inside alone.
     pub closed: bool,
+    /// Levels of detail of the surfels, which are in the order of the tree.
+    pub hierarchy: Option<Arc<Hierarchy>>,
     /// Triangles beside the surfels.
     pub triangles: Triangles,
     /// The axis a camera without instructions takes as up.

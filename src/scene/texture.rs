@@ -112,7 +112,8 @@ pub struct Place {
 ///
 /// **Error.** Let e be the bound of [`crate::passes::accumulate`] on a mean, as a fraction of its range. Coordinates err by e times
 /// their span, so a colour by that times the steepest slope of the interpolated texture (the largest difference of
-/// neighbouring texels times their number for each unit); the variance errs by less than `3 e span^2`, so within the
+/// neighbouring texels times their number for each unit); the part of the texture by e, so where terms have 24 bits a pixel of less than a few
+/// millionths of it may be looked up a halving or two too fine; the variance errs by less than `3 e span^2`, so within the
 /// passage the share of the texture errs by `3 e span^2 / mean of reach^2`, which the least reach keeps below `5e4 e`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Textured {

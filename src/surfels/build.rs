@@ -1,5 +1,7 @@
 //! From points to the scene that is rendered.
 
+use std::sync::Arc;
+
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -89,6 +91,7 @@ fn built_in_texture(
     limits: &Limits,
     progress: &dyn Progress,
 ) -> Result<(Scene, Preparation, Coordinates)> {
+    painting::clear_bare(&mut gathered.points);
     let unusable = |place: &[f32; 2]| !place.iter().all(|turns| turns.abs() <= LARGEST_PLACE);
     for place in gathered.points.texture.iter_mut().flatten().filter(|place| unusable(place)) {
         *place = [0.0; 2];
@@ -106,7 +109,8 @@ fn built_in_texture(
 ///
 /// Those of [`build`].
 pub fn build_at_vertices(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Preparation, Coordinates)> {
-    let inputs: Vec<Points> = inputs.into_iter().map(|input| mesh::of_mesh(input, By::Vertices)).collect();
+    let mut inputs: Vec<Points> = inputs.into_iter().map(|input| mesh::of_mesh(input, By::Vertices)).collect();
+    painting::number_together(&mut inputs)?;
     let all_placed = inputs.iter().all(|input| input.texture.is_some() || input.positions.is_empty());
     let mut gathered = gather::gather(inputs)?;
     if !all_placed {
@@ -166,7 +170,10 @@ pub(super) fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Prog
     };
     let mut surfels = given.surfels(estimated.as_ref(), origin);
     // Nobody says which side of a Gaussian is its front.
-    let oriented = preparation.estimated_normals == 0 && !preparation.has_random_sides() && !gathered.points.encoded;
+    let oriented = preparation.estimated_normals == 0
+        && !preparation.has_random_sides()
+        && !gathered.points.encoded
+        && !gathered.points.unsided;
     let caps = match estimated {
         Some(estimated) if limits.curved && preparation.estimated_radii > 0 => {
             estimated.caps(&given, &surfels, oriented)
@@ -180,14 +187,15 @@ pub(super) fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Prog
     preparation.rounding = rounding(&surfels, &low, relative);
     let normals = own_normals(&given, &surfels);
     let Gathered { points, provenance, .. } = gathered;
-    let Points { colors, encoded, closed, clips, texture, texture_slopes, .. } = points;
+    let Points { colors, encoded, closed, clips, texture, texture_slopes, tree, .. } = points;
     let (centers, slopes) = (texture.unwrap_or_default(), texture_slopes.unwrap_or_default());
     let (colors, closed) = (colors::folded(colors), closed && oriented);
     // Most scenes have no disk that ends before its rim.
     let clips: Vec<Clip> = clips.unwrap_or_default().into_iter().map(Clip::usable).collect();
     let clips = if clips.iter().all(Clip::is_none) { Vec::new() } else { clips };
     let of_disks = Scene { low, clips, caps, normals, ..Scene::default() };
-    let scene = Scene { origin, surfels, colors, encoded, oriented, closed, up, provenance, ..of_disks };
+    let hierarchy = tree.and_then(|tree| tree.hierarchy(origin)).map(Arc::new);
+    let scene = Scene { origin, surfels, colors, encoded, oriented, closed, up, provenance, hierarchy, ..of_disks };
     // As the default view sees it.
     preparation.strays = scene.framed().1;
     Ok(((scene, preparation), Coordinates { centers, slopes, atlas: Atlas::ONE }))

@@ -47,5 +47,5 @@ pub fn curve(points: Points, progress: &dyn Progress) -> Result<Points> {
     progress.end();
     let graph = NeighbourGraph::new(&distinct, NORMAL_NEIGHBOURS, progress);
     let caps = caps_of((&distinct, &graph), (&normals, true), axes);
-    Ok(Points { caps: Some(caps), ..points })
+    Ok(Points { caps: Some(caps), tree: None, ..points })
 }

@@ -16,7 +16,7 @@ use super::sizes::{
     RADIUS_NEIGHBOURS, Size, bsp_radii, common_radius, half_axes_at, local_limits, measure_triangles, offsets,
     open_radius,
 };
-use super::{Limits, Preparation, guess_up, origin_for, unit, usable_axes};
+use super::{Limits, Preparation, guess_up, origin_for, painting, unit, usable_axes};
 use crate::io::Points;
 use crate::scene::{Bounds, Clip, Surfel, body, framed};
 use crate::{Error, Progress, Result};
@@ -91,6 +91,7 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
     if options.size == Size::Qsplat {
         inputs.iter_mut().try_for_each(measure_triangles)?;
     }
+    painting::number_together(&mut inputs)?;
     let mut gathered = gather(inputs)?;
     gathered.points = std::mem::take(&mut gathered.points).in_light();
     if options.estimate_normals {
@@ -141,7 +142,7 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
     let caps = caps.map(|axes| caps_of((&distinct, &graph), (&point_normals, sided), axes));
     let (normals, radii, up) = (Some(point_normals), Some(radii), Some(known_up));
     // Which surfels cover a closed surface nobody knows.
-    let points = Points { normals, radii, axes, clips, caps, up, closed: false, ..gathered.points };
+    let points = Points { normals, radii, axes, clips, caps, up, closed: false, tree: None, ..gathered.points };
     preparation.limited_by_neighbours = sizes.limited(distinct.of_point());
     let radius = |index: usize| points.radii.as_ref().map_or(0.0, |radii| f64::from(radii[index]));
     preparation.strays = framed(count, |index| (DVec3::from_array(points.positions[index]), radius(index))).1;

@@ -73,6 +73,8 @@ fn join(all: &mut Points, mut input: Points) {
     append(&mut all.caps, before, input.caps, count);
     append(&mut all.texture, before, input.texture, count);
     append(&mut all.texture_numbers, before, input.texture_numbers, count);
+    all.tree = input.tree.filter(|_| before == 0).or(all.tree.take().filter(|_| count == 0));
+    all.unsided |= input.unsided;
     append(&mut all.texture_slopes, before, input.texture_slopes, count);
     all.closed &= input.closed || count == 0;
     if before == 0 {

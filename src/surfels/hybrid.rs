@@ -102,6 +102,10 @@ fn surfels_of(small: &Mesh, mesh: &Mesh, pixel: f64, progress: &dyn Progress) ->
     let (mut points, sampling) =
         sample(small, count, &Method::Stratified { priority: &priority, depth: None }, 0, progress)?;
     // Together with the triangles beside them they cover what the mesh does.
+    // Nobody could say which image is which.
+    if points.texture_numbers.take().is_some() {
+        points.texture = None;
+    }
     points.closed = sampling.faces_as_wound && is_closed(&mesh.positions, &mesh.triangles);
     Ok(points)
 }

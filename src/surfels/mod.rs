@@ -16,6 +16,7 @@ mod from_points;
 mod gaps;
 mod gather;
 mod graph;
+pub mod hierarchy;
 pub mod hybrid;
 mod limits;
 mod lines;

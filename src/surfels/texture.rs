@@ -1,5 +1,6 @@
 //! Surfels that are painted by a texture: how its coordinates change over their disks, and its mean there.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::{DMat2, DVec2, DVec3};
@@ -8,14 +9,11 @@ use rayon::prelude::*;
 use super::build::{Coordinates, LARGEST_PLACE};
 use super::neighbours::{Neighbour, NeighbourSearch};
 use super::positions::DistinctPositions;
-use crate::scene::{Atlas, Place, Scene, Surfel, Texture, Textured};
+use crate::scene::{Atlas, Bounds, Place, Scene, Surfel, Texture, Textured};
 use crate::{Progress, Result};
 
 /// Neighbours that tell how fast coordinates change: the first two rings of a square grid.
 const NEIGHBOURS: usize = 8;
-
-/// Those that are looked at where some may be in other textures, which tell nothing.
-const AMONG_OTHERS: usize = 3 * NEIGHBOURS;
 
 /// The change for each length, of those to the neighbours in order, that is typical. At a straight seam three of the first ring
 /// lie on the other side, and five at its corner.
@@ -69,8 +67,14 @@ fn given(scene: &Scene, coordinates: &Coordinates) -> Option<Vec<Place>> {
 
 /// The place of a surfel whose coordinates change so. It overlaps others that are as far off as it is large.
 fn of_slopes(surfel: &Surfel, center: [f32; 2], slopes: [[f32; 3]; 2]) -> Place {
-    let gains = slopes.map(|slope| DVec3::from_array(slope.map(f64::from)));
     let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
+    // What they gain off its plane is nothing of the surfel's.
+    let normal = s.cross(t).normalize_or_zero();
+    let gains = slopes.map(|slope| {
+        let gain = DVec3::from_array(slope.map(f64::from));
+        gain - gain.dot(normal) * normal
+    });
+    let slopes = gains.map(|gain| gain.as_vec3().to_array());
     let typical = (0.5 * (gains[0].length_squared() + gains[1].length_squared())).sqrt();
     Place {
         center,
@@ -82,7 +86,7 @@ fn of_slopes(surfel: &Surfel, center: [f32; 2], slopes: [[f32; 3]; 2]) -> Place 
 
 /// The change of coordinates for each length that is typical around a point, from steps to its neighbours in the order of their distance:
 /// in space, and in the texture.
-fn typical_change(steps: &[(DVec3, DVec2)]) -> f64 {
+pub(super) fn typical_change(steps: &[(DVec3, DVec2)]) -> f64 {
     let mut changes: Vec<f64> = steps.iter().map(|(offset, gain)| gain.length() / offset.length()).collect();
     changes.sort_by(f64::total_cmp);
     changes.get(RANK.min(changes.len().saturating_sub(1))).copied().unwrap_or(0.0)
@@ -113,63 +117,43 @@ pub(super) fn in_world(slopes: DMat2, [s, t]: [DVec3; 2]) -> [[f32; 3]; 2] {
     [0, 1].map(|k| (slopes.x_axis[k] * along_s + slopes.y_axis[k] * along_t).as_vec3().to_array())
 }
 
-/// The texture coordinates of positions, in the plane of their textures: of several surfels at one the smallest, which any order gives. None
-/// where surfels have none.
-pub(super) struct Placed {
-    pub(super) places: Vec<DVec2>,
-    atlas: Atlas,
-}
-
-impl Placed {
-    pub(super) fn new(positions: &DistinctPositions, coordinates: &Coordinates) -> Self {
-        let Coordinates { centers, atlas, .. } = coordinates;
-        let mut places = vec![[f32::INFINITY; 2]; if centers.is_empty() { 0 } else { positions.len() }];
-        for (own, &position) in centers.iter().zip(positions.of_point()) {
-            let known = &mut places[position as usize];
+/// What is `made` of each point, by its index, and of the steps to its nearest neighbours in the same texture, or in none as it is: in space, and
+/// in the plane of textures. Of several points of a texture at one position the smallest coordinates count, which any order gives.
+pub(super) fn around<T: Clone + Default + Send>(
+    (points, bounds): (&[[f64; 3]], &Bounds),
+    places: &[[f32; 2]],
+    atlas: &Atlas,
+    made: impl Fn(usize, &[(DVec3, DVec2)]) -> T + Sync,
+) -> Result<Vec<T>> {
+    let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+    for (index, place) in places.iter().enumerate() {
+        members.entry(atlas.number(place.map(f64::from))).or_default().push(index);
+    }
+    let mut all = vec![T::default(); places.len()];
+    for members in members.into_values() {
+        let own: Vec<[f64; 3]> = members.iter().map(|&index| points[index]).collect();
+        let distinct = DistinctPositions::new(&own, bounds, DVec3::ZERO)?;
+        let mut known = vec![[f32::INFINITY; 2]; distinct.len()];
+        for (&index, &position) in members.iter().zip(distinct.of_point()) {
+            let (known, own) = (&mut known[position as usize], places[index]);
             if own[0].total_cmp(&known[0]).then(own[1].total_cmp(&known[1])).is_lt() {
-                *known = *own;
+                *known = own;
             }
         }
-        let places = places.into_iter().map(|place| DVec2::from_array(place.map(f64::from))).collect();
-        Self { places, atlas: *atlas }
-    }
-
-    /// Whether two places are in one texture, or both in none.
-    pub(super) fn are_in_one(&self, a: DVec2, b: DVec2) -> bool {
-        self.atlas.number(a.to_array()) == self.atlas.number(b.to_array())
-    }
-
-    /// For the neighbours of [`Self::steps`].
-    fn search<'a>(&self, positions: &'a DistinctPositions) -> NeighbourSearch<'a> {
-        let several = self.atlas != Atlas::ONE;
-        NeighbourSearch::new(positions, if several { AMONG_OTHERS } else { NEIGHBOURS })
-    }
-
-    /// The steps from a surfel at a position, whose place is `at`, to the nearest neighbours that are in the same texture: in space, scaled, and in
-    /// the texture.
-    fn steps(
-        &self,
-        positions: &DistinctPositions,
-        found: &[Neighbour],
-        (from, at): (u32, DVec2),
-    ) -> Vec<(DVec3, DVec2)> {
-        let others = found.iter().map(|other| (other.index, self.places[other.index as usize]));
-        let step = |(other, place)| (positions.position(other) - positions.position(from), place - at);
-        others.filter(|(_, place)| self.are_in_one(*place, at)).take(NEIGHBOURS).map(step).collect()
-    }
-
-    /// The typical change around each position, for a scaled unit.
-    pub(super) fn changes(&self, positions: &DistinctPositions) -> Vec<f64> {
-        if self.places.is_empty() {
-            return Vec::new();
-        }
-        let search = self.search(positions);
-        let change = |found: &mut Vec<Neighbour>, (index, at): (usize, &DVec2)| {
-            search.nearest(index as u32, found);
-            typical_change(&self.steps(positions, found, (index as u32, *at)))
+        let search = NeighbourSearch::new(&distinct, NEIGHBOURS);
+        let of_point = |found: &mut Vec<Neighbour>, (&index, &position): (&usize, &u32)| {
+            search.nearest(position, found);
+            let exact = |place: [f32; 2]| DVec2::from_array(place.map(f64::from));
+            let step = |other: &Neighbour| {
+                let offset = (distinct.position(other.index) - distinct.position(position)) / distinct.scale();
+                (offset, exact(known[other.index as usize]) - exact(places[index]))
+            };
+            made(index, &found.iter().map(step).collect::<Vec<_>>())
         };
-        self.places.par_iter().enumerate().map_init(Vec::new, change).collect()
+        let of_members: Vec<T> = members.par_iter().zip(distinct.of_point()).map_init(Vec::new, of_point).collect();
+        members.iter().zip(of_members).for_each(|(&index, made)| all[index] = made);
     }
+    Ok(all)
 }
 
 /// The change of coordinates over each disk, by least squares over those neighbours that no jump lies before. The reach is that of
@@ -178,22 +162,14 @@ fn places(scene: &Scene, coordinates: &Coordinates, progress: &dyn Progress) -> 
     let surfels = &scene.surfels;
     let positions: Vec<[f64; 3]> =
         (0..surfels.len()).into_par_iter().map(|index| scene.center(index).to_array()).collect();
-    let distinct = DistinctPositions::new(&positions, &scene.bounds(), DVec3::ZERO)?;
-    let placed = Placed::new(&distinct, coordinates);
     progress.begin("measuring texture coordinates", surfels.len() as u64);
-    let search = placed.search(&distinct);
-    let of_surfel = |found: &mut Vec<Neighbour>, ((surfel, center), &position): ((&Surfel, &[f32; 2]), &u32)| {
-        search.nearest(position, found);
-        let at = DVec2::from_array(center.map(f64::from));
-        let steps = placed.steps(&distinct, found, (position, at)).into_iter();
-        let steps: Vec<_> = steps.map(|(offset, gain)| (offset / distinct.scale(), gain)).collect();
+    let Coordinates { centers, atlas, .. } = coordinates;
+    let all = around((&positions, &scene.bounds()), centers, atlas, |index, steps| {
         progress.advance(1);
-        place(surfel, *center, &steps)
-    };
-    let all =
-        surfels.par_iter().zip(&coordinates.centers).zip(distinct.of_point()).map_init(Vec::new, of_surfel).collect();
+        place(&surfels[index], centers[index], steps)
+    });
     progress.end();
-    Ok(all)
+    all
 }
 
 /// A surfel's place, from the steps to its neighbours: in world units, and in the texture.

@@ -2,6 +2,8 @@
 
 use super::*;
 use epsplat::io::ply;
+use epsplat::plan::Organisation;
+use epsplat::scene::{Triangle, Triangles};
 
 const BARE: [f32; 4] = [0.2, 0.5, 0.1, 1.0];
 
@@ -92,15 +94,15 @@ fn each_texture_shows_as_if_it_were_alone() {
 fn numbers_survive_files_and_simplification() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("several.ply");
-    let points = parted(12_000, 1.3);
-    ply::write_points(&path, &points, &()).unwrap();
+    let given = parted(12_000, 1.3);
+    ply::write_points(&path, &given, &()).unwrap();
     let read = io::read(&path, &()).unwrap();
-    assert_eq!((&read.texture, &read.texture_numbers), (&points.texture, &points.texture_numbers));
+    assert_eq!((&read.texture, &read.texture_numbers), (&given.texture, &given.texture_numbers));
     let (scene, _, coordinates) = build_at_vertices(vec![read], &()).unwrap();
     let (simplified, left, report) =
         simplify_in_texture(&scene, &coordinates, &within(0.0005, SplatShape::Cap), &()).unwrap();
     assert!(report.selected * 3 < report.surfels, "{report:?}");
-    let left = super::points(&simplified, left, SplatShape::Cap);
+    let left = points(&simplified, left, SplatShape::Cap);
     ply::write_points(&path, &left, &()).unwrap();
     let left = io::read(&path, &()).unwrap();
     let mut seen = [0; 3];
@@ -110,7 +112,8 @@ fn numbers_survive_files_and_simplification() {
         assert_eq!(*number, expected, "{y}");
         seen[(*number).min(2) as usize] += 1;
         let around = [0.5 + z.atan2(*x) / TAU, 1.0 - y.acos() / PI];
-        let seam = *x < 0.0 && z.abs() < 0.2;
+        // Where no texture is, coordinates are nothing.
+        let seam = *x < 0.0 && z.abs() < 0.2 || *number == u32::MAX;
         let off = (f64::from(*u) - around[0]).abs().max((f64::from(*v) - around[1]).abs());
         assert!(seam || off < 2e-3, "{u} {v} and {around:?}");
     }
@@ -128,9 +131,12 @@ fn textures_are_as_many_as_are_named() {
     assert_eq!(count(made(vec![plain(), plain()], vec![waves(true)]).unwrap()), 1);
     assert_eq!(count(made(vec![plain(), plain()], both()).unwrap()), 2);
     assert_eq!(count(made(vec![several()], both()).unwrap()), 2);
+    // A last image that no point is in, and an input that needs none.
+    assert_eq!(count(made(vec![plain()], both()).unwrap()), 2);
+    assert_eq!(count(made(vec![plain(), Points::default()], both()).unwrap()), 2);
     assert_eq!(count(made(vec![plain(), several()], [both(), both()[..1].to_vec()].concat()).unwrap()), 3);
     for (inputs, textures, told) in [
-        (vec![plain()], both(), "2 textures are given, and one is needed"),
+        (vec![plain(), plain()], [both(), both()].concat(), "4 textures are given, and 2 are needed"),
         (vec![several()], vec![waves(true)], "1 texture is given, and 2 are needed"),
         (vec![plain(), several()], both(), "2 textures are given, and 3 are needed"),
     ] {
@@ -149,11 +155,13 @@ fn textures_are_as_many_as_are_named() {
 fn samples_of_a_mesh_with_several_images_are_painted_by_them() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    for (name, code) in [("red.png", [255, 0, 0, 255]), ("blue.png", [0, 0, 255, 255])] {
+    for (name, code) in [("red.png", [255, 0, 0, 255]), ("blue.png", [0, 0, 255, 255]), ("gray.png", [99, 99, 99, 255])]
+    {
         let texels = vec![code; 16];
         io::png::write_texture(path(name).as_ref(), &Texture::new(4, 4, texels).unwrap()).unwrap();
     }
-    let materials = "newmtl a\nmap_Kd red.png\nnewmtl b\nmap_Kd blue.png\nnewmtl c\nKd 0 1 0\n";
+    let materials =
+        "newmtl a\nmap_Kd red.png\nnewmtl b\nmap_Kd blue.png\nnewmtl c\nKd 0 1 0\nnewmtl d\nmap_Kd gray.png\n";
     std::fs::write(path("three.mtl"), materials).unwrap();
     let mut mesh = "mtllib three.mtl\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n".to_owned();
     for (k, material) in ["a", "b", "c"].iter().enumerate() {
@@ -162,6 +170,8 @@ fn samples_of_a_mesh_with_several_images_are_painted_by_them() {
             "v {left} 0 0\nv {right} 0 0\nv {right} 2 0\nv {left} 2 0\nusemtl {material}\nf -4/1 -3/2 -2/3 -1/4\n"
         );
     }
+    // A triangle without an area, of which there are no samples.
+    mesh += "usemtl d\nf -1/1 -1/2 -1/3\n";
     std::fs::write(path("three.obj"), mesh).unwrap();
     let run = |arguments: &[&str]| {
         let run =
@@ -171,7 +181,7 @@ fn samples_of_a_mesh_with_several_images_are_painted_by_them() {
     };
     let told = run(&["sample", "three.obj", "-o", "three.ply", "--count", "3000"]);
     let command = told.lines().find_map(|line| line.split("epsplat render ").nth(1)).unwrap();
-    assert_eq!(command, "three.ply --texture red.png --texture blue.png");
+    assert_eq!(command, "three.ply --texture red.png --texture blue.png --texture gray.png");
     let view = [
         "--shading",
         "unlit",
@@ -220,4 +230,107 @@ fn neighbours_in_another_texture_tell_nothing() {
     let two = largest(vec![first.clone(), second(0.0)], both());
     let one = largest(vec![first.clone(), second(3.0)], vec![waves(true)]);
     assert!(two < 2.0 * alone && one > 10.0 * alone, "{alone} {two} {one}");
+}
+
+/// Past the edges of its image a surfel shows that image, on every side, and where all its coordinates are one place.
+#[test]
+fn no_texture_shows_past_the_edges_of_another() {
+    let Some(gpu) = common::gpu() else { return };
+    let plain = |code: [u8; 4]| Texture::new(2, 2, vec![code; 4]).unwrap();
+    let colors = [[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255], [255, 255, 0, 255]];
+    let patch = |number: usize, place: fn([f64; 2]) -> [f32; 2]| {
+        let at = |k: usize| [(k % 9) as f64 / 8.0, (k / 9) as f64 / 8.0];
+        let [x, y] = [(number % 2) as f64 * 1.6, (number / 2) as f64 * 1.6];
+        Points {
+            positions: (0..81).map(|k| [x + at(k)[0], y + at(k)[1], 0.0]).collect(),
+            normals: Some(vec![[0.0, 0.0, 1.0]; 81]),
+            radii: Some(vec![0.19; 81]),
+            texture: Some((0..81).map(|k| place(at(k))).collect()),
+            ..Points::default()
+        }
+    };
+    let camera = Camera::look_at(
+        (90, 90),
+        Lens::OrthographicHeight(3.4),
+        DVec3::new(1.3, 1.3, 9.0),
+        DVec3::new(1.3, 1.3, 0.0),
+        None,
+        Up::Y,
+        1e-3,
+    );
+    let camera = camera.unwrap();
+    let textures = || colors.map(plain).to_vec();
+    let backends = [Backend::Reference, Backend::gpu(gpu)];
+    let places: [fn([f64; 2]) -> [f32; 2]; 2] = [|at| at.map(|c| c as f32), |_| [0.0; 2]];
+    for (place, backend) in places.iter().flat_map(|place| backends.iter().map(move |backend| (place, backend))) {
+        let inputs = (0..4).map(|number| patch(number, *place)).collect();
+        let scene = build_textured(inputs, textures(), &()).unwrap().0;
+        let (frame, _) = render(&scene, &camera, &unlit(), backend, &()).unwrap();
+        let mut seen = 0;
+        for (pixel, color) in frame.color.iter().enumerate().filter(|(_, color)| color[3] > 0.0) {
+            let right = pixel % 90 >= 45;
+            let upper = pixel / 90 < 45;
+            let code = colors[usize::from(right) + 2 * usize::from(upper)].map(|code| f32::from(code) / 255.0);
+            let off = (0..3).map(|k| (color[k] / color[3] - code[k]).abs()).fold(0.0, f32::max);
+            assert!(off < 1e-5, "{pixel}: {color:?} and {code:?}");
+            seen += 1;
+        }
+        assert!(seen > 4000, "{seen}");
+    }
+}
+
+/// Surfels and triangles with textures of their own in one scene: the device as the twin; other numbers would be seen.
+#[test]
+fn surfels_and_triangles_have_their_own_textures() {
+    let Some(gpu) = common::gpu() else { return };
+    let scene = build_textured(vec![parted(3000, 1.5)], both(), &()).unwrap().0;
+    let wall = |texture: u32| {
+        let corners = [[-3.0, -3.0, 0.1], [3.0, -3.0, 0.1], [0.0, 4.0, 0.1]];
+        Triangle {
+            corners,
+            normals: None,
+            colors: [[1.0; 4]; 3],
+            texture: Some((texture, [[0.0, 0.0], [3.0, 0.0], [1.5, 3.0]])),
+        }
+    };
+    let textures: Vec<std::sync::Arc<Texture>> = both().into_iter().rev().map(Into::into).collect();
+    let with = |texture: u32| Scene { triangles: Triangles::textured(&[wall(texture)], &textures), ..scene.clone() };
+    let camera = camera(96, Projection::Pinhole);
+    let exact = RenderOptions { maps: Maps::of(&[Map::Decision]), ..unlit() };
+    let (twin, _) = render(&with(0), &camera, &exact, &Backend::Reference, &()).unwrap();
+    let decided = twin.map(Map::Decision).unwrap();
+    let off = |frame: &Frame| {
+        let far = |pixel: &usize| (0..4).any(|k| (frame.color[*pixel][k] - twin.color[*pixel][k]).abs() > 2e-3);
+        (0..96 * 96).filter(|&pixel| decided[pixel] > 1e-4).filter(far).count()
+    };
+    let backend = Backend::gpu(gpu);
+    for organisation in [Organisation::Scatter, Organisation::Tile] {
+        let options = RenderOptions { organisation, ..unlit() };
+        let drawn = |texture: u32| render(&with(texture), &camera, &options, &backend, &()).unwrap().0;
+        let (same, other) = (off(&drawn(0)), off(&drawn(1)));
+        assert!(same < 20 && other > 500, "{organisation:?}: {same} {other}");
+    }
+}
+
+/// Numbers of several inputs are told apart, where any has some.
+#[test]
+fn inputs_that_are_simplified_together_keep_their_textures() {
+    let numbers = |inputs: Vec<Points>| {
+        let (scene, _, coordinates) = build_at_vertices(inputs, &()).unwrap();
+        let (simplified, left, _) =
+            simplify_in_texture(&scene, &coordinates, &within(0.0005, SplatShape::Cap), &()).unwrap();
+        let left = points(&simplified, left, SplatShape::Cap).texture_numbers;
+        left.map(|all| all.into_iter().collect::<std::collections::BTreeSet<_>>().into_iter().collect::<Vec<_>>())
+    };
+    let far = |mut points: Points| {
+        points.positions.iter_mut().for_each(|position| position[0] += 5.0);
+        points
+    };
+    assert_eq!(numbers(vec![parted(2000, 1.3), far(parted(2000, 1.3))]), Some(vec![0, 1, 2, 3, u32::MAX]));
+    assert_eq!(numbers(vec![parted(2000, 1.3), far(belt(2000, 1.3))]), Some(vec![0, 1, 2, u32::MAX]));
+    assert_eq!(numbers(vec![belt(2000, 1.3), far(belt(2000, 1.3))]), None);
+    let mut beyond = parted(300, 1.3);
+    beyond.texture_numbers = Some(vec![4_000_000_000; beyond.positions.len()]);
+    let error = build_at_vertices(vec![beyond], &()).unwrap_err().to_string();
+    assert!(error.contains("texture 4000000000"), "{error}");
 }

@@ -3,11 +3,11 @@
 use super::contents::{Contents, ends_early, negative_list};
 use super::faces::{Faces, Role, needed};
 use super::header::{Element, Header, Kind};
-use super::vertex::{Layout, Vertices};
+use super::vertex::{Layout, Vertices, is_tree};
 use crate::Progress;
-use crate::io::Points;
 use crate::io::fault::Fault;
 use crate::io::values::{parse_number, shown};
+use crate::io::{Points, Tree, TreeRow};
 use std::io::{self, BufRead};
 
 /// A number in text is shorter.
@@ -22,10 +22,13 @@ pub(super) fn read(
     progress: &dyn Progress,
 ) -> Result<Contents, Fault> {
     let mut tokens = Tokens { reader, line: header.lines + 1, line_end: header.line_end, token: Vec::new() };
-    let mut contents = Contents { faces, points: Points::default() };
+    let mut contents = Contents { faces, points: Points::default(), tree: None };
     for element in needed(&header.elements) {
         if element.name == "vertex" {
-            contents.points = vertices(&mut tokens, element, length, progress)?;
+            (contents.points, _) = vertices(&mut tokens, element, length, progress)?;
+        } else if is_tree(element) {
+            let (nodes, rows) = vertices(&mut tokens, element, length, &())?;
+            contents.tree = Some(Tree { nodes: Box::new(nodes), rows });
         } else {
             others(&mut tokens, element, &mut contents.faces)?;
         }
@@ -61,7 +64,7 @@ fn vertices(
     vertex: &Element,
     length: u64,
     progress: &dyn Progress,
-) -> Result<Points, Fault> {
+) -> Result<(Points, Vec<TreeRow>), Fault> {
     let layout = Layout::of(vertex)?;
     // Each number takes a digit and a separator at least.
     let possible = length / (2 * layout.scalars.len().max(1)) as u64;

@@ -3,10 +3,10 @@
 use super::contents::{Contents, ends_early, negative_list};
 use super::faces::{Faces, Role, needed};
 use super::header::{Element, Header, Kind, Scalar};
-use super::vertex::{Layout, Vertices};
+use super::vertex::{Layout, Vertices, is_tree};
 use crate::Progress;
-use crate::io::Points;
 use crate::io::fault::Fault;
+use crate::io::{Points, Tree, TreeRow};
 use std::io::{self, BufRead, Read};
 
 /// Bytes of rows, or of a list, that are decoded together.
@@ -20,10 +20,13 @@ pub(super) fn read<const BIG: bool>(
     faces: Faces,
     progress: &dyn Progress,
 ) -> Result<Contents, Fault> {
-    let mut contents = Contents { faces, points: Points::default() };
+    let mut contents = Contents { faces, points: Points::default(), tree: None };
     for element in needed(&header.elements) {
         if element.name == "vertex" {
-            contents.points = vertices::<BIG>(&mut reader, element, length, progress)?;
+            (contents.points, _) = vertices::<BIG>(&mut reader, element, length, progress)?;
+        } else if is_tree(element) {
+            let (nodes, rows) = vertices::<BIG>(&mut reader, element, length, &())?;
+            contents.tree = Some(Tree { nodes: Box::new(nodes), rows });
         } else if Faces::are(element) {
             self::faces::<BIG>(&mut reader, element, &mut contents.faces)?;
         } else {
@@ -38,7 +41,7 @@ fn vertices<const BIG: bool>(
     vertex: &Element,
     length: u64,
     progress: &dyn Progress,
-) -> Result<Points, Fault> {
+) -> Result<(Points, Vec<TreeRow>), Fault> {
     let layout = Layout::of(vertex)?;
     let possible = length / layout.row_size.max(1) as u64;
     let mut vertices = Vertices::with_capacity(&layout, vertex.count.min(possible))?;

@@ -2,14 +2,15 @@
 
 use super::faces::Faces;
 use super::header::Element;
-use crate::io::Points;
 use crate::io::fault::Fault;
 use crate::io::values::shown;
+use crate::io::{Points, Tree};
 
 /// What is read of a file.
 pub(super) struct Contents {
     pub(super) points: Points,
     pub(super) faces: Faces,
+    pub(super) tree: Option<Tree>,
 }
 
 /// The file ended inside an element.

@@ -1,6 +1,7 @@
 //! The triangles of a PLY file: polygons of the element `face`, strips of the element `tristrips`.
 
 use super::header::{Element, Kind, Property};
+use super::vertex::is_tree;
 use crate::io::fault::Fault;
 use crate::io::polygon;
 use glam::DVec3;
@@ -56,7 +57,7 @@ pub(super) struct Faces {
 
 /// The elements up to the last one that is read.
 pub(super) fn needed(elements: &[Element]) -> &[Element] {
-    let read = |element: &Element| element.name == "vertex" || Faces::are(element);
+    let read = |element: &Element| element.name == "vertex" || is_tree(element) || Faces::are(element);
     &elements[..elements.iter().rposition(read).map_or(0, |last| last + 1)]
 }
 

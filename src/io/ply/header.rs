@@ -95,6 +95,8 @@ pub(super) struct Header {
     pub(super) beside: Option<String>,
     /// The surfels cover a closed surface, as it says too.
     pub(super) closed: bool,
+    /// Normals tell no sides, as it says too.
+    pub(super) unsided: bool,
     /// Lines, `end_header` included: the first value of an ASCII file is on the next.
     pub(super) lines: u64,
     /// What lines end with.
@@ -108,7 +110,7 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
     let (mut textures, mut up, mut closed) = (Vec::new(), None, false);
-    let (mut own, mut beside) = (false, None);
+    let (mut own, mut beside, mut unsided) = (false, None, false);
     for number in 1.. {
         line.clear();
         reader.take(LINE_LIMIT).read_until(line_end, &mut line)?;
@@ -139,6 +141,7 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
                 textures.extend(comment.strip_prefix("TextureFile ").map(|name| name.trim().to_owned()));
                 up = [Up::Y, Up::Z].into_iter().find(|up| words.clone().eq(["up", up.name()])).or(up);
                 closed |= comment == "closed";
+                unsided |= comment == "unsided";
                 own |= comment.starts_with("epsplat ");
                 // Others may mean something else by it.
                 let named = comment.strip_prefix("triangles ").filter(|_| own);
@@ -162,7 +165,17 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
             }
             Some("end_header") => {
                 let encoding = encoding.ok_or_else(|| malformed("the PLY header has no format line"))?;
-                return Ok(Header { encoding, elements, textures, up, closed, beside, lines: number, line_end });
+                return Ok(Header {
+                    encoding,
+                    elements,
+                    textures,
+                    up,
+                    closed,
+                    unsided,
+                    beside,
+                    lines: number,
+                    line_end,
+                });
             }
             Some(_) => return Err(malformed("not a PLY header line")),
         }

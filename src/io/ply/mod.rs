@@ -13,7 +13,13 @@
 //! | `texture_u texture_v` | `float` | texture coordinates, origin bottom left |
 //! | `texture_u_x texture_u_y texture_u_z texture_v_x texture_v_y texture_v_z` | `float` | what they gain for a world unit along x, y and z |
 //!
-//! The header has a comment `up y` or `up z` where that is known, `closed` for surfels that cover a closed surface, and `triangles NAME`
+//! | `texnumber` | `int` | which of several textures these coordinates are in, -1 of none |
+//!
+//! Levels of detail are another element `node` after the vertices, which are in the order of the tree: `x y z`, `radius` of the sphere around what is
+//! below, half-axes and colour as above, `cone`, the smallest cosine of the angle between a normal below and its own (-1: normals have no
+//! side), and `first`, `count` and `leaf`, which nodes, or of a leaf which vertices, are below it ([`Hierarchy`](crate::scene::Hierarchy)).
+//!
+//! The header has a comment `up y` or `up z` where that is known, `closed` for surfels that cover a closed surface, `unsided` where normals tell no sides, and `triangles NAME`
 //! for those that are drawn beside a mesh: no other program says it in a PLY file, and none stumbles over it.
 //!
 //! Files of Gaussians, whose vertices have other names, are read too ([`read`]).

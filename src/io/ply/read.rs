@@ -137,10 +137,17 @@ fn contents(
         Encoding::BigEndian => binary::read::<true>(reader, &header, length, Faces::new(surface), progress),
     };
     progress.end();
-    let Contents { mut points, faces } = contents.map_err(in_file)?;
+    let Contents { mut points, faces, tree } = contents.map_err(in_file)?;
     gaussian::check(&points, flatten).map_err(in_file)?;
     points.up = header.up;
     points.closed = header.closed;
+    points.unsided = header.unsided;
+    if let Some(tree) = tree {
+        if let Some(what) = tree.fault(points.positions.len()) {
+            return Err(in_file(Fault::Malformed(format!("its levels of detail (element node) are no tree: {what}"))));
+        }
+        points.tree = Some(tree);
+    }
     points.beside = header.beside.map(|name| beside(path.parent().unwrap_or(Path::new("")), &name));
     let triangles = faces.finish(&points.positions).map_err(in_file)?;
     Ok((points, triangles, header.textures))

@@ -2,9 +2,9 @@
 
 use super::gaussian::{GaussianLayout, Gaussians};
 use super::header::{Element, Kind, Scalar};
-use crate::io::Points;
 use crate::io::fault::{Fault, reserve};
 use crate::io::values::{SRGB16_TO_LINEAR, finite};
+use crate::io::{Points, TreeRow};
 use crate::scene::color::SRGB8_TO_LINEAR;
 use crate::scene::{Cap, Clip, Colors};
 
@@ -75,6 +75,17 @@ pub(super) struct Layout {
     texture_number: Option<usize>,
     texture_slopes: Option<[[usize; 3]; 2]>,
     gaussian: Option<GaussianLayout>,
+    /// Cone, first, count and leaf of a node.
+    node: Option<[usize; 4]>,
+}
+
+/// What a node has beside an ellipse and a colour ([`TreeRow`]).
+pub(super) const NODE_NAMES: [&str; 4] = ["cone", "first", "count", "leaf"];
+
+/// Whether an element has levels of detail: other programs may call something else a node.
+pub(super) fn is_tree(element: &Element) -> bool {
+    let has = |name: &str| element.properties.iter().any(|property| property.name == name);
+    element.name == "node" && ["x", "y", "z", "sx", "tz", "radius"].into_iter().chain(NODE_NAMES).all(has)
 }
 
 /// The lines at which an ellipse ends ([`Clip`]), in units of its half-axes.
@@ -145,6 +156,10 @@ impl Layout {
         });
         let texture = TEXTURE_NAMES.iter().find_map(|[u, v]| Some([column(&[u])?, column(&[v])?]));
         let texture_number = texture.and_then(|_| column(&[NUMBER_NAME]));
+        let node = Some(NODE_NAMES).filter(|_| is_tree(vertex)).and_then(|names| {
+            let found: Vec<usize> = names.iter().filter_map(|name| column(&[name])).collect();
+            <[usize; 4]>::try_from(found).ok()
+        });
         let coded = |index: usize| (index, Coding::of(columns[index].scalar));
         let (color, alpha) = (color.map(|color| color.map(coded)), alpha.map(coded));
         Ok(Self {
@@ -163,6 +178,7 @@ impl Layout {
             texture_number,
             texture_slopes: texture_slopes.filter(|_| texture.is_some()),
             gaussian: None,
+            node,
         })
     }
 
@@ -188,6 +204,7 @@ pub(super) struct Vertices<'a> {
     srgb8: Vec<[u8; 4]>,
     linear: Vec<[f32; 4]>,
     gaussians: Option<Gaussians<'a>>,
+    rows: Vec<TreeRow>,
 }
 
 impl<'a> Vertices<'a> {
@@ -213,6 +230,8 @@ impl<'a> Vertices<'a> {
         };
         reserve(&mut srgb8, codes)?;
         reserve(&mut linear, lights)?;
+        let mut tree = Vec::new();
+        reserve(&mut tree, if layout.node.is_some() { rows } else { 0 })?;
         let gaussians = layout.gaussian.as_ref().map(|own| Gaussians::with_capacity(own, rows)).transpose()?;
         Ok(Self {
             layout,
@@ -228,6 +247,7 @@ impl<'a> Vertices<'a> {
             srgb8,
             linear,
             gaussians,
+            rows: tree,
         })
     }
 
@@ -273,6 +293,15 @@ impl<'a> Vertices<'a> {
             let slopes = |row: usize| slopes.map(|slope| slope.map(|column| value(column, row) as f32));
             self.texture_slopes.extend((0..rows).map(slopes));
         }
+        if let Some([cone, first, count, leaf]) = layout.node {
+            // A cast takes what is no such number for another one, which makes no tree.
+            self.rows.extend((0..rows).map(|row| TreeRow {
+                cone: value(cone, row) as f32,
+                first: value(first, row) as u32,
+                count: value(count, row) as u32,
+                leaf: value(leaf, row) != 0.0,
+            }));
+        }
         if let Some(color) = layout.color {
             if layout.is_srgb8() {
                 self.srgb8.extend((0..rows).map(|row| {
@@ -288,7 +317,8 @@ impl<'a> Vertices<'a> {
         }
     }
 
-    pub(super) fn into_points(self) -> Points {
+    /// The points, and of nodes what else they have.
+    pub(super) fn into_points(self) -> (Points, Vec<TreeRow>) {
         let layout = self.layout;
         let colors = match (layout.color.is_some(), layout.is_srgb8()) {
             (false, _) => None,
@@ -312,6 +342,6 @@ impl<'a> Vertices<'a> {
         if let Some(gaussians) = self.gaussians {
             gaussians.finish(&mut points);
         }
-        points
+        (points, self.rows)
     }
 }

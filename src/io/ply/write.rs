@@ -1,9 +1,9 @@
 //! From surfels to PLY bytes.
 
-use super::vertex::{CAP_NAMES, CLIP_NAMES, NUMBER_NAME, SLOPE_NAMES};
+use super::vertex::{CAP_NAMES, CLIP_NAMES, NODE_NAMES, NUMBER_NAME, SLOPE_NAMES};
 use super::write_gaussians;
 use crate::io::atomic::{Output, write_whole};
-use crate::io::{Points, Up};
+use crate::io::{Points, Tree, Up};
 use crate::scene::color::{DEFAULT_COLOR, SRGB8_TO_LINEAR, linear_to_srgb};
 use crate::scene::{Cap, Clip, Colors};
 use crate::{Error, Progress, Result};
@@ -46,7 +46,7 @@ pub enum Color {
 
 impl Color {
     /// 8-bit sRGB; linear light outside [0, 1] is clamped.
-    fn srgb8(self) -> [u8; 4] {
+    pub(crate) fn srgb8(self) -> [u8; 4] {
         match self {
             Self::Srgb8(codes) => codes,
             Self::Linear([r, g, b, a]) => {
@@ -106,6 +106,8 @@ pub struct Properties {
     pub texture_slopes: bool,
     /// `comment up y` or `comment up z` says which way is up.
     pub up: Option<Up>,
+    /// `comment unsided` says that normals tell no sides.
+    pub unsided: bool,
     /// `comment closed` says that the surfels cover a closed surface, from outside.
     pub closed: bool,
 }
@@ -131,6 +133,7 @@ impl Properties {
             texture_number: points.texture.is_some() && points.texture_numbers.is_some(),
             texture_slopes: points.texture.is_some() && points.texture_slopes.is_some(),
             up: points.up,
+            unsided: points.unsided,
             closed: points.closed,
         }
     }
@@ -143,8 +146,16 @@ impl Properties {
         if self.closed {
             writeln!(out, "comment closed")?;
         }
+        if self.unsided {
+            writeln!(out, "comment unsided")?;
+        }
         comments.iter().try_for_each(|comment| writeln!(out, "comment {comment}"))?;
         writeln!(out, "element vertex {count}")?;
+        self.write_properties(out)
+    }
+
+    /// The lines of an element's properties.
+    fn write_properties(self, out: &mut Output<'_>) -> io::Result<()> {
         let mut scalars =
             |kind: &str, names: &[&str]| names.iter().try_for_each(|name| writeln!(out, "property {kind} {name}"));
         scalars(if self.double_coordinates { "double" } else { "float" }, &["x", "y", "z"])?;
@@ -235,20 +246,29 @@ pub fn write(
     count: u64,
     vertices: impl IntoIterator<Item = Vertex>,
 ) -> Result<()> {
-    write_beside(path, properties, None, count, vertices)
+    write_beside(path, (properties, count, vertices), None, None)
 }
 
-/// The same, drawn beside the mesh of a file.
+/// The same, drawn beside the mesh of a file, with levels of detail.
 fn write_beside(
     path: &Path,
-    properties: Properties,
+    (properties, count, vertices): (Properties, u64, impl IntoIterator<Item = Vertex>),
     beside: Option<&Path>,
-    count: u64,
-    vertices: impl IntoIterator<Item = Vertex>,
+    tree: Option<&Tree>,
 ) -> Result<()> {
     let comments: Vec<String> = beside.map(|mesh| format!("triangles {}", mesh.display())).into_iter().collect();
     write_whole(path, |out| {
         properties.write_header(out, count, &comments)?;
+        let nodes = tree.map(|tree| (tree, node_properties(tree)));
+        if let Some((tree, properties)) = nodes {
+            writeln!(out, "element node {}", tree.rows.len())?;
+            properties.write_properties(out)?;
+            let [cone, first, count, leaf] = NODE_NAMES;
+            write!(
+                out,
+                "property float {cone}\nproperty uint {first}\nproperty uint {count}\nproperty uchar {leaf}\n"
+            )?;
+        }
         out.write_all(b"end_header\n")?;
         let mut written = 0;
         let mut row = Vec::with_capacity(96);
@@ -258,12 +278,25 @@ fn write_beside(
             out.write_all(&row)?;
             written += 1;
         }
-        if written == count {
-            Ok(())
-        } else {
-            Err(io::Error::other(format!("{count} vertices were announced, but {written} came")))
+        if written != count {
+            return Err(io::Error::other(format!("{count} vertices were announced, but {written} came")));
         }
+        for (index, node) in nodes.iter().flat_map(|(tree, _)| tree.rows.iter().enumerate()) {
+            row.clear();
+            let points = nodes.map(|(tree, properties)| (&tree.nodes, properties));
+            points.into_iter().for_each(|(points, properties)| properties.encode(&vertex(points, index), &mut row));
+            row.extend(node.cone.to_le_bytes());
+            row.extend([node.first, node.count].map(u32::to_le_bytes).as_flattened());
+            row.push(node.leaf.into());
+            out.write_all(&row)?;
+        }
+        Ok(())
     })
+}
+
+/// A node has no normal but its half-axes', and a radius that is its sphere's.
+fn node_properties(tree: &Tree) -> Properties {
+    Properties { normals: false, ..Properties::of(&tree.nodes) }
 }
 
 /// Writes all that `points` hold, so that [`read`](super::read) gives them back; Gaussians as files of 2D Gaussian splatting have them, in f32.
@@ -280,34 +313,40 @@ pub fn write_points(path: &Path, points: &Points, progress: &dyn Progress) -> Re
     }
     let count = points.positions.len();
     progress.begin("writing points", count as u64);
-    let vertices = points.positions.iter().enumerate().map(|(index, position)| {
+    let vertices = (0..count).map(|index| {
         if index % TOLD == TOLD - 1 {
             progress.advance(TOLD as u64);
         }
-        let axes = of(&points.axes, index);
-        Vertex {
-            position: *position,
-            clip: of(&points.clips, index).unwrap_or_default(),
-            cap: of(&points.caps, index).unwrap_or_default(),
-            normal: of(&points.normals, index).unwrap_or_else(|| axes.map_or([0.0; 3], normal)),
-            radius: of(&points.radii, index).unwrap_or_else(|| axes.map_or(0.0, longer)),
-            axes: axes.unwrap_or_default(),
-            color: match &points.colors {
-                Some(Colors::Srgb8(codes)) => codes.get(index).map(|code| Color::Srgb8(*code)),
-                Some(Colors::Linear(colors)) => colors.get(index).map(|color| Color::Linear(*color)),
-                Some(Colors::Constant(color)) => Some(Color::Linear(*color)),
-                Some(Colors::Textured(textured)) => textured.colors().get(index).map(|color| Color::Linear(*color)),
-                Some(colors @ Colors::Harmonics(_)) => Some(Color::Linear(colors.linear(index))),
-                None => None,
-            },
-            texture: of(&points.texture, index).unwrap_or_default(),
-            texture_number: of(&points.texture_numbers, index).map_or(-1, |number| i32::try_from(number).unwrap_or(-1)),
-            texture_slopes: of(&points.texture_slopes, index).unwrap_or_default(),
-        }
+        vertex(points, index)
     });
-    let written = write_beside(path, Properties::of(points), points.beside.as_deref(), count as u64, vertices);
+    let all = (Properties::of(points), count as u64, vertices);
+    let written = write_beside(path, all, points.beside.as_deref(), points.tree.as_ref());
     progress.end();
     written
+}
+
+/// What is written of a point.
+fn vertex(points: &Points, index: usize) -> Vertex {
+    let axes = of(&points.axes, index);
+    Vertex {
+        position: points.positions[index],
+        clip: of(&points.clips, index).unwrap_or_default(),
+        cap: of(&points.caps, index).unwrap_or_default(),
+        normal: of(&points.normals, index).unwrap_or_else(|| axes.map_or([0.0; 3], normal)),
+        radius: of(&points.radii, index).unwrap_or_else(|| axes.map_or(0.0, longer)),
+        axes: axes.unwrap_or_default(),
+        color: match &points.colors {
+            Some(Colors::Srgb8(codes)) => codes.get(index).map(|code| Color::Srgb8(*code)),
+            Some(Colors::Linear(colors)) => colors.get(index).map(|color| Color::Linear(*color)),
+            Some(Colors::Constant(color)) => Some(Color::Linear(*color)),
+            Some(Colors::Textured(textured)) => textured.colors().get(index).map(|color| Color::Linear(*color)),
+            Some(colors @ Colors::Harmonics(_)) => Some(Color::Linear(colors.linear(index))),
+            None => None,
+        },
+        texture: of(&points.texture, index).unwrap_or_default(),
+        texture_number: of(&points.texture_numbers, index).map_or(-1, |number| i32::try_from(number).unwrap_or(-1)),
+        texture_slopes: of(&points.texture_slopes, index).unwrap_or_default(),
+    }
 }
 
 /// Whether the path is one of a PLY file, by its extension.

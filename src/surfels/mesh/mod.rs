@@ -91,7 +91,14 @@ fn of_triangles(points: Points, triangles: &[[u32; 3]], all: &[Made]) -> Points 
     let texture = points.texture.as_ref().map(place);
     let first = all.iter().map(|made| corners(made)[0]).collect();
     let positions = all.iter().map(|made| made.center.to_array()).collect();
-    shaped(Points { positions, texture, ..taken(points, first) }, all)
+    // In no texture where its corners are in several.
+    let number = |numbers: &Vec<u32>| {
+        let own = |made: &Made| corners(made).map(|corner| numbers[corner as usize]);
+        let one = |[a, b, c]: [u32; 3]| if a == b && a == c { a } else { u32::MAX };
+        all.iter().map(|made| one(own(made))).collect()
+    };
+    let texture_numbers = points.texture_numbers.as_ref().map(number);
+    shaped(Points { positions, texture, texture_numbers, ..taken(points, first) }, all)
 }
 
 /// `points`, one for each surfel, in the surfels' shapes.

@@ -107,7 +107,7 @@ impl<'a> MeshSurface<'a> {
         self.triangles[at.triangle as usize].index
     }
 
-    /// The number of each of the mesh's triangles' texture, if there are several, or some have none; one past all of them means none.
+    /// The number of each of the mesh's triangles' texture, if there are several, or some have none; [`u32::MAX`] means none.
     pub(super) fn texture_numbers(&self) -> Option<Vec<u32>> {
         let (textures, numbers) = self.mesh.textures();
         let alike = textures.len() < 2 && (textures.is_empty() || numbers.iter().all(Option::is_some));

@@ -193,7 +193,7 @@ impl Chosen {
 
 /// The texture coordinates of a splat that grew from a point: there, and their slopes over what it covers and what is beside that point.
 fn place(surfel: &Surfel, point: u32, covers: &[Cover], samples: &Samples, cells: &Cells) -> ([f32; 2], Slopes) {
-    let Some(own) = samples.placed.places.get(point as usize) else { return Default::default() };
+    let Some(own) = samples.places.get(point as usize) else { return Default::default() };
     let axes = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
     let others = covers.iter().map(|cover| cover.cell).chain(cells.neighbours(point).iter().copied());
     let steps = others.filter(|other| *other != point && !samples.has_seam(point, *other)).map(|other| {
@@ -235,7 +235,7 @@ pub(super) fn scene(
     let surfels: Vec<_> = chosen.iter().map(|chosen| chosen.surfel).collect();
     let low = low_parts(&surfels, |index| chosen[index].center);
     let mut coordinates = Coordinates::default();
-    if !samples.placed.places.is_empty() {
+    if !samples.places.is_empty() {
         (coordinates.centers, coordinates.slopes) = chosen.iter().map(|chosen| chosen.place).unzip();
     }
     let clips: Vec<Clip> = chosen.iter().map(|chosen| chosen.clip).collect();

@@ -4,11 +4,11 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use crate::Result;
-use crate::scene::{Clip, Scene, Surfel};
+use crate::scene::{Atlas, Bounds, Clip, Scene, Surfel};
 use crate::surfels::Coordinates;
 use crate::surfels::creases::SMOOTH;
 use crate::surfels::positions::DistinctPositions;
-use crate::surfels::texture::{Placed, jumps};
+use crate::surfels::texture::{around, jumps, typical_change};
 
 /// The surfels of a scene, one for each distinct position, in an order that depends on the set of positions alone.
 /// Lengths are in scaled units: see [`DistinctPositions::scale`].
@@ -24,8 +24,10 @@ pub(super) struct Samples {
     pub lines: Vec<Vec<End>>,
     /// Mean linear colour of the surfels at a position, premultiplied by alpha.
     pub colors: Vec<[f64; 4]>,
-    /// Texture coordinates.
-    pub placed: Placed,
+    /// Texture coordinates in the plane of their textures, of several surfels at a position the smallest; none where surfels have none.
+    pub places: Vec<DVec2>,
+    /// How the textures lie in that plane.
+    atlas: Atlas,
     /// How far those change for a scaled unit, typically, from each point to the next.
     changes: Vec<f64>,
     /// Whether the side that a normal points to means something.
@@ -84,22 +86,27 @@ impl Samples {
                 _ => Vec::new(),
             });
         }
-        let placed = Placed::new(&positions, coordinates);
-        let changes = placed.changes(&positions);
-        Ok(Self { positions, normals, only, radii, lines, colors, placed, changes, oriented: scene.oriented })
+        let places = places(&positions, &coordinates.centers);
+        let bounds = scene.bounds();
+        let scaled = Bounds { min: bounds.min * positions.scale(), max: bounds.max * positions.scale() };
+        let change = |_, steps: &[(DVec3, DVec2)]| typical_change(steps);
+        let changes = around((positions.as_slice(), &scaled), &places, &coordinates.atlas, change)?;
+        let places = places.into_iter().map(|place| DVec2::from_array(place.map(f64::from))).collect();
+        let atlas = coordinates.atlas;
+        Ok(Self { positions, normals, only, radii, lines, colors, places, atlas, changes, oriented: scene.oriented })
     }
 
     /// The way from one point to another, in space and in the texture.
     pub fn step(&self, from: u32, to: u32) -> (DVec3, DVec2) {
         let offset = self.positions.position(to) - self.positions.position(from);
-        (offset, self.placed.places[to as usize] - self.placed.places[from as usize])
+        (offset, self.places[to as usize] - self.places[from as usize])
     }
 
     /// Whether a seam of the texture lies between two points that are near each other.
     pub fn has_seam(&self, a: u32, b: u32) -> bool {
         let [Some(of_a), Some(of_b)] = [a, b].map(|point| self.changes.get(point as usize)) else { return false };
-        let [place_a, place_b] = [a, b].map(|point| self.placed.places[point as usize]);
-        !self.placed.are_in_one(place_a, place_b) || jumps(&self.step(a, b), of_a.max(*of_b))
+        let [number_a, number_b] = [a, b].map(|point| self.atlas.number(self.places[point as usize].to_array()));
+        number_a != number_b || jumps(&self.step(a, b), of_a.max(*of_b))
     }
 
     pub fn len(&self) -> usize {
@@ -116,6 +123,18 @@ impl Samples {
     pub fn same_side(&self, a: u32, b: u32) -> bool {
         !self.oriented || self.normals[a as usize].dot(self.normals[b as usize]) > 0.0
     }
+}
+
+/// The texture coordinates of positions.
+fn places(positions: &DistinctPositions, coordinates: &[[f32; 2]]) -> Vec<[f32; 2]> {
+    let mut places = vec![[f32::INFINITY; 2]; if coordinates.is_empty() { 0 } else { positions.len() }];
+    for (own, &position) in coordinates.iter().zip(positions.of_point()) {
+        let known = &mut places[position as usize];
+        if own[0].total_cmp(&known[0]).then(own[1].total_cmp(&known[1])).is_lt() {
+            *known = *own;
+        }
+    }
+    places
 }
 
 /// Where the surface ends at a line in a surfel's plane.

@@ -28,23 +28,29 @@ pub(crate) fn bounding_ellipse(offsets: impl Iterator<Item = DVec3> + Clone, nor
         (offset.dot(e1), offset.dot(e2))
     });
     let (xx, xy, yy) = plane.clone().fold((0.0, 0.0, 0.0), |(xx, xy, yy), (x, y)| (xx + x * x, xy + x * y, yy + y * y));
-    let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
-    let root = (half * half + xy * xy).sqrt();
-    let (large, small) = (mean + root, (mean - root).max(0.0));
-    if large == 0.0 {
-        return [DVec3::ZERO; 2];
-    }
-    // Of the two columns of M - small I, which are both along the eigenvector, the one that has not cancelled.
-    let (x, y) = if half >= 0.0 { (half + root, xy) } else { (xy, root - half) };
-    let length = (x * x + y * y).sqrt();
-    let (x, y) = if length > 0.0 { (x / length, y / length) } else { (1.0, 0.0) };
-    let slimness = (small / large).sqrt().max(SLIMMEST);
+    let Some(([x, y], slimness)) = shape([xx, xy, yy]) else { return [DVec3::ZERO; 2] };
     let squared_factor = plane.fold(0.0, |f: f64, (u, v)| {
         let (along, across) = (u * x + v * y, (v * x - u * y) / slimness);
         f.max(along * along + across * across)
     });
     let s = (e1 * x + e2 * y) * (squared_factor.sqrt() * largest);
     [s, normal.cross(s) * slimness]
+}
+
+/// The unit direction of the longer half-axis and the ratio of the shorter one to it, of an ellipse like that of a covariance [xx, xy, yy]; None
+/// if that is zero.
+pub(crate) fn shape([xx, xy, yy]: [f64; 3]) -> Option<([f64; 2], f64)> {
+    let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
+    let root = (half * half + xy * xy).sqrt();
+    let (large, small) = (mean + root, (mean - root).max(0.0));
+    if large == 0.0 {
+        return None;
+    }
+    // Of the two columns of M - small I, which are both along the eigenvector, the one that has not cancelled.
+    let (x, y) = if half >= 0.0 { (half + root, xy) } else { (xy, root - half) };
+    let length = (x * x + y * y).sqrt();
+    let direction = if length > 0.0 { [x / length, y / length] } else { [1.0, 0.0] };
+    Some((direction, (small / large).sqrt().max(SLIMMEST)))
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use glam::DVec3;
 
 pub(crate) use self::bsp::{bsp_radii, common_radius};
 pub(crate) use self::cell::{RADIUS_NEIGHBOURS, cell_ellipse, open_radius};
+pub(crate) use self::ellipse::shape;
 use self::ellipse::{ELLIPSE_NEIGHBOURS, bounding_ellipse};
 pub(crate) use self::limit::local_limits;
 pub(crate) use self::qsplat::measure as measure_triangles;

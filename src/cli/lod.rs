@@ -1,0 +1,84 @@
+//! `epsplat lod`: surfels with levels of detail.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+use epsplat::Result;
+use epsplat::io::ply;
+use epsplat::surfels::{self, hierarchy};
+use serde::Serialize;
+
+use super::progress::Bars;
+use super::reading::{LimitArguments, Reading, help_of, named};
+use super::{note, outputs, print, write_json};
+
+/// Write surfels with levels of detail as PLY: a tree whose nodes are surfels that stand for all below them.
+///
+/// Points are divided at their mean into eight, until there are eight or fewer (Pajarola 2003); each node is the least ellipse of their
+/// covariance's shape that bounds the disks below it, with their mean colour and normal. The surfels are written in the order of the tree, so other programs see a cloud.
+#[derive(Args)]
+#[command(after_help = "Example:\n  epsplat lod scan.ply -o scan.lod.ply\n  epsplat info scan.lod.ply")]
+pub struct Arguments {
+    #[arg(required = true, help = help_of("Surfels, point clouds or meshes"))]
+    inputs: Vec<PathBuf>,
+    #[command(flatten)]
+    reading: Reading,
+    /// The file: .ply
+    #[arg(short, long)]
+    output: PathBuf,
+    #[command(flatten)]
+    limits: LimitArguments,
+    /// What the tree is like as JSON, to a file or - for stdout
+    #[arg(long, value_name = "FILE|-")]
+    json: Option<PathBuf>,
+}
+
+/// What came of it.
+#[derive(Serialize)]
+struct Report {
+    surfels: u64,
+    nodes: u64,
+    levels: u64,
+    /// Seconds to read, to make surfels, to make the tree, and to write.
+    seconds: [f64; 4],
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    ply::check_extension(&arguments.output)?;
+    outputs::check(&arguments.inputs, [&arguments.output].into_iter().chain(&arguments.json))?;
+    let bars = Bars::new();
+    let mut started = Instant::now();
+    let mut seconds = || std::mem::replace(&mut started, Instant::now()).elapsed().as_secs_f64();
+    let inputs = arguments.reading.all(&arguments.inputs, &bars)?;
+    let beside = outputs::beside(&inputs, &arguments.output)?;
+    let read = seconds();
+    let (scene, preparation) = surfels::build_within(inputs, Vec::new(), &arguments.limits.limits(), &bars)
+        .map_err(|error| named(error, &arguments.inputs))?;
+    preparation.notes().iter().for_each(|line| note(line));
+    let made = seconds();
+    let (scene, tree) = hierarchy::build(scene, &bars)?;
+    let divided = seconds();
+    let mut points = hierarchy::points(&scene);
+    drop(scene);
+    points.beside = beside;
+    ply::write_points(&arguments.output, &points, &bars)?;
+    let report = Report {
+        surfels: points.positions.len() as u64,
+        nodes: tree.nodes.len() as u64,
+        levels: tree.levels() as u64,
+        seconds: [read, made, divided, seconds()],
+    };
+    match &arguments.json {
+        Some(path) => write_json(path, &report),
+        None => print(&summary(&report)),
+    }
+}
+
+fn summary(report: &Report) -> String {
+    let [read, made, divided, written] = report.seconds;
+    format!(
+        "{} surfels, {} nodes in {} levels: read in {read:.2} s, made in {made:.2} s, divided in {divided:.2} s, written in {written:.2} s\n",
+        report.surfels, report.nodes, report.levels
+    )
+}

@@ -1,0 +1,90 @@
+//! Levels of detail as a file has them.
+
+use super::Points;
+use crate::scene::hierarchy::{Fault, Hierarchy, Node};
+use crate::scene::{Colors, Surfel};
+
+/// The nodes of a tree over points that are in its order ([`Hierarchy`]).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Tree {
+    /// Their centres, half-axes and colours; radii are those of their spheres.
+    pub nodes: Box<Points>,
+    /// What else each has.
+    pub rows: Vec<TreeRow>,
+}
+
+/// What a node has beside its ellipse and its colour.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TreeRow {
+    /// [`Node::cone`].
+    pub cone: f32,
+    /// [`Node::first`].
+    pub first: u32,
+    /// [`Node::count`].
+    pub count: u32,
+    /// [`Node::leaf`].
+    pub leaf: bool,
+}
+
+impl Tree {
+    /// The nodes about `origin`; None if one has no place or no extent that is a number.
+    pub fn hierarchy(&self, origin: glam::DVec3) -> Option<Hierarchy> {
+        let mut all = Hierarchy::default();
+        let (axes, radii) = (self.nodes.axes.as_ref()?, self.nodes.radii.as_ref()?);
+        for (index, row) in self.rows.iter().enumerate() {
+            let center = glam::DVec3::from_array(*self.nodes.positions.get(index)?) - origin;
+            let rounded = center.as_vec3();
+            let ([s, t], radius) = (*axes.get(index)?, *radii.get(index)?);
+            let numbers = [rounded.to_array(), s, t].into_iter().flatten().chain([radius, row.cone]);
+            if !numbers.into_iter().all(f32::is_finite) || radius < 0.0 {
+                return None;
+            }
+            let color = self.nodes.colors.as_ref().map_or([1.0; 4], |colors| colors.linear(index));
+            let TreeRow { cone, first, count, leaf } = *row;
+            let surfel = Surfel { center: rounded.to_array(), s, t };
+            all.nodes.push(Node { surfel, color, radius, cone, first, count, leaf });
+            all.low.push((center - rounded.as_dvec3()).as_vec3().to_array());
+        }
+        Some(all)
+    }
+
+    /// Why these are no tree over so many points; None if they are one.
+    pub(super) fn fault(&self, points: usize) -> Option<String> {
+        let Some(hierarchy) = self.hierarchy(glam::DVec3::ZERO) else {
+            return Some("a node has a centre, half-axes or a radius that are no numbers".into());
+        };
+        let place = |index: usize| format!("node {index} of {}", self.rows.len());
+        let what = match Hierarchy::check(&hierarchy.nodes, points).err()? {
+            Fault::Children(index) => format!("the children of {} are not the nodes that come next", place(index)),
+            Fault::Elements(index) => format!("the points of {} are not those that come next", place(index)),
+            Fault::Count(index) => format!("{} has nothing below it, or too much", place(index)),
+            Fault::Depth => "it is too deep".into(),
+            Fault::Loose => {
+                format!("its {} nodes and {points} points are not all below its first node", self.rows.len())
+            }
+        };
+        Some(what)
+    }
+
+    /// The nodes of a scene's levels of detail, in world coordinates.
+    pub fn of(hierarchy: &Hierarchy, origin: glam::DVec3, coded: bool) -> Self {
+        let nodes = &hierarchy.nodes;
+        let position = |(index, node): (usize, &Node)| {
+            let low = hierarchy.low.get(index).copied().unwrap_or_default();
+            let [center, low] = [node.surfel.center, low].map(|part| glam::DVec3::from_array(part.map(f64::from)));
+            (origin + (center + low)).to_array()
+        };
+        let points = Points {
+            positions: nodes.iter().enumerate().map(position).collect(),
+            axes: Some(nodes.iter().map(|node| [node.surfel.s, node.surfel.t]).collect()),
+            radii: Some(nodes.iter().map(|node| node.radius).collect()),
+            colors: Some(match coded {
+                true => Colors::Srgb8(nodes.iter().map(|node| super::ply::Color::Linear(node.color).srgb8()).collect()),
+                false => Colors::Linear(nodes.iter().map(|node| node.color).collect()),
+            }),
+            ..Points::default()
+        };
+        let row = |&Node { cone, first, count, leaf, .. }: &Node| TreeRow { cone, first, count, leaf };
+        Self { nodes: Box::new(points), rows: nodes.iter().map(row).collect() }
+    }
+}

@@ -1,0 +1,59 @@
+//! A scene in another order.
+
+use rayon::prelude::*;
+
+use super::{Colors, Scene};
+
+/// The values at these indices; of none, none.
+fn at<T: Copy + Send + Sync>(values: &[T], indices: &[u32]) -> Vec<T> {
+    if values.is_empty() { Vec::new() } else { indices.par_iter().map(|&index| values[index as usize]).collect() }
+}
+
+impl Scene {
+    /// The same scene, whose surfel k was number `order[k]`; each number is there once. Without levels of detail, as it is in no tree's order.
+    #[must_use]
+    pub fn reordered(mut self, order: &[u32]) -> Self {
+        self.surfels = at(&self.surfels, order);
+        self.low = at(&self.low, order);
+        self.clips = at(&self.clips, order);
+        self.caps = at(&self.caps, order);
+        self.normals = at(&self.normals, order);
+        let indices = || order.iter().map(|&index| index as usize).collect::<Vec<_>>();
+        self.colors = match self.colors {
+            Colors::Constant(color) => Colors::Constant(color),
+            Colors::Srgb8(codes) => Colors::Srgb8(at(&codes, order)),
+            Colors::Linear(colors) => Colors::Linear(at(&colors, order)),
+            Colors::Textured(textured) => Colors::Textured(textured.taken(&indices())),
+            Colors::Harmonics(harmonics) => Colors::Harmonics(harmonics.taken(&indices())),
+        };
+        self.hierarchy = None;
+        self.provenance.reorder(order);
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+    use crate::scene::{Provenance, Surfel};
+
+    #[test]
+    fn surfels_keep_what_they_have_and_where_they_came_from() {
+        let surfels: Vec<Surfel> = (0..5).map(|k| Surfel::disk(Vec3::splat(k as f32), Vec3::Z, 1.0)).collect();
+        let mut provenance = Provenance::default();
+        provenance.push(0, vec![0], None);
+        provenance.push(2, vec![], None);
+        let colors = Colors::Srgb8((0..5).map(|k| [k, 0, 0, 255]).collect());
+        let scene = Scene { surfels, colors, provenance, ..Scene::default() };
+        let first = scene.clone().reordered(&[3, 1, 4, 0, 2]);
+        assert_eq!(first.surfels[0], scene.surfels[3]);
+        assert_eq!(first.colors.linear(2), scene.colors.linear(4));
+        let points = |scene: &Scene| (0..5).map(|k| scene.provenance.of(k)).collect::<Vec<_>>();
+        assert_eq!(points(&scene), [(0, 1), (0, 2), (1, 0), (1, 1), (1, 2)]);
+        assert_eq!(points(&first), [(1, 1), (0, 2), (1, 2), (0, 1), (1, 0)]);
+        // And once more, back.
+        assert_eq!(points(&first.reordered(&[3, 1, 4, 0, 2])), points(&scene.reordered(&[0, 1, 2, 3, 4])));
+    }
+}

@@ -1,0 +1,130 @@
+//! Levels of detail of a scene: a point-octree whose nodes are surfels (Pajarola 2003, section 3; [`Hierarchy`]).
+//!
+//! Sets of points are divided at their mean (`octree`); of what is below it each node has sums that are whole numbers (`sums`, `moments`), from which its
+//! centre, normal, colour and shape follow, and then the least ellipse of that shape that bounds all surfels below (`bounds`).
+//! Everything is a sum of whole numbers, a minimum or a maximum, so a tree depends on the set of surfels alone, and not on their order or on the number of threads.
+
+mod bounds;
+mod lattice;
+mod moments;
+mod octree;
+mod points;
+mod sums;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use rayon::prelude::*;
+
+use self::moments::Moments;
+use self::octree::{Element, Octree, Set};
+pub use self::points::points;
+use self::sums::{Scales, Sums};
+use crate::scene::hierarchy::Node;
+use crate::scene::{Colors, Hierarchy, Scene, by_content};
+use crate::{Error, Progress, Result};
+
+/// The scene with levels of detail, which are told too, and its surfels in the order of the tree.
+///
+/// # Errors
+///
+/// [`Error::Usage`] for a scene without surfels, with 2^32 or more, of Gaussians, or painted by textures.
+pub fn build(scene: Scene, progress: &dyn Progress) -> Result<(Scene, Arc<Hierarchy>)> {
+    let Ok(count) = u32::try_from(scene.surfels.len()) else {
+        return Err(Error::Usage(format!("a tree has at most 2^32 - 1 surfels, not {}", scene.surfels.len())));
+    };
+    if count == 0 {
+        return Err(Error::Usage("a scene without surfels has no levels of detail".into()));
+    }
+    if scene.encoded || matches!(scene.colors, Colors::Textured(_) | Colors::Harmonics(_)) {
+        return Err(Error::Usage(
+            "levels of detail are of surfels with a colour each: Gaussians, and surfels that a texture paints, have none yet".into(),
+        ));
+    }
+    progress.begin("dividing points", count.into());
+    let mut tree = Octree::grow(count, |index| scene.center(index as usize), |points| progress.advance(points));
+    progress.end();
+    in_order(&mut tree, &scene);
+    let order: Vec<u32> = tree.elements.iter().map(|element| element.index).collect();
+    let scene = scene.reordered(&order);
+    drop(order);
+    let hierarchy = Arc::new(nodes(&tree, &scene, progress));
+    Ok((Scene { hierarchy: Some(hierarchy.clone()), ..scene }, hierarchy))
+}
+
+/// Puts the points of each leaf in an order of their own.
+fn in_order(tree: &mut Octree, scene: &Scene) {
+    let mut leaves: Vec<&Set> = tree.sets.iter().filter(|set| set.is_leaf()).collect();
+    leaves.par_sort_unstable_by_key(|set| set.first);
+    let mut rest = &mut tree.elements[..];
+    let mut slices: Vec<&mut [Element]> = Vec::with_capacity(leaves.len());
+    for leaf in leaves {
+        let (own, after) = rest.split_at_mut(leaf.range().len());
+        slices.push(own);
+        rest = after;
+    }
+    slices.into_par_iter().for_each(|own| {
+        // What compares as equal is the same, and then any order is.
+        let content = |a: &Element, b: &Element| by_content(scene, a.index as usize, b.index as usize);
+        own.sort_unstable_by(|a, b| a.place.cmp(&b.place).then_with(|| content(a, b)));
+    });
+}
+
+/// A node, and what its f32 centre leaves out.
+type Made = (Node, [f32; 3]);
+
+/// The nodes of a tree, whose points are in the order of `scene`: from the deepest level up.
+fn nodes(tree: &Octree, scene: &Scene, progress: &dyn Progress) -> Hierarchy {
+    let scale = Scales::of(scene);
+    let (mut levels, mut below): (Vec<Vec<Made>>, Vec<Option<Sums>>) = (Vec::new(), Vec::new());
+    progress.begin("bounding nodes", tree.sets.len() as u64);
+    let told = AtomicU64::new(0);
+    for level in tree.levels.windows(2).rev() {
+        let made: Vec<_> = tree.sets[level[0]..level[1]]
+            .par_iter()
+            .map(|set| {
+                let sums = sums_of(tree, set, level[1], &below, scene, &scale);
+                let (mut node, low) =
+                    bounds::node(scene, set.range(), &sums, &tree.lattices[set.lattice as usize], &scale);
+                if !set.is_leaf() {
+                    (node.first, node.count, node.leaf) = (set.first_child, set.children, false);
+                }
+                if told.fetch_add(1, Ordering::Relaxed) % 1024 == 1023 {
+                    progress.advance(1024);
+                }
+                // A leaf's are made again where they are wanted.
+                ((node, low), (!set.is_leaf()).then_some(sums))
+            })
+            .collect();
+        let (of_level, own): (Vec<_>, Vec<_>) = made.into_iter().unzip();
+        levels.push(of_level);
+        below = own;
+    }
+    progress.end();
+    let all = || levels.iter().rev().flatten();
+    let low = if scene.low.is_empty() { Vec::new() } else { all().map(|(_, low)| *low).collect() };
+    Hierarchy { nodes: all().map(|(node, _)| *node).collect(), low }
+}
+
+/// The sums of a set: of a leaf those of its points, else those of its children (EQ 4), of which `below` has some from set `first` on. Of
+/// children on another lattice the moments are made anew on this one.
+fn sums_of(tree: &Octree, set: &Set, first: usize, below: &[Option<Sums>], scene: &Scene, scale: &Scales) -> Sums {
+    let of_points = |set: &Set| Sums::of(&tree.elements[set.range()], scene, set.first as usize, scale);
+    if set.is_leaf() {
+        return of_points(set);
+    }
+    let mut all = Sums::default();
+    for number in set.first_child..set.first_child + set.children {
+        let child = &tree.sets[number as usize];
+        let known = below[number as usize - first];
+        let mut sums = known.unwrap_or_else(|| of_points(child));
+        if child.lattice != set.lattice {
+            let own = &tree.lattices[set.lattice as usize];
+            sums.moments = Moments::of(child.range().map(|index| own.place(scene.center(index))));
+        }
+        all.add(&sums);
+    }
+    all
+}

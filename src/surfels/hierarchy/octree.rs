@@ -1,0 +1,264 @@
+//! The tree: sets of points divided at their mean (Pajarola 2003, section 3.2).
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::lattice::Lattice;
+use crate::scene::Bounds;
+use crate::scene::hierarchy::{DEEPEST, FAN_OUT};
+
+/// Steps across a set of points below which they get a finer lattice of their own: then a mean has five digits within the set, whatever strays
+/// from the body of the scene.
+const FEWEST_STEPS: i64 = 1 << 16;
+
+/// Points of a set whose sums are made by all threads.
+const MANY: usize = 1 << 16;
+
+/// A point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Element {
+    /// On the lattice of the smallest set that it is in.
+    pub place: [i32; 3],
+    /// The surfel.
+    pub index: u32,
+}
+
+/// A set of points, which follow each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Set {
+    pub first: u32,
+    pub end: u32,
+    /// The number of its lattice.
+    pub lattice: u32,
+    /// The number of the first set that it is divided into, and how many there are: none of a leaf.
+    pub first_child: u32,
+    pub children: u32,
+}
+
+impl Set {
+    pub fn is_leaf(&self) -> bool {
+        self.children == 0
+    }
+
+    pub fn range(&self) -> std::ops::Range<usize> {
+        self.first as usize..self.end as usize
+    }
+}
+
+/// All sets level by level, and the points in the order of the leaves.
+pub(super) struct Octree {
+    pub elements: Vec<Element>,
+    pub sets: Vec<Set>,
+    /// Where each level starts, and the end.
+    pub levels: Vec<usize>,
+    pub lattices: Vec<Lattice>,
+}
+
+/// What becomes of a set.
+struct Divided {
+    lattice: Option<Lattice>,
+    /// The points of each octant; none of a leaf.
+    counts: Option<[u32; 8]>,
+}
+
+impl Octree {
+    /// Divides `count` points, fewer than 2^32, at `position`. The sets depend on the positions alone; `told` hears of each point that came to a leaf.
+    pub fn grow(count: u32, position: impl Fn(u32) -> DVec3 + Sync, told: impl Fn(u64)) -> Self {
+        let bounds = Bounds::of((0..count).into_par_iter().with_min_len(4096).map(&position));
+        let root = Lattice::over(&bounds);
+        let element = |index: u32| Element { place: root.place(position(index)), index };
+        let elements: Vec<Element> = (0..count).into_par_iter().with_min_len(4096).map(element).collect();
+        let all = Set { first: 0, end: count, lattice: 0, first_child: 0, children: 0 };
+        let mut tree = Self { elements, sets: vec![all], levels: vec![0, 1], lattices: vec![root] };
+        while tree.divide_level(&position, &told) {}
+        tree
+    }
+
+    /// Divides the sets of the last level; whether there is another one.
+    fn divide_level(&mut self, position: &(impl Fn(u32) -> DVec3 + Sync), told: &impl Fn(u64)) -> bool {
+        let [.., begin, end] = self.levels[..] else { return false };
+        // One level deeper there is none to divide them into.
+        let deepest = self.levels.len() - 2 == DEEPEST;
+        let level = &self.sets[begin..end];
+        let mut slices = Vec::with_capacity(level.len());
+        let (mut rest, mut at) = (&mut self.elements[..], 0);
+        for set in level {
+            let (own, after) = rest.split_at_mut(set.first as usize - at).1.split_at_mut(set.range().len());
+            (rest, at) = (after, set.end as usize);
+            slices.push(own);
+        }
+        let divided: Vec<Divided> = slices.into_par_iter().map(|own| divided(own, deepest, position)).collect();
+        for (index, Divided { lattice, counts }) in (begin..end).zip(divided) {
+            let mut set = self.sets[index];
+            if let Some(lattice) = lattice {
+                set.lattice = self.lattices.len() as u32;
+                self.lattices.push(lattice);
+            }
+            if let Some(counts) = counts {
+                set.first_child = self.sets.len() as u32;
+                let mut first = set.first;
+                for count in counts.into_iter().filter(|count| *count > 0) {
+                    self.sets.push(Set {
+                        first,
+                        end: first + count,
+                        lattice: set.lattice,
+                        first_child: 0,
+                        children: 0,
+                    });
+                    first += count;
+                    set.children += 1;
+                }
+            } else {
+                told(u64::from(set.end - set.first));
+            }
+            self.sets[index] = set;
+        }
+        let more = self.sets.len() > end;
+        if more {
+            self.levels.push(self.sets.len());
+        }
+        more
+    }
+}
+
+/// Puts the points of each octant of a set together, unless it is a leaf.
+fn divided(own: &mut [Element], deepest: bool, position: &(impl Fn(u32) -> DVec3 + Sync)) -> Divided {
+    let mut lattice = None;
+    let mut extent = extent(own);
+    if extent < FEWEST_STEPS && own.len() > FAN_OUT {
+        let bounds = Bounds::of(own.par_iter().with_min_len(4096).map(|element| position(element.index)));
+        let finer = Lattice::over(&bounds);
+        own.par_iter_mut().with_min_len(4096).for_each(|element| element.place = finer.place(position(element.index)));
+        lattice = Some(finer);
+        extent = self::extent(own);
+    }
+    if own.len() <= FAN_OUT || extent == 0 || deepest {
+        return Divided { lattice, counts: None };
+    }
+    let sum = sum(own);
+    let count = own.len() as i64;
+    let octant = |element: &Element| {
+        // Exact: a point is high if count q > Σ q, and equal ones are low, so that no set is divided into itself and nothing.
+        (0..3).fold(0, |octant, k| octant | usize::from(count * i64::from(element.place[k]) > sum[k]) << k)
+    };
+    Divided { lattice, counts: Some(put_together(own, octant)) }
+}
+
+/// The longest side of the box around a set, steps.
+fn extent(own: &[Element]) -> i64 {
+    let nothing = || ([i32::MAX; 3], [i32::MIN; 3]);
+    let both = |a: ([i32; 3], [i32; 3]), b: ([i32; 3], [i32; 3])| {
+        (std::array::from_fn(|k| a.0[k].min(b.0[k])), std::array::from_fn(|k| a.1[k].max(b.1[k])))
+    };
+    let box_of =
+        |part: &[Element]| part.iter().fold(nothing(), |all, element| both(all, (element.place, element.place)));
+    let (low, high) =
+        if own.len() > MANY { own.par_chunks(MANY).map(box_of).reduce(nothing, both) } else { box_of(own) };
+    (0..3).map(|k| i64::from(high[k]) - i64::from(low[k])).max().unwrap_or(0)
+}
+
+/// The sum of the places.
+fn sum(own: &[Element]) -> [i64; 3] {
+    let both = |a: [i64; 3], b: [i64; 3]| std::array::from_fn(|k| a[k] + b[k]);
+    let of = |part: &[Element]| part.iter().fold([0; 3], |all, element| both(all, element.place.map(i64::from)));
+    if own.len() > MANY { own.par_chunks(MANY).map(of).reduce(|| [0; 3], both) } else { of(own) }
+}
+
+/// Sorts a set by octants, in place; how many points each has. Within one their order is of no matter.
+fn put_together(own: &mut [Element], octant: impl Fn(&Element) -> usize) -> [u32; 8] {
+    let mut counts = [0; 8];
+    own.iter().for_each(|element| counts[octant(element)] += 1);
+    let mut next = [0; 8];
+    let mut ends = [0; 8];
+    let mut end = 0;
+    for k in 0..8 {
+        next[k] = end;
+        end += counts[k] as usize;
+        ends[k] = end;
+    }
+    for k in 0..8 {
+        while next[k] < ends[k] {
+            // Each exchange brings one point to its octant, so this ends.
+            let of = octant(&own[next[k]]);
+            own.swap(next[k], next[of]);
+            next[of] += 1;
+        }
+    }
+    counts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    fn positions(count: usize, spread: f64) -> Vec<DVec3> {
+        let mut random = Random::stream(11, 0);
+        (0..count).map(|_| DVec3::from_array(std::array::from_fn(|_| spread * random.number()))).collect()
+    }
+
+    fn grown(points: &[DVec3]) -> Octree {
+        Octree::grow(points.len() as u32, |index| points[index as usize], |_| ())
+    }
+
+    /// A plain recursive division, by the definition in f64: how many sets there are.
+    fn plain(points: Vec<DVec3>) -> usize {
+        if points.len() <= FAN_OUT || points.iter().all(|point| *point == points[0]) {
+            return 1;
+        }
+        let mean = points.iter().sum::<DVec3>() / points.len() as f64;
+        let octant = |point: &DVec3| point.cmpgt(mean).bitmask();
+        1 + (0..8)
+            .map(|of| points.iter().copied().filter(|point| octant(point) == of).collect::<Vec<_>>())
+            .filter(|part| !part.is_empty())
+            .map(plain)
+            .sum::<usize>()
+    }
+
+    #[test]
+    fn sets_are_those_of_a_plain_division() {
+        for (count, copies) in [(1, 1), (8, 1), (9, 1), (5000, 1), (700, 12)] {
+            let points: Vec<DVec3> = positions(count, 3.0).into_iter().flat_map(|point| vec![point; copies]).collect();
+            let tree = grown(&points);
+            assert_eq!(tree.sets.len(), plain(points.clone()), "{count} x {copies}");
+            let mut leaves: Vec<&Set> = tree.sets.iter().filter(|set| set.is_leaf()).collect();
+            leaves.sort_by_key(|set| set.first);
+            assert!(leaves.windows(2).all(|two| two[0].end == two[1].first));
+            assert_eq!((leaves[0].first, leaves[leaves.len() - 1].end as usize), (0, points.len()));
+            let mut seen: Vec<u32> = tree.elements.iter().map(|element| element.index).collect();
+            seen.sort_unstable();
+            assert!(seen.iter().copied().eq(0..points.len() as u32));
+        }
+    }
+
+    #[test]
+    fn points_that_stray_cost_others_no_digits() {
+        let near = positions(3000, 1.0);
+        let with_stray: Vec<DVec3> = near.iter().copied().chain([DVec3::splat(1e17)]).collect();
+        let (tree, alone) = (grown(&with_stray), grown(&near));
+        assert_eq!(tree.sets.len(), alone.sets.len() + 2);
+        // And so do nests of clusters; what no lattice tells apart is one leaf.
+        let nested: Vec<DVec3> = (0..400).map(|k| DVec3::splat(0.5f64.powi(k))).collect();
+        let tree = grown(&nested);
+        assert!(tree.levels.len() <= DEEPEST + 2);
+        let equal = grown(&vec![DVec3::splat(0.3); 100]);
+        assert_eq!((equal.sets.len(), equal.levels.len()), (1, 2));
+    }
+
+    #[test]
+    fn any_order_gives_the_same_sets() {
+        let points = positions(4000, 2.0);
+        let turned: Vec<DVec3> = points.iter().rev().copied().collect();
+        let (one, other) = (grown(&points), grown(&turned));
+        assert_eq!(one.sets, other.sets);
+        for set in one.sets.iter().filter(|set| set.is_leaf()) {
+            let own = |tree: &Octree, flip: bool| {
+                let number = |e: &Element| if flip { points.len() as u32 - 1 - e.index } else { e.index };
+                let mut all: Vec<u32> = tree.elements[set.range()].iter().map(number).collect();
+                all.sort_unstable();
+                all
+            };
+            assert_eq!(own(&one, false), own(&other, true));
+        }
+    }
+}

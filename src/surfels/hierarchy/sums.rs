@@ -1,0 +1,143 @@
+//! What adds up from surfels to nodes and from children to parents: whole numbers, so that no order shows.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::lattice::Lattice;
+use super::moments::Moments;
+use super::octree::Element;
+use crate::io::ply::Color;
+use crate::scene::{Colors, Scene, Surfel};
+use crate::surfels::eigen::Symmetric3;
+
+/// Units of a normal's coordinate; of 2^32 normals the sum fits an i64.
+const NORMAL_ONE: f64 = (1u64 << 30) as f64;
+
+/// Units of a product of two of them.
+const PRODUCT_ONE: f64 = (1u64 << 30) as f64;
+
+/// Units of a colour's range.
+const COLOR_ONE: f64 = (1u64 << 30) as f64;
+
+/// A sum of normals that is shorter, for each of them, has no direction.
+const LEAST_MEAN: f64 = 1e-3;
+
+/// Units of a half-axis as long as the longest; of 2^32 products of two the sum fits an i128.
+const AXIS_ONE: f64 = (1u64 << 30) as f64;
+
+/// How what surfels have is mapped to whole numbers.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scales {
+    /// The smallest premultiplied colour, and what there is up to the largest.
+    low: [f64; 4],
+    span: [f64; 4],
+    /// Colours of surfels are codes of 8 bits, so those of nodes are too.
+    coded: bool,
+    /// World units of the longest half-axis.
+    longest: f64,
+}
+
+impl Scales {
+    pub fn of(scene: &Scene) -> Self {
+        let (low, high) = scene.color_range();
+        let [low, high] = [low, high].map(|color| color.map(f64::from));
+        let coded = matches!(scene.colors, Colors::Srgb8(_));
+        let longest = scene.surfels.par_iter().map(Surfel::radius).reduce(|| 0.0, f32::max).into();
+        Self { low, span: std::array::from_fn(|k| high[k] - low[k]), coded, longest }
+    }
+
+    fn units(&self, [r, g, b, a]: [f32; 4]) -> [i64; 4] {
+        let premultiplied = [r * a, g * a, b * a, a].map(f64::from);
+        std::array::from_fn(|k| {
+            let part = if self.span[k] > 0.0 { (premultiplied[k] - self.low[k]) / self.span[k] } else { 0.0 };
+            (part * COLOR_ONE).round() as i64
+        })
+    }
+
+    /// Straight, of a mean of units.
+    fn color(&self, units: [f64; 4]) -> [f32; 4] {
+        let [r, g, b, a] = std::array::from_fn(|k| self.low[k] + self.span[k] * (units[k] / COLOR_ONE));
+        let color = if a > 0.0 { [r / a, g / a, b / a, a].map(|value| value as f32) } else { [0.0; 4] };
+        if self.coded { Colors::Srgb8(vec![Color::Linear(color).srgb8()]).linear(0) } else { color }
+    }
+}
+
+/// The sums of a set of surfels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Sums {
+    pub moments: Moments,
+    /// Of unit normals.
+    normal: [i64; 3],
+    /// Of n nᵀ: xx, yy, zz, xy, xz, yz.
+    axial: [i64; 6],
+    /// Of premultiplied colours.
+    color: [i64; 4],
+    /// Of s sᵀ + t tᵀ.
+    disks: [i128; 6],
+}
+
+/// The unit normal of a surfel's plane; of one without a plane the world's z.
+pub(super) fn normal_of(surfel: &Surfel) -> DVec3 {
+    let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
+    s.cross(t).try_normalize().unwrap_or(DVec3::Z)
+}
+
+impl Sums {
+    /// Those of `elements`, in the order of the surfels of `scene`, of which the first is number `first`.
+    pub fn of(elements: &[Element], scene: &Scene, first: usize, scale: &Scales) -> Self {
+        let mut all = Self { moments: Moments::of_elements(elements), ..Self::default() };
+        let products = |v: DVec3| [v.x * v.x, v.y * v.y, v.z * v.z, v.x * v.y, v.x * v.z, v.y * v.z];
+        for index in first..first + elements.len() {
+            let surfel = &scene.surfels[index];
+            let n = normal_of(surfel);
+            let units = |value: f64, one: f64| (value * one).round() as i64;
+            all.normal.iter_mut().zip(n.to_array()).for_each(|(sum, value)| *sum += units(value, NORMAL_ONE));
+            for axis in [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from))) {
+                let part = if scale.longest > 0.0 { axis / scale.longest } else { DVec3::ZERO };
+                all.disks
+                    .iter_mut()
+                    .zip(products(part * AXIS_ONE))
+                    .for_each(|(sum, value)| *sum += value.round() as i128);
+            }
+            all.axial.iter_mut().zip(products(n)).for_each(|(sum, value)| *sum += units(value, PRODUCT_ONE));
+            let color = scale.units(scene.colors.linear(index));
+            all.color.iter_mut().zip(color).for_each(|(sum, value)| *sum += value);
+        }
+        all
+    }
+
+    pub fn add(&mut self, other: &Self) {
+        self.moments.add(&other.moments);
+        self.normal.iter_mut().zip(other.normal).for_each(|(sum, other)| *sum += other);
+        self.axial.iter_mut().zip(other.axial).for_each(|(sum, other)| *sum += other);
+        self.color.iter_mut().zip(other.color).for_each(|(sum, other)| *sum += other);
+        self.disks.iter_mut().zip(other.disks).for_each(|(sum, other)| *sum += other);
+    }
+
+    /// The covariance of the disks' points about their mean, square world units: that of the centres (EQ 2), and the mean of each disk's own, which
+    /// is (s sᵀ + t tᵀ) / 4.
+    pub fn covariance(&self, lattice: &Lattice, scale: &Scales) -> Symmetric3 {
+        let unit = scale.longest / AXIS_ONE;
+        let mean = unit * unit / (4.0 * self.moments.count as f64);
+        let [xx, yy, zz, xy, xz, yz] = self.disks.map(|sum| sum as f64 * mean);
+        let step = 1.0 / lattice.steps;
+        self.moments.covariance() * (step * step) + Symmetric3 { xx, yy, zz, xy, xz, yz }
+    }
+
+    /// The unit normal, and whether it tells sides: the mean of the normals, or where these have no side or cancel, the direction that is
+    /// nearest to all of them.
+    pub fn normal(&self, oriented: bool) -> (DVec3, bool) {
+        let sum = DVec3::from_array(self.normal.map(|value| value as f64 / NORMAL_ONE));
+        if oriented && sum.length() > LEAST_MEAN * self.moments.count as f64 {
+            return (sum.normalize(), true);
+        }
+        let [xx, yy, zz, xy, xz, yz] = self.axial.map(|value| value as f64 / PRODUCT_ONE);
+        let (_, [.., nearest]) = Symmetric3 { xx, yy, zz, xy, xz, yz }.eigen();
+        (nearest, false)
+    }
+
+    /// The mean colour, linear, straight alpha.
+    pub fn color(&self, scale: &Scales) -> [f32; 4] {
+        scale.color(self.color.map(|sum| sum as f64 / self.moments.count as f64))
+    }
+}

@@ -1,0 +1,147 @@
+//! Levels of detail: what `epsplat lod` writes, and what a file of them must be.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use std::path::Path;
+use std::process::Command;
+
+use epsplat::io::{self, Points, ply};
+use epsplat::scene::{Colors, Scene};
+use epsplat::surfels::{build, hierarchy};
+
+fn epsplat(arguments: &[&str]) -> (i32, String, String) {
+    let run = Command::new(env!("CARGO_BIN_EXE_epsplat")).args(arguments).output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    (run.status.code().unwrap(), text(run.stdout), text(run.stderr))
+}
+
+/// A sphere's points in 8-bit or linear colours, far from the origin.
+fn points(count: usize, linear: bool) -> Points {
+    let scene = common::scenes::sphere(count, 1.5);
+    let code = |k: usize| [k as u8, (k / 5) as u8, 90, 255];
+    Points {
+        positions: scene.surfels.iter().map(|surfel| surfel.center.map(|c| f64::from(c) + 1000.25)).collect(),
+        normals: Some(scene.surfels.iter().map(|surfel| surfel.center).collect()),
+        radii: Some(vec![scene.surfels[0].radius(); count]),
+        colors: Some(match linear {
+            true => Colors::Linear((0..count).map(|k| code(k).map(|c| 2.0 * f32::from(c))).collect()),
+            false => Colors::Srgb8((0..count).map(code).collect()),
+        }),
+        ..Points::default()
+    }
+}
+
+fn lod(points: Points) -> Scene {
+    hierarchy::build(build(vec![points], &()).unwrap().0, &()).unwrap().0
+}
+
+/// The tree of a file is the one that was made, and other ways to read the file see a cloud.
+#[test]
+fn a_file_keeps_levels_of_detail() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("levels.ply");
+    for linear in [false, true] {
+        let scene = lod(points(3000, linear));
+        ply::write_points(&path, &hierarchy::points(&scene), &()).unwrap();
+        let read = io::read(&path, &()).unwrap();
+        assert_eq!(read.positions.len(), 3000);
+        let (again, _) = build(vec![read], &()).unwrap();
+        assert_eq!(again.surfels, scene.surfels);
+        assert!(again.oriented && scene.oriented);
+        let [made, kept] = [&scene, &again].map(|scene| scene.hierarchy.as_ref().unwrap());
+        assert!(made.nodes == kept.nodes);
+    }
+    // Of several files, or fewer points, there is no tree.
+    let read = || io::read(&path, &()).unwrap();
+    assert!(build(vec![read(), read()], &()).unwrap().0.hierarchy.is_none());
+    let mut nearly = read();
+    nearly.positions[5][1] = f64::NAN;
+    assert!(build(vec![nearly], &()).unwrap().0.hierarchy.is_none());
+}
+
+#[test]
+fn normals_without_a_side_stay_without_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("levels.ply");
+    let scene = lod(Points { normals: None, radii: None, ..points(800, false) });
+    assert!(!scene.oriented);
+    ply::write_points(&path, &hierarchy::points(&scene), &()).unwrap();
+    let (again, _) = build(vec![io::read(&path, &()).unwrap()], &()).unwrap();
+    assert!(!again.oriented && again.hierarchy.is_some());
+}
+
+/// A file whose tree is none ends in a sentence, whatever is wrong with it.
+#[test]
+fn broken_trees_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("levels.ply");
+    let whole = hierarchy::points(&lod(points(500, false)));
+    let rejected = |change: &dyn Fn(&mut Points)| {
+        let mut broken = whole.clone();
+        change(&mut broken);
+        ply::write_points(&path, &broken, &()).unwrap();
+        let (code, _, told) = epsplat(&["info", path.to_str().unwrap()]);
+        assert_eq!(code, 1, "{told}");
+        assert!(told.contains("levels.ply") && told.lines().count() == 1, "{told}");
+        told
+    };
+    let tree = |points: &mut Points| points.tree.take().unwrap();
+    let row = |points: &mut Points, index: usize, change: &dyn Fn(&mut io::TreeRow)| {
+        let mut own = tree(points);
+        change(&mut own.rows[index]);
+        points.tree = Some(own);
+    };
+    let inner = whole.tree.as_ref().unwrap().rows.iter().skip(1).position(|row| !row.leaf).unwrap() + 1;
+    assert!(rejected(&|points| row(points, inner, &|row| row.first = 0)).contains("children"));
+    assert!(rejected(&|points| row(points, inner, &|row| row.first = u32::MAX)).contains("children"));
+    assert!(rejected(&|points| row(points, 0, &|row| row.count = 200)).contains("too much"));
+    assert!(rejected(&|points| row(points, inner, &|row| row.leaf = true)).contains("node"));
+    let last = whole.tree.as_ref().unwrap().rows.len() - 1;
+    assert!(rejected(&|points| row(points, last, &|row| row.count += 1)).contains("points"));
+    assert!(rejected(&|points| row(points, last, &|row| row.count = 0)).contains("nothing"));
+    let told = rejected(&|points| {
+        let mut own = tree(points);
+        own.nodes.positions[3][0] = f64::INFINITY;
+        points.tree = Some(own);
+    });
+    assert!(told.contains("no numbers"), "{told}");
+    // Cut off.
+    ply::write_points(&path, &whole, &()).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    std::fs::write(&path, &bytes[..bytes.len() - 40]).unwrap();
+    let (code, _, told) = epsplat(&["info", path.to_str().unwrap()]);
+    assert!(code == 1 && told.contains("node"), "{told}");
+    std::fs::write(&path, &bytes).unwrap();
+    let (code, text, _) = epsplat(&["info", path.to_str().unwrap()]);
+    assert!(code == 0 && text.contains("nodes in"), "{text}");
+}
+
+#[test]
+fn the_command_writes_what_it_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (surfels, levels) = (path("sphere.ply"), path("levels.ply"));
+    assert_eq!(epsplat(&["generate", "sphere", "--count", "2000", "-o", &surfels]).0, 0);
+    let (code, text, told) = epsplat(&["lod", &surfels, "-o", &levels, "--json", "-"]);
+    assert_eq!(code, 0, "{told}");
+    let report: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let read = io::read(Path::new(&levels), &()).unwrap();
+    assert_eq!(report["surfels"], 2000);
+    assert_eq!(report["nodes"], read.tree.unwrap().rows.len());
+    // The same surfels in another order are the same file.
+    let mut turned = io::read(Path::new(&surfels), &()).unwrap();
+    turned.positions.reverse();
+    turned.normals.iter_mut().for_each(|all| all.reverse());
+    turned.radii.iter_mut().for_each(|all| all.reverse());
+    if let Some(Colors::Srgb8(codes)) = &mut turned.colors {
+        codes.reverse();
+    }
+    ply::write_points(Path::new(&surfels), &turned, &()).unwrap();
+    let again = path("again.ply");
+    assert_eq!(epsplat(&["lod", &surfels, "-o", &again]).0, 0);
+    assert!(std::fs::read(&levels).unwrap() == std::fs::read(&again).unwrap());
+    let (code, _, told) = epsplat(&["lod", &surfels, "-o", &path("levels.txt")]);
+    assert!(code == 2 && told.contains(".ply"), "{told}");
+}

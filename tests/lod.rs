@@ -145,3 +145,52 @@ fn the_command_writes_what_it_says() {
     let (code, _, told) = epsplat(&["lod", &surfels, "-o", &path("levels.txt")]);
     assert!(code == 2 && told.contains(".ply"), "{told}");
 }
+
+/// `--lod 0` is the picture of all surfels to the bit, with and without levels in the file; a coarser cut is near it, of fewer; made levels are those of
+/// the file.
+#[test]
+fn a_cut_is_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (surfels, levels) = (path("sphere.ply"), path("levels.ply"));
+    assert_eq!(epsplat(&["generate", "sphere", "--count", "20000", "-o", &surfels]).0, 0);
+    assert_eq!(epsplat(&["lod", &surfels, "-o", &levels]).0, 0);
+    let draw = |file: &str, name: &str, more: &[&str]| {
+        let output = path(name);
+        let all = [&["render", file, "-o", &output, "--size", "160x160", "--backend", "reference"], more].concat();
+        let (code, _, told) = epsplat(&all);
+        assert_eq!(code, 0, "{told}");
+        (image::open(&output).unwrap().to_rgba8(), told)
+    };
+    let flat = draw(&surfels, "flat.png", &[]).0;
+    assert!(flat == draw(&levels, "all.png", &[]).0 && flat == draw(&levels, "zero.png", &["--lod", "0"]).0);
+    let (coarse, told) = draw(&levels, "coarse.png", &["--lod", "80px"]);
+    let drawn = |told: &str| -> u64 {
+        let line = told.lines().find(|line| line.starts_with("cut: ")).unwrap();
+        let numbers: Vec<u64> = line.split(' ').filter_map(|word| word.parse().ok()).collect();
+        assert_eq!(numbers[2], 20_000);
+        numbers[0] + numbers[1]
+    };
+    assert!(drawn(&told) < 15_000 && drawn(&told) > 500, "{told}");
+    let squared = |other: &image::RgbaImage| {
+        let off = flat.iter().zip(other.iter()).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2));
+        off.sum::<f64>() / flat.len() as f64
+    };
+    let psnr = |other: &image::RgbaImage| 10.0 * (255.0f64.powi(2) / squared(other)).log10();
+    assert!(psnr(&coarse) > 30.0, "{}", psnr(&coarse));
+    let (made, told) = draw(&surfels, "made.png", &["--lod", "80px"]);
+    assert!(made == coarse && told.contains("epsplat lod"), "{told}");
+    let (coarser, told) = draw(&levels, "coarser.png", &["--lod", "1%", "--lod-measure", "area"]);
+    assert!(drawn(&told) < 2500 && psnr(&coarser) < psnr(&coarse), "{told}");
+    for (arguments, words) in [
+        (&["--lod", "4"][..], "no size"),
+        (&["--lod", "1px", "--facing", "sphere"], "face the camera"),
+        (&["--lod", "1px", "--separate"], "--separate"),
+        (&["--lod", "1px", "--format", "exr", "--aov", "index"], "index"),
+    ] {
+        let output = path(if arguments.contains(&"exr") { "refused.exr" } else { "refused.png" });
+        let all = [&["render", &levels, "-o", &output, "--backend", "reference"], arguments].concat();
+        let (code, _, told) = epsplat(&all);
+        assert!(code == 2 && told.contains(words) && !Path::new(&output).exists(), "{arguments:?}: {told}");
+    }
+}

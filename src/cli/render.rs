@@ -1,5 +1,6 @@
 //! `epsplat render`: files in, a picture and its maps out, or one for each of many cameras.
 
+mod levels;
 mod options;
 mod output;
 mod view;
@@ -16,14 +17,15 @@ use epsplat::passes::unseen::{Unseen, is_empty};
 use epsplat::plan::{Accumulator, BackendName, BlendFormat, Organisation, RasterDepth};
 use epsplat::render::{Backend, Report, render};
 use epsplat::scene::{
-    Blend, Camera, Composite, Cull, Epsilon, Join, Kernel, Light, MAPS, Map, Outline, PointShape, PointSize, Samples,
-    Scene, Tail,
+    Blend, Camera, Composite, Cull, Detail, Epsilon, Join, Kernel, Light, MAPS, Map, Outline, PointShape, PointSize,
+    Samples, Scene, Tail,
 };
 use epsplat::surfels::{Preparation, with_triangles};
 use epsplat::{Error, Result, surfels};
 use glam::DVec3;
 use serde::Serialize;
 
+use self::levels::{Levels, MeasureName};
 use self::options::{for_scene, options};
 use self::output::{Format, note_overflows, summary};
 use self::view::{ChosenView, View};
@@ -200,6 +202,13 @@ pub struct Arguments {
     /// colours: .png or .jpg. Given again it is the next input's, or that of the next number (texnumber) of an input's points
     #[arg(long = "texture", value_name = "IMAGE")]
     textures: Vec<PathBuf>,
+    /// Draw a cut of levels of detail: nodes that are seen smaller than this in place of the surfels below them. Square pixels, 16px, or a part of
+    /// the image, 0.01%; 0 draws all surfels. `epsplat lod` keeps the levels in a file, else they are made first
+    #[arg(long, value_name = "SIZE")]
+    lod: Option<Detail>,
+    /// How nodes are measured: extent, as disks as long as their images, or area, of their images, as in Pajarola 2003
+    #[arg(long, value_enum, default_value_t = MeasureName::Extent)]
+    lod_measure: MeasureName,
     /// A light, instead of the headlight: headlight[:INTENSITY] or the direction toward it, x,y,z[:INTENSITY]
     #[arg(long = "light", value_name = "LIGHT", allow_hyphen_values = true)]
     lights: Vec<Light>,
@@ -284,12 +293,16 @@ fn one(arguments: &Arguments) -> Result<()> {
     let backend = backend(arguments)?;
 
     let bars = Bars::new();
-    let (scene, preparation) = scene(arguments, &bars)?;
+    let (mut scene, preparation) = scene(arguments, &bars)?;
     let options = for_scene(arguments, options, &scene)?;
+    let levels = Levels::of(arguments, &mut scene, &bars)?;
     let (camera, chosen) = view.camera(&scene, Camera::default_near(&scene))?;
+    let cut = levels.as_ref().map(|levels| levels.cut(&scene, &camera, &options));
     let chosen = chosen.map(|view| ChosenView::new(view, &scene, arguments.up, preparation.guessed_up));
     chosen.iter().for_each(|view| note(&view.sentence()));
-    let (frame, report) = render(&scene, &camera, &options, &backend, &bars)?;
+    cut.iter().for_each(|(_, what)| note(what));
+    let drawn = cut.as_ref().map_or(&scene, |(cut, _)| cut);
+    let (frame, report) = render(drawn, &camera, &options, &backend, &bars)?;
     note_overflows(&report);
     if is_empty(&frame, &options) {
         note(&Unseen::of(&scene, &camera, &options).sentence());

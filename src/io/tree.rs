@@ -1,6 +1,7 @@
 //! Levels of detail as a file has them.
 
 use super::Points;
+use crate::scene::color::srgb8;
 use crate::scene::hierarchy::{Fault, Hierarchy, Node};
 use crate::scene::{Colors, Surfel};
 
@@ -79,7 +80,7 @@ impl Tree {
             axes: Some(nodes.iter().map(|node| [node.surfel.s, node.surfel.t]).collect()),
             radii: Some(nodes.iter().map(|node| node.radius).collect()),
             colors: Some(match coded {
-                true => Colors::Srgb8(nodes.iter().map(|node| super::ply::Color::Linear(node.color).srgb8()).collect()),
+                true => Colors::Srgb8(nodes.iter().map(|node| srgb8(node.color)).collect()),
                 false => Colors::Linear(nodes.iter().map(|node| node.color).collect()),
             }),
             ..Points::default()

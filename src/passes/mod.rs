@@ -48,6 +48,7 @@ pub mod peel;
 pub mod project;
 pub mod raster;
 pub mod resolve;
+pub mod select;
 pub mod shared;
 pub mod sorted;
 pub mod source;

@@ -24,6 +24,14 @@ pub enum Colors {
 /// The colour of surfels that come without one: a light grey that shading can darken and highlights cannot clip.
 pub const DEFAULT_COLOR: [f32; 4] = [0.7, 0.7, 0.7, 1.0];
 
+/// The nearest 8-bit sRGB codes of a linear colour, alpha straight; what lies outside of [0, 1] is clamped.
+pub fn srgb8([r, g, b, a]: [f32; 4]) -> [u8; 4] {
+    // A cast takes what is larger for 255.
+    let code = |value: f64| (value * 255.0).round() as u8;
+    let [r, g, b] = [r, g, b].map(|linear| code(linear_to_srgb(f64::from(linear))));
+    [r, g, b, code(f64::from(a))]
+}
+
 impl Default for Colors {
     /// All of [`DEFAULT_COLOR`].
     fn default() -> Self {

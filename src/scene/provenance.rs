@@ -68,7 +68,8 @@ impl Provenance {
 
     /// The number of the input that surfel `index` comes from, and of the point in it; both start at 0.
     pub fn of(&self, index: u64) -> (u64, u64) {
-        let index = self.order.as_ref().map_or(index, |order| order[index as usize].into());
+        let before = |order: &Vec<u32>| order.get(index as usize).copied().map(u64::from);
+        let index = self.order.as_ref().and_then(before).unwrap_or(index);
         let after = self.inputs.partition_point(|input| input.first <= index);
         let Some(input) = after.checked_sub(1).and_then(|input| self.inputs.get(input)) else { return (0, index) };
         let kept = index - input.first;

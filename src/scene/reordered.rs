@@ -1,4 +1,4 @@
-//! A scene in another order.
+//! Some surfels of a scene, or all in another order.
 
 use rayon::prelude::*;
 
@@ -10,25 +10,30 @@ fn at<T: Copy + Send + Sync>(values: &[T], indices: &[u32]) -> Vec<T> {
 }
 
 impl Scene {
-    /// The same scene, whose surfel k was number `order[k]`; each number is there once. Without levels of detail, as it is in no tree's order.
+    /// The surfels at these indices, in this order, as a scene like this one; without levels of detail, as it is in no tree's order.
     #[must_use]
-    pub fn reordered(mut self, order: &[u32]) -> Self {
-        self.surfels = at(&self.surfels, order);
-        self.low = at(&self.low, order);
-        self.clips = at(&self.clips, order);
-        self.caps = at(&self.caps, order);
-        self.normals = at(&self.normals, order);
-        let indices = || order.iter().map(|&index| index as usize).collect::<Vec<_>>();
-        self.colors = match self.colors {
-            Colors::Constant(color) => Colors::Constant(color),
-            Colors::Srgb8(codes) => Colors::Srgb8(at(&codes, order)),
-            Colors::Linear(colors) => Colors::Linear(at(&colors, order)),
-            Colors::Textured(textured) => Colors::Textured(textured.taken(&indices())),
-            Colors::Harmonics(harmonics) => Colors::Harmonics(harmonics.taken(&indices())),
-        };
-        self.hierarchy = None;
-        self.provenance.reorder(order);
-        self
+    pub fn taken(&self, indices: &[u32]) -> Self {
+        let places = || indices.iter().map(|&index| index as usize).collect::<Vec<_>>();
+        let mut provenance = self.provenance.clone();
+        provenance.reorder(indices);
+        Self {
+            surfels: at(&self.surfels, indices),
+            low: at(&self.low, indices),
+            clips: at(&self.clips, indices),
+            caps: at(&self.caps, indices),
+            normals: at(&self.normals, indices),
+            colors: match &self.colors {
+                Colors::Constant(color) => Colors::Constant(*color),
+                Colors::Srgb8(codes) => Colors::Srgb8(at(codes, indices)),
+                Colors::Linear(colors) => Colors::Linear(at(colors, indices)),
+                Colors::Textured(textured) => Colors::Textured(textured.taken(&places())),
+                Colors::Harmonics(harmonics) => Colors::Harmonics(harmonics.taken(&places())),
+            },
+            hierarchy: None,
+            triangles: self.triangles.clone(),
+            provenance,
+            ..*self
+        }
     }
 }
 
@@ -47,13 +52,13 @@ mod tests {
         provenance.push(2, vec![], None);
         let colors = Colors::Srgb8((0..5).map(|k| [k, 0, 0, 255]).collect());
         let scene = Scene { surfels, colors, provenance, ..Scene::default() };
-        let first = scene.clone().reordered(&[3, 1, 4, 0, 2]);
+        let first = scene.taken(&[3, 1, 4, 0, 2]);
         assert_eq!(first.surfels[0], scene.surfels[3]);
         assert_eq!(first.colors.linear(2), scene.colors.linear(4));
         let points = |scene: &Scene| (0..5).map(|k| scene.provenance.of(k)).collect::<Vec<_>>();
         assert_eq!(points(&scene), [(0, 1), (0, 2), (1, 0), (1, 1), (1, 2)]);
         assert_eq!(points(&first), [(1, 1), (0, 2), (1, 2), (0, 1), (1, 0)]);
         // And once more, back.
-        assert_eq!(points(&first.reordered(&[3, 1, 4, 0, 2])), points(&scene.reordered(&[0, 1, 2, 3, 4])));
+        assert_eq!(points(&first.taken(&[3, 1, 4, 0, 2])), points(&scene.taken(&[0, 1, 2, 3, 4])));
     }
 }

@@ -4,7 +4,7 @@ use super::vertex::{CAP_NAMES, CLIP_NAMES, NODE_NAMES, NUMBER_NAME, SLOPE_NAMES}
 use super::write_gaussians;
 use crate::io::atomic::{Output, write_whole};
 use crate::io::{Points, Tree, Up};
-use crate::scene::color::{DEFAULT_COLOR, SRGB8_TO_LINEAR, linear_to_srgb};
+use crate::scene::color::{DEFAULT_COLOR, SRGB8_TO_LINEAR, srgb8};
 use crate::scene::{Cap, Clip, Colors};
 use crate::{Error, Progress, Result};
 use std::io::{self, Write};
@@ -46,13 +46,10 @@ pub enum Color {
 
 impl Color {
     /// 8-bit sRGB; linear light outside [0, 1] is clamped.
-    pub(crate) fn srgb8(self) -> [u8; 4] {
+    fn srgb8(self) -> [u8; 4] {
         match self {
             Self::Srgb8(codes) => codes,
-            Self::Linear([r, g, b, a]) => {
-                let code = |linear: f32| (linear_to_srgb(f64::from(linear)) * 255.0).round() as u8;
-                [code(r), code(g), code(b), (a.clamp(0.0, 1.0) * 255.0).round() as u8]
-            }
+            Self::Linear(color) => srgb8(color),
         }
     }
 

@@ -48,7 +48,7 @@ pub fn build(scene: Scene, progress: &dyn Progress) -> Result<(Scene, Arc<Hierar
     progress.end();
     in_order(&mut tree, &scene);
     let order: Vec<u32> = tree.elements.iter().map(|element| element.index).collect();
-    let scene = scene.reordered(&order);
+    let scene = scene.taken(&order);
     drop(order);
     let hierarchy = Arc::new(nodes(&tree, &scene, progress));
     Ok((Scene { hierarchy: Some(hierarchy.clone()), ..scene }, hierarchy))

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::lattice::Lattice;
 use super::moments::Moments;
 use super::octree::Element;
-use crate::io::ply::Color;
+use crate::scene::color::srgb8;
 use crate::scene::{Colors, Scene, Surfel};
 use crate::surfels::eigen::Symmetric3;
 
@@ -58,7 +58,7 @@ impl Scales {
     fn color(&self, units: [f64; 4]) -> [f32; 4] {
         let [r, g, b, a] = std::array::from_fn(|k| self.low[k] + self.span[k] * (units[k] / COLOR_ONE));
         let color = if a > 0.0 { [r / a, g / a, b / a, a].map(|value| value as f32) } else { [0.0; 4] };
-        if self.coded { Colors::Srgb8(vec![Color::Linear(color).srgb8()]).linear(0) } else { color }
+        if self.coded { Colors::Srgb8(vec![srgb8(color)]).linear(0) } else { color }
     }
 }
 

@@ -9,7 +9,7 @@ use super::cells::{Cells, tangent_basis};
 use super::cut::clip;
 use super::growing::Cover;
 use super::samples::Samples;
-use crate::scene::color::linear_to_srgb;
+use crate::scene::color::srgb8;
 use crate::scene::scene::low_parts;
 use crate::scene::{Cap, Clip, Colors, Scene, Surfel};
 use crate::surfels::Coordinates;
@@ -257,11 +257,4 @@ pub(super) fn scene(
         coordinates,
         deviations,
     )
-}
-
-/// The nearest 8-bit codes: a file that came with such colours keeps them.
-fn srgb8([r, g, b, alpha]: [f32; 4]) -> [u8; 4] {
-    let code = |value: f64| (value * 255.0).round() as u8;
-    let [r, g, b] = [r, g, b].map(|linear| code(linear_to_srgb(f64::from(linear))));
-    [r, g, b, code(f64::from(alpha))]
 }

@@ -1,0 +1,128 @@
+//! How fine a cut through levels of detail is.
+
+use std::f64::consts::PI;
+use std::str::FromStr;
+
+use glam::{DVec2, DVec3};
+
+use super::{Camera, Projection, Surfel};
+
+/// The size of a node in the image that it is drawn at instead of what is below it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Detail {
+    /// Square pixels.
+    Pixels(f64),
+    /// A part of the image.
+    Share(f64),
+}
+
+impl Detail {
+    /// Everything as it is: no node is small enough.
+    pub const FINEST: Self = Self::Pixels(0.0);
+
+    /// Square pixels in the image of `camera`.
+    pub fn pixels(self, camera: &Camera) -> f64 {
+        match self {
+            Self::Pixels(pixels) => pixels,
+            Self::Share(share) => share * camera.pixels() as f64,
+        }
+    }
+}
+
+impl FromStr for Detail {
+    type Err = String;
+
+    /// `0`, `16px` or `0.01%`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || {
+            format!(
+                "'{text}' is no size of the smallest nodes: a number of square pixels, 16px, a part of the image, 0.01%, or 0"
+            )
+        };
+        let number = |text: &str| text.parse().ok().filter(|number: &f64| number.is_finite() && *number >= 0.0);
+        let detail = match (text.strip_suffix("px"), text.strip_suffix('%')) {
+            (Some(pixels), _) => number(pixels).map(Self::Pixels),
+            (_, Some(percent)) => number(percent).map(|percent| Self::Share(percent / 100.0)),
+            (None, None) => number(text).filter(|number| *number == 0.0).map(Self::Pixels),
+        };
+        detail.ok_or_else(wrong)
+    }
+}
+
+/// What of a node's ellipse is measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DetailMeasure {
+    /// The area of its image, as in Pajarola 2003: seen from its edge it has none, so outlines get the coarsest nodes.
+    Area,
+    /// The area of the disk that its longer half-axis is seen as: an outline is as fine as a surface that is seen from the front.
+    #[default]
+    Extent,
+}
+
+impl DetailMeasure {
+    /// All of them, by name and what they measure.
+    pub const ALL: [(Self, &'static str, &'static str); 2] = [
+        (Self::Area, "area", "the area of a node's image, as in Pajarola 2003"),
+        (Self::Extent, "extent", "that of a disk as long as its image"),
+    ];
+
+    /// Square pixels of a surfel at the centre `center`, relative to the eye, as seen there; infinite at the eye's plane.
+    pub fn of(self, surfel: &Surfel, center: DVec3, camera: &Camera) -> f64 {
+        let turned = |v: DVec3| camera.rotation * v;
+        let (at, focal) = (turned(center), DVec2::new(camera.fx, camera.fy));
+        if camera.projection == Projection::Pinhole && at.z <= camera.near {
+            return f64::INFINITY;
+        }
+        let image = |axis: [f32; 3]| {
+            let axis = turned(DVec3::from_array(axis.map(f64::from)));
+            match camera.projection {
+                Projection::Pinhole => (axis.truncate() - at.truncate() / at.z * axis.z) / at.z * focal,
+                Projection::Orthographic => axis.truncate() * focal,
+            }
+        };
+        let [s, t] = [surfel.s, surfel.t].map(image);
+        match self {
+            Self::Area => PI * s.perp_dot(t).abs(),
+            Self::Extent => PI * s.length_squared().max(t.length_squared()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use glam::{DMat3, Vec3};
+
+    use super::*;
+    use crate::scene::Lens;
+
+    #[test]
+    fn sizes_are_read() {
+        assert_eq!("16px".parse(), Ok(Detail::Pixels(16.0)));
+        assert_eq!("0.01%".parse(), Ok(Detail::Share(1e-4)));
+        assert_eq!("0".parse(), Ok(Detail::FINEST));
+        for wrong in ["", "px", "-1px", "nanpx", "3", "1e999%", "5 px"] {
+            assert!(wrong.parse::<Detail>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_disk_has_the_size_that_it_is_seen_at() {
+        for (lens, pixels) in [(Lens::Fov(90.0), 50.0 / 4.0), (Lens::OrthographicHeight(10.0), 10.0)] {
+            let camera = Camera::posed((100, 100), lens, DVec3::ZERO, DMat3::IDENTITY, 0.1).unwrap();
+            let center = DVec3::new(0.0, 0.0, 4.0);
+            let front = Surfel::disk(Vec3::ZERO, Vec3::Z, 0.5);
+            let (area, extent) = (DetailMeasure::Area, DetailMeasure::Extent);
+            let expected = PI * (0.5 * pixels) * (0.5 * pixels);
+            assert!((area.of(&front, center, &camera) / expected - 1.0).abs() < 1e-6);
+            assert!((extent.of(&front, center, &camera) / expected - 1.0).abs() < 1e-6);
+            let edge = Surfel::disk(Vec3::ZERO, Vec3::X, 0.5);
+            assert!(area.of(&edge, center, &camera) < 1e-6 * expected);
+            assert!((extent.of(&edge, center, &camera) / expected - 1.0).abs() < 1e-6);
+        }
+        let camera = Camera::posed((9, 9), Lens::Fov(60.0), DVec3::ZERO, DMat3::IDENTITY, 0.1).unwrap();
+        let behind =
+            DetailMeasure::Area.of(&Surfel::disk(Vec3::ZERO, Vec3::Z, 1.0), DVec3::new(0.0, 0.0, -1.0), &camera);
+        assert_eq!(behind, f64::INFINITY);
+    }
+}

@@ -164,6 +164,8 @@ fn a_cut_is_drawn() {
     };
     let flat = draw(&surfels, "flat.png", &[]).0;
     assert!(flat == draw(&levels, "all.png", &[]).0 && flat == draw(&levels, "zero.png", &["--lod", "0"]).0);
+    // All is in view, and no node is so small: a cut of all surfels.
+    assert!(flat == draw(&levels, "finest.png", &["--lod", "0.000001px"]).0);
     let (coarse, told) = draw(&levels, "coarse.png", &["--lod", "80px"]);
     let drawn = |told: &str| -> u64 {
         let line = told.lines().find(|line| line.starts_with("cut: ")).unwrap();
@@ -193,4 +195,31 @@ fn a_cut_is_drawn() {
         let (code, _, told) = epsplat(&all);
         assert!(code == 2 && told.contains(words) && !Path::new(&output).exists(), "{arguments:?}: {told}");
     }
+}
+
+/// From within a closed surface its inside is seen, in a cut too, though what is in view does not lie around the eye; from without, a cut that leaves
+/// out backs has no holes at outlines; and a set of cameras draws what one does.
+#[test]
+fn cuts_of_closed_scenes_are_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let cube = concat!(env!("CARGO_MANIFEST_DIR"), "/data/cube.obj");
+    let (surfels, levels) = (path("cube.ply"), path("levels.ply"));
+    assert_eq!(epsplat(&["sample", cube, "-o", &surfels, "--count", "6000"]).0, 0);
+    assert_eq!(epsplat(&["lod", &surfels, "-o", &levels]).0, 0);
+    let draw = |view: &[&str], more: &[&str]| {
+        let output = path("out.png");
+        let all =
+            [&["render", &levels, "-o", &output, "--size", "120x120", "--backend", "reference"], view, more].concat();
+        let (code, _, told) = epsplat(&all);
+        assert_eq!(code, 0, "{told}");
+        image::open(&output).unwrap().to_rgba8()
+    };
+    let covered = |picture: &image::RgbaImage| picture.pixels().filter(|pixel| pixel.0[3] > 127).count();
+    let inside = ["--eye", "0,0,0", "--target", "1,0.1,0"];
+    assert_eq!(covered(&draw(&inside, &[])), 120 * 120);
+    assert_eq!(covered(&draw(&inside, &["--lod", "1px"])), 120 * 120);
+    let outside = ["--eye", "9,7,8", "--target", "0,0,0", "--fov", "20"];
+    let [all, cut] = [&[][..], &["--lod", "40px"]].map(|lod| covered(&draw(&outside, lod)));
+    assert!(all > 4000 && cut + 60 > all && cut < all + 400, "{all} {cut}");
 }

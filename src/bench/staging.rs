@@ -133,6 +133,7 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
         footprint_px = wanted;
     }
     if let Some(wanted) = point.footprint_px.filter(|_| !scene.surfels.is_empty() && footprint_px > 0.0) {
+        scene.hierarchy = None;
         let factor = (wanted / footprint_px) as f32;
         let scaled = |axis: [f32; 3]| axis.map(|c| c * factor);
         for surfel in &mut scene.surfels {

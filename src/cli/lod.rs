@@ -52,6 +52,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut seconds = || std::mem::replace(&mut started, Instant::now()).elapsed().as_secs_f64();
     let inputs = arguments.reading.all(&arguments.inputs, &bars)?;
     let beside = outputs::beside(&inputs, &arguments.output)?;
+    if inputs.iter().any(|points| points.texture.is_some()) {
+        note("warning: texture coordinates are left out, as levels of detail have none yet");
+    }
     let read = seconds();
     let (scene, preparation) = surfels::build_within(inputs, Vec::new(), &arguments.limits.limits(), &bars)
         .map_err(|error| named(error, &arguments.inputs))?;

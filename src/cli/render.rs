@@ -207,7 +207,7 @@ pub struct Arguments {
     #[arg(long, value_name = "SIZE")]
     lod: Option<Detail>,
     /// How nodes are measured: extent, as disks as long as their images, or area, of their images, as in Pajarola 2003
-    #[arg(long, value_enum, default_value_t = MeasureName::Extent)]
+    #[arg(long, value_enum, default_value_t = MeasureName::Extent, requires = "lod")]
     lod_measure: MeasureName,
     /// A light, instead of the headlight: headlight[:INTENSITY] or the direction toward it, x,y,z[:INTENSITY]
     #[arg(long = "light", value_name = "LIGHT", allow_hyphen_values = true)]
@@ -300,9 +300,9 @@ fn one(arguments: &Arguments) -> Result<()> {
     let cut = levels.as_ref().map(|levels| levels.cut(&scene, &camera, &options));
     let chosen = chosen.map(|view| ChosenView::new(view, &scene, arguments.up, preparation.guessed_up));
     chosen.iter().for_each(|view| note(&view.sentence()));
-    cut.iter().for_each(|(_, what)| note(what));
-    let drawn = cut.as_ref().map_or(&scene, |(cut, _)| cut);
-    let (frame, report) = render(drawn, &camera, &options, &backend, &bars)?;
+    cut.iter().for_each(|(.., what)| note(what));
+    let (drawn, how) = cut.as_ref().map_or((&scene, &options), |(cut, how, _)| (cut, how));
+    let (frame, report) = render(drawn, &camera, how, &backend, &bars)?;
     note_overflows(&report);
     if is_empty(&frame, &options) {
         note(&Unseen::of(&scene, &camera, &options).sentence());

@@ -5,6 +5,9 @@ use crate::scene::color::srgb8;
 use crate::scene::hierarchy::{Fault, Hierarchy, Node};
 use crate::scene::{Colors, Surfel};
 
+/// The largest number of a node, as for coordinates of points.
+const LARGEST: f32 = 1e18;
+
 /// The nodes of a tree over points that are in its order ([`Hierarchy`]).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tree {
@@ -36,13 +39,15 @@ impl Tree {
             let center = glam::DVec3::from_array(*self.nodes.positions.get(index)?) - origin;
             let rounded = center.as_vec3();
             let ([s, t], radius) = (*axes.get(index)?, *radii.get(index)?);
-            let numbers = [rounded.to_array(), s, t].into_iter().flatten().chain([radius, row.cone]);
-            if !numbers.into_iter().all(f32::is_finite) || radius < 0.0 {
+            let color = self.nodes.colors.as_ref().map_or([1.0; 4], |colors| colors.linear(index));
+            let numbers = [rounded.to_array(), s, t].into_iter().flatten().chain(color).chain([radius, row.cone]);
+            let [along, across] = [s, t].map(|axis| glam::DVec3::from_array(axis.map(f64::from)));
+            let spans = along.cross(across).length() > 0.0;
+            if !numbers.into_iter().all(|number| number.abs() <= LARGEST) || radius < 0.0 || !spans || color[3] > 1.0 {
                 return None;
             }
-            let color = self.nodes.colors.as_ref().map_or([1.0; 4], |colors| colors.linear(index));
             let TreeRow { cone, first, count, leaf } = *row;
-            let surfel = Surfel { center: rounded.to_array(), s, t };
+            let surfel = Surfel::ellipse(rounded, along.as_vec3(), across.as_vec3());
             all.nodes.push(Node { surfel, color, radius, cone, first, count, leaf });
             all.low.push((center - rounded.as_dvec3()).as_vec3().to_array());
         }
@@ -52,7 +57,10 @@ impl Tree {
     /// Why these are no tree over so many points; None if they are one.
     pub(super) fn fault(&self, points: usize) -> Option<String> {
         let Some(hierarchy) = self.hierarchy(glam::DVec3::ZERO) else {
-            return Some("a node has a centre, half-axes or a radius that are no numbers".into());
+            return Some(
+                "a node has a centre, half-axes, a radius or a colour that are no numbers, or too large, or no ellipse"
+                    .into(),
+            );
         };
         let place = |index: usize| format!("node {index} of {}", self.rows.len());
         let what = match Hierarchy::check(&hierarchy.nodes, points).err()? {

@@ -1,7 +1,8 @@
 //! Stage 0 of scenes with levels of detail: the cut, which is drawn in place of all surfels (Pajarola 2003, section 5.1, step 1).
 //!
-//! From the root down: what is out of view, or turned away where backs are left out, is passed over; a node that is seen smaller than the size asked
-//! for is drawn; of a leaf that is not, its surfels are; and of other nodes what is below. The cut depends on the tree and the camera alone.
+//! From the root down: what is out of view, or all turned away where backs are left out, is passed over; a node that is seen smaller than the size
+//! asked for is drawn, but where backs are left out none that would be though some of what is below would not; of a leaf that is not, its surfels
+//! are; and of other nodes what is below. The cut depends on the tree, the camera and on whether backs are left out alone.
 
 use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
@@ -12,7 +13,7 @@ use rayon::prelude::*;
 use super::cull;
 use crate::scene::color::srgb8;
 use crate::scene::hierarchy::Node;
-use crate::scene::{Camera, Cap, Clip, Colors, Cull, Detail, DetailMeasure, Hierarchy, Projection, Scene, Surfel};
+use crate::scene::{Camera, Cap, Clip, Colors, Detail, DetailMeasure, Hierarchy, Projection, Scene, Surfel};
 
 /// What is drawn of a tree.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -31,13 +32,13 @@ enum Fate {
     Divided,
 }
 
-/// The cut of `hierarchy` in the view of `camera`, relative to `origin`.
+/// The cut of `hierarchy`, which is relative to `origin`, in the view of `camera`; backs are left out or not.
 pub fn reference(
     hierarchy: &Hierarchy,
     origin: DVec3,
     camera: &Camera,
     (detail, measure): (Detail, DetailMeasure),
-    cull: Cull,
+    backs_out: bool,
 ) -> Cut {
     let eye = camera.eye - origin;
     let size = detail.pixels(camera);
@@ -45,12 +46,14 @@ pub fn reference(
         let node = &hierarchy.nodes[index as usize];
         let low = hierarchy.low.get(index as usize).map_or(DVec3::ZERO, |low| DVec3::from_array(low.map(f64::from)));
         let center = DVec3::from_array(node.surfel.center.map(f64::from)) + low - eye;
-        if is_unseen(node, center, camera) || (cull == Cull::Back && faces_away(node, center, camera)) {
+        let [turned, spread] = if backs_out { turned_away(node, center, camera) } else { [-1.0, 0.0] };
+        if is_unseen(node, center, camera) || turned > spread {
             return Fate::Unseen;
         }
         let seen =
             if reaches_eye(node, center, camera) { f64::INFINITY } else { measure.of(&node.surfel, center, camera) };
-        if seen < size { Fate::Drawn } else { Fate::Divided }
+        // The plane of one that faces away is left out, whatever is below it.
+        if seen < size && turned <= 0.0 { Fate::Drawn } else { Fate::Divided }
     };
     let mut cut = Cut::default();
     let mut frontier: Vec<u32> = vec![0];
@@ -61,6 +64,8 @@ pub fn reference(
             let Node { first, count, leaf, .. } = hierarchy.nodes[index as usize];
             match fate {
                 Fate::Unseen => {}
+                // One surfel is itself, with its lines and its cap.
+                Fate::Drawn if leaf && count == 1 => cut.surfels.push(first..first + 1),
                 Fate::Drawn => cut.nodes.push(index),
                 Fate::Divided if leaf => cut.surfels.push(first..first + count),
                 Fate::Divided => below.extend(first..first + count),
@@ -90,9 +95,9 @@ fn is_unseen(node: &Node, center: DVec3, camera: &Camera) -> bool {
     })
 }
 
-/// Whether all below a node faces away, whatever point of the ball around it is looked at (specification S12): the angle between its normal and
-/// the way to the eye is more than a right one by more than its cone and the ball's half-angle.
-fn faces_away(node: &Node, center: DVec3, camera: &Camera) -> bool {
+/// The sine by which a node's normal points away from the eye, and that past which all below it does, whatever point of the ball around it is looked
+/// at (specification S12): that of its cone and the ball's half-angle together, if they are less than a right angle; else 1.
+fn turned_away(node: &Node, center: DVec3, camera: &Camera) -> [f64; 2] {
     let (toward, ball) = match camera.projection {
         Projection::Pinhole => {
             let distance = center.length();
@@ -102,7 +107,7 @@ fn faces_away(node: &Node, center: DVec3, camera: &Camera) -> bool {
     };
     let spread = f64::from(node.cone).clamp(-1.0, 1.0).acos() + ball;
     let [s, t] = [node.surfel.s, node.surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
-    spread < FRAC_PI_2 && toward.dot(s.cross(t).normalize_or_zero()) < -spread.sin()
+    [-toward.dot(s.cross(t).normalize_or_zero()), if spread < FRAC_PI_2 { spread.sin() } else { 1.0 }]
 }
 
 impl Cut {
@@ -189,7 +194,7 @@ mod tests {
             let mut last = usize::MAX;
             for size in [0.0, 250.0, 1000.0, 6000.0, 1e9] {
                 for measure in [DetailMeasure::Area, DetailMeasure::Extent] {
-                    let cut = reference(&tree, DVec3::ZERO, &camera, (Detail::Pixels(size), measure), Cull::None);
+                    let cut = reference(&tree, DVec3::ZERO, &camera, (Detail::Pixels(size), measure), false);
                     let drawn = cut.surfels.iter().flat_map(Clone::clone);
                     let mut all: Vec<u32> =
                         cut.nodes.iter().flat_map(|&index| below(&tree, index)).chain(drawn).collect();
@@ -228,8 +233,7 @@ mod tests {
             [(DVec3::new(0.0, 0.0, 0.4), false), (DVec3::new(0.2, 0.1, 1.6), false), (DVec3::new(0.2, 0.1, 1.6), true)]
         {
             let camera = camera(eye, Lens::Fov(40.0));
-            let cull = if back { Cull::Back } else { Cull::None };
-            let cut = reference(&tree, DVec3::ZERO, &camera, (Detail::FINEST, DetailMeasure::Area), cull);
+            let cut = reference(&tree, DVec3::ZERO, &camera, (Detail::FINEST, DetailMeasure::Area), back);
             let drawn: std::collections::BTreeSet<u32> = cut.surfels.iter().flat_map(Clone::clone).collect();
             assert!(cut.nodes.is_empty() && drawn.len() < 5000 && drawn.len() > 50, "{}", drawn.len());
             for index in (0..8000u32).filter(|index| !drawn.contains(index)) {

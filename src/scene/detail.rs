@@ -20,6 +20,11 @@ impl Detail {
     /// Everything as it is: no node is small enough.
     pub const FINEST: Self = Self::Pixels(0.0);
 
+    /// Whether all is drawn as it is.
+    pub fn is_finest(self) -> bool {
+        matches!(self, Self::Pixels(size) | Self::Share(size) if size == 0.0)
+    }
+
     /// Square pixels in the image of `camera`.
     pub fn pixels(self, camera: &Camera) -> f64 {
         match self {

@@ -80,6 +80,8 @@ pub fn build_within(
     painting::number(&mut inputs, textures.len())?;
     let gathered = gather::gather(inputs)?;
     let (mut scene, preparation, places) = built_in_texture(gathered, textures.len() as u32, limits, progress)?;
+    // Nodes have no place in a texture.
+    scene.hierarchy = None;
     scene.colors = Colors::Textured(texture::painted(&scene, textures, &places, progress)?);
     Ok((scene, preparation))
 }
@@ -194,7 +196,7 @@ pub(super) fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Prog
     let clips: Vec<Clip> = clips.unwrap_or_default().into_iter().map(Clip::usable).collect();
     let clips = if clips.iter().all(Clip::is_none) { Vec::new() } else { clips };
     let of_disks = Scene { low, clips, caps, normals, ..Scene::default() };
-    let hierarchy = tree.and_then(|tree| tree.hierarchy(origin)).map(Arc::new);
+    let hierarchy = tree.filter(|_| !encoded).and_then(|tree| tree.hierarchy(origin)).map(Arc::new);
     let scene = Scene { origin, surfels, colors, encoded, oriented, closed, up, provenance, hierarchy, ..of_disks };
     // As the default view sees it.
     preparation.strays = scene.framed().1;

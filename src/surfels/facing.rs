@@ -63,5 +63,5 @@ pub fn build_facing(
     let ((scene, mut preparation), _) = built(gathered, limits, progress)?;
     preparation.common_radius =
         common.filter(|_| lacking > 0 && all.is_none()).map(|radius| (lacking, factor * radius));
-    Ok((Scene { oriented: false, closed: false, ..scene }, preparation))
+    Ok((Scene { oriented: false, closed: false, hierarchy: None, ..scene }, preparation))
 }

@@ -142,7 +142,9 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
     let caps = caps.map(|axes| caps_of((&distinct, &graph), (&point_normals, sided), axes));
     let (normals, radii, up) = (Some(point_normals), Some(radii), Some(known_up));
     // Which surfels cover a closed surface nobody knows.
-    let points = Points { normals, radii, axes, clips, caps, up, closed: false, tree: None, ..gathered.points };
+    let unsided = gathered.points.unsided && preparation.estimated_normals < preparation.surfels;
+    let points =
+        Points { unsided, normals, radii, axes, clips, caps, up, closed: false, tree: None, ..gathered.points };
     preparation.limited_by_neighbours = sizes.limited(distinct.of_point());
     let radius = |index: usize| points.radii.as_ref().map_or(0.0, |radii| f64::from(radii[index]));
     preparation.strays = framed(count, |index| (DVec3::from_array(points.positions[index]), radius(index))).1;

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use clap::ValueEnum;
 use epsplat::passes::select;
-use epsplat::plan::RenderOptions;
-use epsplat::scene::{Camera, Detail, DetailMeasure, Hierarchy, Map, Maps, Scene};
+use epsplat::plan::{Facts, RenderOptions, culls_back};
+use epsplat::scene::{Camera, Cull, Detail, DetailMeasure, Hierarchy, Map, Maps, Scene};
 use epsplat::surfels::hierarchy;
 use epsplat::{Error, Result};
 
@@ -22,6 +22,8 @@ pub(super) enum MeasureName {
 /// Levels of detail, and how fine a cut is wanted.
 pub(super) struct Levels {
     hierarchy: Arc<Hierarchy>,
+    /// Of the whole scene, which say whether its backs are left out.
+    facts: Facts,
     detail: Detail,
     measure: DetailMeasure,
 }
@@ -32,7 +34,7 @@ impl Levels {
     /// # Errors
     /// [`Error::Usage`] for what does not go with a cut.
     pub fn of(arguments: &Arguments, scene: &mut Scene, bars: &Bars) -> Result<Option<Self>> {
-        let Some(detail) = arguments.lod.filter(|detail| *detail != Detail::FINEST) else { return Ok(None) };
+        let Some(detail) = arguments.lod.filter(|detail| !detail.is_finest()) else { return Ok(None) };
         let refused = [
             (
                 arguments.facing.is_some(),
@@ -61,15 +63,18 @@ impl Levels {
             MeasureName::Area => DetailMeasure::Area,
             MeasureName::Extent => DetailMeasure::Extent,
         };
-        Ok(Some(Self { hierarchy, detail, measure }))
+        Ok(Some(Self { hierarchy, facts: Facts::of(scene), detail, measure }))
     }
 
-    /// What is drawn of `scene` in the view of `camera`, and what that is.
-    pub fn cut(&self, scene: &Scene, camera: &Camera, options: &RenderOptions) -> (Scene, String) {
+    /// What is drawn of `scene` in the view of `camera`, with which options, and what that is.
+    pub fn cut(&self, scene: &Scene, camera: &Camera, options: &RenderOptions) -> (Scene, RenderOptions, String) {
         let how = (self.detail, self.measure);
-        let cut = select::reference(&self.hierarchy, scene.origin, camera, how, options.cull);
+        let backs_out = culls_back(&self.facts, camera, options);
+        let cut = select::reference(&self.hierarchy, scene.origin, camera, how, backs_out);
+        // What is in view does not say whether the eye is outside of the scene.
+        let cull = if backs_out { Cull::Back } else { Cull::None };
         let surfels: usize = cut.surfels.iter().map(|range| range.len()).sum();
         let what = format!("cut: {} nodes and {surfels} of {} surfels", cut.nodes.len(), scene.surfels.len());
-        (cut.scene(scene, &self.hierarchy), what)
+        (cut.scene(scene, &self.hierarchy), RenderOptions { cull, ..options.clone() }, what)
     }
 }

@@ -75,10 +75,11 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
     let empty = RefCell::new((None, 0));
     let frames = views.iter().map(|(file, view)| {
         let frame = view.camera(&scene, near).and_then(|(camera, _)| {
-            let cut = levels.as_ref().map(|levels| levels.cut(&scene, &camera, &options).0);
+            let cut = levels.as_ref().map(|levels| levels.cut(&scene, &camera, &options));
+            let (drawn, how) = cut.as_ref().map_or((&scene, &options), |(cut, how, _)| (cut, how));
             let frame = match &mut renderer {
                 Some(renderer) => renderer.frame(&camera, &())?,
-                None => render(cut.as_ref().unwrap_or(&scene), &camera, &options, &backend, &())?,
+                None => render(drawn, &camera, how, &backend, &())?,
             };
             if is_empty(&frame.0, &options) {
                 let (first, count) = &mut *empty.borrow_mut();

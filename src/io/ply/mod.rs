@@ -11,9 +11,8 @@
 //! | `red green blue` | `uchar`: 8-bit sRGB; `float`: linear light | colour |
 //! | `alpha` | as the colour | opacity, straight |
 //! | `texture_u texture_v` | `float` | texture coordinates, origin bottom left |
-//! | `texture_u_x texture_u_y texture_u_z texture_v_x texture_v_y texture_v_z` | `float` | what they gain for a world unit along x, y and z |
-//!
 //! | `texnumber` | `int` | which of several textures these coordinates are in, -1 of none |
+//! | `texture_u_x texture_u_y texture_u_z texture_v_x texture_v_y texture_v_z` | `float` | what they gain for a world unit along x, y and z |
 //!
 //! Levels of detail are another element `node` after the vertices, which are in the order of the tree: `x y z`, `radius` of the sphere around what is
 //! below, half-axes and colour as above, `cone`, the smallest cosine of the angle between a normal below and its own (-1: normals have no

@@ -1,5 +1,6 @@
 //! What a node shows and holds: its ellipse, its sphere and its cone of normals (Pajarola 2003, sections 3.2 and 3.4).
 
+use std::f64::consts::PI;
 use std::ops::Range;
 
 use glam::{DVec2, DVec3};
@@ -92,9 +93,18 @@ impl Bound {
         Self {
             squared: corners.into_iter().fold(0.0, f64::max),
             radius: offset.length() + s.length_squared().max(t.length_squared()).sqrt() + height,
-            cosine: own.dot(normal),
+            cosine: (own.dot(normal).clamp(-1.0, 1.0).acos() + tilt(scene, index)).min(PI).cos(),
         }
     }
+}
+
+/// The largest angle between the normals of a surfel's cap and that of its plane, or more: 0 of a flat one.
+fn tilt(scene: &Scene, index: usize) -> f64 {
+    let Some(Cap(heights)) = scene.caps.get(index).filter(|cap| !cap.is_flat()) else { return 0.0 };
+    let [uu, uv, vv] = heights.map(|height| f64::from(height).abs());
+    let [s, t] = [scene.surfels[index].s, scene.surfels[index].t];
+    let length = |axis: [f32; 3]| DVec3::from_array(axis.map(f64::from)).length();
+    ((uu + uv) / length(s)).hypot((uv + vv) / length(t)).atan()
 }
 
 /// The node of the surfels of a range of `scene`, with these sums on their lattice; what its f32 centre leaves out comes second.
@@ -114,7 +124,10 @@ pub(super) fn node(
         let low = scene.low.get(range.start).copied().unwrap_or_default();
         let height = scene.caps.get(range.start).map_or(0.0, Cap::highest);
         let radius = ((f64::from(surfel.radius()) + height) * ROUNDED_UP) as f32;
-        return (Node { surfel, color, radius, cone: cone(1.0), first, count, leaf: true }, low);
+        return (
+            Node { surfel, color, radius, cone: cone(tilt(scene, range.start).cos()), first, count, leaf: true },
+            low,
+        );
     }
     let mean = lattice.position(sums.moments.mean());
     // As a file in world coordinates has it, so that what is read back is the same.

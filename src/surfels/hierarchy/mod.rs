@@ -78,7 +78,7 @@ type Made = (Node, [f32; 3]);
 /// The nodes of a tree, whose points are in the order of `scene`: from the deepest level up.
 fn nodes(tree: &Octree, scene: &Scene, progress: &dyn Progress) -> Hierarchy {
     let scale = Scales::of(scene);
-    let (mut levels, mut below): (Vec<Vec<Made>>, Vec<Option<Sums>>) = (Vec::new(), Vec::new());
+    let (mut levels, mut below): (Vec<Vec<Made>>, Vec<Option<Box<Sums>>>) = (Vec::new(), Vec::new());
     progress.begin("bounding nodes", tree.sets.len() as u64);
     let told = AtomicU64::new(0);
     for level in tree.levels.windows(2).rev() {
@@ -95,7 +95,7 @@ fn nodes(tree: &Octree, scene: &Scene, progress: &dyn Progress) -> Hierarchy {
                     progress.advance(1024);
                 }
                 // A leaf's are made again where they are wanted.
-                ((node, low), (!set.is_leaf()).then_some(sums))
+                ((node, low), (!set.is_leaf()).then(|| Box::new(sums)))
             })
             .collect();
         let (of_level, own): (Vec<_>, Vec<_>) = made.into_iter().unzip();
@@ -110,7 +110,7 @@ fn nodes(tree: &Octree, scene: &Scene, progress: &dyn Progress) -> Hierarchy {
 
 /// The sums of a set: of a leaf those of its points, else those of its children (EQ 4), of which `below` has some from set `first` on. Of
 /// children on another lattice the moments are made anew on this one.
-fn sums_of(tree: &Octree, set: &Set, first: usize, below: &[Option<Sums>], scene: &Scene, scale: &Scales) -> Sums {
+fn sums_of(tree: &Octree, set: &Set, first: usize, below: &[Option<Box<Sums>>], scene: &Scene, scale: &Scales) -> Sums {
     let of_points = |set: &Set| Sums::of(&tree.elements[set.range()], scene, set.first as usize, scale);
     if set.is_leaf() {
         return of_points(set);
@@ -118,8 +118,8 @@ fn sums_of(tree: &Octree, set: &Set, first: usize, below: &[Option<Sums>], scene
     let mut all = Sums::default();
     for number in set.first_child..set.first_child + set.children {
         let child = &tree.sets[number as usize];
-        let known = below[number as usize - first];
-        let mut sums = known.unwrap_or_else(|| of_points(child));
+        let known = &below[number as usize - first];
+        let mut sums = known.as_deref().copied().unwrap_or_else(|| of_points(child));
         if child.lattice != set.lattice {
             let own = &tree.lattices[set.lattice as usize];
             sums.moments = Moments::of(child.range().map(|index| own.place(scene.center(index))));

@@ -7,7 +7,7 @@ use super::lattice::Lattice;
 use crate::scene::Bounds;
 use crate::scene::hierarchy::{DEEPEST, FAN_OUT};
 
-/// Steps across a set of points below which they get a finer lattice of their own: then a mean has five digits within the set, whatever strays
+/// Steps across a set of more than [`FAN_OUT`] points below which they get a finer lattice of their own: then a mean has five digits within the set, whatever strays
 /// from the body of the scene.
 const FEWEST_STEPS: i64 = 1 << 16;
 

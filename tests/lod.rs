@@ -17,6 +17,18 @@ fn epsplat(arguments: &[&str]) -> (i32, String, String) {
     (run.status.code().unwrap(), text(run.stdout), text(run.stderr))
 }
 
+/// A path in a folder, as an argument.
+fn path_in(folder: &tempfile::TempDir, name: &str) -> String {
+    folder.path().join(name).to_str().unwrap().to_owned()
+}
+
+/// The files of a sphere's surfels, and of these with levels of detail.
+fn spheres(folder: &tempfile::TempDir, count: &str) -> [String; 2] {
+    let [surfels, levels] = ["sphere.ply", "levels.ply"].map(|name| path_in(folder, name));
+    assert_eq!(epsplat(&["generate", "sphere", "--count", count, "-o", &surfels]).0, 0);
+    [surfels, levels]
+}
+
 /// A sphere's points in 8-bit or linear colours, far from the origin.
 fn points(count: usize, linear: bool) -> Points {
     let scene = common::scenes::sphere(count, 1.5);
@@ -121,9 +133,8 @@ fn broken_trees_are_told() {
 #[test]
 fn the_command_writes_what_it_says() {
     let folder = tempfile::tempdir().unwrap();
-    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    let (surfels, levels) = (path("sphere.ply"), path("levels.ply"));
-    assert_eq!(epsplat(&["generate", "sphere", "--count", "2000", "-o", &surfels]).0, 0);
+    let path = |name: &str| path_in(&folder, name);
+    let [surfels, levels] = spheres(&folder, "2000");
     let (code, text, told) = epsplat(&["lod", &surfels, "-o", &levels, "--json", "-"]);
     assert_eq!(code, 0, "{told}");
     let report: serde_json::Value = serde_json::from_str(&text).unwrap();
@@ -151,9 +162,8 @@ fn the_command_writes_what_it_says() {
 #[test]
 fn a_cut_is_drawn() {
     let folder = tempfile::tempdir().unwrap();
-    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    let (surfels, levels) = (path("sphere.ply"), path("levels.ply"));
-    assert_eq!(epsplat(&["generate", "sphere", "--count", "20000", "-o", &surfels]).0, 0);
+    let path = |name: &str| path_in(&folder, name);
+    let [surfels, levels] = spheres(&folder, "20000");
     assert_eq!(epsplat(&["lod", &surfels, "-o", &levels]).0, 0);
     let draw = |file: &str, name: &str, more: &[&str]| {
         let output = path(name);
@@ -202,7 +212,7 @@ fn a_cut_is_drawn() {
 #[test]
 fn cuts_of_closed_scenes_are_whole() {
     let folder = tempfile::tempdir().unwrap();
-    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let path = |name: &str| path_in(&folder, name);
     let cube = concat!(env!("CARGO_MANIFEST_DIR"), "/data/cube.obj");
     let (surfels, levels) = (path("cube.ply"), path("levels.ply"));
     assert_eq!(epsplat(&["sample", cube, "-o", &surfels, "--count", "6000"]).0, 0);

@@ -207,11 +207,46 @@ fn colors(points: &Points) -> &'static str {
 
 fn table(input: &std::path::Path, info: &Info) -> String {
     let mut text = String::new();
-    let given = |on| if on { "given" } else { "none, estimated from neighbours" };
     let vector = |v: [f64; 3]| v.map(|c| c.to_string()).join(", ");
     // Writing to a string cannot fail.
     let _ = writeln!(text, "{}", input.display());
     let _ = writeln!(text, "  points    {}", info.points);
+    held(&mut text, info);
+    let _ = writeln!(text, "  box       {} to {}", vector(info.min), vector(info.max));
+    let _ = writeln!(text, "  up        {}{}", info.up, if info.preparation.guessed_up { " (a guess)" } else { "" });
+    if let Some(Coverage { spacing, covered, open }) = info.coverage {
+        let _ = writeln!(text, "  spacing   {spacing:.4} (median distance to the nearest other point)");
+        // Rounded down: 100 % are all.
+        let percent = (1e4 * covered).floor() / 100.0;
+        let open = if open > 0 { format!("; next to {open} one is open") } else { String::new() };
+        let _ = writeln!(text, "  coverage  {percent} % of the surfels have no open gap to their neighbours{open}");
+    }
+    if !info.lacks.is_empty() {
+        let _ = writeln!(text, "  lacks     {}", info.lacks.join(", "));
+    }
+    let _ = writeln!(
+        text,
+        "A renderer makes {} surfels of it, radius up to {:.4},",
+        info.preparation.surfels, info.largest_radius
+    );
+    let _ = writeln!(text, "in f32 relative to the origin {}.", vector(info.origin));
+    if let Some(command) = &info.supplied_by {
+        let colors = if info.colors == "none" { " (but colours)" } else { "" };
+        let _ = writeln!(text, "What it lacks{colors} is estimated each time it is read; {command} keeps it.");
+    }
+    if info.is_mesh {
+        let _ = writeln!(text, "Its triangles are drawn as they are by epsplat render --triangles FILE.");
+    }
+    for note in info.preparation.notes() {
+        let _ = writeln!(text, "{note}");
+    }
+    text
+}
+
+/// The lines of what each point of the file has, and of what the file has beside them.
+fn held(text: &mut String, info: &Info) {
+    let given = |on| if on { "given" } else { "none, estimated from neighbours" };
+    // Writing to a string cannot fail.
     if let Some(Gaussians { degree, opacities: [least, median, greatest], deviations: [longer, shorter] }) =
         info.gaussians
     {
@@ -248,33 +283,4 @@ fn table(input: &std::path::Path, info: &Info) -> String {
     if let Some(triangles) = &info.triangles {
         let _ = writeln!(text, "  triangles those of {} are drawn beside them", triangles.display());
     }
-    let _ = writeln!(text, "  box       {} to {}", vector(info.min), vector(info.max));
-    let _ = writeln!(text, "  up        {}{}", info.up, if info.preparation.guessed_up { " (a guess)" } else { "" });
-    if let Some(Coverage { spacing, covered, open }) = info.coverage {
-        let _ = writeln!(text, "  spacing   {spacing:.4} (median distance to the nearest other point)");
-        // Rounded down: 100 % are all.
-        let percent = (1e4 * covered).floor() / 100.0;
-        let open = if open > 0 { format!("; next to {open} one is open") } else { String::new() };
-        let _ = writeln!(text, "  coverage  {percent} % of the surfels have no open gap to their neighbours{open}");
-    }
-    if !info.lacks.is_empty() {
-        let _ = writeln!(text, "  lacks     {}", info.lacks.join(", "));
-    }
-    let _ = writeln!(
-        text,
-        "A renderer makes {} surfels of it, radius up to {:.4},",
-        info.preparation.surfels, info.largest_radius
-    );
-    let _ = writeln!(text, "in f32 relative to the origin {}.", vector(info.origin));
-    if let Some(command) = &info.supplied_by {
-        let colors = if info.colors == "none" { " (but colours)" } else { "" };
-        let _ = writeln!(text, "What it lacks{colors} is estimated each time it is read; {command} keeps it.");
-    }
-    if info.is_mesh {
-        let _ = writeln!(text, "Its triangles are drawn as they are by epsplat render --triangles FILE.");
-    }
-    for note in info.preparation.notes() {
-        let _ = writeln!(text, "{note}");
-    }
-    text
 }

@@ -87,9 +87,19 @@ pub(super) struct Element {
 pub(super) struct Header {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element>,
-    /// Images that MeshLab names in comments.
+    pub(super) comments: Comments,
+    /// Lines, `end_header` included: the first value of an ASCII file is on the next.
+    pub(super) lines: u64,
+    /// What lines end with.
+    pub(super) line_end: u8,
+}
+
+/// What comments say that means something to a reader.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Comments {
+    /// Images that MeshLab names.
     pub(super) textures: Vec<String>,
-    /// Which way is up, as epsplat says in a comment.
+    /// Which way is up, as epsplat says.
     pub(super) up: Option<Up>,
     /// The file of the triangles that surfels are drawn beside, as it says too.
     pub(super) beside: Option<String>,
@@ -97,10 +107,22 @@ pub(super) struct Header {
     pub(super) closed: bool,
     /// Normals tell no sides, as it says too.
     pub(super) unsided: bool,
-    /// Lines, `end_header` included: the first value of an ASCII file is on the next.
-    pub(super) lines: u64,
-    /// What lines end with.
-    pub(super) line_end: u8,
+    /// It is epsplat's.
+    own: bool,
+}
+
+impl Comments {
+    fn hear(&mut self, comment: &str) {
+        self.textures.extend(comment.strip_prefix("TextureFile ").map(|name| name.trim().to_owned()));
+        let says_up = |up: &Up| comment.split_ascii_whitespace().eq(["up", up.name()]);
+        self.up = [Up::Y, Up::Z].into_iter().find(says_up).or(self.up);
+        self.closed |= comment == "closed";
+        self.unsided |= comment == "unsided";
+        self.own |= comment.starts_with("epsplat ");
+        // Others may mean something else by it.
+        let named = comment.strip_prefix("triangles ").filter(|_| self.own);
+        self.beside = named.map(|name| name.trim().to_owned()).or(self.beside.take());
+    }
 }
 
 /// Reads up to and including the line `end_header`.
@@ -109,8 +131,7 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
     let mut line = Vec::new();
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
-    let (mut textures, mut up, mut closed) = (Vec::new(), None, false);
-    let (mut own, mut beside, mut unsided) = (false, None, false);
+    let mut comments = Comments::default();
     for number in 1.. {
         line.clear();
         reader.take(LINE_LIMIT).read_until(line_end, &mut line)?;
@@ -137,15 +158,7 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
         match keyword {
             None | Some("obj_info") => {}
             Some("comment") => {
-                let comment = text.trim().strip_prefix("comment").unwrap_or_default().trim();
-                textures.extend(comment.strip_prefix("TextureFile ").map(|name| name.trim().to_owned()));
-                up = [Up::Y, Up::Z].into_iter().find(|up| words.clone().eq(["up", up.name()])).or(up);
-                closed |= comment == "closed";
-                unsided |= comment == "unsided";
-                own |= comment.starts_with("epsplat ");
-                // Others may mean something else by it.
-                let named = comment.strip_prefix("triangles ").filter(|_| own);
-                beside = named.map(|name| name.trim().to_owned()).or(beside);
+                comments.hear(text.trim().strip_prefix("comment").unwrap_or_default().trim());
             }
             Some("format") => {
                 let unread = "not a PLY format that is read (ascii, binary_little_endian or binary_big_endian 1.0)";
@@ -165,17 +178,7 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
             }
             Some("end_header") => {
                 let encoding = encoding.ok_or_else(|| malformed("the PLY header has no format line"))?;
-                return Ok(Header {
-                    encoding,
-                    elements,
-                    textures,
-                    up,
-                    closed,
-                    unsided,
-                    beside,
-                    lines: number,
-                    line_end,
-                });
+                return Ok(Header { encoding, elements, comments, lines: number, line_end });
             }
             Some(_) => return Err(malformed("not a PLY header line")),
         }

@@ -107,7 +107,7 @@ pub fn read_mesh(input: Input, progress: &dyn Progress) -> Result<Mesh> {
 pub(in crate::io) fn companions(path: &Path) -> Vec<PathBuf> {
     let header = File::open(path).map_err(Fault::Io).and_then(|file| header::read(&mut BufReader::new(file)));
     let folder = path.parent().unwrap_or(Path::new(""));
-    let names = |header: header::Header| header.textures.into_iter().chain(header.beside);
+    let names = |header: header::Header| header.comments.textures.into_iter().chain(header.comments.beside);
     header.map_or(Vec::new(), |header| names(header).map(|name| beside(folder, &name)).collect())
 }
 
@@ -139,16 +139,16 @@ fn contents(
     progress.end();
     let Contents { mut points, faces, tree } = contents.map_err(in_file)?;
     gaussian::check(&points, flatten).map_err(in_file)?;
-    points.up = header.up;
-    points.closed = header.closed;
-    points.unsided = header.unsided;
+    points.up = header.comments.up;
+    points.closed = header.comments.closed;
+    points.unsided = header.comments.unsided;
     if let Some(tree) = tree {
         if let Some(what) = tree.fault(points.positions.len()) {
             return Err(in_file(Fault::Malformed(format!("its levels of detail (element node) are no tree: {what}"))));
         }
         points.tree = Some(tree);
     }
-    points.beside = header.beside.map(|name| beside(path.parent().unwrap_or(Path::new("")), &name));
+    points.beside = header.comments.beside.map(|name| beside(path.parent().unwrap_or(Path::new("")), &name));
     let triangles = faces.finish(&points.positions).map_err(in_file)?;
-    Ok((points, triangles, header.textures))
+    Ok((points, triangles, header.comments.textures))
 }

@@ -105,18 +105,24 @@ pub(super) const NUMBER_NAME: &str = "texnumber";
 const TEXTURE_NAMES: [[&str; 2]; 5] =
     [["texture_u", "texture_v"], ["texcoord_u", "texcoord_v"], ["s", "t"], ["u", "v"], ["texcoord_s", "texcoord_t"]];
 
+/// The scalar properties of a row, by name, where each one is.
+fn scalars_of(element: &Element) -> Vec<(&str, Column)> {
+    let mut places: Vec<(&str, Column)> = Vec::new();
+    let mut offset = 0;
+    for property in &element.properties {
+        if let Kind::Scalar(scalar) = property.kind {
+            places.push((&property.name, Column { slot: places.len(), offset, scalar }));
+            offset += scalar.size();
+        }
+    }
+    places
+}
+
 impl Layout {
     pub(super) fn of(vertex: &Element) -> Result<Self, Fault> {
-        let mut scalars = Vec::new();
-        let mut places: Vec<(&str, Column)> = Vec::new();
-        let mut offset = 0;
-        for property in &vertex.properties {
-            if let Kind::Scalar(scalar) = property.kind {
-                places.push((&property.name, Column { slot: scalars.len(), offset, scalar }));
-                scalars.push(scalar);
-                offset += scalar.size();
-            }
-        }
+        let places = scalars_of(vertex);
+        let scalars = places.iter().map(|(_, column)| column.scalar).collect();
+        let row_size = places.iter().map(|(_, column)| column.scalar.size()).sum();
         let mut columns = Vec::new();
         let mut column = |names: &[&str]| -> Option<usize> {
             let found = names.iter().find_map(|name| places.iter().find(|(place, _)| place == name))?;
@@ -137,7 +143,7 @@ impl Layout {
         let gaussian = GaussianLayout::of(has, |name| column(&[name]))?;
         if gaussian.is_some() {
             let position = [x, y, z];
-            return Ok(Self { columns, scalars, row_size: offset, position, gaussian, ..Self::default() });
+            return Ok(Self { columns, scalars, row_size, position, gaussian, ..Self::default() });
         }
         let mut triple = |names: [&[&str]; 3]| Some([column(names[0])?, column(names[1])?, column(names[2])?]);
         let normal = triple([&["nx", "normal_x"], &["ny", "normal_y"], &["nz", "normal_z"]]);
@@ -165,7 +171,7 @@ impl Layout {
         Ok(Self {
             columns,
             scalars,
-            row_size: offset,
+            row_size,
             position: [x, y, z],
             normal,
             radius,

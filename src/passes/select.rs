@@ -11,6 +11,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::cull;
+use super::lowpass::Design;
+use crate::plan::RenderOptions;
 use crate::scene::color::srgb8;
 use crate::scene::hierarchy::Node;
 use crate::scene::{Camera, Cap, Clip, Colors, Detail, DetailMeasure, Hierarchy, Projection, Scene, Surfel};
@@ -24,6 +26,26 @@ pub struct Cut {
     pub surfels: Vec<Range<u32>>,
 }
 
+/// Which cut is wanted.
+#[derive(Clone, Copy, Debug)]
+pub struct Wanted {
+    /// The size of what is drawn in place of what is below it.
+    pub detail: Detail,
+    /// How that is measured.
+    pub measure: DetailMeasure,
+    /// Surfels that face away are left out.
+    pub backs_out: bool,
+    /// How far a low-pass may reach past a surfel, pixels ([`cull::filter_reach`]).
+    pub filter_reach: f64,
+}
+
+impl Wanted {
+    /// One for a picture with `options`, of which backs are left out or not.
+    pub fn of(detail: Detail, measure: DetailMeasure, backs_out: bool, options: &RenderOptions) -> Self {
+        Self { detail, measure, backs_out, filter_reach: cull::filter_reach(&Design::of(options)) }
+    }
+}
+
 /// What becomes of a node.
 enum Fate {
     Unseen,
@@ -32,14 +54,9 @@ enum Fate {
     Divided,
 }
 
-/// The cut of `hierarchy`, which is relative to `origin`, in the view of `camera`; backs are left out or not.
-pub fn reference(
-    hierarchy: &Hierarchy,
-    origin: DVec3,
-    camera: &Camera,
-    (detail, measure): (Detail, DetailMeasure),
-    backs_out: bool,
-) -> Cut {
+/// The cut of `hierarchy`, which is relative to `origin`, in the view of `camera`.
+pub fn reference(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: &Wanted) -> Cut {
+    let Wanted { detail, measure, backs_out, filter_reach } = *wanted;
     let eye = camera.eye - origin;
     let size = detail.pixels(camera);
     let fate = |index: u32| {
@@ -47,7 +64,7 @@ pub fn reference(
         let low = hierarchy.low.get(index as usize).map_or(DVec3::ZERO, |low| DVec3::from_array(low.map(f64::from)));
         let center = DVec3::from_array(node.surfel.center.map(f64::from)) + low - eye;
         let [turned, spread] = if backs_out { turned_away(node, center, camera) } else { [-1.0, 0.0] };
-        if is_unseen(node, center, camera) || turned > spread {
+        if is_unseen(node, center, camera, filter_reach) || turned > spread {
             return Fate::Unseen;
         }
         let seen =
@@ -81,15 +98,14 @@ fn reaches_eye(node: &Node, center: DVec3, camera: &Camera) -> bool {
     (camera.rotation * center).z - f64::from(node.radius) <= camera.near
 }
 
-/// Whether nothing below a node is in view: the ball around it is before the near depth or beside the image, with room for what a low-pass adds.
-fn is_unseen(node: &Node, center: DVec3, camera: &Camera) -> bool {
-    /// Pixels.
-    const ROOM: f64 = 8.0;
+/// Whether nothing below a node is in view: the ball around it is before the near depth or beside the image, farther than a low-pass
+/// reaches.
+fn is_unseen(node: &Node, center: DVec3, camera: &Camera, filter_reach: f64) -> bool {
     let at = camera.rotation * center;
     if at.z + f64::from(node.radius) < camera.near {
         return true;
     }
-    let image = cull::reference(at, node.radius.into(), camera, ROOM);
+    let image = cull::reference(at, node.radius.into(), camera, filter_reach);
     image.is_some_and(|[low, high]| {
         high.x < 0.0 || high.y < 0.0 || low.x > f64::from(camera.width) || low.y > f64::from(camera.height)
     })
@@ -174,6 +190,10 @@ mod tests {
         Camera::look_at((300, 300), lens, eye, DVec3::ZERO, None, Up::Y, 1e-3).unwrap()
     }
 
+    fn wanted(detail: Detail, measure: DetailMeasure, backs_out: bool) -> Wanted {
+        Wanted::of(detail, measure, backs_out, &RenderOptions::default())
+    }
+
     /// The surfels below a node.
     fn below(tree: &Hierarchy, index: u32) -> Vec<u32> {
         let Node { first, count, leaf, .. } = tree.nodes[index as usize];
@@ -194,7 +214,7 @@ mod tests {
             let mut last = usize::MAX;
             for size in [0.0, 250.0, 1000.0, 6000.0, 1e9] {
                 for measure in [DetailMeasure::Area, DetailMeasure::Extent] {
-                    let cut = reference(&tree, DVec3::ZERO, &camera, (Detail::Pixels(size), measure), false);
+                    let cut = reference(&tree, DVec3::ZERO, &camera, &wanted(Detail::Pixels(size), measure, false));
                     let drawn = cut.surfels.iter().flat_map(Clone::clone);
                     let mut all: Vec<u32> =
                         cut.nodes.iter().flat_map(|&index| below(&tree, index)).chain(drawn).collect();
@@ -233,7 +253,7 @@ mod tests {
             [(DVec3::new(0.0, 0.0, 0.4), false), (DVec3::new(0.2, 0.1, 1.6), false), (DVec3::new(0.2, 0.1, 1.6), true)]
         {
             let camera = camera(eye, Lens::Fov(40.0));
-            let cut = reference(&tree, DVec3::ZERO, &camera, (Detail::FINEST, DetailMeasure::Area), back);
+            let cut = reference(&tree, DVec3::ZERO, &camera, &wanted(Detail::FINEST, DetailMeasure::Area, back));
             let drawn: std::collections::BTreeSet<u32> = cut.surfels.iter().flat_map(Clone::clone).collect();
             assert!(cut.nodes.is_empty() && drawn.len() < 5000 && drawn.len() > 50, "{}", drawn.len());
             for index in (0..8000u32).filter(|index| !drawn.contains(index)) {

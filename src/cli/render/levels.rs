@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use clap::ValueEnum;
-use epsplat::passes::select;
+use epsplat::passes::select::{self, Wanted};
 use epsplat::plan::{Facts, RenderOptions, culls_back};
 use epsplat::scene::{Camera, Cull, Detail, DetailMeasure, Hierarchy, Map, Maps, Scene};
 use epsplat::surfels::hierarchy;
@@ -68,9 +68,9 @@ impl Levels {
 
     /// What is drawn of `scene` in the view of `camera`, with which options, and what that is.
     pub fn cut(&self, scene: &Scene, camera: &Camera, options: &RenderOptions) -> (Scene, RenderOptions, String) {
-        let how = (self.detail, self.measure);
         let backs_out = culls_back(&self.facts, camera, options);
-        let cut = select::reference(&self.hierarchy, scene.origin, camera, how, backs_out);
+        let wanted = Wanted::of(self.detail, self.measure, backs_out, options);
+        let cut = select::reference(&self.hierarchy, scene.origin, camera, &wanted);
         // What is in view does not say whether the eye is outside of the scene.
         let cull = if backs_out { Cull::Back } else { Cull::None };
         let surfels: usize = cut.surfels.iter().map(|range| range.len()).sum();

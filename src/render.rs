@@ -1,5 +1,6 @@
 //! The sequence: project, visibility, accumulate, resolve, on every backend.
 
+mod cut;
 mod encoded;
 pub mod inspect;
 mod kept;
@@ -138,8 +139,13 @@ fn one(
             let scene = source.whole().ok_or_else(|| {
                 Error::Usage("the reference needs all surfels in memory: render on an adapter".into())
             })?;
-            let camera = camera.sampled(kept.options.samples)?;
-            Ok(reference::frame(scene, &kept.facts, &camera, &kept.options, progress))
+            let sampled = camera.sampled(kept.options.samples)?;
+            let Some((cut, options)) = reference::cut(scene, &kept.facts, camera, &kept.options) else {
+                return Ok(reference::frame(scene, &kept.facts, &sampled, &kept.options, progress));
+            };
+            let (frame, mut report) = reference::frame(&cut, &kept.facts, &sampled, &options, progress);
+            report.cut = Some(cut.surfels.len() as u64);
+            Ok((frame, report))
         }
     }
 }

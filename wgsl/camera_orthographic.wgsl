@@ -7,6 +7,14 @@ fn image_of(position: Double, axis: u32) -> Double {
     return sum(product(focal, position), principal);
 }
 
+fn axis_image(center: vec3<f32>, axis: vec3<f32>) -> vec2<f32> {
+    return axis.xy * held.intrinsics.xy;
+}
+
+fn ball_sine(radius: f32, distance: f32) -> f32 {
+    return 0.0;
+}
+
 // The part of the image (low x, y; high x, y) that a ball covers.
 fn ball_extent(center: vec3<f32>, radius: f32, nearest: f32) -> vec4<f32> {
     let image = center.xy * held.intrinsics.xy + held.intrinsics.zw;

@@ -1,6 +1,6 @@
 // The pinhole camera x = fx X/Z + cx: homography and bounds of a disk, and the evaluation at a pixel.
 // Twin: src/passes/homography.rs and src/passes/footprint.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x13b66c782bccfe75
+// All loops end, by 1 of src/gpu/loops.rs: 0x37360ee7424755df
 
 fn image_of(position: Double, depth: Double, axis: u32) -> Double {
     let focal = Double(held.intrinsics[axis], held.intrinsics_low[axis]);
@@ -54,6 +54,16 @@ fn clipped_extent(
         }
     }
     return extent;
+}
+
+// The image of a half-axis at a centre, camera space: how far its end is seen from there, as if it were short.
+fn axis_image(center: vec3<f32>, axis: vec3<f32>) -> vec2<f32> {
+    return (axis.xy - center.xy / center.z * axis.z) / center.z * held.intrinsics.xy;
+}
+
+// The sine of half the angle that a ball at this distance is seen at.
+fn ball_sine(radius: f32, distance: f32) -> f32 {
+    return min(radius / distance, 1.0);
 }
 
 // The part of the image (low x, y; high x, y) that a ball before the camera covers; `nearest` is its least depth. An image of

@@ -3,7 +3,7 @@
 // its fragments could be nearest or within epsilon of the nearest, so no image depends on it. The splats of the others are
 // stored one batch after the other, in slots: those that are left out take no room.
 // Host side and twin: src/passes/cull.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x6b1af0861d8b20c6
+// All loops end, by 1 of src/gpu/loops.rs: 0x24583e3ed430eef0
 
 // A batch's bounding ball: centre and radius, world units relative to the scene's origin.
 @group(0) @binding(23) var<storage, read> balls: array<vec4<f32>>;
@@ -54,43 +54,13 @@ fn surfel_in(record: SplatRecord, slot: u32) -> u32 {
     return (spare.x | spare.y << SPARE.x) * BATCH + slot % BATCH;
 }
 
-struct Ball {
-    // Camera space, device units.
-    center: vec3<f32>,
-    radius: f32,
-    // Depths of its fragments.
-    nearest: f32,
-    farthest: f32,
+fn ball_of_batch(batch: u32) -> Ball {
+    return ball_of(balls[batch]);
 }
-
-fn ball_of(batch: u32) -> Ball {
-    let ball = balls[batch];
-    let relative = ball.xyz * held.unit - held.eye.xyz;
-    var b: Ball;
-    b.center = rotate_plain(relative);
-    // Ten roundings of f32 in these lengths.
-    b.radius = ball.w * held.unit + 1e-6 * (length(relative) + length(held.eye.xyz));
-    b.radius += growth(b.center.z + b.radius);
-    b.nearest = b.center.z - b.radius;
-    b.farthest = b.center.z + b.radius;
-    return b;
-}
-
-// How far a low-pass may reach past its disk, pixels.
-override FILTER_REACH: f32;
 
 // The batch's pixels, as far as they lie in the band; empty if a first lies past a last.
 fn pixels_of(ball: Ball) -> Rectangle {
-    let extent = ball_extent(ball.center, ball.radius, ball.nearest);
-    // A pixel more on each side, as splats' own bounds have a margin, and one for rounding.
-    let margin = FILTER_REACH + 2.0 + 1e-5 * (abs(extent.xy) + abs(extent.zw));
-    let top = f32(held_band.first_row);
-    let first = max(extent.xy - margin, vec2<f32>(0.0, top));
-    let last = min(extent.zw + margin, vec2<f32>(f32(held.width), top + f32(held_band.rows)) - 1.0);
-    if (!all(first <= last)) {
-        return Rectangle(vec2<u32>(1u), vec2<u32>(0u));
-    }
-    return Rectangle(vec2<u32>(first), vec2<u32>(last));
+    return pixels_of_ball(ball, f32(held_band.first_row), f32(held_band.rows));
 }
 
 fn list(batch: u32) {
@@ -99,11 +69,6 @@ fn list(batch: u32) {
 
 fn leave_out(batch: u32) {
     atomicAdd(&queue[1], min(BATCH, surfels_held() - batch * BATCH));
-}
-
-// Whether the batch reaches the near depth, so that its place in the image says nothing.
-fn reaches_near(ball: Ball) -> bool {
-    return !(ball.nearest > held.near);
 }
 
 // One invocation a batch.
@@ -118,7 +83,7 @@ fn cull_near(
     if (batch >= arrayLength(&balls)) {
         return;
     }
-    let ball = ball_of(batch);
+    let ball = ball_of_batch(batch);
     let near = reaches_near(ball);
     let pixels = pixels_of(ball);
     if (ball.farthest < held.near || (!near && any(pixels.first > pixels.last))) {
@@ -154,7 +119,7 @@ fn cull_far(
         return;
     }
     let batch = atomicLoad(&rest[1u + place]);
-    let ball = ball_of(batch);
+    let ball = ball_of_batch(batch);
     if (behind(ball, pixels_of(ball))) {
         leave_out(batch);
     } else {

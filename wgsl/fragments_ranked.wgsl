@@ -1,8 +1,5 @@
-// Of fragments of one depth that comes first whose surfel does in the order in which they are stored, which depends on what they are and
+// Of fragments of one depth that comes first whose surfel does in the order in which they are stored, or in that of the tree, which depends on what they are and
 // not on where they stood in their files.
-
-// Surfels of the pages before this one.
-@group(0) @binding(42) var<uniform> page_first: u32;
 
 override FRAGMENT_RANK: u32;
 
@@ -18,7 +15,7 @@ fn is_listed(pixel: u32, fragment: Fragment, alpha: f32) -> bool {
 
 fn with_rank(record: Record, surfel: u32) -> Record {
     var ranked = record;
-    ranked[FRAGMENT_RANK] = page_first + surfel;
+    ranked[FRAGMENT_RANK] = rank_of(surfel);
     return ranked;
 }
 

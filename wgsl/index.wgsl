@@ -1,11 +1,9 @@
 // The map of the strongest surfels, by the words of the image: of the fragments within epsilon of a pixel's nearest depth the greatest
 // weight, and then the place of the surfel that has it. Twin: src/passes/index.rs.
-// All loops end, by 1, 2 of src/gpu/loops.rs: 0xd93bd99b9f961a1c
+// All loops end, by 1, 2 of src/gpu/loops.rs: 0xc8be5e9b2bfdbee8
 
 // The image, of which these words are no one else's.
 @group(0) @binding(41) var<storage, read_write> indexed: array<atomic<u32>>;
-// Surfels of the pages before this one.
-@group(0) @binding(42) var<uniform> page_first: u32;
 
 override INDEX_IMAGE: u32;
 

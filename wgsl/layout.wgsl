@@ -48,6 +48,9 @@ struct View {
     textures: u32,
     // The middle of the range of texture coordinates, its span, and the largest squared reach in units of the span.
     place: vec4<f32>,
+    // x: a node that is seen smaller, square pixels of the image, is drawn in place of what is below it (src/scene/detail.rs); yz: the
+    // part of a pixel of the image that one here is across and down.
+    levels: vec4<f32>,
     // Where textures lie in the plane of coordinates (src/scene/atlas.rs): its corner, the side of a cell, cells in a row.
     atlas: vec4<f32>,
 }
@@ -87,6 +90,29 @@ struct Splat {
     cap: Cap,
 }
 
+// A node of a tree, or one that has a part of a leaf's surfels.
+struct TreeNode {
+    // A sphere of this radius around the centre of its surfel holds all below it, world units.
+    radius: f32,
+    // The smallest cosine between its normal and those below it; -1 where they have no side.
+    cone: f32,
+    // The first of its children in this branch, or of its surfels, or which root of another branch it is.
+    first: u32,
+    // How many there are, and in the two highest bits of what kind.
+    below: u32,
+}
+
+// Neighbouring subtrees, whose surfels and nodes fit a buffer: first the surfels, then the nodes level by level.
+struct Branch {
+    surfels: u32,
+    // The first so many nodes are its roots.
+    roots: u32,
+    // The number of the first of them among the roots of all branches.
+    first_root: u32,
+    // 1 if its root is that of the tree.
+    whole: u32,
+}
+
 const AWAY: u32 = 0x80000000u;
 
 // The nearest depth where nothing is: +inf.
@@ -106,6 +132,8 @@ const FIXED_ONE: f32 = 4294966272.0;
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<uniform> band: Band;
+// Surfels of the pages before this one.
+@group(0) @binding(42) var<uniform> page_first: u32;
 
 // The uniforms, read once an invocation and where all take part: some drivers read uniforms again wherever they are used, and
 // one by one for each invocation where some do not take part (Mesa's llvmpipe), which took a third of the projection. Every

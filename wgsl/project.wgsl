@@ -1,7 +1,7 @@
 // Stage 1: every surfel becomes a splat, once. One invocation a surfel; the rare ones that take longer (thin splats, disks
 // that reach the near depth, large splats) are listed and done together, so that the others of a subgroup need not wait.
 // Twin: src/passes/project.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xcbac92c4010e0c02
+// All loops end, by 1 of src/gpu/loops.rs: 0x981b3ffac41670a6
 
 @group(0) @binding(3) var<storage, read_write> splats: array<SplatRecord>;
 // Word 0 counts the large splats, word 1 all that are out of view; three words from QUEUE_GRID on are a grid with a workgroup
@@ -69,7 +69,7 @@ fn project_into(slot: u32, every: bool) -> u32 {
     let margin = 0.01 + 1e-5 * (abs(h.low) + abs(h.high));
     let first = max(ceil(h.low - margin - 0.5), vec2<f32>(0.0));
     let last = min(floor(h.high + margin - 0.5), size - 1.0);
-    let exists = index < surfels_held();
+    let exists = index < surfels_held() && is_filled(index);
     let faces = !(CULL_BACK && is_back(h, cap));
     let visible = exists && faces && all(first <= last);
 

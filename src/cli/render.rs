@@ -25,7 +25,7 @@ use epsplat::{Error, Result, surfels};
 use glam::DVec3;
 use serde::Serialize;
 
-use self::levels::{Levels, MeasureName};
+use self::levels::MeasureName;
 use self::options::{for_scene, options};
 use self::output::{Format, note_overflows, summary};
 use self::view::{ChosenView, View};
@@ -293,16 +293,13 @@ fn one(arguments: &Arguments) -> Result<()> {
     let backend = backend(arguments)?;
 
     let bars = Bars::new();
-    let (mut scene, preparation) = scene(arguments, &bars)?;
+    let (scene, preparation) = scene(arguments, &bars)?;
     let options = for_scene(arguments, options, &scene)?;
-    let levels = Levels::of(arguments, &mut scene, &bars)?;
+    let scene = levels::made(scene, &options, &bars)?;
     let (camera, chosen) = view.camera(&scene, Camera::default_near(&scene))?;
-    let cut = levels.as_ref().map(|levels| levels.cut(&scene, &camera, &options));
     let chosen = chosen.map(|view| ChosenView::new(view, &scene, arguments.up, preparation.guessed_up));
     chosen.iter().for_each(|view| note(&view.sentence()));
-    cut.iter().for_each(|(.., what)| note(what));
-    let (drawn, how) = cut.as_ref().map_or((&scene, &options), |(cut, how, _)| (cut, how));
-    let (frame, report) = render(drawn, &camera, how, &backend, &bars)?;
+    let (frame, report) = render(&scene, &camera, &options, &backend, &bars)?;
     note_overflows(&report);
     if is_empty(&frame, &options) {
         note(&Unseen::of(&scene, &camera, &options).sentence());

@@ -104,6 +104,7 @@ pub struct View {
     pub last: f32,
     pub textures: u32,
     pub place: [f32; 4],
+    pub levels: [f32; 4],
     pub atlas: [f32; 4],
 }
 
@@ -134,6 +135,28 @@ pub struct Splat {
     pub b: [f32; 3],
     pub c: [f32; 3],
     pub a_low: [f32; 3],
+}
+
+/// A node of a tree; see the WGSL.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct TreeNode {
+    pub radius: f32,
+    pub cone: f32,
+    pub first: u32,
+    pub below: u32,
+}
+
+/// Neighbouring subtrees of a tree; see the WGSL.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Branch {
+    pub surfels: u32,
+    pub roots: u32,
+    pub first_root: u32,
+    pub whole: u32,
 }
 
 /// What a low-pass needs of a splat; see `wgsl/filter.wgsl`.

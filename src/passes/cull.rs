@@ -54,7 +54,7 @@ pub fn filter_reach(design: &Design) -> f64 {
     }
 }
 
-/// The twin of `ball_extent` and `pixels_of`: the first and last points of the image that disks in the ball at `center`
+/// The twin of `ball_extent` and `pixels_of_ball`: the first and last points of the image that disks in the ball at `center`
 /// (camera space) can touch, world units and pixels; `None` for a ball that reaches the near depth.
 pub fn reference(center: DVec3, radius: f64, camera: &Camera, filter_reach: f64) -> Option<[DVec2; 2]> {
     let focal = DVec2::new(camera.fx, camera.fy);
@@ -78,9 +78,13 @@ pub fn reference(center: DVec3, radius: f64, camera: &Camera, filter_reach: f64)
 /// The pass's kernels, files and constants.
 pub const PASS: Pass = Pass {
     name: "cull",
-    files: |needs| vec![if needs.cull { "cull.wgsl" } else { "cull_absent.wgsl" }],
+    files: |needs| match (needs.cull, needs.levels) {
+        (true, _) => vec!["ball.wgsl", "cull.wgsl"],
+        (false, true) => vec!["ball.wgsl", "cull_absent.wgsl"],
+        (false, false) => vec!["cull_absent.wgsl"],
+    },
     kernels: |needs| if needs.cull { vec![CULL_NEAR, CULL_FAR] } else { Vec::new() },
-    constants: |making| match making.needs.cull {
+    constants: |making| match making.needs.cull || making.needs.levels {
         true => vec![("FILTER_REACH", filter_reach(&Design::of(making.options)))],
         false => Vec::new(),
     },

@@ -5,6 +5,7 @@
 //! |---|---|---|
 //! | [`order`] | [`Scene`] | the order of its surfels in memory |
 //! | [`upload`] | a [`source::Source`] | pages of surfels |
+//! | [`branches`], [`select`] | a tree of surfels | the cut that is drawn in place of all |
 //! | [`cull`] | surfels, nearest depths so far | the batches that are projected |
 //! | [`project`] | surfels | [`splat::Splat`] each |
 //! | [`visibility`] | splats | the nearest depth of each pixel |
@@ -27,6 +28,7 @@
 
 pub mod accumulate;
 pub mod attributes;
+pub mod branches;
 pub mod covered;
 pub mod cull;
 pub mod curved;
@@ -106,8 +108,8 @@ impl<'a> Strip<'a> {
             corners: &[],
             ranks: None,
             depths: depths(facts, camera),
-            largest_shorter: facts.largest_shorter.into(),
-            farthest: farthest(facts, camera),
+            largest_shorter: facts.drawn_shorter(options).into(),
+            farthest: farthest(facts, camera, options),
             first_row: 0,
             rows: 0,
         }
@@ -157,8 +159,9 @@ pub fn finish(frame: &mut Frame, needs: &SceneNeeds, provenance: &Provenance, or
 }
 
 /// The passes whose files every module has.
-const PASSES: [&Pass; 24] = [
+const PASSES: [&Pass; 25] = [
     &shared::PASS,
+    &select::PASS,
     &project::PASS,
     &facing::PASS,
     &cull::PASS,

@@ -3,6 +3,9 @@
 //! From the root down: what is out of view, or all turned away where backs are left out, is passed over; a node that is seen smaller than the size
 //! asked for is drawn, but where backs are left out none that would be though some of what is below would not; of a leaf that is not, its surfels
 //! are; and of other nodes what is below. The cut depends on the tree, the camera and on whether backs are left out alone.
+//!
+//! On a device the tree lies in [`branches`](super::branches), which are gone through one after the other, and what was chosen of each is copied to the
+//! pages that surfels are drawn from: nothing that follows knows of trees.
 
 use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
@@ -12,17 +15,67 @@ use rayon::prelude::*;
 
 use super::cull;
 use super::lowpass::Design;
-use crate::plan::RenderOptions;
+use crate::plan::pass::Pass;
+use crate::plan::steps::{Kernel, Over, Run};
+use crate::plan::{RenderOptions, SurfelLayout};
 use crate::scene::color::srgb8;
 use crate::scene::hierarchy::Node;
 use crate::scene::{Camera, Cap, Clip, Colors, Detail, DetailMeasure, Hierarchy, Projection, Scene, Surfel};
 
+/// The pass's kernels, files and constants.
+pub const PASS: Pass = Pass {
+    name: "select",
+    files: |needs| match (needs.levels, SurfelLayout::of(needs).words > 0) {
+        (true, true) => vec!["select.wgsl", "gather.wgsl"],
+        (true, false) => vec!["select.wgsl", "gather_absent.wgsl"],
+        (false, _) => vec!["select_absent.wgsl"],
+    },
+    kernels: |needs| match needs.levels {
+        true => vec![SELECT_ROOTS, SELECT_JUDGE, SELECT_SUM, SELECT_SPREAD, SELECT_GATHER],
+        false => Vec::new(),
+    },
+    constants: |making| match making.needs.levels {
+        true => {
+            vec![("MEASURES_EXTENT", u32::from(making.options.detail_measure == DetailMeasure::Extent).into())]
+        }
+        false => Vec::new(),
+    },
+};
+
+const SELECT_ROOTS: Kernel = Kernel::of("select_roots", [1, 1, 1]);
+const SELECT_JUDGE: Kernel = Kernel::new("select_judge");
+const SELECT_SUM: Kernel = Kernel::new("select_sum");
+const SELECT_SPREAD: Kernel = Kernel::new("select_spread");
+/// It copies to the pages, one after the other.
+pub(crate) const SELECT_GATHER: Kernel = Kernel::new("select_gather");
+
+/// The dispatches that choose what of a branch with so many levels is drawn, and then copy it if it is `gathered`.
+pub fn runs(levels: u32, gathered: bool) -> Vec<Run> {
+    let level = [
+        Run { kernel: SELECT_JUDGE, over: Over::Judged },
+        Run { kernel: SELECT_SUM, over: Over::Once },
+        Run { kernel: SELECT_SPREAD, over: Over::Spread },
+    ];
+    let mut runs = vec![Run { kernel: SELECT_ROOTS, over: Over::Once }];
+    runs.extend((0..levels).flat_map(|_| level));
+    runs.extend(gathered.then_some(Run { kernel: SELECT_GATHER, over: Over::Chosen }));
+    runs
+}
+
+/// Words of [`Over`]'s grids in the state of a cut, `selection` (`wgsl/select.wgsl`).
+pub(crate) const JUDGE_GRID: u64 = 7;
+pub(crate) const SPREAD_GRID: u64 = 10;
+pub(crate) const GATHER_GRID: u64 = 13;
+
+/// Words of that state.
+pub(crate) const SELECTION_WORDS: u64 = 16;
+
 /// What is drawn of a tree.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cut {
-    /// Nodes, by their numbers.
+    /// Nodes, by their numbers, which ascend.
     pub nodes: Vec<u32>,
-    /// Surfels of leaves.
+    /// Surfels of leaves, in the order of the tree.
     pub surfels: Vec<Range<u32>>,
 }
 
@@ -40,9 +93,10 @@ pub struct Wanted {
 }
 
 impl Wanted {
-    /// One for a picture with `options`, of which backs are left out or not.
-    pub fn of(detail: Detail, measure: DetailMeasure, backs_out: bool, options: &RenderOptions) -> Self {
-        Self { detail, measure, backs_out, filter_reach: cull::filter_reach(&Design::of(options)) }
+    /// That of a picture with `options`, of which backs are left out or not.
+    pub fn of(options: &RenderOptions, backs_out: bool) -> Self {
+        let filter_reach = cull::filter_reach(&Design::of(options));
+        Self { detail: options.detail, measure: options.detail_measure, backs_out, filter_reach }
     }
 }
 
@@ -58,7 +112,7 @@ enum Fate {
 pub fn reference(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: &Wanted) -> Cut {
     let Wanted { detail, measure, backs_out, filter_reach } = *wanted;
     let eye = camera.eye - origin;
-    let size = detail.pixels(camera);
+    let size = detail.pixels(camera.pixels() as f64);
     let fate = |index: u32| {
         let node = &hierarchy.nodes[index as usize];
         let low = hierarchy.low.get(index as usize).map_or(DVec3::ZERO, |low| DVec3::from_array(low.map(f64::from)));
@@ -90,6 +144,8 @@ pub fn reference(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: 
         }
         frontier = below;
     }
+    cut.nodes.sort_unstable();
+    cut.surfels.sort_unstable_by_key(|range| range.start);
     cut
 }
 
@@ -107,7 +163,8 @@ fn is_unseen(node: &Node, center: DVec3, camera: &Camera, filter_reach: f64) -> 
     }
     let image = cull::reference(at, node.radius.into(), camera, filter_reach);
     image.is_some_and(|[low, high]| {
-        high.x < 0.0 || high.y < 0.0 || low.x > f64::from(camera.width) || low.y > f64::from(camera.height)
+        let last = [camera.width, camera.height].map(|side| f64::from(side) - 1.0);
+        high.x < 0.0 || high.y < 0.0 || low.x > last[0] || low.y > last[1]
     })
 }
 
@@ -191,7 +248,8 @@ mod tests {
     }
 
     fn wanted(detail: Detail, measure: DetailMeasure, backs_out: bool) -> Wanted {
-        Wanted::of(detail, measure, backs_out, &RenderOptions::default())
+        let options = RenderOptions { detail, detail_measure: measure, ..RenderOptions::default() };
+        Wanted::of(&options, backs_out)
     }
 
     /// The surfels below a node.

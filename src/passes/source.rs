@@ -7,11 +7,14 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::branches::Branch;
 use super::cull::ball;
 use super::order::order;
 use crate::gpu::layout::BATCH;
 use crate::plan::{ColorNeed, Facts, SceneNeeds, SurfelLayout};
-use crate::scene::{Cap, Colors, Mipmap, Provenance, Scene, Surfel, Triangles, copies};
+use crate::scene::color::srgb8;
+use crate::scene::hierarchy::{Hierarchy, Node};
+use crate::scene::{Cap, Clip, Colors, Mipmap, Provenance, Scene, Surfel, Triangles, copies};
 
 /// Surfels, page by page.
 pub trait Source: Send + Sync {
@@ -27,6 +30,16 @@ pub trait Source: Send + Sync {
 
     /// The triangles beside them.
     fn triangles(&self) -> Option<&Triangles> {
+        None
+    }
+
+    /// Their levels of detail.
+    fn levels(&self) -> Option<&Hierarchy> {
+        None
+    }
+
+    /// The surfels of a branch of these levels, and behind them those of its nodes, as a render with `needs` draws them.
+    fn branch<'a>(&'a self, _needs: &SceneNeeds, _branch: &Branch) -> Option<Box<dyn Page + 'a>> {
         None
     }
 
@@ -75,6 +88,14 @@ macro_rules! leads_to_source {
                 (**self).triangles()
             }
 
+            fn levels(&self) -> Option<&Hierarchy> {
+                (**self).levels()
+            }
+
+            fn branch<'a>(&'a self, needs: &SceneNeeds, branch: &Branch) -> Option<Box<dyn Page + 'a>> {
+                (**self).branch(needs, branch)
+            }
+
             fn provenance(&self) -> Cow<'_, Provenance> {
                 (**self).provenance()
             }
@@ -102,6 +123,7 @@ impl Source for Scene {
         }
         let page = |indices: &[u32]| ScenePage {
             scene: self,
+            nodes: None,
             needs: *needs,
             layout: SurfelLayout::of(needs),
             indices: indices.into(),
@@ -127,6 +149,23 @@ impl Source for Scene {
         Some(&self.triangles).filter(|triangles| !triangles.is_empty())
     }
 
+    fn levels(&self) -> Option<&Hierarchy> {
+        self.hierarchy.as_deref()
+    }
+
+    fn branch<'a>(&'a self, needs: &SceneNeeds, branch: &Branch) -> Option<Box<dyn Page + 'a>> {
+        let first = self.surfels.len() as u32;
+        let nodes = branch.numbers.iter().map(|number| first + number);
+        Some(Box::new(ScenePage {
+            scene: self,
+            nodes: self.levels(),
+            needs: *needs,
+            layout: SurfelLayout::of(needs),
+            indices: branch.surfels.clone().chain(nodes).collect(),
+            copies: None,
+        }))
+    }
+
     fn provenance(&self) -> Cow<'_, Provenance> {
         Cow::Borrowed(&self.provenance)
     }
@@ -136,9 +175,10 @@ impl Source for Scene {
     }
 }
 
-/// The surfels of a scene at `indices`.
+/// The surfels of a scene at `indices`, of which those past the last are nodes.
 struct ScenePage<'a> {
     scene: &'a Scene,
+    nodes: Option<&'a Hierarchy>,
     needs: SceneNeeds,
     layout: SurfelLayout,
     indices: Box<[u32]>,
@@ -146,18 +186,59 @@ struct ScenePage<'a> {
     copies: Option<Arc<[u32]>>,
 }
 
+/// The bits of numbers.
+fn write(values: &[f32], into: &mut [u32]) {
+    values.iter().zip(into).for_each(|(value, into)| *into = value.to_bits());
+}
+
 impl ScenePage<'_> {
+    /// The node that an index past the last surfel is of, with its number.
+    fn node(&self, index: usize) -> Option<(usize, &Node)> {
+        let number = index.checked_sub(self.scene.surfels.len())?;
+        Some((number, self.nodes?.nodes.get(number)?))
+    }
+
+    fn surfel(&self, index: usize) -> Surfel {
+        self.node(index).map_or_else(|| self.scene.surfels[index], |(_, node)| node.surfel)
+    }
+
+    /// Those of a node: it is flat, and ends at no lines.
+    fn write_node(&self, (number, node): (usize, &Node), into: &mut [u32]) {
+        match self.needs.color {
+            ColorNeed::Srgb8 => into[0] = u32::from_le_bytes(srgb8(node.color)),
+            ColorNeed::Linear => write(&node.color, into),
+            _ => {}
+        }
+        if let (true, Some(low)) = (self.needs.doubled, self.nodes.and_then(|nodes| nodes.low.get(number))) {
+            write(low, &mut into[self.layout.low as usize..]);
+        }
+        if self.needs.own_normals {
+            let normal = node.surfel.normal().normalize_or_zero();
+            write(&normal.to_array(), &mut into[self.layout.normal as usize..]);
+        }
+        if self.needs.clips {
+            write(Clip::NONE.0.as_flattened(), &mut into[self.layout.clip as usize..]);
+        }
+        if self.needs.curved {
+            write(&Cap::FLAT.0, &mut into[self.layout.cap as usize..]);
+        }
+    }
+
     fn write_attributes(&self, index: usize, into: &mut [u32]) {
-        let bits = |vectors: &[[f32; 4]], into: &mut [u32]| {
-            vectors.iter().flatten().zip(into).for_each(|(value, into)| *into = value.to_bits());
-        };
+        if self.needs.numbers_surfels() {
+            into[self.layout.number as usize] = index as u32;
+        }
+        if let Some(node) = self.node(index) {
+            return self.write_node(node, into);
+        }
+        let bits = |vectors: &[[f32; 4]], into: &mut [u32]| write(vectors.as_flattened(), into);
         let low = self.scene.low.get(index);
         match (self.needs.color, &self.scene.colors) {
             (ColorNeed::Srgb8, Colors::Srgb8(codes)) => into[0] = u32::from_le_bytes(codes[index]),
             (ColorNeed::Linear, colors) => bits(&[colors.linear(index)], into),
             (ColorNeed::Harmonics(_), Colors::Harmonics(harmonics)) => {
                 bits(&[harmonics.colors()[index]], into);
-                harmonics.terms(index).iter().zip(&mut into[4..]).for_each(|(value, into)| *into = value.to_bits());
+                write(harmonics.terms(index), &mut into[4..]);
             }
             (ColorNeed::Textured, Colors::Textured(textured)) => {
                 let [center, u_slope, v_slope] = textured.mapped(index, low);
@@ -169,20 +250,16 @@ impl ScenePage<'_> {
             into[self.layout.copies as usize] = copies[index];
         }
         if let (true, Some(low)) = (self.needs.doubled, low) {
-            let into = &mut into[self.layout.low as usize..];
-            low.iter().zip(into).for_each(|(value, into)| *into = value.to_bits());
+            write(low, &mut into[self.layout.low as usize..]);
         }
         if let (true, Some(normal)) = (self.needs.own_normals, self.scene.normals.get(index)) {
-            let into = &mut into[self.layout.normal as usize..];
-            normal.iter().zip(into).for_each(|(value, into)| *into = value.to_bits());
+            write(normal, &mut into[self.layout.normal as usize..]);
         }
         if let (true, Some(clip)) = (self.needs.clips, self.scene.clips.get(index)) {
-            let into = &mut into[self.layout.clip as usize..];
-            clip.0.iter().flatten().zip(into).for_each(|(value, into)| *into = value.to_bits());
+            write(clip.0.as_flattened(), &mut into[self.layout.clip as usize..]);
         }
         if let (true, Some(cap)) = (self.needs.curved, self.scene.caps.get(index)) {
-            let into = &mut into[self.layout.cap as usize..];
-            cap.0.iter().zip(into).for_each(|(value, into)| *into = value.to_bits());
+            write(&cap.0, &mut into[self.layout.cap as usize..]);
         }
     }
 }
@@ -193,7 +270,7 @@ impl Page for ScenePage<'_> {
     }
 
     fn surfels(&self, range: Range<usize>) -> Vec<Surfel> {
-        self.indices[range].par_iter().map(|&index| self.scene.surfels[index as usize]).collect()
+        self.indices[range].par_iter().map(|&index| self.surfel(index as usize)).collect()
     }
 
     fn attributes(&self, range: Range<usize>) -> Vec<u32> {

@@ -2,16 +2,17 @@
 
 use std::ops::Range;
 
+use super::branches::{self, Branch};
 use super::source::{self, Source};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
-use crate::gpu::layout::QUEUE_START;
+use crate::gpu::layout::{self, QUEUE_START};
 use crate::passes::triangles::CORNER_WORDS;
 use crate::plan::{ColorNeed, Facts, MeshNeeds, SceneNeeds, SurfelLayout, page_surfels, texture_words};
 use crate::progress::Progress;
 use crate::scene::color::SRGB8_TO_LINEAR;
-use crate::scene::{Mipmap, Triangles};
+use crate::scene::{Mipmap, Surfel, Triangles};
 
 /// Buffers by their names in WGSL.
 pub type Named = Vec<(&'static str, Buffer<u32>)>;
@@ -20,8 +21,22 @@ pub type Named = Vec<(&'static str, Buffer<u32>)>;
 pub struct Uploaded {
     /// Consecutive surfels; kernels see one page at a time.
     pub pages: Vec<Page>,
+    /// The branches of the levels of detail, if a cut is drawn: then there are no pages yet.
+    pub branches: Vec<BranchBuffers>,
     /// What is there once: the table that decodes 8-bit sRGB, the texture.
     pub shared: Named,
+}
+
+/// A branch of a tree.
+pub struct BranchBuffers {
+    /// Its surfels and nodes, with their attributes as far as the render needs them.
+    pub buffers: Named,
+    /// How many levels it has.
+    pub levels: u32,
+    /// How many surfels and nodes, and how many of them are nodes.
+    pub records: [u64; 2],
+    /// How many roots.
+    pub roots: u64,
 }
 
 /// One page of a scene.
@@ -43,21 +58,63 @@ pub fn upload(
     progress: &dyn Progress,
 ) -> Result<Uploaded> {
     progress.begin("uploading surfels", facts.surfels);
+    if needs.levels {
+        let branches = branches(gpu, source, needs, progress)?;
+        progress.end();
+        return Ok(Uploaded { pages: Vec::new(), branches, shared: shared(gpu, source, needs)? });
+    }
     let pages = source.pages(needs, page_surfels(&gpu.adapter, needs) as usize, ordered.then_some(facts));
     let pages = pages.into_iter().map(|of| page(gpu, &*of, needs, progress)).collect::<Result<_>>()?;
     let shared = shared(gpu, source, needs)?;
     progress.end();
-    Ok(Uploaded { pages, shared })
+    Ok(Uploaded { pages, branches: Vec::new(), shared })
+}
+
+/// The branches of the levels of detail that `source` has.
+fn branches(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds, progress: &dyn Progress) -> Result<Vec<BranchBuffers>> {
+    let words = SurfelLayout::of(needs).words as usize;
+    let most = gpu.adapter.page_len(size_of::<Surfel>().max(4 * words));
+    let tree = source.levels().map(|tree| branches::branches(tree, most)).unwrap_or_default();
+    let of = |branch: Branch| {
+        let page = source.branch(needs, &branch).ok_or_else(|| gpu.error("a scene has no levels of detail"))?;
+        let Branch { surfels, nodes, roots, first_root, whole, levels, .. } = branch;
+        let (surfels, records) = (surfels.len() as u32, surfels.len() + nodes.len());
+        let own = layout::Branch { surfels, roots, first_root, whole: whole.into() };
+        let mut buffers = vec![
+            ("branch", Buffer::uniform(gpu, "branch", &own)?.words()),
+            ("tree_nodes", filled(gpu, "nodes", bytemuck::cast_slice(&nodes))?),
+        ];
+        let names = ["tree_surfels", "tree_attributes"];
+        buffers.extend(names.into_iter().zip(records_of(gpu, (&*page, records), words, progress)?));
+        Ok(BranchBuffers { buffers, levels, records: [records as u64, nodes.len() as u64], roots: roots.into() })
+    };
+    tree.into_iter().map(of).collect()
 }
 
 fn page(gpu: &Gpu, of: &dyn source::Page, needs: &SceneNeeds, progress: &dyn Progress) -> Result<Page> {
     let numbers = of.numbers().into_owned();
-    let surfels = Buffer::storage(gpu, "surfels", numbers.len() as u64)?;
-    surfels.write(gpu, numbers.len(), |range| of.surfels(range).into(), progress)?;
-    let mut buffers = vec![("surfels", surfels.words())];
     let words = SurfelLayout::of(needs).words as usize;
+    let records = records_of(gpu, (of, numbers.len()), words, progress)?;
+    let mut buffers: Named = ["surfels", "attributes"].into_iter().zip(records).collect();
+    let batches = of.balls();
+    let balls = Buffer::storage(gpu, "batches", batches.len() as u64)?;
+    balls.write(gpu, batches.len(), |range| batches[range].into(), &())?;
+    buffers.push(("balls", balls.words()));
+    Ok(Page { buffers, numbers, stand_for: of.stand_for() })
+}
+
+/// The surfels of a page that has so many, and their attributes, of `words` each, if they have some.
+fn records_of(
+    gpu: &Gpu,
+    (of, count): (&dyn source::Page, usize),
+    words: usize,
+    progress: &dyn Progress,
+) -> Result<Vec<Buffer<u32>>> {
+    let surfels = Buffer::storage(gpu, "surfels", count as u64)?;
+    surfels.write(gpu, count, |range| of.surfels(range).into(), progress)?;
+    let mut buffers = vec![surfels.words()];
     if words > 0 {
-        let attributes = Buffer::storage(gpu, "attributes", (numbers.len() * words) as u64)?;
+        let attributes = Buffer::storage(gpu, "attributes", (count * words) as u64)?;
         // Of whole records, in which a range of words may start and end anywhere.
         let values = |range: Range<usize>| {
             let mut values = of.attributes(range.start / words..range.end.div_ceil(words));
@@ -65,14 +122,10 @@ fn page(gpu: &Gpu, of: &dyn source::Page, needs: &SceneNeeds, progress: &dyn Pro
             values.truncate(range.len());
             values.into()
         };
-        attributes.write(gpu, numbers.len() * words, values, &())?;
-        buffers.push(("attributes", attributes));
+        attributes.write(gpu, count * words, values, &())?;
+        buffers.push(attributes);
     }
-    let batches = of.balls();
-    let balls = Buffer::storage(gpu, "batches", batches.len() as u64)?;
-    balls.write(gpu, batches.len(), |range| batches[range].into(), &())?;
-    buffers.push(("balls", balls.words()));
-    Ok(Page { buffers, numbers, stand_for: of.stand_for() })
+    Ok(buffers)
 }
 
 /// The table that decodes 8-bit sRGB, where it is needed, and the texture.

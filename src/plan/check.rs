@@ -47,6 +47,9 @@ pub fn options(options: &RenderOptions, reference: bool) -> Result<()> {
     if options.composite != Composite::Opaque {
         composite(options, reference)?;
     }
+    if !options.detail.is_finest() {
+        levels(options)?;
+    }
     let cut = matches!(options.composite, Composite::Layers(most) if most < ALL_LAYERS);
     if options.separate {
         separate(options, reference)?;
@@ -71,6 +74,20 @@ pub fn options(options: &RenderOptions, reference: bool) -> Result<()> {
         }
         None if options.organisation == Organisation::Tile && options.accumulator != Accumulator::Fixed => {
             usage("the organisation tile needs the accumulator fixed: leave one of them out")
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Nodes of levels of detail are disks, of all inputs together.
+fn levels(options: &RenderOptions) -> Result<()> {
+    match options {
+        _ if options.facing.is_some() => {
+            usage("points that face the camera have a size each and no levels of detail: leave --lod out")
+        }
+        _ if options.separate => usage("levels of detail are of all inputs together: leave --separate or --lod out"),
+        _ if options.maps.has(Map::Index) => {
+            usage("the map index names points, and nodes are none: leave one of the map and --lod out")
         }
         _ => Ok(()),
     }
@@ -248,6 +265,9 @@ pub fn scene(facts: &Facts, options: &RenderOptions, reference: bool) -> Result<
             "only surfels whose normals have a side face away, and not all of these do: leave --cull back out, or give \
              normals a side with epsplat surfels",
         );
+    }
+    if !options.detail.is_finest() && facts.levels.is_none() {
+        return usage("the scene has no levels of detail to take: leave --lod out, or make some with epsplat lod");
     }
     // A scene may say how it is composited, so that this is asked where both are known.
     let told_apart = options.composite != Composite::Opaque && !options.composite.is_order_free();

@@ -1,10 +1,11 @@
 //! What a renderer must know of all surfels together, looked up once and not for each frame. No view is in it.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
-use super::MeshFacts;
+use super::{MeshFacts, RenderOptions};
 use crate::scene::texture::PlaceRange;
-use crate::scene::{Atlas, Bounds, Colors, Scene, Surfel, has_copies};
+use crate::scene::{Atlas, Bounds, Colors, Hierarchy, Scene, Surfel, has_copies};
 
 /// Where a surfel's colour comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -67,11 +68,52 @@ pub struct Facts {
     pub doubled: bool,
     /// One surfel has many copies, which can be drawn as one.
     pub copies: bool,
+    /// Of nodes of levels of detail.
+    pub levels: Option<LevelFacts>,
     /// Every so many surfels one, and its centre with all digits.
     pub sample: Vec<(Surfel, DVec3)>,
 }
 
+/// What is known of the nodes of levels of detail.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LevelFacts {
+    /// How many there are.
+    pub nodes: u64,
+    /// The longest half-axis, world units.
+    pub largest_radius: f32,
+    /// The longest shorter half-axis, world units.
+    pub largest_shorter: f32,
+}
+
+impl LevelFacts {
+    /// Those of `hierarchy`.
+    pub fn of(hierarchy: &Hierarchy) -> Self {
+        let largest =
+            |of: fn(&Surfel) -> f32| hierarchy.nodes.par_iter().map(|node| of(&node.surfel)).reduce(|| 0.0, f32::max);
+        Self {
+            nodes: hierarchy.nodes.len() as u64,
+            largest_radius: largest(Surfel::radius),
+            largest_shorter: largest(Surfel::shorter),
+        }
+    }
+}
+
 impl Facts {
+    /// The longest half-axis of what may be drawn, world units.
+    pub fn drawn_radius(&self, options: &RenderOptions) -> f32 {
+        self.nodes_of(options).map_or(self.largest_radius, |nodes| nodes.largest_radius.max(self.largest_radius))
+    }
+
+    /// The longest shorter half-axis of what may be drawn, world units.
+    pub fn drawn_shorter(&self, options: &RenderOptions) -> f32 {
+        self.nodes_of(options).map_or(self.largest_shorter, |nodes| nodes.largest_shorter.max(self.largest_shorter))
+    }
+
+    /// Nodes that may be drawn, of a picture that asks for some.
+    pub fn nodes_of(&self, options: &RenderOptions) -> Option<LevelFacts> {
+        self.levels.filter(|_| !options.detail.is_finest())
+    }
+
     /// Those of `scene`.
     pub fn of(scene: &Scene) -> Self {
         let (low, high) = scene.color_range();
@@ -107,6 +149,7 @@ impl Facts {
             own_normals: !scene.normals.is_empty(),
             doubled: !scene.low.is_empty(),
             copies: has_copies(scene),
+            levels: scene.hierarchy.as_deref().map(LevelFacts::of),
             sample: (0..scene.surfels.len()).step_by(step).map(|k| (scene.surfels[k], scene.center(k))).collect(),
         }
     }

@@ -3,9 +3,9 @@
 
 use super::Band;
 
-/// Times that a frame is rendered at most. A try fails for one of four reasons: slots, lists of large splats, lists of all, sums that
+/// Times that a frame is rendered at most. A try fails for one of five reasons: cuts, slots, lists of large splats, lists of all, sums that
 /// wrap; and each teaches what ends it, or, of a list whose length a view changes, what ends it in this view.
-pub const MOST_TRIES: usize = 6;
+pub const MOST_TRIES: usize = 7;
 
 /// Lists of the splats that may touch each cell of the image (`wgsl/bin.wgsl`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,6 +21,8 @@ pub enum Listed {
 pub struct Known {
     /// Tiles that a splat touches on average in this view, by a sample.
     pub touched_tiles: f64,
+    /// Surfels of a cut that there is room for, of a scene with levels of detail.
+    pub cut: Option<u64>,
     /// The slots of splats were counted for an earlier view, which has left some spare.
     pub slots: bool,
     /// Whether the last frame had large splats.

@@ -23,7 +23,7 @@ mod view;
 pub use accumulator::{ACCUMULATORS, Accumulator, AccumulatorRow, Features, wide_bits};
 pub use composited::composited;
 pub use cuts::{Band, bands, page_surfels};
-pub use facts::{ColorNeed, Facts};
+pub use facts::{ColorNeed, Facts, LevelFacts};
 pub use fragment::{FragmentLayout, KEY_WORDS};
 pub use known::Known;
 pub use mesh::{MeshFacts, MeshNeeds, texture_words};
@@ -68,6 +68,8 @@ pub struct Plan {
     pub mesh: MeshFacts,
     /// Pages that the surfels fill, where each is drawn by itself.
     pub pages: usize,
+    /// Surfels of a cut that pages have room for, once that is known; of a scene of which one is drawn.
+    pub cut: Option<u64>,
     /// Those of each individual, where they are kept apart.
     pub individuals: Vec<Range<usize>>,
     /// No list is longer than this, if some are gone through in rounds.
@@ -95,9 +97,9 @@ fn most_words(needs: &SceneNeeds) -> u32 {
 }
 
 /// Surfels that blend with each other, at most: of one page tiles gather them.
-fn most_together(facts: &Facts, needs: &SceneNeeds) -> u64 {
+fn most_together((facts, drawn): (&Facts, u64), needs: &SceneNeeds) -> u64 {
     let largest = facts.individuals.iter().copied().max();
-    largest.filter(|_| needs.separate).unwrap_or(facts.surfels)
+    largest.filter(|_| needs.separate).unwrap_or(drawn)
 }
 
 /// The pages that individuals of so many surfels fill, each its own.
@@ -130,6 +132,7 @@ fn culls(facts: &Facts, needs: &SceneNeeds, camera: &Camera, options: &RenderOpt
         && needs.lists.is_none()
         && needs.oit.is_none()
         && !needs.separate
+        && !needs.levels
         && needs.raster.is_none()
 }
 
@@ -151,7 +154,9 @@ impl Plan {
         check::on_adapter(adapter, &needs, camera)?;
         let pixel = PixelLayout::of(&needs);
         let page = page_surfels(adapter, &needs);
-        let gather = (1..=page).contains(&most_together(facts, &needs)) && gathers(&needs, options, known);
+        let cut = known.cut.filter(|_| needs.levels);
+        let drawn = if needs.levels { cut.unwrap_or(0) } else { facts.surfels };
+        let gather = (1..=page).contains(&most_together((facts, drawn), &needs)) && gathers(&needs, options, known);
         let cull = page >= BATCH.into() && culls(facts, &needs, camera, options);
         let individuals = if needs.separate { pages_of(&facts.individuals, page) } else { Vec::new() };
         let veils = needs.lists == Some(Lists::Sorted) && known.veiled;
@@ -184,7 +189,8 @@ impl Plan {
             width: camera.width,
             bands,
             mesh: facts.mesh,
-            pages: individuals.last().map_or(facts.surfels.div_ceil(page) as usize, |last| last.end),
+            pages: individuals.last().map_or(drawn.div_ceil(page) as usize, |last| last.end),
+            cut,
             individuals,
             longest_list: known.longest_list,
             lists_empty: options.shows_where_nothing_is() || needs.peels.is_some(),
@@ -201,7 +207,15 @@ impl Plan {
         let individuals = if needs.separate { pages_of(&facts.individuals, u64::MAX) } else { Vec::new() };
         Self {
             // What a device draws in another way, the twins draw as all else.
-            needs: SceneNeeds { raster: None, tiles: false, lists: Lists::of(facts, options), peels: None, ..needs },
+            needs: SceneNeeds {
+                raster: None,
+                tiles: false,
+                lists: Lists::of(facts, options),
+                peels: None,
+                // It is given the cut alone.
+                levels: false,
+                ..needs
+            },
             pixel: PixelLayout::of(&needs),
             sum_words: 0,
             one: 1,
@@ -209,6 +223,7 @@ impl Plan {
             bands: cuts::strips(camera, tuning::REFERENCE_ROWS),
             mesh: facts.mesh,
             pages: individuals.len().max(1),
+            cut: None,
             individuals,
             longest_list: 0,
             lists_empty: options.shows_where_nothing_is(),
@@ -217,6 +232,11 @@ impl Plan {
             large_by_tiles: false,
             looks_for_lists: [false; 2],
         }
+    }
+
+    /// How large a cut is is not known yet.
+    pub fn looks_for_cut(&self) -> bool {
+        self.needs.levels && self.cut.is_none()
     }
 
     /// Pages whose surfels blend with each other: all, or those of each individual.

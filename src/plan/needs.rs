@@ -30,6 +30,8 @@ pub struct SceneNeeds {
     pub doubled: bool,
     /// A surfel stands for all that are the same: the accumulator is `fixed`, one has many copies, there is no texture, and no inputs are kept apart.
     pub copies: bool,
+    /// A cut of levels of detail is drawn.
+    pub levels: bool,
     /// Batches of surfels that are out of view or hidden are left out: there are enough surfels for the image's pixels, all of which are looked at for what hides ([`tuning::PIXELS_A_CULLED_SURFEL`]).
     pub cull: bool,
     /// Large splats, at least, are drawn by tiles: the accumulator is `fixed`, and the options do not say scatter.
@@ -255,6 +257,7 @@ impl SceneNeeds {
             long_words: false,
             doubled: facts.doubled,
             copies: false,
+            levels: facts.nodes_of(options).is_some(),
             cull: false,
             tiles: fixed && lists.is_none() && oit.is_none() && options.organisation != Organisation::Scatter,
             gather: false,
@@ -315,6 +318,7 @@ impl SceneNeeds {
             && fixed
             && picture.oit.is_none()
             && !picture.separate
+            && !picture.levels
             && picture.color != ColorNeed::Textured;
         // Of copies tiles would make long lists.
         let tiles = picture.tiles && !copies;
@@ -338,6 +342,11 @@ impl SceneNeeds {
     /// Tiles may sum all splats: with textures and triangles they would bind more buffers than core WebGPU has.
     pub fn may_gather(&self) -> bool {
         self.tiles && !(self.color == ColorNeed::Textured && self.mesh.is_some())
+    }
+
+    /// Surfels of a cut are told apart by their places in the tree, as what is sorted goes by them at one depth.
+    pub fn numbers_surfels(&self) -> bool {
+        self.levels && self.lists == Some(Lists::Sorted)
     }
 
     /// Surfaces are told apart by the depth that they blend to.
@@ -398,6 +407,7 @@ impl SceneNeeds {
             (self.long_words, "long-words"),
             (self.doubled, "doubled"),
             (self.copies, "copies"),
+            (self.levels, "levels"),
             (self.cull, "cull"),
             (self.tiles, "tiles"),
             (self.gather, "gather"),

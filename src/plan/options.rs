@@ -5,8 +5,8 @@ use std::str::FromStr;
 use super::{Accumulator, Optimisation, Raster};
 use crate::error::Error;
 use crate::scene::{
-    Blend, Composite, Cull, Epsilon, Facing, Join, Kernel, Light, LowPass, Map, Maps, Outline, Samples, Shading,
-    ShadingAt, Tail,
+    Blend, Composite, Cull, Detail, DetailMeasure, Epsilon, Facing, Join, Kernel, Light, LowPass, Map, Maps, Outline,
+    Samples, Shading, ShadingAt, Tail,
 };
 
 /// Who renders.
@@ -72,6 +72,10 @@ pub struct RenderOptions {
     pub epsilon: Epsilon,
     /// Which surfels are left out by the side that they show.
     pub cull: Cull,
+    /// The size of a node that is drawn in place of what is below it, of a scene with levels of detail.
+    pub detail: Detail,
+    /// How that is measured.
+    pub detail_measure: DetailMeasure,
     /// Samples of a pixel's colour. Maps are of its centre, however many there are: a depth between two surfaces is of none.
     pub samples: Samples,
     /// Surfels are points that face the camera; else each lies in its own plane.
@@ -150,6 +154,8 @@ impl Default for RenderOptions {
         Self {
             epsilon: Epsilon::Bounded { radius: 1.0, relative: 0.01 },
             cull: Cull::Auto,
+            detail: Detail::FINEST,
+            detail_measure: DetailMeasure::default(),
             samples: Samples::ONE,
             facing: None,
             outline: None,

@@ -51,6 +51,12 @@ pub enum Over {
     Slots(Part),
     /// An invocation for each batch of a page.
     Batches,
+    /// An invocation for each node of a level of a branch that is come to, as the device counted them.
+    Judged,
+    /// The same, after the next level's are known.
+    Spread,
+    /// An invocation for each surfel of the cut in a branch.
+    Chosen,
     /// Workgroups for the splats that take long to project, as the device counted them.
     Rare,
     /// A workgroup for each large splat.
@@ -198,6 +204,8 @@ impl Stage {
 /// Something that is looked at on the device in the middle of a frame, because buffers are sized by it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Look {
+    /// The surfels of a cut.
+    Cut,
     /// The slots that the listed batches of a part take.
     Slots(Part),
     /// What lists hold that these stages count.
@@ -209,6 +217,11 @@ pub enum Look {
 /// A step of a frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Step {
+    /// The cut of a tree, branch by branch.
+    Select {
+        /// It is copied to the pages that it is drawn from; else it is counted.
+        gathers: bool,
+    },
     /// Kernels.
     Stage(Stage),
     /// Makes room by what is there.

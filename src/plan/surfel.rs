@@ -20,6 +20,8 @@ pub struct SurfelLayout {
     pub cap: u32,
     /// The first of the three words of its own normal.
     pub normal: u32,
+    /// Its place in a tree.
+    pub number: u32,
 }
 
 impl SurfelLayout {
@@ -37,7 +39,8 @@ impl SurfelLayout {
         let clip = low + if needs.doubled { 3 } else { 0 };
         let cap = clip + if needs.clips { 6 } else { 0 };
         let normal = cap + if needs.curved { 3 } else { 0 };
-        Self { words: normal + if needs.own_normals { 3 } else { 0 }, copies, low, clip, cap, normal }
+        let number = normal + if needs.own_normals { 3 } else { 0 };
+        Self { words: number + u32::from(needs.numbers_surfels()), copies, low, clip, cap, normal, number }
     }
 }
 

@@ -7,7 +7,7 @@ use crate::gpu::layout::View;
 use crate::scene::light::MAX_LIGHTS;
 use crate::scene::options::HIGHLIGHT;
 use crate::scene::texture::PlaceRange;
-use crate::scene::{Atlas, Bounds, Camera, Composite, Light, Projection, Shading};
+use crate::scene::{Atlas, Bounds, Camera, Composite, Light, Projection, Samples, Shading};
 
 /// x as the nearest f32 and the nearest f32 to what that leaves.
 fn split(x: f64) -> (f32, f32) {
@@ -90,14 +90,15 @@ impl View {
             epsilon_absolute: (absolute * unit) as f32,
             world: (1.0 / unit) as f32,
             epsilon_radius: of_radius as f32,
-            epsilon_deepest: (of_radius * f64::from(facts.largest_shorter) * unit) as f32,
-            farthest: (farthest(facts, camera) * unit) as f32,
+            epsilon_deepest: (of_radius * f64::from(facts.drawn_shorter(options)) * unit) as f32,
+            farthest: (farthest(facts, camera, options) * unit) as f32,
             middle: (camera.rotation.row(2).dot(core.center() - eye_relative) * unit) as f32,
             epsilon_most: options.epsilon.most().min(LARGEST_FRACTION) as f32,
             first: (first * unit) as f32,
             last: (last * unit) as f32,
             textures,
             place,
+            levels: levels(camera, options),
             atlas,
         }
     }
@@ -116,8 +117,9 @@ pub fn depths(facts: &Facts, camera: &Camera) -> [f64; 2] {
 
 /// A depth past every surfel, with room for the rounding of depths: an epsilon that accepts everything must not make the interval that depths
 /// are measured in infinite, nor coarser than the scene. World units.
-pub fn farthest(facts: &Facts, camera: &Camera) -> f64 {
-    (farthest_of(&facts.bounds, camera.eye - facts.origin, camera) + f64::from(facts.largest_radius)) * 1.001
+pub fn farthest(facts: &Facts, camera: &Camera, options: &RenderOptions) -> f64 {
+    let reach = f64::from(facts.drawn_radius(options));
+    (farthest_of(&facts.bounds, camera.eye - facts.origin, camera) + reach) * 1.001
 }
 
 /// The largest depth of a corner of `bounds`, at least 0; world units.
@@ -158,6 +160,13 @@ fn mapped([low, high]: [[f32; 4]; 2], composite: Composite) -> [[f32; 4]; 2] {
     let summed = !matches!(composite, Composite::Sorted | Composite::Gaussians);
     let of = |k: usize| if summed || low[k] == high[k] { [low[k], high[k] - low[k]] } else { [0.0, 1.0] };
     [std::array::from_fn(|k| of(k)[0]), std::array::from_fn(|k| of(k)[1])]
+}
+
+/// The size of a node that is drawn, square pixels of the image, and the part of a pixel that a sample is across and down.
+fn levels(camera: &Camera, options: &RenderOptions) -> [f32; 4] {
+    let Samples { across, down } = options.samples;
+    let image = camera.pixels() as f64 / f64::from(across * down);
+    [options.detail.pixels(image) as f32, 1.0 / across as f32, 1.0 / down as f32, 0.0]
 }
 
 /// The lights as the kernels see them: a direction, zero for a headlight, and an intensity.

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::kernels::Kernels;
 use super::report::{DeviceBytes, Report};
-use super::run::Run;
+use super::run::{Run, Tally};
 use super::sequence;
 use super::store::Store;
 use crate::error::Result;
@@ -82,7 +82,7 @@ impl Kept {
                 bar.end();
                 let clock = if run.timing.on_device() { "timestamps" } else { "wall" };
                 let passes = run.timing.finish(gpu)?;
-                let report = self.report(gpu, &plan, image, (tally.drawn, clock, passes, total_ms));
+                let report = self.report(gpu, &plan, image, (tally, clock, passes, total_ms));
                 return Ok((frame, report));
             }
         }
@@ -138,7 +138,7 @@ impl Kept {
         gpu: &Gpu,
         plan: &Plan,
         camera: &Camera,
-        (splats_drawn, clock, passes, total_ms): (u64, &'static str, BTreeMap<&'static str, f64>, f64),
+        (tally, clock, passes, total_ms): (Tally, &'static str, BTreeMap<&'static str, f64>, f64),
     ) -> Report {
         let raster = plan.needs.raster;
         Report {
@@ -147,7 +147,8 @@ impl Kept {
             accumulator: raster.map_or(plan.needs.accumulator.name(), |raster| raster.format.name()),
             overflows: self.known.overflows,
             surfels: self.facts.surfels,
-            splats_drawn: splats_drawn.min(self.facts.surfels),
+            splats_drawn: tally.drawn.min(self.facts.surfels),
+            cut: tally.cut,
             triangles: self.facts.mesh.triangles,
             width: camera.width,
             height: camera.height,

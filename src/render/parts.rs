@@ -37,11 +37,14 @@ pub(super) fn parts(facts: &Facts, options: &RenderOptions) -> Vec<RenderOptions
     parts
 }
 
-/// Fails for several samples, where what a pixel sums is read back.
+/// Fails for several samples, and for levels of detail, where what a pixel sums of all surfels is read back.
 ///
 /// # Errors
 /// [`Error::Usage`].
 pub(super) fn one_alone(options: &RenderOptions) -> Result<()> {
+    if !options.detail.is_finest() {
+        return Err(Error::Usage("sums are read back of all surfels: leave levels of detail out".into()));
+    }
     if options.samples == Samples::ONE {
         return Ok(());
     }

@@ -14,14 +14,15 @@ use crate::passes::asks_for_order;
 use crate::passes::join::Beside;
 use crate::passes::order::order;
 use crate::passes::resolve::Surface;
+use crate::passes::select::{self, Wanted};
 use crate::passes::splat::Splat;
 use crate::passes::{
     MAP_PASSES, Strip, accumulate, individuals, layers, oit, project, resolve, sorted, triangles, visibility, winner,
 };
 use crate::plan::steps::{Step, Twin};
-use crate::plan::{Facts, Plan, RenderOptions, SceneNeeds};
+use crate::plan::{Facts, Plan, RenderOptions, SceneNeeds, culls_back};
 use crate::progress::Progress;
-use crate::scene::{Blend, Camera, Samples, Scene};
+use crate::scene::{Blend, Camera, Cull, Samples, Scene};
 
 /// Renders `scene` by `camera`, whose pixels are the samples.
 pub(super) fn frame(
@@ -40,7 +41,7 @@ pub(super) fn frame(
         splats = spent.timed("project", 1, || project::reference_all(scene, camera, options));
     }
     let (starts, members) = bin(&splats, &plan);
-    let ranks = asks_for_order(&plan.needs).then(|| ranks(scene, facts));
+    let ranks = asks_for_order(&plan.needs).then(|| ranks(scene, facts, options));
     let corners = triangles::corners(scene, camera);
     progress.begin("rendering rows", camera.height.into());
     let one = |band: usize| {
@@ -77,6 +78,21 @@ pub(super) fn frame(
             start.elapsed().as_secs_f64() * 1e3,
         ),
     )
+}
+
+/// The cut of `scene` that is drawn by the image's `camera`, and how, if one is: whether its backs are left out the whole scene says.
+pub(super) fn cut(
+    scene: &Scene,
+    facts: &Facts,
+    camera: &Camera,
+    options: &RenderOptions,
+) -> Option<(Scene, RenderOptions)> {
+    facts.nodes_of(options)?;
+    let tree = scene.hierarchy.as_deref()?;
+    let backs_out = culls_back(facts, camera, options);
+    let cut = select::reference(tree, scene.origin, camera, &Wanted::of(options, backs_out));
+    let cull = if backs_out { Cull::Back } else { Cull::None };
+    Some((cut.scene(scene, tree), RenderOptions { cull, ..options.clone() }))
 }
 
 /// What the steps of `plan` have twins for: before there are bands, and in each of them.
@@ -136,7 +152,11 @@ fn strip_by(strip: &Strip<'_>, twins: &[Twin], spent: &Spent) -> Frame {
 }
 
 /// The place of each surfel in the order in which a device stores them.
-fn ranks(scene: &Scene, facts: &Facts) -> Vec<u32> {
+fn ranks(scene: &Scene, facts: &Facts, options: &RenderOptions) -> Vec<u32> {
+    if facts.nodes_of(options).is_some() {
+        // A cut has the order of the tree.
+        return (0..scene.surfels.len() as u32).collect();
+    }
     let mut ranks = vec![0; scene.surfels.len()];
     for (rank, index) in order(scene, &facts.core).into_iter().enumerate() {
         ranks[index as usize] = rank as u32;
@@ -179,6 +199,7 @@ fn report(
         overflows: 0,
         surfels,
         splats_drawn,
+        cut: None,
         triangles,
         width: camera.width,
         height: camera.height,

@@ -24,6 +24,9 @@ pub struct Report {
     /// Splats that may touch a pixel; of an image that is drawn in bands a splat counts in each that it touches, up to as many as there
     /// are surfels. Those that were left out because they are hidden are not counted.
     pub splats_drawn: u64,
+    /// Surfels and nodes that are drawn in place of all surfels, of a scene with levels of detail.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cut: Option<u64>,
     /// Triangles in the scene.
     #[serde(skip_serializing_if = "is_none")]
     pub triangles: u64,

@@ -12,7 +12,7 @@ use crate::gpu::layout::{
 };
 use crate::gpu::timing::Timing;
 use crate::passes::tiles::{self, LONGEST, list_name};
-use crate::passes::{covered, long_lists, raster, resolve, triangles};
+use crate::passes::{covered, long_lists, raster, resolve, select, triangles};
 use crate::plan::known::{Known, Listed};
 use crate::plan::steps::{Clear, Kernel, Look, Over, Part, Stage, Step};
 use crate::plan::{Plan, RasterDepth};
@@ -24,6 +24,8 @@ pub struct Tally {
     /// Those that may touch a pixel of the image, and are not known to be hidden; where bands have splats of their own, each counts in
     /// every band that it is drawn in.
     pub drawn: u64,
+    /// Surfels and nodes of the cut that is drawn, if one is.
+    pub cut: Option<u64>,
     /// The image is right. If it is not, what is known now makes the next one right.
     pub complete: bool,
 }
@@ -65,7 +67,7 @@ impl<'a> Run<'a> {
             known,
             timing: Timing::new(gpu),
             by_tiles: plan.large_by_tiles,
-            tally: Tally { drawn: 0, complete: true },
+            tally: Tally { drawn: 0, cut: None, complete: true },
             needed: [None; 2],
             wanting: false,
             unlisted: false,
@@ -87,6 +89,11 @@ impl<'a> Run<'a> {
                     self.end_band(*band)?;
                     self.read_back(*band, frame)?;
                     progress.advance(self.plan.bands[*band].rows.into());
+                }
+                Step::Select { gathers } => self.select(*gathers)?,
+                Step::Look(Look::Cut) => {
+                    self.look_for_cut()?;
+                    return Ok(false);
                 }
                 Step::Look(Look::Slots(part)) => self.look_for_slots(*part)?,
                 Step::Look(Look::Fragments(band)) => {
@@ -138,14 +145,16 @@ impl<'a> Run<'a> {
         let small = self.plan.needs.gather.then(|| wanted("small_lists")).flatten();
         let counts_wraps = self.plan.sum_words > 0 && self.plan.needs.accumulator.row().head_words() > 0;
         let sums = counts_wraps.then(|| wanted("sums")).flatten();
+        let selection = self.plan.cut.and_then(|_| wanted("selection"));
         let of_pages = self.store.pages.iter().flat_map(|page| [page.buffer("queue"), page.buffer("drawn")]);
-        let all: Vec<&Buffer<u32>> = of_pages.chain([large, small, sums]).flatten().collect();
+        let all: Vec<&Buffer<u32>> = of_pages.chain([large, small, sums, selection]).flatten().collect();
         let mut counted = counts(self.gpu, &all)?.into_iter();
         let mut next = || counted.next().unwrap_or_default();
-        let (mut most_large, mut slots) = (0, true);
+        let (mut most_large, mut slots, mut unseen_in_all) = (0, true, 0);
         for page in &self.store.pages {
             let ([large, unseen], [_, batches]) = (next(), next());
             self.tally.drawn += page.stand_for.saturating_sub(unseen.into());
+            unseen_in_all += u64::from(unseen);
             most_large = most_large.max(large);
             slots &= !self.plan.needs.cull || u64::from(batches) * u64::from(BATCH) <= page.slots;
         }
@@ -155,16 +164,22 @@ impl<'a> Run<'a> {
             lists &= entries <= self.store.entries(of) && longest <= LONGEST;
         }
         let [overflows, _] = sums.map_or([0; 2], |_| next());
+        let [cut, _] = selection.map_or([0; 2], |_| next()).map(u64::from);
+        let fits = self.plan.cut.is_none_or(|room| self.fits_cut(room, cut));
+        if self.plan.cut.is_some() {
+            self.tally.drawn += cut.saturating_sub(unseen_in_all);
+            self.tally.cut = Some(cut);
+        }
         // Of a view all bands are asked.
         let before = band > 0 && self.plan.projects_each_band && self.known.large == Some(true);
         self.known.large = Some(before || most_large > 0);
         self.known.slots &= slots;
         self.wanting |= !lists;
         // Where splats are missing, sums are those of others.
-        if slots && lists {
+        if slots && lists && fits {
             self.known.overflows = self.known.overflows.max(overflows.into());
         }
-        self.tally.complete &= slots && lists && overflows == 0;
+        self.tally.complete &= slots && lists && fits && overflows == 0;
         Ok(())
     }
 
@@ -287,7 +302,13 @@ fn binding<'a>(
 }
 
 /// The workgroups of a dispatch.
-fn over<'a>(gpu: &Gpu, plan: &Plan, store: &'a Store, (band, page): (usize, usize), over: Over) -> Result<Grid<'a>> {
+pub(super) fn over<'a>(
+    gpu: &Gpu,
+    plan: &Plan,
+    store: &'a Store,
+    (band, page): (usize, usize),
+    over: Over,
+) -> Result<Grid<'a>> {
     let of_page = store.pages.get(page);
     let missing = || gpu.error("a stage goes over what does not exist");
     let counted = |buffer: Option<&'a Buffer<u32>>, word: u64| {
@@ -300,6 +321,9 @@ fn over<'a>(gpu: &Gpu, plan: &Plan, store: &'a Store, (band, page): (usize, usiz
             let word = if part == Part::Far { LIST_FAR } else { 0 };
             return counted(of_page.and_then(|page| page.buffer("drawn")), word.into());
         }
+        Over::Judged => return counted(store.buffer("selection"), select::JUDGE_GRID),
+        Over::Spread => return counted(store.buffer("selection"), select::SPREAD_GRID),
+        Over::Chosen => return counted(store.buffer("selection"), select::GATHER_GRID),
         Over::Rare => return counted(of_page.and_then(|page| page.buffer("rare")), QUEUE_GRID.into()),
         Over::Large => return counted(queue(), QUEUE_GRID.into()),
         Over::LargeTriangles => return counted(store.buffer("large_triangles"), QUEUE_GRID.into()),

@@ -13,6 +13,14 @@ use crate::plan::{Oit, Plan, Winner};
 /// The steps of a frame by `plan`.
 pub fn steps(plan: &Plan) -> Vec<Step> {
     let mut steps = Vec::new();
+    if plan.needs.levels {
+        steps.push(Step::Select { gathers: !plan.looks_for_cut() });
+    }
+    if plan.looks_for_cut() {
+        // Nothing else has room yet.
+        steps.push(Step::Look(Look::Cut));
+        return steps;
+    }
     if plan.needs.raster.is_some() {
         steps.push(Step::Stage(project::steps(plan, 0, Part::All)));
         steps.extend(plan.needs.mesh.into_iter().flat_map(|_| triangles::drawn()));

@@ -9,17 +9,23 @@ use crate::gpu::buffers::{Buffer, Readback};
 use crate::gpu::layout::{BATCH, Band as BandUniform, LIST_START, QUEUE_START, View, WORKGROUP};
 use crate::passes::moments::MOMENT_WORDS;
 use crate::passes::peel::PEELED_WORDS;
+use crate::passes::select::SELECTION_WORDS;
 use crate::passes::tiles::{list_name, list_words};
 use crate::passes::triangles::{self, NEAREST_TRIANGLE_WORDS};
-use crate::passes::upload::{self, Uploaded};
+use crate::passes::upload::{self, BranchBuffers, Uploaded};
 use crate::passes::veils::VEIL_WORDS;
 use crate::passes::{asks_for_order, covered, fragments, individuals, long_lists, visibility};
 use crate::plan::known::Listed;
-use crate::plan::{Band, FragmentLayout, KEY_WORDS, Known, Oit, Plan, Raster, SceneNeeds, SurfelLayout, splat_words};
-use crate::scene::Samples;
+use crate::plan::{
+    Band, FragmentLayout, KEY_WORDS, Known, Oit, Plan, Raster, SceneNeeds, SurfelLayout, page_surfels, splat_words,
+};
+use crate::scene::{Samples, Surfel};
 
 /// Names in WGSL of buffers that have another one where kernels write them.
-const ALIASES: [(&str, &str); 17] = [
+const ALIASES: [(&str, &str); 20] = [
+    ("selected", "selection"),
+    ("gathered_surfels", "surfels"),
+    ("gathered_attributes", "attributes"),
     ("projected", "splats"),
     ("queued", "queue"),
     ("listed", "rare"),
@@ -71,8 +77,28 @@ pub struct Page {
 impl Page {
     fn new(gpu: &Gpu, uploaded: upload::Page, first: u32, needs: &SceneNeeds) -> Result<Self> {
         let upload::Page { buffers, numbers, stand_for } = uploaded;
-        let surfels = numbers.len() as u64;
-        let mut buffers = Named::from_iter(buffers);
+        Self::with(gpu, Named::from_iter(buffers), (numbers.len() as u64, stand_for), (first, needs))
+    }
+
+    /// One with room for so many surfels of a cut, from the one with the number `first` on.
+    fn of_cut(gpu: &Gpu, surfels: u64, first: u32, needs: &SceneNeeds) -> Result<Self> {
+        let mut buffers = Named::new();
+        buffers.insert("surfels", Buffer::<Surfel>::storage(gpu, "surfels of a cut", surfels)?.words());
+        let words = u64::from(SurfelLayout::of(needs).words);
+        if words > 0 {
+            buffers.insert("attributes", Buffer::storage(gpu, "attributes of a cut", surfels * words)?);
+        }
+        // Of how many of them there are the state of the cut tells.
+        Self::with(gpu, buffers, (surfels, 0), (first, needs))
+    }
+
+    /// One with these buffers, and room for nothing yet of what is made of them.
+    fn with(
+        gpu: &Gpu,
+        mut buffers: Named,
+        (surfels, stand_for): (u64, u64),
+        (first, needs): (u32, &SceneNeeds),
+    ) -> Result<Self> {
         let batches = surfels.div_ceil(BATCH.into());
         let drawn = Buffer::indirect(gpu, "batches that are drawn", batches + u64::from(LIST_START))?;
         // A row of a grid is a batch.
@@ -118,6 +144,29 @@ impl Page {
     }
 }
 
+/// A branch of a tree ([`branches`](crate::passes::branches)).
+pub struct Branch {
+    buffers: Named,
+    /// How many levels it has.
+    pub levels: u32,
+}
+
+/// What all branches share while a cut is made, one after the other.
+fn of_selection(gpu: &Gpu, branches: &[BranchBuffers]) -> Result<Named> {
+    let most = |k: usize| branches.iter().map(|branch| branch.records[k]).max().unwrap_or(0);
+    let [records, nodes] = [most(0), most(1)];
+    let roots = branches.iter().map(|branch| branch.roots).sum();
+    let groups = nodes.div_ceil(WORKGROUP.into());
+    Ok(Named::from([
+        ("selection", Buffer::indirect(gpu, "state of a cut", SELECTION_WORDS)?),
+        ("frontier", Buffer::storage(gpu, "nodes that a cut comes to", nodes)?),
+        ("fates", Buffer::storage(gpu, "what becomes of nodes", nodes)?),
+        ("group_counts", Buffer::<[u32; 2]>::storage(gpu, "counts of a cut", groups)?.words()),
+        ("chosen", Buffer::storage(gpu, "surfels of a cut", records)?),
+        ("reached", Buffer::storage(gpu, "branches that a cut comes to", roots)?),
+    ]))
+}
+
 /// What the buffers of a frame's pixels are made for.
 #[derive(Clone, PartialEq)]
 struct Made {
@@ -142,6 +191,8 @@ struct Uploading {
     copies: bool,
     /// Each input has pages of its own.
     separate: bool,
+    /// There is a tree.
+    levels: bool,
     surfel: SurfelLayout,
     splat_words: u64,
     /// The numbers of the surfels are kept.
@@ -151,7 +202,8 @@ struct Uploading {
 impl Uploading {
     fn of(needs: &SceneNeeds) -> Self {
         let (surfel, splat_words) = (SurfelLayout::of(needs), splat_words(needs));
-        Self { copies: needs.copies, separate: needs.separate, surfel, splat_words, order: asks_for_order(needs) }
+        let order = asks_for_order(needs) && !needs.levels;
+        Self { copies: needs.copies, separate: needs.separate, levels: needs.levels, surfel, splat_words, order }
     }
 }
 
@@ -159,6 +211,10 @@ impl Uploading {
 pub struct Store {
     /// The scene's pages.
     pub pages: Vec<Page>,
+    /// The branches of its levels of detail, if a cut is drawn.
+    pub branches: Vec<Branch>,
+    /// Surfels of a cut that pages are made for.
+    room: u64,
     /// What it was uploaded for.
     uploaded: Uploading,
     shared: Named,
@@ -188,10 +244,21 @@ impl Store {
             Page::new(gpu, page, before, needs)
         });
         let pages = pages.collect::<Result<_>>()?;
+        let mut shared = Named::from_iter(uploaded.shared);
+        if needs.levels {
+            shared.extend(of_selection(gpu, &uploaded.branches)?);
+        }
+        let branches = uploaded
+            .branches
+            .into_iter()
+            .map(|branch| Branch { levels: branch.levels, buffers: Named::from_iter(branch.buffers) });
+        let branches = branches.collect();
         Ok(Self {
             uploaded: Uploading::of(needs),
             pages,
-            shared: Named::from_iter(uploaded.shared),
+            branches,
+            room: 0,
+            shared,
             made: None,
             frame: Named::new(),
             bands: Vec::new(),
@@ -239,6 +306,15 @@ impl Store {
             // The old ones make room first.
             (self.made, self.targets, self.readback) = (None, None, None);
             self.frame.clear();
+        }
+        if let Some(room) = plan.cut.filter(|room| *room != self.room) {
+            // The old ones make room first.
+            self.pages.clear();
+            let most = page_surfels(&gpu.adapter, &plan.needs);
+            for first in (0..room).step_by(most as usize) {
+                self.pages.push(Page::of_cut(gpu, most.min(room - first), first as u32, &plan.needs)?);
+            }
+            self.room = room;
         }
         if !plan.needs.cull {
             self.pages.iter_mut().try_for_each(|page| page.grow(gpu, page.surfels))?;
@@ -379,6 +455,12 @@ impl Store {
         PAGED.contains(&kept(name))
     }
 
+    /// What a variable of a kernel that makes a cut is bound to, for a branch and a page.
+    pub fn binding_of_branch(&self, name: &str, branch: usize, page: usize) -> Option<wgpu::BindingResource<'_>> {
+        let own = self.branches.get(branch).and_then(|branch| branch.buffers.get(kept(name)));
+        own.map(Buffer::bound).or_else(|| self.binding(name, page, 0))
+    }
+
     /// What a variable of a kernel is bound to, for a page and a band.
     pub fn binding(&self, name: &str, page: usize, band: usize) -> Option<wgpu::BindingResource<'_>> {
         if name == "band" {
@@ -396,7 +478,9 @@ impl Store {
 
     /// Device memory of surfels and splats, and of pixels, bytes.
     pub fn bytes(&self) -> (u64, u64) {
-        let splats = self.pages.iter().map(|page| bytes(&page.buffers)).sum::<u64>() + bytes(&self.shared);
+        let pages = self.pages.iter().map(|page| &page.buffers);
+        let branches = self.branches.iter().map(|branch| &branch.buffers);
+        let splats = pages.chain(branches).map(bytes).sum::<u64>() + bytes(&self.shared);
         let bands = self.bands.iter().map(Buffer::bytes).sum::<u64>();
         let others = self.readback.as_ref().map_or(0, Readback::bytes) + self.targets.as_ref().map_or(0, |t| t.bytes);
         (splats, bytes(&self.frame) + bands + others)

@@ -198,7 +198,7 @@ pub fn resolve(
         return Err(Error::Usage("the sums are of another scene, view or choice of options".into()));
     }
     let kernels = Kernels::new(gpu, sources, &plan, options, facts.surfels)?;
-    let scene_wide = Uploaded { pages: Vec::new(), shared: shared(gpu, source, &plan.needs)? };
+    let scene_wide = Uploaded { pages: Vec::new(), branches: Vec::new(), shared: shared(gpu, source, &plan.needs)? };
     let mut store = Store::new(gpu, scene_wide, &plan.needs)?;
     store.fit(gpu, &plan, &known)?;
     store.set_view(gpu, &view);

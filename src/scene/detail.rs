@@ -25,11 +25,11 @@ impl Detail {
         matches!(self, Self::Pixels(size) | Self::Share(size) if size == 0.0)
     }
 
-    /// Square pixels in the image of `camera`.
-    pub fn pixels(self, camera: &Camera) -> f64 {
+    /// Square pixels of an image that has so many.
+    pub fn pixels(self, image: f64) -> f64 {
         match self {
             Self::Pixels(pixels) => pixels,
-            Self::Share(share) => share * camera.pixels() as f64,
+            Self::Share(share) => share * image,
         }
     }
 }

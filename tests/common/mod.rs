@@ -180,6 +180,7 @@ pub fn all_needs() -> Vec<SceneNeeds> {
     all.extend(peeled(&all));
     all.extend(beside_triangles(&all));
     all.extend(kept_apart(&all));
+    all.extend(cut(&all));
     for needs in &mut all {
         needs.outline &= needs.low_pass == LowPass::None;
         needs.gather &= needs.may_gather();
@@ -279,6 +280,15 @@ fn kept_apart(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
         SceneNeeds { separate: true, cull: false, maps, ..*needs }
     };
     all.iter().filter(opaque).filter(blended).step_by(5).map(of).collect()
+}
+
+/// Those of renders of cuts of levels of detail, a third of what they could be.
+fn cut(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
+    let of_disks = |needs: &&SceneNeeds| needs.facing.is_none() && !needs.separate && !needs.maps.has(Map::Index);
+    let with_colors =
+        |needs: &&SceneNeeds| matches!(needs.color, ColorNeed::Constant | ColorNeed::Srgb8 | ColorNeed::Linear);
+    let of = |needs: &SceneNeeds| SceneNeeds { levels: true, cull: false, ..*needs };
+    all.iter().filter(of_disks).filter(with_colors).filter(|needs| !needs.copies).step_by(3).map(of).collect()
 }
 
 /// Those of the rasteriser that peels layers.

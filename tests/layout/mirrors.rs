@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::mem::{offset_of, size_of};
 
-use epsplat::gpu::layout::{Band, Filter, Splat, View};
+use epsplat::gpu::layout::{Band, Branch, Filter, Splat, TreeNode, View};
 use epsplat::passes::triangles::CORNER_WORDS;
 use epsplat::plan::SceneNeeds;
 use epsplat::scene::Surfel;
@@ -99,11 +99,14 @@ pub fn mirrors() -> BTreeMap<&'static str, Struct> {
             last,
             textures,
             place,
+            levels,
             atlas,
         }),
         mirror!(Band { first_row, rows, padding_0, padding_1 }),
         mirror!(Splat { anchor_x, anchor_y, bounds_first, bounds_last, a, b, c, a_low }),
         mirror!(Surfel { center, s, t }),
+        mirror!(TreeNode { radius, cone, first, below }),
+        mirror!(Branch { surfels, roots, first_root, whole }),
         mirror!(Filter { center_x, center_y, depth_low, depth_high, r_xx, r_xy, r_yy, gain }),
     ])
 }
@@ -140,6 +143,19 @@ pub fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         ("attributes", Element::Plain(WORD)),
         ("indexed", Element::Plain(WORD)),
         ("page_first", Element::Plain(WORD)),
+        ("branch", Element::Struct("Branch")),
+        ("tree_nodes", Element::Struct("TreeNode")),
+        ("tree_surfels", Element::Struct("Surfel")),
+        ("tree_attributes", Element::Plain(WORD)),
+        ("gathered_surfels", Element::Struct("Surfel")),
+        ("gathered_attributes", Element::Plain(WORD)),
+        ("frontier", Element::Plain(WORD)),
+        ("fates", Element::Plain(WORD)),
+        ("group_counts", Element::Plain(&[<[u32; 2]>::SHAPE])),
+        ("chosen", Element::Plain(WORD)),
+        ("reached", Element::Plain(WORD)),
+        ("selection", Element::Plain(WORD)),
+        ("selected", Element::Plain(WORD)),
         ("queue", Element::Plain(WORD)),
         ("queued", Element::Plain(WORD)),
         ("rare", Element::Plain(WORD)),

@@ -59,6 +59,8 @@ pub(super) fn options(arguments: &Arguments, format: Format) -> Result<RenderOpt
         join: arguments.join.unwrap_or_default(),
         separate: arguments.separate,
         cull: arguments.cull,
+        detail: arguments.lod.unwrap_or(default.detail),
+        detail_measure: arguments.lod_measure.into(),
         samples: arguments.samples.unwrap_or(SAMPLES),
         facing: facing(arguments),
         outline: arguments.outline,

@@ -56,7 +56,7 @@ pub(super) fn note_overflows(report: &Report) {
 
 /// One line: what was drawn, and how long each pass took.
 pub(super) fn summary(report: &Report, output: &Path) -> String {
-    let order = ["project_ms", "visibility_ms", "triangles_ms", "accumulate_ms", "sort_ms", "resolve_ms"];
+    let order = ["select_ms", "project_ms", "visibility_ms", "triangles_ms", "accumulate_ms", "sort_ms", "resolve_ms"];
     let passes = order
         .iter()
         .filter_map(|name| report.passes.get(*name).map(|ms| format!("{} {ms:.1}", name.trim_end_matches("_ms"))));
@@ -73,7 +73,10 @@ pub(super) fn summary(report: &Report, output: &Path) -> String {
     });
     let surfels = match (report.surfels, report.triangles) {
         (0, triangles) if triangles > 0 => String::new(),
-        (surfels, _) => format!("{} of {surfels} surfels", report.splats_drawn),
+        (surfels, _) => match report.cut {
+            Some(cut) => format!("{} of a cut of {cut} in place of {surfels} surfels", report.splats_drawn),
+            None => format!("{} of {surfels} surfels", report.splats_drawn),
+        },
     };
     let triangles = (report.triangles > 0).then(|| format!("{} triangles", report.triangles));
     let drawn: Vec<_> = Some(surfels).filter(|text| !text.is_empty()).into_iter().chain(triangles).collect();

@@ -9,18 +9,17 @@ use std::time::Instant;
 use epsplat::io::write_behind::write_behind;
 use epsplat::io::{atomic, cameras};
 use epsplat::passes::unseen::{Unseen, is_empty};
-use epsplat::render::{Renderer, Report, render};
+use epsplat::render::{Renderer, Report};
 use epsplat::scene::{Camera, Maps};
 use epsplat::{Error, Progress, Result};
 use serde::Serialize;
 
 use super::super::progress::Bars;
 use super::super::{note, outputs, write_json};
-use super::levels::Levels;
 use super::options::{for_scene, options};
 use super::output::{Format, note_overflows};
 use super::view::{DEFAULT_SIZE, View};
-use super::{Arguments, backend, scene};
+use super::{Arguments, backend, levels, scene};
 
 /// Frames that wait for a writer or are in its hands take no more host memory than this, bytes, unless one frame does.
 const MOST_WAITING: u64 = 1 << 30;
@@ -61,26 +60,20 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
     let backend = backend(arguments)?;
 
     let bars = Bars::new();
-    let (mut scene, _) = scene(arguments, &bars)?;
+    let (scene, _) = scene(arguments, &bars)?;
     let options = for_scene(arguments, options, &scene)?;
-    let levels = Levels::of(arguments, &mut scene, &bars)?;
+    let scene = levels::made(scene, &options, &bars)?;
     let near = Camera::default_near(&scene);
     let largest = views.iter().map(|(_, view)| view.pixels()).max().unwrap_or(1);
     let writers = writers(largest, options.maps);
-    // A cut is another scene for each view.
-    let mut renderer = levels.is_none().then(|| Renderer::new(&scene, &options, &backend)).transpose()?;
+    let mut renderer = Renderer::new(&scene, &options, &backend)?;
     let start = Instant::now();
     bars.begin("rendering views", views.len() as u64);
     // The first empty picture and why it is, and how many are.
     let empty = RefCell::new((None, 0));
     let frames = views.iter().map(|(file, view)| {
         let frame = view.camera(&scene, near).and_then(|(camera, _)| {
-            let cut = levels.as_ref().map(|levels| levels.cut(&scene, &camera, &options));
-            let (drawn, how) = cut.as_ref().map_or((&scene, &options), |(cut, how, _)| (cut, how));
-            let frame = match &mut renderer {
-                Some(renderer) => renderer.frame(&camera, &())?,
-                None => render(drawn, &camera, how, &backend, &())?,
-            };
+            let frame = renderer.frame(&camera, &())?;
             if is_empty(&frame.0, &options) {
                 let (first, count) = &mut *empty.borrow_mut();
                 first.get_or_insert_with(|| (file, Unseen::of(&scene, &camera, &options)));

@@ -1,0 +1,276 @@
+//! Stage 0 of scenes with levels of detail: the tree cut into branches that fit a device's buffers.
+//!
+//! A branch has neighbouring subtrees, whose surfels follow each other; and if there are several, the first has no surfels but the nodes above all of
+//! them, of which the lowest ones lead to roots of the others. Which nodes are together depends on the adapter, but what becomes of a node
+//! does not depend on its branch.
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use crate::gpu::layout::TreeNode;
+use crate::scene::hierarchy::{Hierarchy, Node};
+
+/// The most surfels that one invocation copies the numbers of.
+const MOST_OF_LEAF: u32 = 4096;
+
+/// Kinds of nodes as the device sees them (`wgsl/select.wgsl`).
+const KIND_SHIFT: u32 = 30;
+const INNER: u32 = 0;
+const LEAF: u32 = 1;
+const OTHER_BRANCH: u32 = 2;
+
+/// Neighbouring subtrees.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Branch {
+    /// Its surfels, by their places in the scene.
+    pub surfels: Range<u32>,
+    /// Its nodes as the device sees them, roots first and level by level.
+    pub nodes: Vec<TreeNode>,
+    /// The number in the tree of each of them.
+    pub numbers: Vec<u32>,
+    /// How many are roots.
+    pub roots: u32,
+    /// The number of the first root among those of all branches but the first.
+    pub first_root: u32,
+    /// Its root is that of the tree.
+    pub whole: bool,
+    /// How many levels it has.
+    pub levels: u32,
+}
+
+/// What a row of a branch is made of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Item {
+    /// A node and what is below it.
+    Node(u32),
+    /// Some surfels of a leaf that has too many: what becomes of it is what became of the leaf.
+    Part { leaf: u32, first: u32, count: u32 },
+    /// A root of another branch, by its number.
+    Other { root: u32, node: u32 },
+}
+
+/// Where a node is that is in another branch.
+#[derive(Clone, Copy)]
+struct Elsewhere {
+    /// The number of the root, or of the first one.
+    root: u32,
+    /// It is a leaf, each part of which is a root.
+    in_parts: bool,
+}
+
+/// The parts of a leaf with more surfels than one invocation should copy; of another none.
+fn parts(number: u32, node: &Node) -> impl Iterator<Item = Item> + use<> {
+    let Node { first, count, leaf, .. } = *node;
+    let end = if leaf && count > MOST_OF_LEAF { first + count } else { first };
+    (first..end).step_by(MOST_OF_LEAF as usize).map(move |first| Item::Part {
+        leaf: number,
+        first,
+        count: MOST_OF_LEAF.min(end - first),
+    })
+}
+
+/// The branches of a tree, each of at most `most` surfels and nodes together, if that is a few thousand or more.
+pub fn branches(tree: &Hierarchy, most: u64) -> Vec<Branch> {
+    let sizes = sizes(tree);
+    let all = sizes.first().map_or(0..0, |_| 0..surfels_below(tree));
+    if sizes.first().is_none_or(|size| *size <= most) {
+        return vec![Branch { whole: true, ..laid_out(tree, vec![Item::Node(0)], all, |_| None) }];
+    }
+    let subtrees = subtrees(tree, &sizes, most);
+    let mut roots: HashMap<u32, Elsewhere> = HashMap::new();
+    for (root, (item, ..)) in (0..).zip(&subtrees) {
+        let (node, in_parts) = match *item {
+            Item::Node(node) | Item::Other { node, .. } => (node, false),
+            Item::Part { leaf, .. } => (leaf, true),
+        };
+        roots.entry(node).or_insert(Elsewhere { root, in_parts });
+    }
+    let top = Branch { whole: true, ..laid_out(tree, vec![Item::Node(0)], 0..0, |node| roots.get(&node).copied()) };
+    let mut all = vec![top];
+    let (mut first, mut surfel) = (0, 0);
+    while first < subtrees.len() {
+        let (mut end, mut size, mut surfels) = (first, 0, 0);
+        while end < subtrees.len() && (end == first || size + subtrees[end].1 <= most) {
+            (size, surfels) = (size + subtrees[end].1, surfels + subtrees[end].2);
+            end += 1;
+        }
+        let items = subtrees[first..end].iter().map(|(item, ..)| *item).collect();
+        let branch = laid_out(tree, items, surfel..surfel + surfels, |_| None);
+        all.push(Branch { first_root: first as u32, ..branch });
+        (first, surfel) = (end, surfel + surfels);
+    }
+    all
+}
+
+/// Surfels below the root.
+fn surfels_below(tree: &Hierarchy) -> u32 {
+    tree.nodes.iter().filter(|node| node.leaf).map(|node| node.count).sum()
+}
+
+/// How many surfels and rows are below each node, itself with them.
+fn sizes(tree: &Hierarchy) -> Vec<u64> {
+    let mut sizes = vec![0u64; tree.nodes.len()];
+    // Children have larger numbers.
+    for (index, node) in tree.nodes.iter().enumerate().rev() {
+        sizes[index] = 1 + match node.leaf {
+            true => u64::from(node.count) + parts(index as u32, node).count() as u64,
+            false => sizes[node.first as usize..(node.first + node.count) as usize].iter().sum(),
+        };
+    }
+    sizes
+}
+
+/// The largest subtrees of at most `most` from left to right, with their sizes and their surfels.
+fn subtrees(tree: &Hierarchy, sizes: &[u64], most: u64) -> Vec<(Item, u64, u32)> {
+    let (mut found, mut open) = (Vec::new(), vec![0u32]);
+    while let Some(index) = open.pop() {
+        let node = &tree.nodes[index as usize];
+        if sizes[index as usize] <= most {
+            found.push((Item::Node(index), sizes[index as usize], 0));
+        } else if node.leaf {
+            found.extend(parts(index, node).map(|part| (part, 1, 0)));
+        } else {
+            open.extend((node.first..node.first + node.count).rev());
+        }
+    }
+    for (item, size, surfels) in &mut found {
+        match *item {
+            Item::Part { count, .. } => (*size, *surfels) = (1 + u64::from(count), count),
+            Item::Node(index) => *surfels = surfels_of(tree, index),
+            Item::Other { .. } => {}
+        }
+    }
+    found
+}
+
+/// Surfels below a node: from those of its leftmost leaf to those of its rightmost.
+fn surfels_of(tree: &Hierarchy, index: u32) -> u32 {
+    let end_of = |last: bool| {
+        let mut node = &tree.nodes[index as usize];
+        while !node.leaf {
+            node = &tree.nodes[(node.first + if last { node.count - 1 } else { 0 }) as usize];
+        }
+        node
+    };
+    let (first, last) = (end_of(false), end_of(true));
+    last.first + last.count - first.first
+}
+
+/// The branch of some subtrees, whose surfels are a range; nodes that are `elsewhere` lead to roots of other branches.
+fn laid_out(
+    tree: &Hierarchy,
+    mut items: Vec<Item>,
+    surfels: Range<u32>,
+    elsewhere: impl Fn(u32) -> Option<Elsewhere>,
+) -> Branch {
+    let roots = items.len() as u32;
+    let (mut nodes, mut numbers) = (Vec::new(), Vec::new());
+    let (mut levels, mut level_end) = (0, 0);
+    while nodes.len() < items.len() {
+        if nodes.len() == level_end {
+            (levels, level_end) = (levels + 1, items.len());
+        }
+        let (number, kind, first, count) = match items[nodes.len()] {
+            Item::Part { leaf, first, count } => (leaf, LEAF, first - surfels.start, count),
+            Item::Other { root, node } => (node, OTHER_BRANCH, root, 1),
+            Item::Node(number) => {
+                let node = &tree.nodes[number as usize];
+                let below = items.len() as u32;
+                match (node.leaf, elsewhere(number)) {
+                    // A leaf in parts is a node above them.
+                    (_, Some(Elsewhere { root, in_parts: true })) => {
+                        let parts = (root..).zip(parts(number, node));
+                        items.extend(parts.map(|(root, _)| Item::Other { root, node: number }));
+                        (number, INNER, below, items.len() as u32 - below)
+                    }
+                    (_, Some(Elsewhere { root, .. })) => (number, OTHER_BRANCH, root, 1),
+                    (true, None) if node.count > MOST_OF_LEAF => {
+                        items.extend(parts(number, node));
+                        (number, INNER, below, items.len() as u32 - below)
+                    }
+                    (true, None) => (number, LEAF, node.first - surfels.start, node.count),
+                    (false, None) => {
+                        items.extend((node.first..node.first + node.count).map(Item::Node));
+                        (number, INNER, below, node.count)
+                    }
+                }
+            }
+        };
+        let Node { radius, cone, .. } = tree.nodes[number as usize];
+        nodes.push(TreeNode { radius, cone, first, below: count | kind << KIND_SHIFT });
+        numbers.push(number);
+    }
+    Branch { surfels, nodes, numbers, roots, first_root: 0, whole: false, levels }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use glam::Vec3;
+
+    use super::*;
+    use crate::scene::{Scene, Surfel};
+    use crate::surfels::hierarchy;
+
+    /// Surfels on a spiral, and `copies` more of the first.
+    fn tree(count: usize, copies: usize) -> Hierarchy {
+        let at = |k: usize| {
+            let (sine, cosine) = (k as f32 * 2.4).sin_cos();
+            Vec3::new(cosine, sine, 1.0) * (k as f32).sqrt()
+        };
+        let places = (0..count).map(at).chain(vec![at(0); copies]);
+        let surfels = places.map(|place| Surfel::disk(place, Vec3::Z, 0.5)).collect();
+        let scene = Scene { surfels, ..Scene::default() };
+        hierarchy::build(scene, &()).unwrap().1.as_ref().clone()
+    }
+
+    fn kind(node: &TreeNode) -> (u32, u32) {
+        (node.below >> KIND_SHIFT, node.below & ((1 << KIND_SHIFT) - 1))
+    }
+
+    /// The surfels below a row of a branch, by their places in the scene, and the numbers of the nodes that lead there.
+    fn below(branches: &[Branch], (branch, row): (usize, u32), depth: u32, into: &mut Vec<u32>) {
+        let of = &branches[branch];
+        assert!(depth < 2 * of.levels + branches[0].levels);
+        let node = &of.nodes[row as usize];
+        match kind(node) {
+            (LEAF, count) => into.extend((node.first..node.first + count).map(|place| of.surfels.start + place)),
+            (OTHER_BRANCH, _) => {
+                let holds = |b: &Branch| !b.whole && (b.first_root..b.first_root + b.roots).contains(&node.first);
+                let other = branches.iter().position(holds).unwrap();
+                let root = node.first - branches[other].first_root;
+                assert_eq!(branches[other].numbers[root as usize], of.numbers[row as usize]);
+                below(branches, (other, root), depth + 1, into);
+            }
+            (_, count) => {
+                (node.first..node.first + count).for_each(|child| below(branches, (branch, child), depth + 1, into))
+            }
+        }
+    }
+
+    #[test]
+    fn branches_have_every_surfel_once_and_fit() {
+        for (count, copies, most) in
+            [(1, 0, 10_000), (3000, 0, 10_000), (3000, 0, 500), (3000, 20_000, 6000), (50, 9000, 1 << 20)]
+        {
+            let tree = tree(count, copies);
+            let all = branches(&tree, most);
+            assert!(all[0].whole && all.iter().skip(1).all(|branch| !branch.whole));
+            assert!(all.len() == 1 || all[0].surfels.is_empty());
+            let fits = |branch: &Branch| (branch.surfels.len() + branch.nodes.len()) as u64 <= most;
+            // The nodes above all others are few.
+            assert!(all.iter().all(fits), "{count} {copies}");
+            let mut found = Vec::new();
+            below(&all, (0, 0), 0, &mut found);
+            assert!(found.iter().copied().eq(0..(count + copies) as u32), "{count} {copies}");
+            let leaves = all.iter().flat_map(|branch| &branch.nodes).map(kind).filter(|(kind, _)| *kind == LEAF);
+            assert!(leaves.map(|(_, count)| count).max().unwrap() <= MOST_OF_LEAF);
+            if most == 500 {
+                assert!(all.len() > 6 && all.len() < 30, "{}", all.len());
+                let nodes: usize = all.iter().map(|branch| branch.nodes.len()).sum();
+                let others = all[0].nodes.iter().filter(|node| kind(node).0 == OTHER_BRANCH).count();
+                assert_eq!(nodes - others, tree.nodes.len());
+            }
+        }
+    }
+}

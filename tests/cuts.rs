@@ -1,0 +1,299 @@
+//! Cuts of levels of detail on a device: the twin's, to the bit, however the tree lies in buffers.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use std::borrow::Cow;
+
+use common::bits;
+use common::scenes::{shuffled, sphere, sphere_camera};
+use epsplat::frame::Frame;
+use epsplat::gpu::{Gpu, Sources};
+use epsplat::passes::select::{self, Wanted};
+use epsplat::passes::source::{Page, Source};
+use epsplat::plan::{Facts, RenderOptions, SceneNeeds};
+use epsplat::render::{Backend, Renderer, render};
+use epsplat::scene::{
+    Camera, Clip, Colors, Composite, Cull, Detail, DetailMeasure, Hierarchy, Lens, Map, Maps, Mipmap, Projection,
+    Provenance, Samples, Scene, Up,
+};
+use epsplat::surfels::hierarchy;
+use glam::DVec3;
+
+/// The twin's cut as a scene of its own, with what is known of all that it is a cut of: then kernels work in the same units.
+struct Cut {
+    scene: Scene,
+    facts: Facts,
+}
+
+impl Source for Cut {
+    fn facts(&self) -> Facts {
+        self.facts.clone()
+    }
+
+    fn pages<'a>(&'a self, needs: &SceneNeeds, most: usize, ordered: Option<&Facts>) -> Vec<Box<dyn Page + 'a>> {
+        self.scene.pages(needs, most, ordered)
+    }
+
+    fn textures(&self) -> &[Mipmap] {
+        &[]
+    }
+
+    fn provenance(&self) -> Cow<'_, Provenance> {
+        Cow::Borrowed(&self.scene.provenance)
+    }
+
+    fn whole(&self) -> Option<&Scene> {
+        Some(&self.scene)
+    }
+}
+
+fn levels(scene: Scene) -> Scene {
+    hierarchy::build(scene, &()).unwrap().0
+}
+
+fn tree(scene: &Scene) -> &Hierarchy {
+    scene.hierarchy.as_ref().unwrap()
+}
+
+/// What the twin draws, and how.
+fn cut(scene: &Scene, camera: &Camera, options: &RenderOptions) -> (Cut, RenderOptions) {
+    let back = options.cull == Cull::Back;
+    let cut =
+        select::reference(tree(scene), scene.origin, camera, &Wanted::of(options, back)).scene(scene, tree(scene));
+    let whole = Facts::of(scene);
+    let (largest_radius, largest_shorter) = (whole.drawn_radius(options), whole.drawn_shorter(options));
+    let surfels = cut.surfels.len() as u64;
+    let facts = Facts { surfels, largest_radius, largest_shorter, levels: None, copies: false, ..whole };
+    (Cut { scene: cut, facts }, RenderOptions { detail: Detail::FINEST, ..options.clone() })
+}
+
+fn frame(source: &dyn Source, camera: &Camera, options: &RenderOptions, backend: &Backend) -> Frame {
+    render(source, camera, options, backend, &()).unwrap().0
+}
+
+fn broken(file: &str, from: &str, to: &str) -> Backend {
+    let sources = Sources::default().replace(file, from, to).unwrap();
+    Backend::Gpu { gpu: Box::new(common::gpu().unwrap()), sources }
+}
+
+/// One whose buffers hold 1,900 surfels and nodes, so that a tree has several branches.
+fn small() -> Gpu {
+    common::gpu().unwrap().with_buffer_limit(70_000)
+}
+
+const MAPS: Maps = Maps::of(&[Map::Depth, Map::Normal, Map::Weight, Map::Count]);
+
+fn at(pixels: f64) -> RenderOptions {
+    RenderOptions { detail: Detail::Pixels(pixels), cull: Cull::None, maps: MAPS, ..RenderOptions::default() }
+}
+
+/// Spheres in all that a surfel may have, and one of which a part lies far off.
+fn all() -> Vec<(&'static str, Scene)> {
+    let plain = sphere(6000, 1.7);
+    let number = |k: usize, step: usize| (k * step % 97) as f32 / 97.0;
+    let count = plain.surfels.len();
+    let linear = Colors::Linear((0..count).map(|k| [number(k, 5), 3.0 * number(k, 7), 0.5, 1.0]).collect());
+    let clipped =
+        (0..count).map(|k| if k % 3 == 0 { Clip([[0.0; 3], [1.0, 0.2, 0.1 * number(k, 3)]]) } else { Clip::NONE });
+    let normals = plain.surfels.iter().map(|s| (s.normal().normalize() + 0.1).normalize().to_array()).collect();
+    let mut far = plain.clone();
+    far.low = vec![[0.0; 3]; count];
+    for index in 0..40 {
+        far.surfels[index].center[0] += 3e6;
+    }
+    let unsided = Scene { oriented: false, colors: linear, ..plain.clone() };
+    vec![
+        ("plain", plain.clone()),
+        ("one colour", Scene { colors: Colors::Constant([0.3, 0.5, 0.9, 1.0]), ..plain.clone() }),
+        ("linear, without sides", unsided),
+        ("clipped, normals", Scene { clips: clipped.collect(), normals, ..plain.clone() }),
+        ("doubled", far),
+    ]
+}
+
+/// The frame of a cut that the device makes is that of the twin's cut, to the bit.
+#[test]
+fn a_device_makes_the_cut_of_its_twin() {
+    let Some(gpu) = common::gpu() else { return };
+    let own = [("gpu", gpu), ("branches", small())];
+    let others = [("core", common::core_gpu().unwrap())].into_iter().chain(common::opengl().map(|gpu| ("opengl", gpu)));
+    let backends: Vec<_> = own.into_iter().chain(others).map(|(name, gpu)| (name, Backend::gpu(gpu))).collect();
+    for (name, scene) in all() {
+        let scene = levels(scene);
+        let options = [
+            (Projection::Pinhole, at(250.0)),
+            (Projection::Pinhole, RenderOptions { detail_measure: DetailMeasure::Area, ..at(100.0) }),
+            (Projection::Orthographic, at(400.0)),
+            (
+                Projection::Pinhole,
+                RenderOptions {
+                    detail: Detail::Share(0.02),
+                    maps: Maps::NONE,
+                    samples: Samples { across: 2, down: 1 },
+                    ..at(0.0)
+                },
+            ),
+        ];
+        // All that there is of one scene; of the others what they add.
+        let (ways, adapters) = if name == "plain" { (4, 4) } else { (1, 2) };
+        for (projection, options) in options.into_iter().take(ways) {
+            let camera = sphere_camera(100, projection);
+            let (twins, flat) = cut(&scene, &camera, &options);
+            let (drawn, all) = (twins.scene.surfels.len(), scene.surfels.len());
+            assert!(drawn > 50 && drawn < 3 * all / 4, "{name}: {drawn} {options:?}");
+            for (on, backend) in backends.iter().take(adapters) {
+                let (shown, report) = render(&scene, &camera, &options, backend, &()).unwrap();
+                assert_eq!(report.cut, Some(drawn as u64), "{name} {on} {options:?}");
+                assert!(bits(&shown) == bits(&frame(&twins, &camera, &flat, backend)), "{name} {on} {options:?}");
+            }
+            let (reference, report) = render(&scene, &camera, &options, &Backend::Reference, &()).unwrap();
+            assert_eq!(report.cut, Some(drawn as u64), "{name}");
+            assert!(bits(&reference) == bits(&frame(&twins, &camera, &flat, &Backend::Reference)), "{name}");
+        }
+    }
+}
+
+/// Backs are left out by the cones of their nodes, from without, from within and beside the image.
+#[test]
+fn a_device_leaves_out_what_its_twin_does() {
+    let Some(gpu) = common::gpu() else { return };
+    let backends = [Backend::gpu(gpu), Backend::gpu(small())];
+    let scene = levels(sphere(6000, 1.7));
+    let look = |eye: [f64; 3], target: [f64; 3], lens| {
+        Camera::look_at((100, 80), lens, eye.into(), target.into(), None, Up::Y, 0.05).unwrap()
+    };
+    let views = [
+        look([1.2, 0.7, 2.4], [0.0; 3], Lens::Fov(45.0)),
+        look([0.3, 0.1, 0.2], [0.9, 0.0, 0.0], Lens::Fov(60.0)),
+        look([0.0, 0.2, 1.1], [0.5, 0.0, 0.0], Lens::Fov(70.0)),
+        look([0.0, 1.0, 3.0], [0.7, 0.5, 0.0], Lens::OrthographicHeight(1.0)),
+    ];
+    let mut left_out = 0;
+    for camera in views {
+        for detail in [Detail::Pixels(1e-6), Detail::Pixels(300.0)] {
+            for cull in [Cull::Back, Cull::None] {
+                let options = RenderOptions { detail, cull, ..at(0.0) };
+                let (twins, flat) = cut(&scene, &camera, &options);
+                left_out += usize::from(twins.scene.surfels.len() < 3000 && detail == Detail::Pixels(1e-6));
+                for backend in &backends {
+                    let (shown, report) = render(&scene, &camera, &options, backend, &()).unwrap();
+                    assert_eq!(report.cut, Some(twins.scene.surfels.len() as u64), "{camera:?} {options:?}");
+                    let alike = || bits(&shown) == bits(&frame(&twins, &camera, &flat, backend));
+                    assert!(twins.scene.surfels.is_empty() || alike(), "{camera:?} {options:?}");
+                }
+            }
+        }
+    }
+    assert!(left_out >= 5, "{left_out}");
+}
+
+/// All that shows through, by lists whose ties go by the order of the cut.
+#[test]
+fn cuts_are_composited_and_rasterised() {
+    let Some(gpu) = common::gpu() else { return };
+    let (own, small) = (Backend::gpu(gpu), Backend::gpu(small()));
+    let scene = levels(sphere(4000, 1.7));
+    let camera = sphere_camera(64, Projection::Pinhole);
+    for composite in [Composite::Layers(2), Composite::Sorted, Composite::Weighted, Composite::Moments] {
+        let options = RenderOptions { composite, opacity: 0.5, maps: Maps::NONE, ..at(100.0) };
+        let expected = bits(&frame(&scene, &camera, &options, &own));
+        assert!(expected == bits(&frame(&scene, &camera, &options, &small)), "{composite:?}");
+        let (twins, flat) = cut(&scene, &camera, &options);
+        // Of a scene by itself ties go by another order, and depths start elsewhere.
+        let alike = || expected == bits(&frame(&twins, &camera, &flat, &own));
+        assert!(!matches!(composite, Composite::Layers(_)) || alike(), "{composite:?}");
+        let reference = frame(&scene, &camera, &options, &Backend::Reference);
+        assert!(differ(&frame(&scene, &camera, &options, &own), &reference) < 5, "{composite:?}");
+    }
+    let raster = RenderOptions { raster: Some(Default::default()), maps: Maps::of(&[Map::Depth]), ..at(100.0) };
+    let reference = frame(&scene, &camera, &RenderOptions { raster: None, ..raster.clone() }, &Backend::Reference);
+    assert!(differ(&frame(&scene, &camera, &raster, &own), &reference) < 5);
+}
+
+/// Pixels whose colours are not nearly the same.
+fn differ(shown: &Frame, truth: &Frame) -> usize {
+    let near = |(a, b): (&[f32; 4], &[f32; 4])| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 0.01);
+    shown.color.iter().zip(&truth.color).filter(|pair| !near(*pair)).count()
+}
+
+/// The same bits for any order of the surfels, on one thread or more, view after view, with room for them or without.
+#[test]
+fn a_cut_depends_on_tree_and_camera_alone() {
+    let Some(gpu) = common::gpu() else { return };
+    let backend = Backend::gpu(gpu);
+    let (flat, camera) = (sphere(6000, 1.7), sphere_camera(100, Projection::Pinhole));
+    let options = at(250.0);
+    let scene = levels(flat.clone());
+    let expected = bits(&frame(&scene, &camera, &options, &backend));
+    assert!(expected == bits(&frame(&levels(shuffled(&flat, 3)), &camera, &options, &backend)));
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    assert!(expected == one.install(|| bits(&frame(&levels(flat.clone()), &camera, &options, &backend))));
+    // From afar little is drawn, and from near more than there was room for; then there is too much.
+    let view = |distance: f64| {
+        let eye = DVec3::new(1.2, 0.7, 2.4) * distance;
+        Camera::look_at((100, 100), Lens::Fov(45.0), eye, DVec3::ZERO, None, Up::Y, 1e-5).unwrap()
+    };
+    for backend in [&backend, &Backend::gpu(small())] {
+        let mut renderer = Renderer::new(&scene, &options, backend).unwrap();
+        for distance in [9.0, 1.0, 40.0, 0.8, 2000.0, 1.0] {
+            let (shown, report) = renderer.frame(&view(distance), &()).unwrap();
+            let (twins, flat) = cut(&scene, &view(distance), &options);
+            assert_eq!(report.cut, Some(twins.scene.surfels.len() as u64), "{distance}");
+            assert!(bits(&shown) == bits(&frame(&twins, &view(distance), &flat, backend)), "{distance}");
+        }
+    }
+}
+
+/// A leaf of more surfels than one invocation copies, or a buffer holds.
+#[test]
+fn crowded_leaves_are_drawn_whole() {
+    let Some(gpu) = common::gpu() else { return };
+    let mut scene = sphere(2000, 1.7);
+    let (surfel, color) = (scene.surfels[77], [200, 10, 10, 255]);
+    scene.surfels.extend([surfel; 9000]);
+    if let Colors::Srgb8(codes) = &mut scene.colors {
+        codes.extend([color; 9000]);
+    }
+    let scene = levels(scene);
+    assert!(tree(&scene).nodes.iter().any(|node| node.leaf && node.count > 9000));
+    let camera = sphere_camera(90, Projection::Pinhole);
+    // Copies of one surfel are one where all are drawn.
+    let options = RenderOptions { without: vec![epsplat::plan::Optimisation::Copies], ..at(1e-6) };
+    let (twins, flat) = cut(&scene, &camera, &options);
+    assert_eq!(twins.scene.surfels.len(), 11_000);
+    for backend in [Backend::gpu(gpu), Backend::gpu(common::gpu().unwrap().with_buffer_limit(200_000))] {
+        let (shown, report) = render(&scene, &camera, &options, &backend, &()).unwrap();
+        assert_eq!(report.cut, Some(11_000));
+        assert!(bits(&shown) == bits(&frame(&twins, &camera, &flat, &backend)));
+        let coarse = RenderOptions { detail: Detail::Pixels(1e7), ..options.clone() };
+        assert_eq!(render(&scene, &camera, &coarse, &backend, &()).unwrap().1.cut, Some(1));
+    }
+}
+
+/// A kernel that makes a cut wrongly is noticed, whatever it does wrong.
+#[test]
+fn broken_kernels_are_noticed() {
+    let Some(gpu) = common::gpu() else { return };
+    let scene = levels(sphere(6000, 1.7));
+    let camera = sphere_camera(100, Projection::Pinhole);
+    let options = RenderOptions { cull: Cull::Back, ..at(250.0) };
+    let expected = bits(&frame(&scene, &camera, &options, &Backend::gpu(gpu)));
+    for (file, from, to) in [
+        (
+            "select.wgsl",
+            "size_of(ball.center, surfel) < held.levels.x",
+            "size_of(ball.center, surfel) < 1.2 * held.levels.x",
+        ),
+        ("select.wgsl", "if (away.x > away.y) {", "if (away.x > away.y - 0.5) {"),
+        ("select.wgsl", "return scanned[local] - counts;", "return scanned[local];"),
+        ("select.wgsl", "vec2<u32>(here, end);", "vec2<u32>(0u, end);"),
+        ("select.wgsl", "page_first + index < selected[CUT]", "page_first + index + 1u < selected[CUT]"),
+        ("select.wgsl", "set_grid(GATHER_GRID, here + all.x);", "set_grid(GATHER_GRID, all.x);"),
+        ("gather.wgsl", "tree_attributes[from_ * ATTRIBUTE_WORDS + word]", "tree_attributes[word]"),
+    ] {
+        let shown = frame(&scene, &camera, &options, &broken(file, from, to));
+        assert!(bits(&shown) != expected, "{file}: {to}");
+    }
+}

@@ -1,0 +1,287 @@
+// Stage 0 of scenes with levels of detail: the cut that is drawn in place of all surfels (Pajarola 2003, section 5.1, step 1), branch by
+// branch of the tree, and in each level by level from its roots down. The nodes of a level that are come to are a stretch of `frontier`: they
+// are judged, what they leave is counted by workgroups, and from these counts follows where each puts what it leaves. So the order of the cut, too,
+// depends on tree and camera alone. Then what was chosen is copied to where pages of surfels are drawn from.
+// Host side and twin: src/passes/select.rs.
+// All loops end, by 1 of src/gpu/loops.rs: 0xce599120319a5856
+
+@group(0) @binding(72) var<uniform> branch: Branch;
+@group(0) @binding(73) var<storage, read> tree_nodes: array<TreeNode>;
+// Its surfels, and those of its nodes.
+@group(0) @binding(74) var<storage, read> tree_surfels: array<Surfel>;
+// Numbers of nodes that are come to, level after level, and what becomes of each.
+@group(0) @binding(75) var<storage, read_write> frontier: array<u32>;
+@group(0) @binding(76) var<storage, read_write> fates: array<u32>;
+// Of each workgroup: how many surfels its nodes leave, and how many children; then where these start.
+@group(0) @binding(77) var<storage, read_write> group_counts: array<vec2<u32>>;
+// The surfels of this branch that are drawn, nodes' among them, by their places in tree_surfels.
+@group(0) @binding(78) var<storage, read_write> chosen: array<u32>;
+// The roots of branches that are come to.
+@group(0) @binding(79) var<storage, read_write> reached: array<u32>;
+// The words below.
+@group(0) @binding(80) var<storage, read_write> selection: array<u32>;
+@group(0) @binding(81) var<storage, read> selected: array<u32>;
+// Where the cut is drawn from: a page of it.
+@group(0) @binding(82) var<storage, read_write> gathered_surfels: array<Surfel>;
+
+// Surfels of the cut in all branches so far, in those before this one, and in this one.
+const CUT: u32 = 0u;
+const CUT_BEFORE: u32 = 1u;
+const CUT_HERE: u32 = 2u;
+// The stretch of the frontier that is the level in work, and the next one.
+const LEVEL: u32 = 3u;
+const LEVEL_END: u32 = 4u;
+const NEXT: u32 = 5u;
+const NEXT_END: u32 = 6u;
+// Grids with an invocation for each node of the level that is judged, of that which is spread, and for each surfel of this branch's cut.
+const JUDGE_GRID: u32 = 7u;
+const SPREAD_GRID: u32 = 10u;
+const GATHER_GRID: u32 = 13u;
+
+// Kinds of nodes.
+const KIND_SHIFT: u32 = 30u;
+const COUNT_MASK: u32 = 0x3fffffffu;
+const INNER: u32 = 0u;
+const LEAF: u32 = 1u;
+const OTHER_BRANCH: u32 = 2u;
+
+// What becomes of a node.
+const UNSEEN: u32 = 0u;
+const DRAWN: u32 = 1u;
+const DIVIDED: u32 = 2u;
+
+// A node's size is that of a disk as long as its image, not that of its image.
+override MEASURES_EXTENT: bool;
+
+const PI: f32 = 3.14159265;
+
+// Room for the rounding of sines.
+const SINE_SLACK: f32 = 1e-5;
+
+var<workgroup> scanned: array<vec2<u32>, WORKGROUP>;
+
+// Whether the slot of a surfel in its page has one of the cut.
+fn is_filled(index: u32) -> bool {
+    return page_first + index < selected[CUT];
+}
+
+// Which word of a surfel's attributes.
+override NUMBER_WORD: u32;
+
+// The place of a surfel among all of the tree, its nodes after them; where it is asked for.
+fn rank_of(index: u32) -> u32 {
+    return attribute_word(index, NUMBER_WORD);
+}
+
+fn kind_of(node: TreeNode) -> u32 {
+    return node.below >> KIND_SHIFT;
+}
+
+fn vector(parts: array<f32, 3>) -> vec3<f32> {
+    return vec3<f32>(parts[0], parts[1], parts[2]);
+}
+
+// The sine by which its plane faces away from the eye, and that past which all below it does.
+fn turned_away(node: TreeNode, surfel: Surfel) -> vec2<f32> {
+    let relative = vector(surfel.center) * held.unit - held.eye.xyz;
+    let normal = cross(vector(surfel.s) * held.unit, vector(surfel.t) * held.unit);
+    let turned = dot(ray_to(relative), normal * inverseSqrt(max(dot(normal, normal), 1e-38)));
+    // Of the cone's angle and the ball's together, if they are less than a right angle; else nothing is told.
+    let ball = ball_sine(node.radius * held.unit, length(relative));
+    let cone = sqrt(max(1.0 - node.cone * node.cone, 0.0));
+    let ball_cosine = sqrt(max(1.0 - ball * ball, 0.0));
+    let narrow = node.cone * ball_cosine - cone * ball > SINE_SLACK;
+    return vec2<f32>(turned, select(1.0, cone * ball_cosine + node.cone * ball, narrow) + SINE_SLACK);
+}
+
+// Square pixels of the image that a node is seen at.
+fn size_of(center: vec3<f32>, surfel: Surfel) -> f32 {
+    let s = axis_image(center, rotate_plain(vector(surfel.s) * held.unit)) * held.levels.yz;
+    let t = axis_image(center, rotate_plain(vector(surfel.t) * held.unit)) * held.levels.yz;
+    return PI * select(abs(s.x * t.y - s.y * t.x), max(dot(s, s), dot(t, t)), MEASURES_EXTENT);
+}
+
+fn fate_of(node: TreeNode, surfel: Surfel) -> u32 {
+    // In its own branch it is judged.
+    if (kind_of(node) == OTHER_BRANCH) {
+        return DIVIDED;
+    }
+    let ball = ball_of(vec4<f32>(vector(surfel.center), node.radius));
+    let near = reaches_near(ball);
+    let pixels = pixels_of_ball(ball, 0.0, f32(held.height));
+    if (ball.farthest < held.near || (!near && any(pixels.first > pixels.last))) {
+        return UNSEEN;
+    }
+    var faces = true;
+    if (CULL_BACK) {
+        let away = turned_away(node, surfel);
+        if (away.x > away.y) {
+            return UNSEEN;
+        }
+        // The plane of one that faces away is left out, whatever is below it.
+        faces = away.x <= 0.0;
+    }
+    return select(DIVIDED, DRAWN, !near && faces && size_of(ball.center, surfel) < held.levels.x);
+}
+
+// How many surfels of the cut a node leaves, and how many children for the next level.
+fn left_by(node: TreeNode, fate: u32) -> vec2<u32> {
+    let count = node.below & COUNT_MASK;
+    let divided = fate == DIVIDED;
+    let surfels = select(select(0u, count, divided && kind_of(node) == LEAF), 1u, fate == DRAWN);
+    return vec2<u32>(surfels, select(0u, count, divided && kind_of(node) == INNER));
+}
+
+// The sum of the counts of the invocations before this one; scanned has the sum up to each.
+fn sum_before(counts: vec2<u32>, local: u32) -> vec2<u32> {
+    scanned[local] = counts;
+    for (var i = 0u; i < 6u; i++) {
+        workgroupBarrier();
+        var more = vec2<u32>(0u);
+        if (local >= (1u << i)) {
+            more = scanned[local - (1u << i)];
+        }
+        workgroupBarrier();
+        scanned[local] += more;
+    }
+    workgroupBarrier();
+    return scanned[local] - counts;
+}
+
+fn set_grid(at: u32, invocations: u32) {
+    let grid = rows_of(groups_of(invocations));
+    for (var k = 0u; k < 3u; k++) {
+        selection[at + k] = grid[k];
+    }
+}
+
+// The roots of a branch that are come to are its first level.
+@compute @workgroup_size(1)
+fn select_roots() {
+    var end = 0u;
+    for (var root = 0u; root < branch.roots; root++) {
+        if (branch.whole == 1u || reached[branch.first_root + root] == 1u) {
+            frontier[end] = root;
+            end++;
+        }
+    }
+    selection[CUT_BEFORE] = selection[CUT];
+    selection[CUT_HERE] = 0u;
+    selection[NEXT] = 0u;
+    selection[NEXT_END] = end;
+    set_grid(JUDGE_GRID, end);
+    set_grid(GATHER_GRID, 0u);
+}
+
+// One invocation a node of the next level.
+@compute @workgroup_size(WORKGROUP)
+fn select_judge(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    hold_view();
+    let place = selected[NEXT] + linear_index(workgroup, workgroups, local);
+    var counts = vec2<u32>(0u);
+    if (place < selected[NEXT_END]) {
+        let index = frontier[place];
+        let node = tree_nodes[index];
+        let fate = fate_of(node, tree_surfels[branch.surfels + index]);
+        fates[place] = fate;
+        counts = left_by(node, fate);
+    }
+    let before = sum_before(counts, local);
+    if (local == WORKGROUP - 1u) {
+        group_counts[workgroup.y * workgroups.x + workgroup.x] = before + counts;
+    }
+}
+
+// One workgroup: where the surfels and the children of each workgroup start, and the level after this one.
+@compute @workgroup_size(WORKGROUP)
+fn select_sum(@builtin(local_invocation_index) local: u32) {
+    let first = selection[NEXT];
+    let end = selection[NEXT_END];
+    let here = selection[CUT_HERE];
+    let groups = groups_of(end - first);
+    let each = (groups + WORKGROUP - 1u) / WORKGROUP;
+    let stop = min((local + 1u) * each, groups);
+    var own = vec2<u32>(0u);
+    for (var group = local * each; group < stop; group++) {
+        own += group_counts[group];
+    }
+    var start = sum_before(own, local) + vec2<u32>(here, end);
+    for (var group = local * each; group < stop; group++) {
+        let counts = group_counts[group];
+        group_counts[group] = start;
+        start += counts;
+    }
+    // All have read the old words before the barriers above.
+    if (local == WORKGROUP - 1u) {
+        let all = scanned[local];
+        selection[LEVEL] = first;
+        selection[LEVEL_END] = end;
+        selection[NEXT] = end;
+        selection[NEXT_END] = end + all.y;
+        selection[CUT_HERE] = here + all.x;
+        selection[CUT] = selection[CUT_BEFORE] + here + all.x;
+        set_grid(SPREAD_GRID, end - first);
+        set_grid(JUDGE_GRID, all.y);
+        set_grid(GATHER_GRID, here + all.x);
+    }
+}
+
+// One invocation a node of the level that was judged.
+@compute @workgroup_size(WORKGROUP)
+fn select_spread(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let place = selected[LEVEL] + linear_index(workgroup, workgroups, local);
+    let exists = place < selected[LEVEL_END];
+    var index = 0u;
+    var fate = UNSEEN;
+    if (exists) {
+        index = frontier[place];
+        fate = fates[place];
+    }
+    let node = tree_nodes[index];
+    let counts = left_by(node, fate);
+    let before = sum_before(counts, local);
+    if (fate == UNSEEN) {
+        return;
+    }
+    let start = group_counts[workgroup.y * workgroups.x + workgroup.x] + before;
+    if (fate == DRAWN) {
+        // One surfel is itself, with its lines and its cap.
+        let itself = kind_of(node) == LEAF && (node.below & COUNT_MASK) == 1u;
+        chosen[start.x] = select(branch.surfels + index, node.first, itself);
+        return;
+    }
+    if (kind_of(node) == OTHER_BRANCH) {
+        reached[node.first] = 1u;
+    }
+    for (var k = 0u; k < counts.x; k++) {
+        chosen[start.x + k] = node.first + k;
+    }
+    for (var k = 0u; k < counts.y; k++) {
+        frontier[start.y + k] = node.first + k;
+    }
+}
+
+// One invocation a surfel of this branch's cut.
+@compute @workgroup_size(WORKGROUP)
+fn select_gather(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let place = linear_index(workgroup, workgroups, local);
+    let slot = selected[CUT_BEFORE] + place;
+    // Others are of pages before and after this one.
+    if (place >= selected[CUT_HERE] || slot < page_first || slot - page_first >= arrayLength(&gathered_surfels)) {
+        return;
+    }
+    gathered_surfels[slot - page_first] = tree_surfels[chosen[place]];
+    gather_attributes(chosen[place], slot - page_first);
+}

@@ -287,10 +287,18 @@ fn broken_kernels_are_noticed() {
             "size_of(ball.center, surfel) < 1.2 * held.levels.x",
         ),
         ("select.wgsl", "if (away.x > away.y) {", "if (away.x > away.y - 0.5) {"),
-        ("select.wgsl", "return scanned[local] - counts;", "return scanned[local];"),
+        ("select.wgsl", "return before;", "return before + counts;"),
         ("select.wgsl", "vec2<u32>(here, end);", "vec2<u32>(0u, end);"),
-        ("select.wgsl", "page_first + index < selected[CUT]", "page_first + index + 1u < selected[CUT]"),
-        ("select.wgsl", "set_grid(GATHER_GRID, here + all.x);", "set_grid(GATHER_GRID, all.x);"),
+        (
+            "select.wgsl",
+            "page.first + dealt(index, page.back) < selected[CUT]",
+            "page.first + dealt(index, page.back) + 99u < selected[CUT]",
+        ),
+        (
+            "select.wgsl",
+            "let stop = clamp(page.first + arrayLength(&gathered_surfels), first, end);",
+            "let stop = end - 1u;",
+        ),
         ("gather.wgsl", "tree_attributes[from_ * ATTRIBUTE_WORDS + word]", "tree_attributes[word]"),
     ] {
         let shown = frame(&scene, &camera, &options, &broken(file, from, to));

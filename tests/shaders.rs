@@ -157,7 +157,7 @@ const PAINTLESS: &[&str] = &[
 
 /// Needs that no render has together (`src/plan/check.rs`, `src/plan/needs.rs`).
 const EXCLUSIVE: [(&str, &[&str]); 35] = [
-    ("levels", &["facing", "separate", "index", "color-textured", "color-harmonics", "copies", "cull", "texz-map"]),
+    ("levels", &["facing", "separate", "index", "color-textured", "color-harmonics", "copies", "texz-map"]),
     ("painted-triangles", MESHLESS),
     ("triangles", MESHLESS),
     ("join", MESHLESS),

@@ -3,7 +3,7 @@
 // its fragments could be nearest or within epsilon of the nearest, so no image depends on it. The splats of the others are
 // stored one batch after the other, in slots: those that are left out take no room.
 // Host side and twin: src/passes/cull.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x24583e3ed430eef0
+// All loops end, by 1 of src/gpu/loops.rs: 0xd28b2a8576e4883c
 
 // A batch's bounding ball: centre and radius, world units relative to the scene's origin.
 @group(0) @binding(23) var<storage, read> balls: array<vec4<f32>>;
@@ -14,7 +14,6 @@
 // Those in view that are not near: how many they are, and their numbers.
 @group(0) @binding(38) var<storage, read_write> rest: array<atomic<u32>>;
 
-const BATCH: u32 = 64u;
 const LIST_FAR: u32 = 3u;
 const LIST_START: u32 = 6u;
 
@@ -68,7 +67,7 @@ fn list(batch: u32) {
 }
 
 fn leave_out(batch: u32) {
-    atomicAdd(&queue[1], min(BATCH, surfels_held() - batch * BATCH));
+    atomicAdd(&queue[1], batch_size(batch));
 }
 
 // One invocation a batch.

@@ -1,6 +1,6 @@
 // The map of the strongest surfels, by the words of the image: of the fragments within epsilon of a pixel's nearest depth the greatest
 // weight, and then the place of the surfel that has it. Twin: src/passes/index.rs.
-// All loops end, by 1, 2 of src/gpu/loops.rs: 0xc8be5e9b2bfdbee8
+// All loops end, by 1, 2 of src/gpu/loops.rs: 0x7ad15fb1c5a0cea7
 
 // The image, of which these words are no one else's.
 @group(0) @binding(41) var<storage, read_write> indexed: array<atomic<u32>>;
@@ -23,7 +23,7 @@ fn take(splat: Splat, filter_: Filter, surfel: u32, x: u32, y: u32, names: bool)
     if (!names) {
         atomicMax(&indexed[at], weight);
     } else if (weight + AS_GREAT >= atomicLoad(&indexed[at])) {
-        atomicMax(&indexed[at + 1u], 0xffffffffu - (page_first + surfel));
+        atomicMax(&indexed[at + 1u], 0xffffffffu - (page.first + surfel));
     }
 }
 

@@ -90,6 +90,16 @@ struct Splat {
     cap: Cap,
 }
 
+// A page of surfels.
+struct Page {
+    // Surfels of the pages before it.
+    first: u32,
+    // Of a cut: runs of surfels that are dealt out over the page, the stride by which they are, and the one that undoes that.
+    runs: u32,
+    stride: u32,
+    back: u32,
+}
+
 // A node of a tree, or one that has a part of a leaf's surfels.
 struct TreeNode {
     // A sphere of this radius around the centre of its surfel holds all below it, world units.
@@ -132,8 +142,7 @@ const FIXED_ONE: f32 = 4294966272.0;
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<uniform> band: Band;
-// Surfels of the pages before this one.
-@group(0) @binding(42) var<uniform> page_first: u32;
+@group(0) @binding(42) var<uniform> page: Page;
 
 // The uniforms, read once an invocation and where all take part: some drivers read uniforms again wherever they are used, and
 // one by one for each invocation where some do not take part (Mesa's llvmpipe), which took a third of the projection. Every
@@ -152,6 +161,9 @@ fn hold_view() {
 }
 
 const WORKGROUP: u32 = 64u;
+
+// Surfels that are left out together (cull.wgsl), and of a cut bounded by one workgroup.
+const BATCH: u32 = 64u;
 
 // The index of this invocation in a 2-D dispatch of 1-D workgroups.
 fn linear_index(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32) -> u32 {

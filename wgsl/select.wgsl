@@ -3,7 +3,7 @@
 // are judged, what they leave is counted by workgroups, and from these counts follows where each puts what it leaves. So the order of the cut, too,
 // depends on tree and camera alone. Then what was chosen is copied to where pages of surfels are drawn from.
 // Host side and twin: src/passes/select.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xce599120319a5856
+// All loops end, by 1 of src/gpu/loops.rs: 0x27545cc0f74b2096
 
 @group(0) @binding(72) var<uniform> branch: Branch;
 @group(0) @binding(73) var<storage, read> tree_nodes: array<TreeNode>;
@@ -33,10 +33,16 @@ const LEVEL: u32 = 3u;
 const LEVEL_END: u32 = 4u;
 const NEXT: u32 = 5u;
 const NEXT_END: u32 = 6u;
-// Grids with an invocation for each node of the level that is judged, of that which is spread, and for each surfel of this branch's cut.
+// Grids with an invocation for each node of the level that is judged, of that which is spread, and for each surfel of this branch's cut in a page.
 const JUDGE_GRID: u32 = 7u;
 const SPREAD_GRID: u32 = 10u;
 const GATHER_GRID: u32 = 13u;
+// The surfels of this branch's cut that lie in a page, among them.
+const GATHERED: u32 = 16u;
+const GATHERED_END: u32 = 17u;
+
+// Surfels of a run: whole batches.
+const RUN: u32 = 512u;
 
 // Kinds of nodes.
 const KIND_SHIFT: u32 = 30u;
@@ -58,11 +64,27 @@ const PI: f32 = 3.14159265;
 // Room for the rounding of sines.
 const SINE_SLACK: f32 = 1e-5;
 
-var<workgroup> scanned: array<vec2<u32>, WORKGROUP>;
+var<workgroup> counted: array<vec2<u32>, WORKGROUP>;
+var<workgroup> eights: array<vec2<u32>, 8>;
+
+// Where the surfel of a place in the page lies, by its stride, and the other way round. Neighbours in a cut are neighbours in the image, and
+// what is in work at the same time should not be: atomics would wait for each other (src/passes/order.rs).
+fn dealt(place: u32, stride: u32) -> u32 {
+    let run = place / RUN;
+    // No product is past 2^32: a page has fewer than 2^16 runs. What is left of the last run stays.
+    let turn = select(run, (run * stride) % max(page.runs, 1u), run < page.runs);
+    return turn * RUN + place % RUN;
+}
+
+// How many of a batch are of the cut.
+fn batch_size(batch: u32) -> u32 {
+    let first = min(page.first + dealt(batch * BATCH, page.back), selected[CUT]);
+    return min(min(BATCH, selected[CUT] - first), surfels_held() - batch * BATCH);
+}
 
 // Whether the slot of a surfel in its page has one of the cut.
 fn is_filled(index: u32) -> bool {
-    return page_first + index < selected[CUT];
+    return page.first + dealt(index, page.back) < selected[CUT];
 }
 
 // Which word of a surfel's attributes.
@@ -132,20 +154,26 @@ fn left_by(node: TreeNode, fate: u32) -> vec2<u32> {
     return vec2<u32>(surfels, select(0u, count, divided && kind_of(node) == INNER));
 }
 
-// The sum of the counts of the invocations before this one; scanned has the sum up to each.
+// The sum of the counts of the invocations before this one: of whole eights, and in its own. Few barriers, as each is dear on processors.
 fn sum_before(counts: vec2<u32>, local: u32) -> vec2<u32> {
-    scanned[local] = counts;
-    for (var i = 0u; i < 6u; i++) {
-        workgroupBarrier();
-        var more = vec2<u32>(0u);
-        if (local >= (1u << i)) {
-            more = scanned[local - (1u << i)];
+    counted[local] = counts;
+    workgroupBarrier();
+    if (local < 8u) {
+        var sum = vec2<u32>(0u);
+        for (var k = 0u; k < 8u; k++) {
+            sum += counted[8u * local + k];
         }
-        workgroupBarrier();
-        scanned[local] += more;
+        eights[local] = sum;
     }
     workgroupBarrier();
-    return scanned[local] - counts;
+    var before = vec2<u32>(0u);
+    for (var k = 0u; k < local / 8u; k++) {
+        before += eights[k];
+    }
+    for (var k = local & 56u; k < local; k++) {
+        before += counted[k];
+    }
+    return before;
 }
 
 fn set_grid(at: u32, invocations: u32) {
@@ -170,7 +198,6 @@ fn select_roots() {
     selection[NEXT] = 0u;
     selection[NEXT_END] = end;
     set_grid(JUDGE_GRID, end);
-    set_grid(GATHER_GRID, 0u);
 }
 
 // One invocation a node of the next level.
@@ -209,7 +236,8 @@ fn select_sum(@builtin(local_invocation_index) local: u32) {
     for (var group = local * each; group < stop; group++) {
         own += group_counts[group];
     }
-    var start = sum_before(own, local) + vec2<u32>(here, end);
+    let before = sum_before(own, local);
+    var start = before + vec2<u32>(here, end);
     for (var group = local * each; group < stop; group++) {
         let counts = group_counts[group];
         group_counts[group] = start;
@@ -217,7 +245,7 @@ fn select_sum(@builtin(local_invocation_index) local: u32) {
     }
     // All have read the old words before the barriers above.
     if (local == WORKGROUP - 1u) {
-        let all = scanned[local];
+        let all = before + own;
         selection[LEVEL] = first;
         selection[LEVEL_END] = end;
         selection[NEXT] = end;
@@ -226,7 +254,6 @@ fn select_sum(@builtin(local_invocation_index) local: u32) {
         selection[CUT] = selection[CUT_BEFORE] + here + all.x;
         set_grid(SPREAD_GRID, end - first);
         set_grid(JUDGE_GRID, all.y);
-        set_grid(GATHER_GRID, here + all.x);
     }
 }
 
@@ -269,19 +296,30 @@ fn select_spread(
     }
 }
 
-// One invocation a surfel of this branch's cut.
+// What of this branch's cut lies in a page.
+@compute @workgroup_size(1)
+fn select_page() {
+    let start = selection[CUT_BEFORE];
+    let end = start + selection[CUT_HERE];
+    let first = clamp(page.first, start, end);
+    let stop = clamp(page.first + arrayLength(&gathered_surfels), first, end);
+    selection[GATHERED] = first - start;
+    selection[GATHERED_END] = stop - start;
+    set_grid(GATHER_GRID, stop - first);
+}
+
+// One invocation a surfel of it.
 @compute @workgroup_size(WORKGROUP)
 fn select_gather(
     @builtin(workgroup_id) workgroup: vec3<u32>,
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
-    let place = linear_index(workgroup, workgroups, local);
-    let slot = selected[CUT_BEFORE] + place;
-    // Others are of pages before and after this one.
-    if (place >= selected[CUT_HERE] || slot < page_first || slot - page_first >= arrayLength(&gathered_surfels)) {
+    let place = selected[GATHERED] + linear_index(workgroup, workgroups, local);
+    if (place >= selected[GATHERED_END]) {
         return;
     }
-    gathered_surfels[slot - page_first] = tree_surfels[chosen[place]];
-    gather_attributes(chosen[place], slot - page_first);
+    let to = dealt(selected[CUT_BEFORE] + place - page.first, page.stride);
+    gathered_surfels[to] = tree_surfels[chosen[place]];
+    gather_attributes(chosen[place], to);
 }

@@ -4,6 +4,10 @@ fn is_filled(index: u32) -> bool {
     return true;
 }
 
+fn batch_size(batch: u32) -> u32 {
+    return min(BATCH, surfels_held() - batch * BATCH);
+}
+
 fn rank_of(index: u32) -> u32 {
-    return page_first + index;
+    return page.first + index;
 }

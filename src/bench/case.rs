@@ -28,6 +28,8 @@ pub(super) struct Timed<'a> {
     /// What the last run showed, a frame for each camera.
     pub frames: Vec<Frame>,
     pub bytes: DeviceBytes,
+    /// Surfels and nodes that are drawn in place of all surfels, mean over the cameras, if levels of detail are cut.
+    pub cut: Option<f64>,
     /// Whether the last run has the bits of the first.
     pub stable: bool,
 }

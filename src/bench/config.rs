@@ -9,8 +9,8 @@ use crate::plan::{
     Accumulator, BackendName, BlendFormat, Optimisation, Organisation, Raster, RasterDepth, RenderOptions,
 };
 use crate::scene::{
-    Blend, Composite, Cull, Epsilon, Facing, Join, Kernel, LowPass, Map, Maps, Outline, PointShape, Samples, Shading,
-    ShadingAt, Tail,
+    Blend, Composite, Cull, Detail, DetailMeasure, Epsilon, Facing, Join, Kernel, LowPass, Map, Maps, Outline,
+    PointShape, Samples, Shading, ShadingAt, Tail,
 };
 
 /// One way to render. What it does not say is as for `epsplat render`.
@@ -42,6 +42,12 @@ pub struct Config {
     /// Which surfels are left out by the side that they show.
     #[serde(default, deserialize_with = "parsed")]
     pub cull: Option<Cull>,
+    /// The size of a node that is drawn in place of what is below it, as `epsplat render --lod` takes it: scenes get levels of detail.
+    #[serde(default, deserialize_with = "parsed")]
+    pub lod: Option<Detail>,
+    /// How that is measured: area or extent.
+    #[serde(default, deserialize_with = "parsed")]
+    pub lod_measure: Option<DetailMeasure>,
     /// Samples of a pixel: 1, 4, 8 or 16.
     #[serde(default, deserialize_with = "parsed")]
     pub samples: Option<Samples>,
@@ -107,6 +113,8 @@ impl Config {
         RenderOptions {
             epsilon: self.epsilon.unwrap_or(default.epsilon),
             cull: self.cull.unwrap_or(default.cull),
+            detail: self.lod.unwrap_or(default.detail),
+            detail_measure: self.lod_measure.unwrap_or_default(),
             samples: self.samples.unwrap_or(default.samples),
             outline: self.outline,
             facing: self.facing.map(|shape| Facing { shape, pixels: self.pixels.unwrap_or(Facing::LIMITS) }),
@@ -130,6 +138,11 @@ impl Config {
             maps: Maps::of(&self.maps),
             ..default
         }
+    }
+
+    /// Whether a cut of levels of detail is drawn.
+    pub fn cuts(&self) -> bool {
+        self.lod.is_some_and(|detail| !detail.is_finest())
     }
 
     /// Whether normals are of no use: of points that face the camera there are none, and of what is not blended none is kept.

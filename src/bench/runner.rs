@@ -111,6 +111,9 @@ impl<'a> Case<'a> {
         for (measures, apart) in truths.iter_mut().zip(judge::against_approximated(self, &timed, progress)?) {
             measures.extend(apart);
         }
+        for (timed, measures) in timed.iter().zip(&mut truths) {
+            measures.extend(timed.cut.map(|cut| ("cut".to_owned(), cut)));
+        }
         let mut measurements = Vec::new();
         for ((timed, error), reconstruction) in timed.iter().zip(errors).zip(truths) {
             let config = timed.config;
@@ -170,6 +173,7 @@ impl<'a> Case<'a> {
                 passes: BTreeMap::new(),
                 frames: Vec::new(),
                 bytes: renderer.device_bytes(),
+                cut: lap.cut,
                 stable: true,
             };
             runners.push((renderer, first, timed));
@@ -216,6 +220,9 @@ impl<'a> Case<'a> {
             })?;
             lap.total_ms += share * report.total_ms;
             lap.overflows += report.overflows;
+            if let Some(cut) = report.cut {
+                *lap.cut.get_or_insert(0.0) += share * cut as f64;
+            }
             for (pass, ms) in report.passes {
                 *lap.passes.entry(pass.trim_end_matches("_ms").to_owned()).or_default() += share * ms;
             }
@@ -280,6 +287,7 @@ struct Lap {
     passes: BTreeMap<String, f64>,
     frames: Vec<Frame>,
     overflows: u64,
+    cut: Option<f64>,
 }
 
 /// Why a configuration does not run.

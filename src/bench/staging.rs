@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3};
 
+use super::config::Config;
 use super::definition::{Beside, Definition, Making, OneOrMany, Rims, SceneEntry};
 use crate::error::{Error, Result};
 use crate::io::{self, Mesh, Points, ReadOptions, Texture};
@@ -19,7 +20,8 @@ use crate::surfels::sampling::voxels::Voxel;
 use crate::surfels::sampling::{MeshSurface, Method, sample};
 use crate::surfels::simplify::{self, SplatShape, Tolerance, simplify_in_texture};
 use crate::surfels::{
-    FromPoints, Size, Triangle, build, build_at_vertices, build_textured, curve, from_points, hybrid, with_triangles,
+    FromPoints, Size, Triangle, build, build_at_vertices, build_textured, curve, from_points, hierarchy, hybrid,
+    with_triangles,
 };
 use crate::truth::Surface;
 
@@ -140,6 +142,9 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
             *surfel = Surfel { s: scaled(surfel.s), t: scaled(surfel.t), ..*surfel };
         }
         footprint_px = wanted;
+    }
+    if definition.configs.iter().any(Config::cuts) && !scene.surfels.is_empty() {
+        (scene, _) = hierarchy::build(scene, progress)?;
     }
     Ok(Staged { scene, cameras, surface, dressed: entry.shirt.is_some(), footprint_px })
 }

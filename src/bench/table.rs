@@ -13,7 +13,7 @@ const NONE: &str = "-";
 
 /// Every measurement in a line: scene, configuration, milliseconds a frame (median ± median absolute deviation), the time as
 /// a multiple of the baseline's, largest error and RMSE against the f64 reference, PSNR, mean errors of depth and normal, holes and leaks against ground
-/// truth, PSNR against what it approximates, and how many times as fast as the fastest rasteriser of the same error. Columns that would be empty are left out.
+/// truth, PSNR against what it approximates, the surfels of a cut, and how many times as fast as the fastest rasteriser of the same error. Columns that would be empty are left out.
 pub fn text(definition: &Definition, study: &Study) -> String {
     let all = &study.measurements;
     let optional = |value: Option<f64>, digits: usize| value.map_or(NONE.to_owned(), |v| format!("{v:.digits$}"));
@@ -41,6 +41,9 @@ pub fn text(definition: &Definition, study: &Study) -> String {
     }
     if all.iter().any(|m| m.reconstruction.contains_key("apart_psnr_db")) {
         columns.push(("apart, dB".into(), Box::new(move |m| optional(truth(m, "apart_psnr_db"), 2))));
+    }
+    if all.iter().any(|m| m.reconstruction.contains_key("cut")) {
+        columns.push(("cut".into(), Box::new(move |m| optional(truth(m, "cut"), 0))));
     }
     if all.iter().any(|m| m.ratio_to_raster.is_some()) {
         columns.push(("x raster".into(), Box::new(|m| optional(m.ratio_to_raster, 2))));

@@ -6,6 +6,7 @@ use std::time::Instant;
 use clap::Args;
 use epsplat::Result;
 use epsplat::io::ply;
+use epsplat::scene::Cut;
 use epsplat::surfels::{self, hierarchy};
 use serde::Serialize;
 
@@ -18,7 +19,9 @@ use super::{note, outputs, print, write_json};
 /// Points are divided at their mean into eight, until there are eight or fewer (Pajarola 2003); each node is the least ellipse of their
 /// covariance's shape that bounds the disks below it, with their mean colour and normal. The surfels are written in the order of the tree, so other programs see a cloud.
 #[derive(Args)]
-#[command(after_help = "Example:\n  epsplat lod scan.ply -o scan.lod.ply\n  epsplat info scan.lod.ply")]
+#[command(
+    after_help = "Examples:\n  epsplat lod scan.ply -o scan.lod.ply\n  epsplat render scan.lod.ply -o scan.png --lod 4px\n  epsplat lod scan.ply --cut 0.05 -o coarse.ply"
+)]
 pub struct Arguments {
     #[arg(required = true, help = help_of("Surfels, point clouds or meshes"))]
     inputs: Vec<PathBuf>,
@@ -29,6 +32,9 @@ pub struct Arguments {
     output: PathBuf,
     #[command(flatten)]
     limits: LimitArguments,
+    /// Write no tree, but a cut of it: nodes whose longest half-axis is shorter than this, world units, in place of the surfels below them
+    #[arg(long, value_name = "LENGTH", value_parser = parse_length)]
+    cut: Option<f64>,
     /// What the tree is like as JSON, to a file or - for stdout
     #[arg(long, value_name = "FILE|-")]
     json: Option<PathBuf>,
@@ -40,6 +46,9 @@ struct Report {
     surfels: u64,
     nodes: u64,
     levels: u64,
+    /// Surfels that were written in place of all, if a cut was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cut: Option<u64>,
     /// Seconds to read, to make surfels, to make the tree, and to write.
     seconds: [f64; 4],
 }
@@ -60,14 +69,22 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         .map_err(|error| named(error, &arguments.inputs))?;
     preparation.notes().iter().for_each(|line| note(line));
     let made = seconds();
-    let (scene, tree) = hierarchy::build(scene, &bars)?;
+    let (scene, tree) = match scene.hierarchy.clone() {
+        Some(known) => (scene, known),
+        None => hierarchy::build(scene, &bars)?,
+    };
     let divided = seconds();
-    let mut points = hierarchy::points(&scene);
+    let surfels = scene.surfels.len() as u64;
+    let mut points = match arguments.cut {
+        Some(length) => hierarchy::points(&Cut::by_length(&tree, length).scene(&scene, &tree)),
+        None => hierarchy::points(&scene),
+    };
     drop(scene);
     points.beside = beside;
     ply::write_points(&arguments.output, &points, &bars)?;
     let report = Report {
-        surfels: points.positions.len() as u64,
+        surfels,
+        cut: arguments.cut.map(|_| points.positions.len() as u64),
         nodes: tree.nodes.len() as u64,
         levels: tree.levels() as u64,
         seconds: [read, made, divided, seconds()],
@@ -78,10 +95,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
 }
 
+/// A positive length, world units.
+fn parse_length(text: &str) -> std::result::Result<f64, String> {
+    let length: Option<f64> = text.parse().ok().filter(|length: &f64| length.is_finite() && *length > 0.0);
+    length.ok_or_else(|| format!("'{text}' is no length: a positive number, world units"))
+}
+
 fn summary(report: &Report) -> String {
     let [read, made, divided, written] = report.seconds;
+    let cut = report.cut.map_or_else(String::new, |cut| format!(", a cut of {cut}"));
     format!(
-        "{} surfels, {} nodes in {} levels: read in {read:.2} s, made in {made:.2} s, divided in {divided:.2} s, written in {written:.2} s\n",
+        "{} surfels, {} nodes in {} levels{cut}: read in {read:.2} s, made in {made:.2} s, divided in {divided:.2} s, written in {written:.2} s\n",
         report.surfels, report.nodes, report.levels
     )
 }

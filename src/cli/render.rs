@@ -7,6 +7,7 @@ mod view;
 mod views;
 
 use std::collections::BTreeSet;
+use std::num::NonZeroU64;
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -204,10 +205,13 @@ pub struct Arguments {
     textures: Vec<PathBuf>,
     /// Draw a cut of levels of detail: nodes that are seen smaller than this in place of the surfels below them. Square pixels, 16px, or a part of
     /// the image, 0.01%; 0 draws all surfels. `epsplat lod` keeps the levels in a file, else they are made first
-    #[arg(long, value_name = "SIZE")]
+    #[arg(long, value_name = "SIZE", group = "cut")]
     lod: Option<Detail>,
+    /// Draw a cut of no more surfels and nodes than this: of all such cuts the finest
+    #[arg(long, value_name = "N", group = "cut")]
+    splats: Option<NonZeroU64>,
     /// How nodes are measured: extent, as disks as long as their images, or area, of their images, as in Pajarola 2003
-    #[arg(long, value_enum, default_value_t = MeasureName::Extent, requires = "lod")]
+    #[arg(long, value_enum, default_value_t = MeasureName::Extent, requires = "cut")]
     lod_measure: MeasureName,
     /// A light, instead of the headlight: headlight[:INTENSITY] or the direction toward it, x,y,z[:INTENSITY]
     #[arg(long = "light", value_name = "LIGHT", allow_hyphen_values = true)]

@@ -137,6 +137,17 @@ pub struct Splat {
     pub a_low: [f32; 3],
 }
 
+/// A page of surfels; see the WGSL.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[allow(missing_docs)]
+pub struct Page {
+    pub first: u32,
+    pub runs: u32,
+    pub stride: u32,
+    pub back: u32,
+}
+
 /// A node of a tree; see the WGSL.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]

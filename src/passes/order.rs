@@ -8,7 +8,7 @@
 
 use rayon::prelude::*;
 
-use crate::gpu::layout::BATCH;
+use crate::gpu::layout::{BATCH, Page};
 use crate::morton;
 use crate::scene::{Bounds, Cap, Clip, Colors, Scene, Surfel};
 
@@ -68,6 +68,15 @@ fn content(scene: &Scene, index: usize) -> ([[u32; 3]; 8], [u32; 4]) {
     ([center, low, s, t, first, second, cap, normal].map(|part| part.map(f32::to_bits)), color.map(f32::to_bits))
 }
 
+/// How the surfels of a cut that a page has room for are dealt out over it (`wgsl/select.wgsl`), those of pages before it being `first`.
+pub(crate) fn dealt(surfels: u64, first: u32) -> Page {
+    let runs = surfels / RUN as u64;
+    let stride = dealing(runs as usize) as u64;
+    // Of what leads to each run once, a power undoes itself: there are few runs, so it is looked for.
+    let back = (1..runs).find(|back| stride * back % runs == 1).unwrap_or(1);
+    Page { first, runs: runs as u32, stride: stride as u32, back: back as u32 }
+}
+
 /// A step near the golden ratio of `runs` that comes to each of them once.
 fn dealing(runs: usize) -> usize {
     let gcd = |mut a: usize, mut b: usize| {
@@ -109,6 +118,10 @@ mod tests {
             let mut indices = order(&scene, &bounds);
             indices.sort_unstable();
             assert!(indices.iter().copied().eq(0..count as u32), "{count}");
+        }
+        for runs in [0, 1, 2, 3, 7, 4096] {
+            let Page { stride, back, .. } = dealt(runs * RUN as u64 + 5, 0);
+            assert!((0..runs).all(|run| run * u64::from(stride) % runs * u64::from(back) % runs == run), "{runs}");
         }
         assert!(order(&scene(vec![]), &Bounds::EMPTY).is_empty());
         let one = vec![Surfel::disk(Vec3::ZERO, Vec3::Z, 1.0); 3];

@@ -8,30 +8,35 @@
 //! pages that surfels are drawn from: nothing that follows knows of trees.
 
 use std::f64::consts::FRAC_PI_2;
-use std::ops::Range;
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::cull;
 use super::lowpass::Design;
 use crate::plan::pass::Pass;
 use crate::plan::steps::{Kernel, Over, Run};
 use crate::plan::{RenderOptions, SurfelLayout};
-use crate::scene::color::srgb8;
+use crate::scene::cut::Fate;
 use crate::scene::hierarchy::Node;
-use crate::scene::{Camera, Cap, Clip, Colors, Detail, DetailMeasure, Hierarchy, Projection, Scene, Surfel};
+use crate::scene::{Camera, Cut, Detail, DetailMeasure, Hierarchy, Projection};
 
 /// The pass's kernels, files and constants.
 pub const PASS: Pass = Pass {
     name: "select",
-    files: |needs| match (needs.levels, SurfelLayout::of(needs).words > 0) {
-        (true, true) => vec!["select.wgsl", "gather.wgsl"],
-        (true, false) => vec!["select.wgsl", "gather_absent.wgsl"],
-        (false, _) => vec!["select_absent.wgsl"],
+    files: |needs| {
+        let gather = if SurfelLayout::of(needs).words > 0 { "gather.wgsl" } else { "gather_absent.wgsl" };
+        match (needs.levels, needs.cull) {
+            (true, true) => vec!["select.wgsl", gather, "select_balls.wgsl"],
+            (true, false) => vec!["select.wgsl", gather],
+            (false, _) => vec!["select_absent.wgsl"],
+        }
     },
     kernels: |needs| match needs.levels {
-        true => vec![SELECT_ROOTS, SELECT_JUDGE, SELECT_SUM, SELECT_SPREAD, SELECT_GATHER],
+        true => {
+            let balls = needs.cull.then_some(BALLS.kernel);
+            let all = [SELECT_ROOTS, SELECT_JUDGE, SELECT_SUM, SELECT_SPREAD, SELECT_PAGE, SELECT_GATHER];
+            all.into_iter().chain(balls).collect()
+        }
         false => Vec::new(),
     },
     constants: |making| match making.needs.levels {
@@ -46,11 +51,11 @@ const SELECT_ROOTS: Kernel = Kernel::of("select_roots", [1, 1, 1]);
 const SELECT_JUDGE: Kernel = Kernel::new("select_judge");
 const SELECT_SUM: Kernel = Kernel::new("select_sum");
 const SELECT_SPREAD: Kernel = Kernel::new("select_spread");
-/// It copies to the pages, one after the other.
-pub(crate) const SELECT_GATHER: Kernel = Kernel::new("select_gather");
+const SELECT_PAGE: Kernel = Kernel::of("select_page", [1, 1, 1]);
+const SELECT_GATHER: Kernel = Kernel::new("select_gather");
 
-/// The dispatches that choose what of a branch with so many levels is drawn, and then copy it if it is `gathered`.
-pub fn runs(levels: u32, gathered: bool) -> Vec<Run> {
+/// The dispatches that choose what of a branch with so many levels is drawn.
+pub fn choose(levels: u32) -> Vec<Run> {
     let level = [
         Run { kernel: SELECT_JUDGE, over: Over::Judged },
         Run { kernel: SELECT_SUM, over: Over::Once },
@@ -58,9 +63,15 @@ pub fn runs(levels: u32, gathered: bool) -> Vec<Run> {
     ];
     let mut runs = vec![Run { kernel: SELECT_ROOTS, over: Over::Once }];
     runs.extend((0..levels).flat_map(|_| level));
-    runs.extend(gathered.then_some(Run { kernel: SELECT_GATHER, over: Over::Chosen }));
     runs
 }
+
+/// The dispatches that copy what was chosen of a branch to a page.
+pub const GATHER: [Run; 2] =
+    [Run { kernel: SELECT_PAGE, over: Over::Once }, Run { kernel: SELECT_GATHER, over: Over::Chosen }];
+
+/// The dispatches that bound the batches of what was copied, which are then culled.
+pub const BALLS: Run = Run { kernel: Kernel::new("select_balls"), over: Over::BatchGroups };
 
 /// Words of [`Over`]'s grids in the state of a cut, `selection` (`wgsl/select.wgsl`).
 pub(crate) const JUDGE_GRID: u64 = 7;
@@ -68,16 +79,7 @@ pub(crate) const SPREAD_GRID: u64 = 10;
 pub(crate) const GATHER_GRID: u64 = 13;
 
 /// Words of that state.
-pub(crate) const SELECTION_WORDS: u64 = 16;
-
-/// What is drawn of a tree.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Cut {
-    /// Nodes, by their numbers, which ascend.
-    pub nodes: Vec<u32>,
-    /// Surfels of leaves, in the order of the tree.
-    pub surfels: Vec<Range<u32>>,
-}
+pub(crate) const SELECTION_WORDS: u64 = 18;
 
 /// Which cut is wanted.
 #[derive(Clone, Copy, Debug)]
@@ -100,16 +102,50 @@ impl Wanted {
     }
 }
 
-/// What becomes of a node.
-enum Fate {
-    Unseen,
-    Drawn,
-    /// Its children, or its surfels.
-    Divided,
+/// The size for a number of splats as square pixels in the view of the image's `camera`; every other one as it is.
+///
+/// The fewer square pixels, the more is drawn, so that halving an interval finds the least size with which no more are drawn than asked for. Where even
+/// the largest nodes are more, as those are that reach the near depth, these are drawn.
+pub fn sized(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: &Wanted) -> Detail {
+    let Detail::Splats(splats) = wanted.detail else { return wanted.detail };
+    let fits = |size: f64| {
+        let wanted = Wanted { detail: Detail::Pixels(size), ..*wanted };
+        bounded(hierarchy, origin, camera, &wanted, splats).is_some()
+    };
+    // Powers of two, from above, as cuts of small sizes take long to make.
+    let mut high = LARGEST;
+    while high > SMALLEST && fits((high - 1.0).exp2()) {
+        high -= 1.0;
+    }
+    let mut low = high - 1.0;
+    for _ in 0..STEPS {
+        let middle = 0.5 * (low + high);
+        (low, high) = if fits(middle.exp2()) { (low, middle) } else { (middle, high) };
+    }
+    // What a device rounds to the other side of this size is drawn on this one.
+    Detail::Pixels(high.exp2() * SIZE_SLACK)
 }
+
+/// Powers of two among which a size is looked for, square pixels.
+const LARGEST: f64 = 60.0;
+const SMALLEST: f64 = -30.0;
+
+/// How often the interval between two of them is halved: the size is found to a part in a million.
+const STEPS: u32 = 20;
+
+/// By how much a device may err in the size of a node.
+const SIZE_SLACK: f64 = 1.0 + 1e-5;
+
+/// By how much a device may err in a sine.
+const SINE_SLACK: f64 = 1e-5;
 
 /// The cut of `hierarchy`, which is relative to `origin`, in the view of `camera`.
 pub fn reference(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: &Wanted) -> Cut {
+    bounded(hierarchy, origin, camera, wanted, u64::MAX).unwrap_or_default()
+}
+
+/// The same, or None if it has more than `most` surfels and nodes.
+fn bounded(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: &Wanted, most: u64) -> Option<Cut> {
     let Wanted { detail, measure, backs_out, filter_reach } = *wanted;
     let eye = camera.eye - origin;
     let size = detail.pixels(camera.pixels() as f64);
@@ -118,7 +154,7 @@ pub fn reference(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: 
         let low = hierarchy.low.get(index as usize).map_or(DVec3::ZERO, |low| DVec3::from_array(low.map(f64::from)));
         let center = DVec3::from_array(node.surfel.center.map(f64::from)) + low - eye;
         let [turned, spread] = if backs_out { turned_away(node, center, camera) } else { [-1.0, 0.0] };
-        if is_unseen(node, center, camera, filter_reach) || turned > spread {
+        if is_unseen(node, center, camera, filter_reach) || turned > spread + SINE_SLACK {
             return Fate::Unseen;
         }
         let seen =
@@ -126,27 +162,7 @@ pub fn reference(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: 
         // The plane of one that faces away is left out, whatever is below it.
         if seen < size && turned <= 0.0 { Fate::Drawn } else { Fate::Divided }
     };
-    let mut cut = Cut::default();
-    let mut frontier: Vec<u32> = vec![0];
-    while !frontier.is_empty() {
-        let fates: Vec<Fate> = frontier.par_iter().with_min_len(256).map(|&index| fate(index)).collect();
-        let mut below = Vec::new();
-        for (index, fate) in frontier.into_iter().zip(fates) {
-            let Node { first, count, leaf, .. } = hierarchy.nodes[index as usize];
-            match fate {
-                Fate::Unseen => {}
-                // One surfel is itself, with its lines and its cap.
-                Fate::Drawn if leaf && count == 1 => cut.surfels.push(first..first + 1),
-                Fate::Drawn => cut.nodes.push(index),
-                Fate::Divided if leaf => cut.surfels.push(first..first + count),
-                Fate::Divided => below.extend(first..first + count),
-            }
-        }
-        frontier = below;
-    }
-    cut.nodes.sort_unstable();
-    cut.surfels.sort_unstable_by_key(|range| range.start);
-    cut
+    Cut::of(hierarchy, most, fate)
 }
 
 /// Whether the ball around all below a node reaches the near depth, so that its place in the image says nothing.
@@ -183,54 +199,13 @@ fn turned_away(node: &Node, center: DVec3, camera: &Camera) -> [f64; 2] {
     [-toward.dot(s.cross(t).normalize_or_zero()), if spread < FRAC_PI_2 { spread.sin() } else { 1.0 }]
 }
 
-impl Cut {
-    /// How many surfels are drawn.
-    pub fn len(&self) -> usize {
-        self.nodes.len() + self.surfels.iter().map(|range| range.len()).sum::<usize>()
-    }
-
-    /// Whether nothing is drawn.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// The surfels of leaves and then the nodes, as a scene like `scene`, which they are cut from. Nodes end at no lines and are flat.
-    pub fn scene(&self, scene: &Scene, hierarchy: &Hierarchy) -> Scene {
-        let indices: Vec<u32> = self.surfels.iter().flat_map(Clone::clone).collect();
-        let nodes = || self.nodes.iter().map(|&index| &hierarchy.nodes[index as usize]);
-        let mut cut = scene.taken(&indices);
-        cut.surfels.extend(nodes().map(|node| node.surfel));
-        let count = cut.surfels.len();
-        if !scene.low.is_empty() {
-            cut.low.extend(self.nodes.iter().map(|&index| hierarchy.low[index as usize]));
-        }
-        if !scene.clips.is_empty() {
-            cut.clips.resize(count, Clip::NONE);
-        }
-        if !scene.caps.is_empty() {
-            cut.caps.resize(count, Cap::FLAT);
-        }
-        let plane = |surfel: &Surfel| surfel.normal().normalize_or_zero().to_array();
-        if !scene.normals.is_empty() {
-            cut.normals.extend(nodes().map(|node| plane(&node.surfel)));
-        }
-        match &mut cut.colors {
-            Colors::Srgb8(codes) => codes.extend(nodes().map(|node| srgb8(node.color))),
-            Colors::Linear(colors) => colors.extend(nodes().map(|node| node.color)),
-            // One for all, and others have no levels of detail.
-            Colors::Constant(_) | Colors::Textured(_) | Colors::Harmonics(_) => {}
-        }
-        cut
-    }
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use glam::Vec3;
 
     use super::*;
-    use crate::scene::{Lens, Up};
+    use crate::scene::{Colors, Lens, Scene, Surfel, Up};
     use crate::surfels::analytic::{Shape, generate};
     use crate::surfels::hierarchy;
 
@@ -295,6 +270,21 @@ mod tests {
                 }
             }
             assert_eq!(last, 1);
+        }
+    }
+
+    /// No more than asked for are drawn, and hardly fewer; of a hundredth more the cut is another one.
+    #[test]
+    fn a_number_of_splats_is_kept() {
+        let (_, tree) = sphere();
+        let camera = camera(DVec3::new(0.0, 0.7, 3.0), Lens::Fov(50.0));
+        for (splats, least) in [(1, 1), (10, 1), (300, 250), (2000, 1900), (7999, 7900), (8000, 8000), (1 << 40, 8000)]
+        {
+            let options = RenderOptions { detail: Detail::Splats(splats), ..RenderOptions::default() };
+            let wanted = Wanted::of(&options, false);
+            let detail = sized(&tree, DVec3::ZERO, &camera, &wanted);
+            let drawn = reference(&tree, DVec3::ZERO, &camera, &Wanted { detail, ..wanted }).len() as u64;
+            assert!((least..=splats).contains(&drawn), "{splats}: {drawn} at {detail:?}");
         }
     }
 

@@ -124,15 +124,14 @@ fn gathers(needs: &SceneNeeds, options: &RenderOptions, known: &Known) -> bool {
 }
 
 /// Whether batches that are hidden or out of view are left out.
-fn culls(facts: &Facts, needs: &SceneNeeds, camera: &Camera, options: &RenderOptions) -> bool {
+fn culls(drawn: u64, needs: &SceneNeeds, camera: &Camera, options: &RenderOptions) -> bool {
     // The rasteriser draws every splat.
     options.has(Optimisation::Culling)
-        && tuning::PIXELS_A_CULLED_SURFEL * facts.surfels > camera.pixels() as u64
+        && tuning::PIXELS_A_CULLED_SURFEL * drawn > camera.pixels() as u64
         && !needs.copies
         && needs.lists.is_none()
         && needs.oit.is_none()
         && !needs.separate
-        && !needs.levels
         && needs.raster.is_none()
 }
 
@@ -157,7 +156,7 @@ impl Plan {
         let cut = known.cut.filter(|_| needs.levels);
         let drawn = if needs.levels { cut.unwrap_or(0) } else { facts.surfels };
         let gather = (1..=page).contains(&most_together((facts, drawn), &needs)) && gathers(&needs, options, known);
-        let cull = page >= BATCH.into() && culls(facts, &needs, camera, options);
+        let cull = page >= BATCH.into() && culls(drawn, &needs, camera, options);
         let individuals = if needs.separate { pages_of(&facts.individuals, page) } else { Vec::new() };
         let veils = needs.lists == Some(Lists::Sorted) && known.veiled;
         let long_lists = needs.lists.is_some() && known.longest_list > 0;

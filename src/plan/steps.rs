@@ -51,11 +51,13 @@ pub enum Over {
     Slots(Part),
     /// An invocation for each batch of a page.
     Batches,
+    /// A workgroup for each batch of a page.
+    BatchGroups,
     /// An invocation for each node of a level of a branch that is come to, as the device counted them.
     Judged,
     /// The same, after the next level's are known.
     Spread,
-    /// An invocation for each surfel of the cut in a branch.
+    /// An invocation for each surfel of the cut that a branch has in a page.
     Chosen,
     /// Workgroups for the splats that take long to project, as the device counted them.
     Rare,

@@ -20,19 +20,34 @@ impl Run<'_> {
                     .for_each(|buffer| encoder.clear_buffer(&buffer.raw, 0, None));
             };
             self.timing.pass(gpu, "select", clears, |pass| {
-                for run in select::runs(branch.levels, gathered) {
+                let chosen = select::choose(branch.levels).into_iter().map(|run| (run, 0));
+                let pages = 0..if gathered { store.pages.len() } else { 0 };
+                let copied = pages.flat_map(|page| select::GATHER.map(|run| (run, page)));
+                for (run, page) in chosen.chain(copied) {
                     let program = kernels.of(gpu, &run.kernel)?;
-                    let pages = if run.kernel == select::SELECT_GATHER { 0..store.pages.len() } else { 0..1 };
-                    for page in pages {
-                        let grid = over(gpu, plan, store, (0, page), run.over)?;
-                        let binding = |name: &str| store.binding_of_branch(name, number, page);
-                        program.dispatch(gpu, pass, run.kernel.name, &binding, grid)?;
-                    }
+                    let grid = over(gpu, plan, store, (0, page), run.over)?;
+                    let binding = |name: &str| store.binding_of_branch(name, number, page);
+                    program.dispatch(gpu, pass, run.kernel.name, &binding, grid)?;
                 }
                 Ok(())
             })?;
         }
-        Ok(())
+        if !(gathered && plan.needs.cull) {
+            return Ok(());
+        }
+        let program = kernels.of(gpu, &select::BALLS.kernel)?;
+        self.timing.pass(
+            gpu,
+            "select",
+            |_| {},
+            |pass| {
+                (0..store.pages.len()).try_for_each(|page| {
+                    let grid = over(gpu, plan, store, (0, page), select::BALLS.over)?;
+                    let binding = |name: &str| store.binding(name, page, 0);
+                    program.dispatch(gpu, pass, select::BALLS.kernel.name, &binding, grid)
+                })
+            },
+        )
     }
 
     /// Learns how large the cut is.
@@ -40,16 +55,21 @@ impl Run<'_> {
         self.timing.flush(self.gpu)?;
         let Some(selection) = self.store.buffer("selection") else { return Ok(()) };
         let [cut, _] = counts(self.gpu, &[selection])?.first().copied().unwrap_or_default();
-        self.known.cut = Some(with_room(cut.into()));
+        self.make_room(cut.into());
         Ok(())
     }
 
     /// Whether pages with `room` for so many surfels have room for a cut; if not, or if it is far too much, the next try has as much as it takes.
     pub(super) fn fits_cut(&mut self, room: u64, cut: u64) -> bool {
         if cut > room || room > 4 * with_room(cut) + SPARE {
-            self.known.cut = Some(with_room(cut));
+            self.make_room(cut);
         }
         cut <= room
+    }
+
+    /// From the next try on; its pages are new ones.
+    fn make_room(&mut self, cut: u64) {
+        (self.known.cut, self.known.slots) = (Some(with_room(cut)), false);
     }
 }
 

@@ -8,7 +8,7 @@ use crate::gpu::Gpu;
 use crate::gpu::buffers::{Buffer, counts};
 use crate::gpu::kernel::{Grid, grid};
 use crate::gpu::layout::{
-    BATCH, COVERED_GRID, COVERED_GRID_OF_EIGHTS, LIST_FAR, QUEUE_GRID, QUEUE_LISTING, TILE_WIDTH,
+    BATCH, COVERED_GRID, COVERED_GRID_OF_EIGHTS, LIST_FAR, QUEUE_GRID, QUEUE_LISTING, TILE_WIDTH, WORKGROUP,
 };
 use crate::gpu::timing::Timing;
 use crate::passes::tiles::{self, LONGEST, list_name};
@@ -335,6 +335,7 @@ pub(super) fn over<'a>(
         Over::Once => return Ok(Grid::Of((1, 1))),
         Over::Slots(_) => of_page.map_or(0, |page| page.slots),
         Over::Batches => of_page.map_or(0, |page| page.batches()),
+        Over::BatchGroups => of_page.map_or(0, |page| page.batches() * u64::from(WORKGROUP)),
         Over::Occlusion => plan.bands[band].tiles,
         Over::Vertices => plan.mesh.vertices,
         Over::Triangles => plan.mesh.triangles,

@@ -6,7 +6,7 @@ use super::targets::Targets;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::{Buffer, Readback};
-use crate::gpu::layout::{BATCH, Band as BandUniform, LIST_START, QUEUE_START, View, WORKGROUP};
+use crate::gpu::layout::{self, BATCH, Band as BandUniform, LIST_START, QUEUE_START, View, WORKGROUP};
 use crate::passes::moments::MOMENT_WORDS;
 use crate::passes::peel::PEELED_WORDS;
 use crate::passes::select::SELECTION_WORDS;
@@ -14,7 +14,7 @@ use crate::passes::tiles::{list_name, list_words};
 use crate::passes::triangles::{self, NEAREST_TRIANGLE_WORDS};
 use crate::passes::upload::{self, BranchBuffers, Uploaded};
 use crate::passes::veils::VEIL_WORDS;
-use crate::passes::{asks_for_order, covered, fragments, individuals, long_lists, visibility};
+use crate::passes::{asks_for_order, covered, fragments, individuals, long_lists, order, visibility};
 use crate::plan::known::Listed;
 use crate::plan::{
     Band, FragmentLayout, KEY_WORDS, Known, Oit, Plan, Raster, SceneNeeds, SurfelLayout, page_surfels, splat_words,
@@ -22,7 +22,8 @@ use crate::plan::{
 use crate::scene::{Samples, Surfel};
 
 /// Names in WGSL of buffers that have another one where kernels write them.
-const ALIASES: [(&str, &str); 20] = [
+const ALIASES: [(&str, &str); 21] = [
+    ("made_balls", "balls"),
     ("selected", "selection"),
     ("gathered_surfels", "surfels"),
     ("gathered_attributes", "attributes"),
@@ -46,7 +47,7 @@ const ALIASES: [(&str, &str); 20] = [
 ];
 
 /// Names of buffers that each page has.
-const PAGED: [&str; 9] = ["attributes", "balls", "drawn", "page_first", "queue", "rare", "rest", "splats", "surfels"];
+const PAGED: [&str; 9] = ["attributes", "balls", "drawn", "page", "queue", "rare", "rest", "splats", "surfels"];
 
 /// The name under which a buffer is kept.
 fn kept(name: &str) -> &str {
@@ -77,7 +78,8 @@ pub struct Page {
 impl Page {
     fn new(gpu: &Gpu, uploaded: upload::Page, first: u32, needs: &SceneNeeds) -> Result<Self> {
         let upload::Page { buffers, numbers, stand_for } = uploaded;
-        Self::with(gpu, Named::from_iter(buffers), (numbers.len() as u64, stand_for), (first, needs))
+        let own = layout::Page { first, runs: 0, stride: 0, back: 0 };
+        Self::with(gpu, Named::from_iter(buffers), (numbers.len() as u64, stand_for), (own, needs))
     }
 
     /// One with room for so many surfels of a cut, from the one with the number `first` on.
@@ -89,7 +91,9 @@ impl Page {
             buffers.insert("attributes", Buffer::storage(gpu, "attributes of a cut", surfels * words)?);
         }
         // Of how many of them there are the state of the cut tells.
-        Self::with(gpu, buffers, (surfels, 0), (first, needs))
+        let balls = Buffer::<[f32; 4]>::storage(gpu, "balls of a cut", surfels.div_ceil(BATCH.into()))?;
+        buffers.insert("balls", balls.words());
+        Self::with(gpu, buffers, (surfels, 0), (order::dealt(surfels, first), needs))
     }
 
     /// One with these buffers, and room for nothing yet of what is made of them.
@@ -97,8 +101,9 @@ impl Page {
         gpu: &Gpu,
         mut buffers: Named,
         (surfels, stand_for): (u64, u64),
-        (first, needs): (u32, &SceneNeeds),
+        (own, needs): (layout::Page, &SceneNeeds),
     ) -> Result<Self> {
+        buffers.insert("page", Buffer::uniform(gpu, "page", &own)?.words());
         let batches = surfels.div_ceil(BATCH.into());
         let drawn = Buffer::indirect(gpu, "batches that are drawn", batches + u64::from(LIST_START))?;
         // A row of a grid is a batch.
@@ -110,7 +115,6 @@ impl Page {
         for (name, what) in [("queue", "queue of large splats"), ("rare", "list of rare splats")] {
             buffers.insert(name, Buffer::indirect(gpu, what, QUEUE_START.into())?);
         }
-        buffers.insert("page_first", Buffer::uniform(gpu, "page", &first)?);
         Ok(Self { buffers, surfels, stand_for, splat_words: splat_words(needs), slots: 0 })
     }
 

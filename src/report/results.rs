@@ -83,7 +83,7 @@ pub struct Measurement {
     pub numeric: Option<Numeric>,
     /// Error against ground truth by measure: `psnr_db`, `max_abs`, `percentile_99_9`, `ssim`, `depth_relative_mean`,
     /// `normal_degrees_mean`, `hole_rate` and so on, none without ground truth; and `apart_psnr_db` and `apart_rmse` against the reference of the
-    /// configuration that it approximates. An image that equals the truth has a
+    /// configuration that it approximates, and `cut`, the surfels that are drawn in place of all. An image that equals the truth has a
     /// `psnr_db` of infinity.
     pub reconstruction: BTreeMap<String, f64>,
     /// How many times as fast as the fastest raster configuration of the same scene with an equal or smaller

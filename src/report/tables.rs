@@ -25,7 +25,7 @@ impl<'a> Column<'a> {
 const PASSES: [&str; 4] = ["project", "visibility", "accumulate", "resolve"];
 
 /// Measures against ground truth as a reader knows them; others have their own name.
-const TRUTHS: [(&str, &str); 16] = [
+const TRUTHS: [(&str, &str); 17] = [
     ("psnr_db", "PSNR, dB"),
     ("ssim", "SSIM"),
     ("max_abs", "largest"),
@@ -41,6 +41,7 @@ const TRUTHS: [(&str, &str); 16] = [
     ("outline_px", "outline, px"),
     ("apart_psnr_db", "apart, dB"),
     ("apart_rmse", "apart, RMSE"),
+    ("cut", "surfels of the cut"),
     ("rmse", "RMSE"),
 ];
 

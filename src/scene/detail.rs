@@ -6,6 +6,7 @@ use std::str::FromStr;
 use glam::{DVec2, DVec3};
 
 use super::{Camera, Projection, Surfel};
+use crate::error::Error;
 
 /// The size of a node in the image that it is drawn at instead of what is below it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,6 +15,8 @@ pub enum Detail {
     Pixels(f64),
     /// A part of the image.
     Share(f64),
+    /// As small as it can be with so many surfels and nodes drawn: the size follows from each view.
+    Splats(u64),
 }
 
 impl Detail {
@@ -25,24 +28,25 @@ impl Detail {
         matches!(self, Self::Pixels(size) | Self::Share(size) if size == 0.0)
     }
 
-    /// Square pixels of an image that has so many.
+    /// Square pixels of an image that has so many; those of a number of splats are looked for first ([`sized`](crate::passes::select::sized)).
     pub fn pixels(self, image: f64) -> f64 {
         match self {
             Self::Pixels(pixels) => pixels,
             Self::Share(share) => share * image,
+            Self::Splats(_) => 0.0,
         }
     }
 }
 
 impl FromStr for Detail {
-    type Err = String;
+    type Err = Error;
 
     /// `0`, `16px` or `0.01%`.
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, Error> {
         let wrong = || {
-            format!(
+            Error::Usage(format!(
                 "'{text}' is no size of the smallest nodes: a number of square pixels, 16px, a part of the image, 0.01%, or 0"
-            )
+            ))
         };
         let number = |text: &str| text.parse().ok().filter(|number: &f64| number.is_finite() && *number >= 0.0);
         let detail = match (text.strip_suffix("px"), text.strip_suffix('%')) {
@@ -62,6 +66,15 @@ pub enum DetailMeasure {
     /// The area of the disk that its longer half-axis is seen as: an outline is as fine as a surface that is seen from the front.
     #[default]
     Extent,
+}
+
+impl FromStr for DetailMeasure {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        let named = Self::ALL.into_iter().find(|(_, name, _)| *name == text).map(|(measure, ..)| measure);
+        named.ok_or_else(|| Error::Usage(format!("there is no measure {text:?} of nodes: take area or extent")))
+    }
 }
 
 impl DetailMeasure {
@@ -103,9 +116,11 @@ mod tests {
 
     #[test]
     fn sizes_are_read() {
-        assert_eq!("16px".parse(), Ok(Detail::Pixels(16.0)));
-        assert_eq!("0.01%".parse(), Ok(Detail::Share(1e-4)));
-        assert_eq!("0".parse(), Ok(Detail::FINEST));
+        assert_eq!("16px".parse::<Detail>().unwrap(), Detail::Pixels(16.0));
+        assert_eq!("0.01%".parse::<Detail>().unwrap(), Detail::Share(1e-4));
+        assert_eq!("0".parse::<Detail>().unwrap(), Detail::FINEST);
+        assert_eq!("area".parse::<DetailMeasure>().unwrap(), DetailMeasure::Area);
+        assert!("length".parse::<DetailMeasure>().is_err());
         for wrong in ["", "px", "-1px", "nanpx", "3", "1e999%", "5 px"] {
             assert!(wrong.parse::<Detail>().is_err(), "{wrong}");
         }

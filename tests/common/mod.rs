@@ -287,7 +287,7 @@ fn cut(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
     let of_disks = |needs: &&SceneNeeds| needs.facing.is_none() && !needs.separate && !needs.maps.has(Map::Index);
     let with_colors =
         |needs: &&SceneNeeds| matches!(needs.color, ColorNeed::Constant | ColorNeed::Srgb8 | ColorNeed::Linear);
-    let of = |needs: &SceneNeeds| SceneNeeds { levels: true, cull: false, ..*needs };
+    let of = |needs: &SceneNeeds| SceneNeeds { levels: true, ..*needs };
     all.iter().filter(of_disks).filter(with_colors).filter(|needs| !needs.copies).step_by(3).map(of).collect()
 }
 

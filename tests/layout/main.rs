@@ -130,6 +130,7 @@ fn constants_agree() {
         for (name, value) in [
             ("WORKGROUP", WORKGROUP),
             ("TILE", TILE),
+            ("BATCH", BATCH),
             ("QUEUE_START", QUEUE_START),
             ("QUEUE_GRID", QUEUE_GRID),
             ("QUEUE_LISTING", QUEUE_LISTING),
@@ -147,7 +148,7 @@ fn constants_agree() {
         let tile = needs.raster.is_none().then_some(f64::from(OCCLUSION_TILE));
         assert_eq!(constant("OCCLUSION_TILE"), tile);
         let of_tiles = [("BLOCK_SIDE", BLOCK_SIDE), ("LIST_ENDS", LIST_ENDS)];
-        let of_batches = [("BATCH", BATCH), ("LIST_START", LIST_START), ("LIST_FAR", LIST_FAR)];
+        let of_batches = [("LIST_START", LIST_START), ("LIST_FAR", LIST_FAR)];
         for (exists, constants) in [(tiles, &of_tiles[..]), (needs.cull, &of_batches)] {
             for &(name, value) in constants {
                 assert_eq!(constant(name), exists.then_some(f64::from(value)), "{name}");

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::mem::{offset_of, size_of};
 
-use epsplat::gpu::layout::{Band, Branch, Filter, Splat, TreeNode, View};
+use epsplat::gpu::layout::{Band, Branch, Filter, Page, Splat, TreeNode, View};
 use epsplat::passes::triangles::CORNER_WORDS;
 use epsplat::plan::SceneNeeds;
 use epsplat::scene::Surfel;
@@ -105,6 +105,7 @@ pub fn mirrors() -> BTreeMap<&'static str, Struct> {
         mirror!(Band { first_row, rows, padding_0, padding_1 }),
         mirror!(Splat { anchor_x, anchor_y, bounds_first, bounds_last, a, b, c, a_low }),
         mirror!(Surfel { center, s, t }),
+        mirror!(Page { first, runs, stride, back }),
         mirror!(TreeNode { radius, cone, first, below }),
         mirror!(Branch { surfels, roots, first_root, whole }),
         mirror!(Filter { center_x, center_y, depth_low, depth_high, r_xx, r_xy, r_yy, gain }),
@@ -142,7 +143,8 @@ pub fn elements(accumulator: &str) -> BTreeMap<&'static str, Element> {
         ("projected", Element::Words("Splat")),
         ("attributes", Element::Plain(WORD)),
         ("indexed", Element::Plain(WORD)),
-        ("page_first", Element::Plain(WORD)),
+        ("page", Element::Struct("Page")),
+        ("made_balls", Element::Plain(&[<[f32; 4]>::SHAPE])),
         ("branch", Element::Struct("Branch")),
         ("tree_nodes", Element::Struct("TreeNode")),
         ("tree_surfels", Element::Struct("Surfel")),

@@ -3,7 +3,7 @@
 use epsplat::plan::{BackendName, Raster, RenderOptions, check};
 use epsplat::scene::composite::ALL_LAYERS;
 use epsplat::scene::{
-    Blend, Composite, Facing, Kernel, LowPass, Maps, PointSize, Samples, Scene, Shading, ShadingAt, gaussian,
+    Blend, Composite, Detail, Facing, Kernel, LowPass, Maps, PointSize, Samples, Scene, Shading, ShadingAt, gaussian,
 };
 use epsplat::{Error, Result};
 
@@ -59,7 +59,7 @@ pub(super) fn options(arguments: &Arguments, format: Format) -> Result<RenderOpt
         join: arguments.join.unwrap_or_default(),
         separate: arguments.separate,
         cull: arguments.cull,
-        detail: arguments.lod.unwrap_or(default.detail),
+        detail: arguments.splats.map(|splats| Detail::Splats(splats.get())).or(arguments.lod).unwrap_or(default.detail),
         detail_measure: arguments.lod_measure.into(),
         samples: arguments.samples.unwrap_or(SAMPLES),
         facing: facing(arguments),

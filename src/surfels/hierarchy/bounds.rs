@@ -1,12 +1,12 @@
 //! What a node shows and holds: its ellipse, its sphere and its cone of normals (Pajarola 2003, sections 3.2 and 3.4).
 
 use std::f64::consts::PI;
-use std::ops::Range;
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::lattice::Lattice;
+use super::Made;
+use super::octree::{Octree, Set};
 use super::sums::{Scales, Sums, normal_of};
 use crate::scene::hierarchy::Node;
 use crate::scene::{Cap, Scene, Surfel};
@@ -14,10 +14,13 @@ use crate::surfels::eigen::Symmetric3;
 use crate::surfels::sizes::shape;
 
 /// Surfels of a node whose bounds are made by all threads.
-const MANY: usize = 1 << 14;
+const MANY: usize = 1 << 16;
 
 /// What half-axes and radii are longer by than was found, as they are rounded to f32.
 const ROUNDED_UP: f64 = 1.0 + 1.0 / (1u64 << 21) as f64;
+
+/// What the angle of a cone is larger by than was found, as cosines near 1 tell it badly.
+const ROUNDED_ANGLE: f64 = 1e-3;
 
 /// What is rounded off a cosine.
 const ROUNDED_OFF: f64 = 1e-7;
@@ -58,8 +61,8 @@ impl Shape {
 /// What bounds surfels so far.
 #[derive(Clone, Copy)]
 struct Bound {
-    /// The largest u² + v² of a corner.
-    squared: f64,
+    /// The largest |(u, v)| of a disk.
+    rim: f64,
     /// The largest distance from the centre.
     radius: f64,
     /// The smallest cosine.
@@ -67,33 +70,89 @@ struct Bound {
 }
 
 impl Bound {
-    const NOTHING: Self = Self { squared: 0.0, radius: 0.0, cosine: 1.0 };
+    const NOTHING: Self = Self { rim: 0.0, radius: 0.0, cosine: 1.0 };
 
     fn both(self, other: Self) -> Self {
         Self {
-            squared: self.squared.max(other.squared),
+            rim: self.rim.max(other.rim),
             radius: self.radius.max(other.radius),
             cosine: self.cosine.min(other.cosine),
         }
     }
+}
 
-    /// That of one surfel.
-    fn of(scene: &Scene, index: usize, (center, normal): (DVec3, DVec3), shape: &Shape) -> Self {
-        let surfel = &scene.surfels[index];
-        let offset = scene.center(index) - center;
+/// The longer half-axis of the ellipse with the half-axes s and t, of whose products these are: the larger singular value of [s t].
+fn longest([ss, st, tt]: [f64; 3]) -> f64 {
+    (0.5 * (ss + tt + (ss - tt).hypot(2.0 * st))).sqrt()
+}
+
+/// The largest distance from 0 of a point of the ellipse around `at` with these half-axes, or hardly more.
+///
+/// It is the maximum of `|a + M w|²` over the unit circle, and by duality the least of `λ + Σ b_i² / (λ - λ_i) + |a|²` over λ > λ_1, where λ_i are the
+/// eigenvalues of `MᵀM`, greatest first, and b is `Mᵀa` along its eigenvectors: each λ gives a bound, and where the derivative is 0 the least.
+fn farthest(at: DVec2, [u, v]: [DVec2; 2]) -> f64 {
+    let (uu, uv, vv) = (u.dot(u), u.dot(v), v.dot(v));
+    let (mean, half) = (0.5 * (uu + vv), (0.5 * (uu - vv)).hypot(uv));
+    let [first, second] = [mean + half, mean - half];
+    let along = 0.5 * (2.0 * uv).atan2(uu - vv);
+    let axis = DVec2::from_angle(along);
+    let b = DVec2::new(u.dot(at), v.dot(at));
+    let b = DVec2::new(b.dot(axis), b.perp_dot(axis));
+    let (b1, b2) = (b.x * b.x, b.y * b.y);
+    // From past the least, so that each step stays there.
+    let least = first + b.x.abs();
+    let mut lambda = first + b.length();
+    for _ in 0..4 {
+        let [p, q] = [lambda - first, lambda - second];
+        let [square, cube] = [b1 / (p * p) + b2 / (q * q), b1 / (p * p * p) + b2 / (q * q * q)];
+        let step = (square.sqrt() - 1.0) * square / cube;
+        lambda = if step.is_finite() { (lambda + step).max(least) } else { lambda };
+    }
+    let part = |b: f64, rest: f64| if b > 0.0 { b / rest } else { 0.0 };
+    let squared = lambda + part(b1, lambda - first) + part(b2, lambda - second) + at.length_squared();
+    // Where roundings leave no distance it is that of a circle around the ellipse.
+    if squared.is_finite() { squared.sqrt() } else { at.length() + first.sqrt() }
+}
+
+/// A node whose bounds are looked for.
+struct Bounding<'a> {
+    scene: &'a Scene,
+    center: DVec3,
+    normal: DVec3,
+    shape: Shape,
+    /// How much longer a vector is in units of the half-axes, at most.
+    scale: f64,
+}
+
+impl Bounding<'_> {
+    /// What bounds one surfel.
+    fn of(&self, index: usize) -> Bound {
+        let surfel = &self.scene.surfels[index];
+        let offset = self.scene.center(index) - self.center;
         let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
         let own = normal_of(surfel);
-        let height = scene.caps.get(index).map_or(0.0, Cap::highest);
-        let [at, s_seen, t_seen] = [offset, s, t].map(|vector| shape.seen(vector));
+        let height = self.scene.caps.get(index).map_or(0.0, Cap::highest);
+        let [at, u, v] = [offset, s, t].map(|vector| self.shape.seen(vector));
         // A cap leans out as far as it is high.
-        let lean = shape.seen(own * height).abs();
-        let corner = |s: DVec2, t: DVec2| ((at + s + t).abs() + lean).length_squared();
-        let corners =
-            [corner(s_seen, t_seen), corner(s_seen, -t_seen), corner(-s_seen, t_seen), corner(-s_seen, -t_seen)];
-        Self {
-            squared: corners.into_iter().fold(0.0, f64::max),
-            radius: offset.length() + s.length_squared().max(t.length_squared()).sqrt() + height,
-            cosine: (own.dot(normal).clamp(-1.0, 1.0).acos() + tilt(scene, index)).min(PI).cos(),
+        let lean = self.shape.seen(own * height).abs();
+        Bound {
+            rim: farthest(at, [u, v]) + lean.length(),
+            radius: offset.length() + longest([s.dot(s), s.dot(t), t.dot(t)]) + height,
+            cosine: (own.dot(self.normal).clamp(-1.0, 1.0).acos() + tilt(self.scene, index)).min(PI).cos(),
+        }
+    }
+
+    /// What bounds all below a node, or more.
+    fn of_node(&self, node: &Node, low: [f32; 3]) -> Bound {
+        let [center, low] = [node.surfel.center, low].map(|part| DVec3::from_array(part.map(f64::from)));
+        let offset = center + low - self.center;
+        let radius = f64::from(node.radius) * ROUNDED_UP;
+        let angle = normal_of(&node.surfel).dot(self.normal).clamp(-1.0, 1.0).acos();
+        let cone = f64::from(node.cone).clamp(-1.0, 1.0).acos() + ROUNDED_ANGLE;
+        Bound {
+            rim: (self.shape.seen(offset).length() + radius * self.scale) * ROUNDED_UP,
+            radius: (offset.length() + radius) * ROUNDED_UP,
+            cosine: (angle + cone).min(PI).cos(),
         }
     }
 }
@@ -107,15 +166,17 @@ fn tilt(scene: &Scene, index: usize) -> f64 {
     ((uu + uv) / length(s)).hypot((uv + vv) / length(t)).atan()
 }
 
-/// The node of the surfels of a range of `scene`, with these sums on their lattice; what its f32 centre leaves out comes second.
-pub(super) fn node(
-    scene: &Scene,
-    range: Range<usize>,
-    sums: &Sums,
-    lattice: &Lattice,
-    scale: &Scales,
-) -> (Node, [f32; 3]) {
+/// What is known of the nodes below one: all of these nodes, and what their f32 centres leave out.
+#[derive(Clone, Copy)]
+pub(super) struct Below<'a> {
+    pub tree: &'a Octree,
+    pub nodes: &'a [Made],
+}
+
+/// The node of a set of `scene`, with these sums on their lattice; what its f32 centre leaves out comes second.
+pub(super) fn node(scene: &Scene, set: &Set, sums: &Sums, below: Below<'_>, scale: &Scales) -> Made {
     let color = sums.color(scale);
+    let range = set.range();
     let (first, count) = (range.start as u32, range.len() as u32);
     let (normal, sided) = sums.normal(scene.oriented);
     let cone = |cosine: f64| if sided { (cosine - ROUNDED_OFF) as f32 } else { -1.0 };
@@ -123,12 +184,14 @@ pub(super) fn node(
         let surfel = scene.surfels[range.start];
         let low = scene.low.get(range.start).copied().unwrap_or_default();
         let height = scene.caps.get(range.start).map_or(0.0, Cap::highest);
-        let radius = ((f64::from(surfel.radius()) + height) * ROUNDED_UP) as f32;
+        let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
+        let radius = ((longest([s.dot(s), s.dot(t), t.dot(t)]) + height) * ROUNDED_UP) as f32;
         return (
             Node { surfel, color, radius, cone: cone(tilt(scene, range.start).cos()), first, count, leaf: true },
             low,
         );
     }
+    let lattice = &below.tree.lattices[set.lattice as usize];
     let mean = lattice.position(sums.moments.mean());
     // As a file in world coordinates has it, so that what is read back is the same.
     let mean = (scene.origin + mean) - scene.origin;
@@ -138,15 +201,54 @@ pub(super) fn node(
     let shape = Shape::of(sums.covariance(lattice, scale), normal);
     // As what is stored has it.
     let stored = shape.s.cross(shape.t).normalize();
-    let bound = |index: usize| Bound::of(scene, index, (center, stored), &shape);
-    let all = if range.len() > MANY {
-        range.into_par_iter().with_min_len(4096).map(bound).reduce(|| Bound::NOTHING, Bound::both)
-    } else {
-        range.map(bound).fold(Bound::NOTHING, Bound::both)
-    };
-    let factor = all.squared.sqrt() * ROUNDED_UP;
+    let longer = shape.seen.map(DVec3::length);
+    let bounding = Bounding { scene, center, normal: stored, shape, scale: longer[0].hypot(longer[1]) };
+    let all = bound(&bounding, set, below, sided);
+    let factor = all.rim * ROUNDED_UP;
     let [s, t] = [shape.s, shape.t].map(|axis| (axis * factor).as_vec3().to_array());
     let surfel = Surfel { center: rounded.to_array(), s, t };
     let radius = (all.radius.max(factor) * ROUNDED_UP) as f32;
     (Node { surfel, color, radius, cone: cone(all.cosine), first, count, leaf: true }, low.to_array())
+}
+
+/// What bounds all surfels of a set: those that could change it are looked at, and what is below a node that could not is passed over. What comes
+/// out is what looking at all would, whatever is passed over.
+fn bound(of: &Bounding<'_>, set: &Set, below: Below<'_>, sided: bool) -> Bound {
+    if set.is_leaf() || set.range().len() <= MANY {
+        return bound_from(of, set, below, sided);
+    }
+    // By all threads, what is below one node each.
+    let children = || (set.first_child..set.first_child + set.children).into_par_iter();
+    let one = |child: u32| bound(of, &below.tree.sets[child as usize], below, sided);
+    children().map(one).reduce(|| Bound::NOTHING, Bound::both)
+}
+
+/// That of a set, by one thread.
+fn bound_from(of: &Bounding<'_>, set: &Set, below: Below<'_>, sided: bool) -> Bound {
+    let mut all = Bound::NOTHING;
+    let mut open: Vec<(Bound, u32)> = Vec::new();
+    let push = |set: &Set, open: &mut Vec<(Bound, u32)>| {
+        let first = open.len();
+        for child in set.first_child..set.first_child + set.children {
+            let (node, low) = &below.nodes[child as usize];
+            open.push((of.of_node(node, *low), child));
+        }
+        // What reaches farthest comes first.
+        open[first..].sort_by(|a, b| a.0.rim.total_cmp(&b.0.rim));
+    };
+    let look = |set: &Set, all: &mut Bound| *all = set.range().map(|index| of.of(index)).fold(*all, Bound::both);
+    if set.is_leaf() {
+        look(set, &mut all);
+    }
+    push(set, &mut open);
+    while let Some((most, child)) = open.pop() {
+        let changes = most.rim > all.rim || most.radius > all.radius || (sided && most.cosine < all.cosine);
+        let set = &below.tree.sets[child as usize];
+        match changes {
+            true if set.is_leaf() => look(set, &mut all),
+            true => push(set, &mut open),
+            false => {}
+        }
+    }
+    all
 }

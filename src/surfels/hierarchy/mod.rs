@@ -18,12 +18,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
+use self::bounds::Below;
 use self::moments::Moments;
 use self::octree::{Element, Octree, Set};
 pub use self::points::points;
 use self::sums::{Scales, Sums};
 use crate::scene::hierarchy::Node;
-use crate::scene::{Colors, Hierarchy, Scene, by_content};
+use crate::scene::{Colors, Hierarchy, Scene, Surfel, by_content};
 use crate::{Error, Progress, Result};
 
 /// The scene with levels of detail, which are told too, and its surfels in the order of the tree.
@@ -78,7 +79,10 @@ type Made = (Node, [f32; 3]);
 /// The nodes of a tree, whose points are in the order of `scene`: from the deepest level up.
 fn nodes(tree: &Octree, scene: &Scene, progress: &dyn Progress) -> Hierarchy {
     let scale = Scales::of(scene);
-    let (mut levels, mut below): (Vec<Vec<Made>>, Vec<Option<Box<Sums>>>) = (Vec::new(), Vec::new());
+    let nothing = Surfel { center: [0.0; 3], s: [0.0; 3], t: [0.0; 3] };
+    let nothing = Node { surfel: nothing, color: [0.0; 4], radius: 0.0, cone: 0.0, first: 0, count: 0, leaf: true };
+    let mut all: Vec<Made> = vec![(nothing, [0.0; 3]); tree.sets.len()];
+    let mut below: Vec<Option<Box<Sums>>> = Vec::new();
     progress.begin("bounding nodes", tree.sets.len() as u64);
     let told = AtomicU64::new(0);
     for level in tree.levels.windows(2).rev() {
@@ -86,8 +90,7 @@ fn nodes(tree: &Octree, scene: &Scene, progress: &dyn Progress) -> Hierarchy {
             .par_iter()
             .map(|set| {
                 let sums = sums_of(tree, set, level[1], &below, scene, &scale);
-                let (mut node, low) =
-                    bounds::node(scene, set.range(), &sums, &tree.lattices[set.lattice as usize], &scale);
+                let (mut node, low) = bounds::node(scene, set, &sums, Below { tree, nodes: &all }, &scale);
                 if !set.is_leaf() {
                     (node.first, node.count, node.leaf) = (set.first_child, set.children, false);
                 }
@@ -98,14 +101,13 @@ fn nodes(tree: &Octree, scene: &Scene, progress: &dyn Progress) -> Hierarchy {
                 ((node, low), (!set.is_leaf()).then(|| Box::new(sums)))
             })
             .collect();
-        let (of_level, own): (Vec<_>, Vec<_>) = made.into_iter().unzip();
-        levels.push(of_level);
+        let (of_level, own): (Vec<Made>, Vec<_>) = made.into_iter().unzip();
+        all[level[0]..level[1]].copy_from_slice(&of_level);
         below = own;
     }
     progress.end();
-    let all = || levels.iter().rev().flatten();
-    let low = if scene.low.is_empty() { Vec::new() } else { all().map(|(_, low)| *low).collect() };
-    Hierarchy { nodes: all().map(|(node, _)| *node).collect(), low }
+    let low = if scene.low.is_empty() { Vec::new() } else { all.iter().map(|(_, low)| *low).collect() };
+    Hierarchy { nodes: all.into_iter().map(|(node, _)| node).collect(), low }
 }
 
 /// The sums of a set: of a leaf those of its points, else those of its children (EQ 4), of which `below` has some from set `first` on. Of

@@ -96,7 +96,7 @@ fn nodes_hold_what_is_below_them() {
             let center = DVec3::from_array(node.surfel.center.map(f64::from));
             let normal = sums::normal_of(&node.surfel);
             let smaller =
-                Surfel { s: node.surfel.s.map(|c| 0.999 * c), t: node.surfel.t.map(|c| 0.999 * c), ..node.surfel };
+                Surfel { s: node.surfel.s.map(|c| 0.99 * c), t: node.surfel.t.map(|c| 0.99 * c), ..node.surfel };
             let mut on_the_rim = false;
             for k in own.clone() {
                 let surfel = &scene.surfels[k];
@@ -111,14 +111,17 @@ fn nodes_hold_what_is_below_them() {
                     assert_eq!(node.surfel, *surfel);
                     continue;
                 }
-                let corners = [s + t, s - t, t - s, -s - t].map(|corner| offset + corner);
-                assert!(corners.iter().all(|corner| holds(&node.surfel, *corner)), "{index}");
-                on_the_rim |= !corners.iter().all(|corner| holds(&smaller, *corner));
+                let mut rim = (0..48).map(|k| f64::from(k) * (std::f64::consts::PI / 24.0));
+                let rim: [DVec3; 48] = std::array::from_fn(|_| {
+                    rim.next().map_or(offset, |angle| offset + s * angle.cos() + t * angle.sin())
+                });
+                assert!(rim.iter().all(|point| holds(&node.surfel, *point)), "{index}");
+                on_the_rim |= !rim.iter().all(|point| holds(&smaller, *point));
             }
             looked += usize::from(own.len() > 1);
             tight += usize::from(on_the_rim);
         }
-        // A corner is on each rim; where caps lean out, it is farther than it need be.
+        // A rim is on each node's; where caps lean out, it is farther than it need be.
         assert!(looked > 1000 && (curved || tight == looked), "{tight} of {looked}");
         assert!(oriented == tree.nodes.iter().any(|node| node.cone > -1.0));
     }

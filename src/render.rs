@@ -16,14 +16,16 @@ pub mod sums;
 mod targets;
 
 use std::borrow::Borrow;
+use std::time::Instant;
 
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::{Gpu, Sources};
+use crate::passes::select::{self, Wanted};
 use crate::passes::source::Source;
-use crate::plan::{Optimisation, RenderOptions, check};
+use crate::plan::{Optimisation, RenderOptions, check, culls_back};
 use crate::progress::Progress;
-use crate::scene::Camera;
+use crate::scene::{Camera, Detail};
 use kept::Kept;
 pub use report::{DeviceBytes, Report, Tail};
 
@@ -73,6 +75,8 @@ pub struct Renderer<S, B> {
     kept: Kept,
     /// Those of maps that are made in another way.
     of_maps: Vec<Kept>,
+    /// What was asked for: of a number of splats each view has a size of its own.
+    detail: Detail,
 }
 
 impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
@@ -89,7 +93,8 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         let mut parts = parts::parts(&facts, options).into_iter();
         let colors = parts.next().unwrap_or_else(|| options.clone());
         let of_maps = parts.map(|options| Kept::new(facts.clone(), options)).collect();
-        Ok(Self { source, backend, kept: Kept::new(facts, colors), of_maps })
+        let detail = colors.detail;
+        Ok(Self { source, backend, kept: Kept::new(facts, colors), of_maps, detail })
     }
 
     /// One frame.
@@ -97,7 +102,11 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
     /// # Errors
     /// A limit of the adapter, and whatever a device may report.
     pub fn frame(&mut self, camera: &Camera, progress: &dyn Progress) -> Result<(Frame, Report)> {
-        let Self { source, backend, kept, of_maps } = self;
+        let start = Instant::now();
+        let detail = self.sized(camera);
+        let spent = start.elapsed().as_secs_f64() * 1e3;
+        let Self { source, backend, kept, of_maps, .. } = self;
+        of_maps.iter_mut().chain([&mut *kept]).for_each(|part| part.options.detail = detail);
         let one = |kept: &mut Kept| one(&*source, (*backend).borrow(), kept, camera, progress);
         let mut maps = Vec::new();
         for part in of_maps {
@@ -108,10 +117,22 @@ impl<S: Source, B: Borrow<Backend>> Renderer<S, B> {
         }
         let (mut frame, mut report) = parts::joined(one(kept)?, maps);
         report.tail = Tail::of(&frame);
+        if matches!(self.detail, Detail::Splats(_)) {
+            *report.passes.entry("select_ms".to_owned()).or_default() += spent;
+            report.total_ms += spent;
+        }
         if kept.facts.encoded {
             encoded::decode(&mut frame);
         }
         Ok((frame, report))
+    }
+
+    /// The size of nodes in the view of `camera`, by the colour's part: all parts have the same.
+    fn sized(&self, camera: &Camera) -> Detail {
+        let (facts, options) = (&self.kept.facts, RenderOptions { detail: self.detail, ..self.kept.options.clone() });
+        let wanted = Wanted::of(&options, culls_back(facts, camera, &options));
+        let tree = self.source.levels();
+        tree.map_or(self.detail, |tree| select::sized(tree, facts.origin, camera, &wanted))
     }
 
     /// Device memory that the last frame was rendered with; none for the reference.

@@ -73,11 +73,6 @@ fn frame(source: &dyn Source, camera: &Camera, options: &RenderOptions, backend:
     render(source, camera, options, backend, &()).unwrap().0
 }
 
-fn broken(file: &str, from: &str, to: &str) -> Backend {
-    let sources = Sources::default().replace(file, from, to).unwrap();
-    Backend::Gpu { gpu: Box::new(common::gpu().unwrap()), sources }
-}
-
 /// One whose buffers hold 1,900 surfels and nodes, so that a tree has several branches.
 fn small() -> Gpu {
     common::gpu().unwrap().with_buffer_limit(70_000)
@@ -272,14 +267,66 @@ fn crowded_leaves_are_drawn_whole() {
     }
 }
 
+/// Views through which the camera's plane goes, in samples, far from the origin and of a number of splats: the twin's cut.
+#[test]
+fn odd_views_have_the_cut_of_the_twin() {
+    let Some(gpu) = common::gpu() else { return };
+    let backend = Backend::gpu(gpu);
+    let plain = sphere(6000, 1.7);
+    let mut far = plain.clone();
+    far.low = vec![[0.0; 3]; 6000];
+    // Two spheres, of which the one that is looked at is so far off that f32 has no room for its digits.
+    for (index, surfel) in far.surfels.iter_mut().enumerate().skip(3000) {
+        let x = f64::from(surfel.center[0]) + 3e7;
+        surfel.center[0] = x as f32;
+        far.low[index][0] = (x - f64::from(surfel.center[0])) as f32;
+    }
+    let scenes = [levels(plain), levels(far)];
+    let look = |eye: [f64; 3], target: [f64; 3], lens| {
+        Camera::look_at((120, 80), lens, eye.into(), target.into(), None, Up::Y, 1e-3).unwrap()
+    };
+    let within = look([0.3, 0.1, 0.2], [0.9, 0.0, 0.0], Lens::Fov(30.0));
+    let beside = look([1.2, 0.7, 2.4], [0.6, 0.3, 0.0], Lens::Fov(20.0));
+    let there = look([3e7 + 1.2, 0.7, 2.4], [3e7, 0.0, -0.5], Lens::Fov(50.0));
+    let flat = look([0.4, 0.1, 0.3], [0.9, 0.0, 0.1], Lens::OrthographicHeight(0.5));
+    let samples = Samples { across: 2, down: 4 };
+    for (scene, camera, most) in [(0, &within, 600), (0, &beside, 3000), (1, &there, 3500), (0, &flat, 600)] {
+        let scene = &scenes[scene];
+        for cull in [Cull::None, Cull::Back] {
+            for detail in [Detail::Pixels(1e-6), Detail::Pixels(500.0), Detail::Splats(200)] {
+                let options = RenderOptions { detail, cull, samples, maps: Maps::NONE, ..at(0.0) };
+                let (shown, report) = render(scene, camera, &options, &backend, &()).unwrap();
+                let (reference, of_twin) = render(scene, camera, &options, &Backend::Reference, &()).unwrap();
+                assert_eq!(report.cut, of_twin.cut, "{camera:?} {options:?}");
+                let drawn = report.cut.unwrap();
+                // From within a sphere nothing faces the eye.
+                let least = if cull == Cull::None { 50 } else { 0 };
+                assert!(drawn < most, "{drawn} {options:?}");
+                assert!(detail != Detail::Splats(200) || (least..=200).contains(&drawn), "{drawn} {options:?}");
+                assert!(differ(&shown, &reference) < 3, "{camera:?} {options:?}");
+                // What is left out does not show.
+                let whole = RenderOptions { detail: Detail::FINEST, ..options.clone() };
+                let all = frame(scene, camera, &whole, &backend);
+                assert!(detail != Detail::Pixels(1e-6) || differ(&shown, &all) == 0, "{camera:?} {cull:?}");
+            }
+        }
+    }
+}
+
 /// A kernel that makes a cut wrongly is noticed, whatever it does wrong.
 #[test]
 fn broken_kernels_are_noticed() {
     let Some(gpu) = common::gpu() else { return };
     let scene = levels(sphere(6000, 1.7));
-    let camera = sphere_camera(100, Projection::Pinhole);
-    let options = RenderOptions { cull: Cull::Back, ..at(250.0) };
-    let expected = bits(&frame(&scene, &camera, &options, &Backend::gpu(gpu)));
+    let camera = sphere_camera(50, Projection::Pinhole);
+    // Of which the first is culled by batches, and the second has several branches and pages.
+    let ways = [RenderOptions { cull: Cull::None, ..at(60.0) }, RenderOptions { cull: Cull::Back, ..at(60.0) }];
+    let whole = [Backend::gpu(gpu), Backend::gpu(small())];
+    let right = [0, 1].map(|way| {
+        let (shown, report) = render(&scene, &camera, &ways[way], &whole[way], &()).unwrap();
+        assert!(way > 0 || report.needs.contains(&"cull"));
+        bits(&shown)
+    });
     for (file, from, to) in [
         (
             "select.wgsl",
@@ -289,6 +336,7 @@ fn broken_kernels_are_noticed() {
         ("select.wgsl", "if (away.x > away.y) {", "if (away.x > away.y - 0.5) {"),
         ("select.wgsl", "return before;", "return before + counts;"),
         ("select.wgsl", "vec2<u32>(here, end);", "vec2<u32>(0u, end);"),
+        ("select.wgsl", "reached[node.first] = 1u;", "reached[node.first] = 0u;"),
         (
             "select.wgsl",
             "page.first + dealt(index, page.back) < selected[CUT]",
@@ -299,9 +347,16 @@ fn broken_kernels_are_noticed() {
             "let stop = clamp(page.first + arrayLength(&gathered_surfels), first, end);",
             "let stop = end - 1u;",
         ),
+        ("select.wgsl", "let to = dealt(selected[CUT_BEFORE] + place - page.first, page.stride);", "let to = place;"),
+        ("select_balls.wgsl", "* (1.0 + BALL_SLACK);", "* 0.1;"),
         ("gather.wgsl", "tree_attributes[from_ * ATTRIBUTE_WORDS + word]", "tree_attributes[word]"),
     ] {
-        let shown = frame(&scene, &camera, &options, &broken(file, from, to));
-        assert!(bits(&shown) != expected, "{file}: {to}");
+        let sources = Sources::default().replace(file, from, to).unwrap();
+        let noticed =
+            [common::gpu().unwrap(), small()].into_iter().zip(&ways).zip(&right).any(|((gpu, way), right)| {
+                let backend = Backend::Gpu { gpu: Box::new(gpu), sources: sources.clone() };
+                render(&scene, &camera, way, &backend, &()).is_ok_and(|(shown, _)| bits(&shown) != *right)
+            });
+        assert!(noticed, "{file}: {to}");
     }
 }

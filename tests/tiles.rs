@@ -118,7 +118,7 @@ fn bands_and_pages_of_tiles_do_not_show() {
     let tiles = RenderOptions { organisation: Organisation::Tile, ..options.clone() };
     assert!(hidden(&tiles, 70_000), "tiles gather in every band");
     // Of a band that leaves out what shows in its first rows something is missing.
-    let above = large_from(30).replace("ball.wgsl", "vec2<f32>(0.0, top));", "vec2<f32>(0.0, top + 40.0));").unwrap();
+    let above = large_from(30).replace("cull.wgsl", "vec2<f32>(0.0, top));", "vec2<f32>(0.0, top + 40.0));").unwrap();
     let (cut, _) = frame(&scene, &camera, &options, &in_pieces(70_000, above));
     assert!(bits(&cut) != bits(&one.0), "{name}: a band's first rows do not show");
 }

@@ -11,6 +11,12 @@ fn axis_image(center: vec3<f32>, axis: vec3<f32>) -> vec2<f32> {
     return axis.xy * held.intrinsics.xy;
 }
 
+fn is_beside(center: vec3<f32>, radius: f32, margin: f32) -> bool {
+    let extent = ball_extent(center, radius, 0.0);
+    let size = vec2<f32>(f32(held.width), f32(held.height));
+    return any(extent.zw < vec2<f32>(-margin)) || any(extent.xy > size + margin);
+}
+
 fn ball_sine(radius: f32, distance: f32) -> f32 {
     return 0.0;
 }

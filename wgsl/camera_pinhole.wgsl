@@ -1,6 +1,6 @@
 // The pinhole camera x = fx X/Z + cx: homography and bounds of a disk, and the evaluation at a pixel.
 // Twin: src/passes/homography.rs and src/passes/footprint.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x37360ee7424755df
+// All loops end, by 1 of src/gpu/loops.rs: 0xee17ce54e305f138
 
 fn image_of(position: Double, depth: Double, axis: u32) -> Double {
     let focal = Double(held.intrinsics[axis], held.intrinsics_low[axis]);
@@ -59,6 +59,18 @@ fn clipped_extent(
 // The image of a half-axis at a centre, camera space: how far its end is seen from there, as if it were short.
 fn axis_image(center: vec3<f32>, axis: vec3<f32>) -> vec2<f32> {
     return (axis.xy - center.xy / center.z * axis.z) / center.z * held.intrinsics.xy;
+}
+
+// Whether a ball lies beside the image, by more than a margin of pixels: on the far side of a plane through the eye and an edge, so that this is told
+// of one that reaches the eye's plane too.
+fn is_beside(center: vec3<f32>, radius: f32, margin: f32) -> bool {
+    let before = held.intrinsics.zw + margin;
+    let after = vec2<f32>(f32(held.width), f32(held.height)) + margin - held.intrinsics.zw;
+    let along = held.intrinsics.xy * center.xy;
+    let focal_2 = held.intrinsics.xy * held.intrinsics.xy;
+    let first = along + before * center.z < -radius * sqrt(focal_2 + before * before);
+    let last = along - after * center.z > radius * sqrt(focal_2 + after * after);
+    return any(first) || any(last);
 }
 
 // The sine of half the angle that a ball at this distance is seen at.

@@ -3,7 +3,7 @@
 // its fragments could be nearest or within epsilon of the nearest, so no image depends on it. The splats of the others are
 // stored one batch after the other, in slots: those that are left out take no room.
 // Host side and twin: src/passes/cull.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xd28b2a8576e4883c
+// All loops end, by 1 of src/gpu/loops.rs: 0x4a70849808b8e6ae
 
 // A batch's bounding ball: centre and radius, world units relative to the scene's origin.
 @group(0) @binding(23) var<storage, read> balls: array<vec4<f32>>;
@@ -54,12 +54,24 @@ fn surfel_in(record: SplatRecord, slot: u32) -> u32 {
 }
 
 fn ball_of_batch(batch: u32) -> Ball {
-    return ball_of(balls[batch]);
+    let sphere = balls[batch];
+    let relative = sphere.xyz * held.unit - held.eye.xyz;
+    // Ten roundings of f32 in these lengths.
+    return ball_at(relative, sphere.w * held.unit + 1e-6 * (length(relative) + length(held.eye.xyz)));
 }
 
 // The batch's pixels, as far as they lie in the band; empty if a first lies past a last.
 fn pixels_of(ball: Ball) -> Rectangle {
-    return pixels_of_ball(ball, f32(held_band.first_row), f32(held_band.rows));
+    let top = f32(held_band.first_row);
+    let extent = ball_extent(ball.center, ball.radius, ball.nearest);
+    // A pixel more on each side, as splats' own bounds have a margin, and one for rounding.
+    let margin = FILTER_REACH + 2.0 + 1e-5 * (abs(extent.xy) + abs(extent.zw));
+    let first = max(extent.xy - margin, vec2<f32>(0.0, top));
+    let last = min(extent.zw + margin, vec2<f32>(f32(held.width), top + f32(held_band.rows)) - 1.0);
+    if (!all(first <= last)) {
+        return Rectangle(vec2<u32>(1u), vec2<u32>(0u));
+    }
+    return Rectangle(vec2<u32>(first), vec2<u32>(last));
 }
 
 fn list(batch: u32) {

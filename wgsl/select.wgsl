@@ -3,7 +3,7 @@
 // are judged, what they leave is counted by workgroups, and from these counts follows where each puts what it leaves. So the order of the cut, too,
 // depends on tree and camera alone. Then what was chosen is copied to where pages of surfels are drawn from.
 // Host side and twin: src/passes/select.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x27545cc0f74b2096
+// All loops end, by 1 of src/gpu/loops.rs: 0x8f381480200150e4
 
 @group(0) @binding(72) var<uniform> branch: Branch;
 @group(0) @binding(73) var<storage, read> tree_nodes: array<TreeNode>;
@@ -61,7 +61,8 @@ override MEASURES_EXTENT: bool;
 
 const PI: f32 = 3.14159265;
 
-// Room for the rounding of sines.
+// Room for the rounding of a ball's place and size, of its distance; and of sines.
+const BALL_ROUNDING: f32 = 1e-6;
 const SINE_SLACK: f32 = 1e-5;
 
 var<workgroup> counted: array<vec2<u32>, WORKGROUP>;
@@ -104,12 +105,11 @@ fn vector(parts: array<f32, 3>) -> vec3<f32> {
 }
 
 // The sine by which its plane faces away from the eye, and that past which all below it does.
-fn turned_away(node: TreeNode, surfel: Surfel) -> vec2<f32> {
-    let relative = vector(surfel.center) * held.unit - held.eye.xyz;
+fn turned_away(node: TreeNode, surfel: Surfel, relative: vec3<f32>, radius: f32) -> vec2<f32> {
     let normal = cross(vector(surfel.s) * held.unit, vector(surfel.t) * held.unit);
     let turned = dot(ray_to(relative), normal * inverseSqrt(max(dot(normal, normal), 1e-38)));
     // Of the cone's angle and the ball's together, if they are less than a right angle; else nothing is told.
-    let ball = ball_sine(node.radius * held.unit, length(relative));
+    let ball = ball_sine(radius, length(relative));
     let cone = sqrt(max(1.0 - node.cone * node.cone, 0.0));
     let ball_cosine = sqrt(max(1.0 - ball * ball, 0.0));
     let narrow = node.cone * ball_cosine - cone * ball > SINE_SLACK;
@@ -123,27 +123,29 @@ fn size_of(center: vec3<f32>, surfel: Surfel) -> f32 {
     return PI * select(abs(s.x * t.y - s.y * t.x), max(dot(s, s), dot(t, t)), MEASURES_EXTENT);
 }
 
-fn fate_of(node: TreeNode, surfel: Surfel) -> u32 {
+// What becomes of a node, what whose surfel's centre leaves out is `low`.
+fn fate_of(node: TreeNode, surfel: Surfel, low: vec3<f32>) -> u32 {
     // In its own branch it is judged.
     if (kind_of(node) == OTHER_BRANCH) {
         return DIVIDED;
     }
-    let ball = ball_of(vec4<f32>(vector(surfel.center), node.radius));
-    let near = reaches_near(ball);
-    let pixels = pixels_of_ball(ball, 0.0, f32(held.height));
-    if (ball.farthest < held.near || (!near && any(pixels.first > pixels.last))) {
+    // Leading parts cancel, and what is left is as exact as the trailing ones.
+    let relative = (vector(surfel.center) * held.unit - held.eye.xyz) + (low * held.unit - held.eye_low.xyz);
+    // Ten roundings of f32 in this length.
+    let ball = ball_at(relative, node.radius * held.unit + BALL_ROUNDING * length(relative));
+    if (ball.farthest < held.near || is_beside(ball.center, ball.radius, FILTER_REACH + 2.0)) {
         return UNSEEN;
     }
     var faces = true;
     if (CULL_BACK) {
-        let away = turned_away(node, surfel);
+        let away = turned_away(node, surfel, relative, ball.radius);
         if (away.x > away.y) {
             return UNSEEN;
         }
         // The plane of one that faces away is left out, whatever is below it.
         faces = away.x <= 0.0;
     }
-    return select(DIVIDED, DRAWN, !near && faces && size_of(ball.center, surfel) < held.levels.x);
+    return select(DIVIDED, DRAWN, !reaches_near(ball) && faces && size_of(ball.center, surfel) < held.levels.x);
 }
 
 // How many surfels of the cut a node leaves, and how many children for the next level.
@@ -213,7 +215,8 @@ fn select_judge(
     if (place < selected[NEXT_END]) {
         let index = frontier[place];
         let node = tree_nodes[index];
-        let fate = fate_of(node, tree_surfels[branch.surfels + index]);
+        let record = branch.surfels + index;
+        let fate = fate_of(node, tree_surfels[record], low_part(record));
         fates[place] = fate;
         counts = left_by(node, fate);
     }

@@ -207,7 +207,8 @@ pub struct Arguments {
     /// the image, 0.01%; 0 draws all surfels. `epsplat lod` keeps the levels in a file, else they are made first
     #[arg(long, value_name = "SIZE", group = "cut")]
     lod: Option<Detail>,
-    /// Draw a cut of no more surfels and nodes than this: of all such cuts the finest
+    /// Draw a cut of no more surfels and nodes than this, and hardly fewer: --lod by a size that is found for each view. What reaches the
+    /// camera's plane is always drawn by its surfels
     #[arg(long, value_name = "N", group = "cut")]
     splats: Option<NonZeroU64>,
     /// How nodes are measured: extent, as disks as long as their images, or area, of their images, as in Pajarola 2003

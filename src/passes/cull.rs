@@ -54,7 +54,7 @@ pub fn filter_reach(design: &Design) -> f64 {
     }
 }
 
-/// The twin of `ball_extent` and `pixels_of_ball`: the first and last points of the image that disks in the ball at `center`
+/// The twin of `ball_extent` and `pixels_of`: the first and last points of the image that disks in the ball at `center`
 /// (camera space) can touch, world units and pixels; `None` for a ball that reaches the near depth.
 pub fn reference(center: DVec3, radius: f64, camera: &Camera, filter_reach: f64) -> Option<[DVec2; 2]> {
     let focal = DVec2::new(camera.fx, camera.fy);

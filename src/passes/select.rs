@@ -9,7 +9,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::cull;
 use super::lowpass::Design;
@@ -25,9 +25,10 @@ pub const PASS: Pass = Pass {
     name: "select",
     files: |needs| {
         let gather = if SurfelLayout::of(needs).words > 0 { "gather.wgsl" } else { "gather_absent.wgsl" };
+        let low = if needs.doubled { "low_part.wgsl" } else { "low_part_absent.wgsl" };
         match (needs.levels, needs.cull) {
-            (true, true) => vec!["select.wgsl", gather, "select_balls.wgsl"],
-            (true, false) => vec!["select.wgsl", gather],
+            (true, true) => vec!["select.wgsl", gather, low, "select_balls.wgsl"],
+            (true, false) => vec!["select.wgsl", gather, low],
             (false, _) => vec!["select_absent.wgsl"],
         }
     },
@@ -90,22 +91,24 @@ pub struct Wanted {
     pub measure: DetailMeasure,
     /// Surfels that face away are left out.
     pub backs_out: bool,
-    /// How far a low-pass may reach past a surfel, pixels ([`cull::filter_reach`]).
-    pub filter_reach: f64,
+    /// How far beside the image a node may be seen and not be left out, pixels: as far as a low-pass reaches ([`cull::filter_reach`]), and two samples.
+    pub margin: DVec2,
 }
 
 impl Wanted {
     /// That of a picture with `options`, of which backs are left out or not.
     pub fn of(options: &RenderOptions, backs_out: bool) -> Self {
-        let filter_reach = cull::filter_reach(&Design::of(options));
-        Self { detail: options.detail, measure: options.detail_measure, backs_out, filter_reach }
+        let samples = DVec2::new(options.samples.across.into(), options.samples.down.into());
+        let margin = (cull::filter_reach(&Design::of(options)) + 2.0) / samples;
+        Self { detail: options.detail, measure: options.detail_measure, backs_out, margin }
     }
 }
 
 /// The size for a number of splats as square pixels in the view of the image's `camera`; every other one as it is.
 ///
-/// The fewer square pixels, the more is drawn, so that halving an interval finds the least size with which no more are drawn than asked for. Where even
-/// the largest nodes are more, as those are that reach the near depth, these are drawn.
+/// The fewer square pixels, the more is drawn but for few nodes at the image's edges of which less is in view than they stand for, so that going down by
+/// powers of two and then halving an interval finds a size with which no more are drawn than asked for, and hardly fewer. What reaches the near
+/// depth is divided at any size, and may be more.
 pub fn sized(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: &Wanted) -> Detail {
     let Detail::Splats(splats) = wanted.detail else { return wanted.detail };
     let fits = |size: f64| {
@@ -136,6 +139,9 @@ const STEPS: u32 = 20;
 /// By how much a device may err in the size of a node.
 const SIZE_SLACK: f64 = 1.0 + 1e-5;
 
+/// By how much a device may err in a ball's place and size, of its distance.
+const BALL_ROUNDING: f64 = 1e-6;
+
 /// By how much a device may err in a sine.
 const SINE_SLACK: f64 = 1e-5;
 
@@ -146,51 +152,52 @@ pub fn reference(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: 
 
 /// The same, or None if it has more than `most` surfels and nodes.
 fn bounded(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: &Wanted, most: u64) -> Option<Cut> {
-    let Wanted { detail, measure, backs_out, filter_reach } = *wanted;
+    let Wanted { detail, measure, backs_out, margin } = *wanted;
     let eye = camera.eye - origin;
     let size = detail.pixels(camera.pixels() as f64);
     let fate = |index: u32| {
         let node = &hierarchy.nodes[index as usize];
         let low = hierarchy.low.get(index as usize).map_or(DVec3::ZERO, |low| DVec3::from_array(low.map(f64::from)));
         let center = DVec3::from_array(node.surfel.center.map(f64::from)) + low - eye;
-        let [turned, spread] = if backs_out { turned_away(node, center, camera) } else { [-1.0, 0.0] };
-        if is_unseen(node, center, camera, filter_reach) || turned > spread + SINE_SLACK {
+        let radius = f64::from(node.radius) + BALL_ROUNDING * center.length();
+        let at = camera.rotation * center;
+        let [turned, spread] = if backs_out { turned_away(node, (center, radius), camera) } else { [-1.0, 0.0] };
+        if at.z + radius < camera.near || is_beside(at, radius, camera, margin) || turned > spread + SINE_SLACK {
             return Fate::Unseen;
         }
-        let seen =
-            if reaches_eye(node, center, camera) { f64::INFINITY } else { measure.of(&node.surfel, center, camera) };
+        // The place of what reaches the near depth in the image says nothing.
+        let near = at.z - radius <= camera.near;
+        let seen = if near { f64::INFINITY } else { measure.of(&node.surfel, center, camera) };
         // The plane of one that faces away is left out, whatever is below it.
         if seen < size && turned <= 0.0 { Fate::Drawn } else { Fate::Divided }
     };
     Cut::of(hierarchy, most, fate)
 }
 
-/// Whether the ball around all below a node reaches the near depth, so that its place in the image says nothing.
-fn reaches_eye(node: &Node, center: DVec3, camera: &Camera) -> bool {
-    (camera.rotation * center).z - f64::from(node.radius) <= camera.near
-}
-
-/// Whether nothing below a node is in view: the ball around it is before the near depth or beside the image, farther than a low-pass
-/// reaches.
-fn is_unseen(node: &Node, center: DVec3, camera: &Camera, filter_reach: f64) -> bool {
-    let at = camera.rotation * center;
-    if at.z + f64::from(node.radius) < camera.near {
-        return true;
-    }
-    let image = cull::reference(at, node.radius.into(), camera, filter_reach);
-    image.is_some_and(|[low, high]| {
-        let last = [camera.width, camera.height].map(|side| f64::from(side) - 1.0);
-        high.x < 0.0 || high.y < 0.0 || low.x > last[0] || low.y > last[1]
-    })
+/// Whether a ball around a place in camera space lies beside the image, farther than a margin of pixels: on the far side of a plane through the eye and
+/// an edge of the image, so that this is told of one that reaches the eye's plane too.
+fn is_beside(at: DVec3, radius: f64, camera: &Camera, margin: DVec2) -> bool {
+    let (focal, principal) = (DVec2::new(camera.fx, camera.fy), DVec2::new(camera.cx, camera.cy));
+    let size = DVec2::new(camera.width.into(), camera.height.into());
+    let (before, after) = (principal + margin, size + margin - principal);
+    let along = focal * at.truncate();
+    let out = match camera.projection {
+        Projection::Pinhole => {
+            let reach = |edge: DVec2| (focal * focal + edge * edge).map(f64::sqrt) * radius;
+            (along + before * at.z).cmplt(-reach(before)) | (along - after * at.z).cmpgt(reach(after))
+        }
+        Projection::Orthographic => (along + before).cmplt(-focal * radius) | (along - after).cmpgt(focal * radius),
+    };
+    out.any()
 }
 
 /// The sine by which a node's normal points away from the eye, and that past which all below it does, whatever point of the ball around it is looked
 /// at (specification S12): that of its cone and the ball's half-angle together, if they are less than a right angle; else 1.
-fn turned_away(node: &Node, center: DVec3, camera: &Camera) -> [f64; 2] {
+fn turned_away(node: &Node, (center, radius): (DVec3, f64), camera: &Camera) -> [f64; 2] {
     let (toward, ball) = match camera.projection {
         Projection::Pinhole => {
             let distance = center.length();
-            (-center / distance, (f64::from(node.radius) / distance).min(1.0).asin())
+            (-center / distance, (radius / distance).min(1.0).asin())
         }
         Projection::Orthographic => (-camera.rotation.row(2), 0.0),
     };

@@ -74,7 +74,8 @@ pub fn upload(
 fn branches(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds, progress: &dyn Progress) -> Result<Vec<BranchBuffers>> {
     let words = SurfelLayout::of(needs).words as usize;
     let most = gpu.adapter.page_len(size_of::<Surfel>().max(4 * words));
-    let tree = source.levels().map(|tree| branches::branches(tree, most)).unwrap_or_default();
+    let tree = source.levels().ok_or_else(|| gpu.error("a scene has no levels of detail"))?;
+    let tree = branches::branches(tree, most);
     let of = |branch: Branch| {
         let page = source.branch(needs, &branch).ok_or_else(|| gpu.error("a scene has no levels of detail"))?;
         let Branch { surfels, nodes, roots, first_root, whole, levels, .. } = branch;

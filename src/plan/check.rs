@@ -83,11 +83,13 @@ pub fn options(options: &RenderOptions, reference: bool) -> Result<()> {
 fn levels(options: &RenderOptions) -> Result<()> {
     match options {
         _ if options.facing.is_some() => {
-            usage("points that face the camera have a size each and no levels of detail: leave --lod out")
+            usage("points that face the camera have a size each and no levels of detail: leave --lod and --splats out")
         }
-        _ if options.separate => usage("levels of detail are of all inputs together: leave --separate or --lod out"),
+        _ if options.separate => {
+            usage("levels of detail are of all inputs together: leave --separate out, or --lod and --splats")
+        }
         _ if options.maps.has(Map::Index) => {
-            usage("the map index names points, and nodes are none: leave one of the map and --lod out")
+            usage("the map index names points, and nodes are none: leave the map out, or --lod and --splats")
         }
         _ => Ok(()),
     }
@@ -267,7 +269,9 @@ pub fn scene(facts: &Facts, options: &RenderOptions, reference: bool) -> Result<
         );
     }
     if !options.detail.is_finest() && facts.levels.is_none() {
-        return usage("the scene has no levels of detail to take: leave --lod out, or make some with epsplat lod");
+        return usage(
+            "the scene has no levels of detail to take: leave --lod and --splats out, or make some with epsplat lod",
+        );
     }
     // A scene may say how it is composited, so that this is asked where both are known.
     let told_apart = options.composite != Composite::Opaque && !options.composite.is_order_free();

@@ -12,12 +12,11 @@ use crate::error::Result;
 use crate::frame::Frame;
 use crate::gpu::layout::View;
 use crate::gpu::{Gpu, Sources};
-use crate::passes::select::{self, Wanted};
 use crate::passes::source::Source;
 use crate::passes::upload::upload;
 use crate::passes::{asks_for_order, finish, tiles};
 use crate::plan::known::MOST_TRIES;
-use crate::plan::{Facts, Known, Optimisation, Organisation, Plan, RenderOptions, culls_back, tuning};
+use crate::plan::{Facts, Known, Optimisation, Organisation, Plan, RenderOptions, tuning};
 use crate::progress::Progress;
 use crate::scene::Camera;
 
@@ -54,13 +53,12 @@ impl Kept {
     ) -> Result<(Frame, Report)> {
         let (image, camera) = (camera, &camera.sampled(self.options.samples)?);
         self.look_at(gpu, camera);
-        let options = &self.sized(source, image);
         let mut total_ms = 0.0;
         let mut number = 0;
         while number < MOST_TRIES + self.known.times_cut {
             let first = number == 0;
             number += 1;
-            let plan = Plan::of(&self.facts, &gpu.adapter, camera, options, &self.known)?;
+            let plan = Plan::of(&self.facts, &gpu.adapter, camera, &self.options, &self.known)?;
             // A second try adds nothing to the bar.
             let progress = if first { bar } else { &() };
             self.prepare((gpu, sources), source, &plan, progress)?;
@@ -69,7 +67,7 @@ impl Kept {
                 progress.begin("rendering rows", camera.height.into());
             }
             let start = Instant::now();
-            store.set_view(gpu, &View::new(&self.facts, camera, options));
+            store.set_view(gpu, &View::new(&self.facts, camera, &self.options));
             let mut run = Run::new(gpu, &plan, kernels, store, &mut self.known);
             let mut frame = Frame::new(image, self.options.maps);
             let all = run.steps(&sequence::steps(&plan), &mut frame, progress)?;
@@ -90,17 +88,6 @@ impl Kept {
         }
         bar.end();
         Err(Run::never_fits(gpu))
-    }
-
-    /// The options of a frame by the image's `camera`: a number of splats is a size of nodes.
-    fn sized(&self, source: &dyn Source, camera: &Camera) -> RenderOptions {
-        let backs_out = culls_back(&self.facts, camera, &self.options);
-        let wanted = Wanted::of(&self.options, backs_out);
-        let detail = source
-            .levels()
-            .map(|tree| select::sized(tree, self.facts.origin, camera, &wanted))
-            .unwrap_or(wanted.detail);
-        RenderOptions { detail, ..self.options.clone() }
     }
 
     /// Forgets what held for another size of image, and looks at how large splats are.

@@ -90,9 +90,7 @@ pub(super) fn cut(
     facts.nodes_of(options)?;
     let tree = scene.hierarchy.as_deref()?;
     let backs_out = culls_back(facts, camera, options);
-    let wanted = Wanted::of(options, backs_out);
-    let wanted = Wanted { detail: select::sized(tree, scene.origin, camera, &wanted), ..wanted };
-    let cut = select::reference(tree, scene.origin, camera, &wanted);
+    let cut = select::reference(tree, scene.origin, camera, &Wanted::of(options, backs_out));
     let cull = if backs_out { Cull::Back } else { Cull::None };
     Some((cut.scene(scene, tree), RenderOptions { cull, ..options.clone() }))
 }

@@ -313,7 +313,7 @@ impl Store {
         }
         if let Some(room) = plan.cut.filter(|room| *room != self.room) {
             // The old ones make room first.
-            self.pages.clear();
+            (self.pages, self.room) = (Vec::new(), 0);
             let most = page_surfels(&gpu.adapter, &plan.needs);
             for first in (0..room).step_by(most as usize) {
                 self.pages.push(Page::of_cut(gpu, most.min(room - first), first as u32, &plan.needs)?);

@@ -41,14 +41,17 @@ impl Detail {
 impl FromStr for Detail {
     type Err = Error;
 
-    /// `0`, `16px` or `0.01%`.
+    /// `0`, `16px`, `0.01%` or `100000splats`.
     fn from_str(text: &str) -> Result<Self, Error> {
         let wrong = || {
             Error::Usage(format!(
-                "'{text}' is no size of the smallest nodes: a number of square pixels, 16px, a part of the image, 0.01%, or 0"
+                "'{text}' is no size of the smallest nodes: a number of square pixels, 16px, a part of the image, 0.01%, a number of splats, 100000splats, or 0"
             ))
         };
         let number = |text: &str| text.parse().ok().filter(|number: &f64| number.is_finite() && *number >= 0.0);
+        if let Some(count) = text.strip_suffix("splats") {
+            return count.parse().ok().filter(|count| *count > 0).map(Self::Splats).ok_or_else(wrong);
+        }
         let detail = match (text.strip_suffix("px"), text.strip_suffix('%')) {
             (Some(pixels), _) => number(pixels).map(Self::Pixels),
             (_, Some(percent)) => number(percent).map(|percent| Self::Share(percent / 100.0)),
@@ -118,6 +121,7 @@ mod tests {
     fn sizes_are_read() {
         assert_eq!("16px".parse::<Detail>().unwrap(), Detail::Pixels(16.0));
         assert_eq!("0.01%".parse::<Detail>().unwrap(), Detail::Share(1e-4));
+        assert_eq!("70splats".parse::<Detail>().unwrap(), Detail::Splats(70));
         assert_eq!("0".parse::<Detail>().unwrap(), Detail::FINEST);
         assert_eq!("area".parse::<DetailMeasure>().unwrap(), DetailMeasure::Area);
         assert!("length".parse::<DetailMeasure>().is_err());

@@ -11,7 +11,7 @@ pub const DEEPEST: usize = 63;
 /// A node of a [`Hierarchy`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Node {
-    /// The ellipse that stands for its surfels: it bounds the corners `p ± s ± t` of theirs, seen along its normal.
+    /// The ellipse that stands for its surfels: it bounds their disks, seen along its normal.
     pub surfel: Surfel,
     /// Their mean colour, linear, straight alpha.
     pub color: [f32; 4],

@@ -33,7 +33,9 @@ pub(super) fn made(mut scene: Scene, options: &RenderOptions, bars: &Bars) -> Re
         return Ok(scene);
     }
     if scene.surfels.is_empty() {
-        return Err(Error::Usage("levels of detail are of surfels, and there are none: leave --lod out".into()));
+        return Err(Error::Usage(
+            "levels of detail are of surfels, and there are none: leave --lod and --splats out".into(),
+        ));
     }
     (scene, _) = hierarchy::build(scene, bars)?;
     note("levels of detail are made for this picture: `epsplat lod` keeps them in a file");

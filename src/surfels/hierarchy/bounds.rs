@@ -99,7 +99,7 @@ fn farthest(at: DVec2, [u, v]: [DVec2; 2]) -> f64 {
     let b = DVec2::new(u.dot(at), v.dot(at));
     let b = DVec2::new(b.dot(axis), b.perp_dot(axis));
     let (b1, b2) = (b.x * b.x, b.y * b.y);
-    // From past the least, so that each step stays there.
+    // From past where the derivative is 0.
     let least = first + b.x.abs();
     let mut lambda = first + b.length();
     for _ in 0..4 {

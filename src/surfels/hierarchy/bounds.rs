@@ -94,15 +94,17 @@ fn farthest(at: DVec2, [u, v]: [DVec2; 2]) -> f64 {
     let (uu, uv, vv) = (u.dot(u), u.dot(v), v.dot(v));
     let (mean, half) = (0.5 * (uu + vv), (0.5 * (uu - vv)).hypot(uv));
     let [first, second] = [mean + half, mean - half];
-    let along = 0.5 * (2.0 * uv).atan2(uu - vv);
-    let axis = DVec2::from_angle(along);
+    // The longer of the eigenvector's two forms does not cancel; of a circle each direction is one.
+    let (one, other) = (DVec2::new(first - vv, uv), DVec2::new(uv, first - uu));
+    let longer = if one.length_squared() > other.length_squared() { one } else { other };
+    let axis = longer.try_normalize().unwrap_or(DVec2::X);
     let b = DVec2::new(u.dot(at), v.dot(at));
     let b = DVec2::new(b.dot(axis), b.perp_dot(axis));
     let (b1, b2) = (b.x * b.x, b.y * b.y);
     // From past where the derivative is 0.
     let least = first + b.x.abs();
     let mut lambda = first + b.length();
-    for _ in 0..4 {
+    for _ in 0..2 {
         let [p, q] = [lambda - first, lambda - second];
         let [square, cube] = [b1 / (p * p) + b2 / (q * q), b1 / (p * p * p) + b2 / (q * q * q)];
         let step = (square.sqrt() - 1.0) * square / cube;
@@ -125,8 +127,8 @@ struct Bounding<'a> {
 }
 
 impl Bounding<'_> {
-    /// What bounds one surfel.
-    fn of(&self, index: usize) -> Bound {
+    /// What bounds one surfel, where a rim no farther than `known` is of no matter.
+    fn of(&self, index: usize, known: f64) -> Bound {
         let surfel = &self.scene.surfels[index];
         let offset = self.scene.center(index) - self.center;
         let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
@@ -135,8 +137,11 @@ impl Bounding<'_> {
         let [at, u, v] = [offset, s, t].map(|vector| self.shape.seen(vector));
         // A cap leans out as far as it is high.
         let lean = self.shape.seen(own * height).abs();
+        // That of a circle around the disk is found sooner.
+        let (circle, lean) = (at.length() + longest([u.dot(u), u.dot(v), v.dot(v)]), lean.length());
+        let rim = if circle + lean > known { circle.min(farthest(at, [u, v])) + lean } else { 0.0 };
         Bound {
-            rim: farthest(at, [u, v]) + lean.length(),
+            rim,
             radius: offset.length() + longest([s.dot(s), s.dot(t), t.dot(t)]) + height,
             cosine: (own.dot(self.normal).clamp(-1.0, 1.0).acos() + tilt(self.scene, index)).min(PI).cos(),
         }
@@ -236,7 +241,7 @@ fn bound_from(of: &Bounding<'_>, set: &Set, below: Below<'_>, sided: bool) -> Bo
         // What reaches farthest comes first.
         open[first..].sort_by(|a, b| a.0.rim.total_cmp(&b.0.rim));
     };
-    let look = |set: &Set, all: &mut Bound| *all = set.range().map(|index| of.of(index)).fold(*all, Bound::both);
+    let look = |set: &Set, all: &mut Bound| set.range().for_each(|index| *all = all.both(of.of(index, all.rim)));
     if set.is_leaf() {
         look(set, &mut all);
     }

@@ -6,6 +6,7 @@ pub mod inspect;
 mod kept;
 mod kernels;
 mod look;
+mod page;
 mod parts;
 mod reference;
 mod report;

@@ -1,0 +1,122 @@
+//! What of the buffers there is for each page of surfels, and for each branch of a tree.
+
+use super::store::{Named, kept};
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::gpu::buffers::Buffer;
+use crate::gpu::layout::{self, BATCH, LIST_START, QUEUE_START, WORKGROUP};
+use crate::passes::order;
+use crate::passes::select::SELECTION_WORDS;
+use crate::passes::upload::{self, BranchBuffers};
+use crate::plan::{SceneNeeds, SurfelLayout, splat_words};
+use crate::scene::Surfel;
+
+/// One page: its surfels, and slots for splats of all of them, in their order, or, where batches are left out, of as many batches as
+/// there are to be drawn, one after the other ([`cull`](crate::passes::cull)).
+pub struct Page {
+    pub(super) buffers: Named,
+    /// Surfels in it.
+    pub surfels: u64,
+    /// Surfels that they stand for together.
+    pub stand_for: u64,
+    /// Words of a splat's record.
+    splat_words: u64,
+    /// Splats that there is room for.
+    pub slots: u64,
+}
+
+impl Page {
+    pub(super) fn new(gpu: &Gpu, uploaded: upload::Page, first: u32, needs: &SceneNeeds) -> Result<Self> {
+        let upload::Page { buffers, numbers, stand_for } = uploaded;
+        let own = layout::Page { first, runs: 0, stride: 0, back: 0 };
+        Self::with(gpu, Named::from_iter(buffers), (numbers.len() as u64, stand_for), (own, needs))
+    }
+
+    /// One with room for so many surfels of a cut, from the one with the number `first` on.
+    pub(super) fn of_cut(gpu: &Gpu, surfels: u64, first: u32, needs: &SceneNeeds) -> Result<Self> {
+        let mut buffers = Named::new();
+        buffers.insert("surfels", Buffer::<Surfel>::storage(gpu, "surfels of a cut", surfels)?.words());
+        let words = u64::from(SurfelLayout::of(needs).words);
+        if words > 0 {
+            buffers.insert("attributes", Buffer::storage(gpu, "attributes of a cut", surfels * words)?);
+        }
+        // Of how many of them there are the state of the cut tells.
+        let balls = Buffer::<[f32; 4]>::storage(gpu, "balls of a cut", surfels.div_ceil(BATCH.into()))?;
+        buffers.insert("balls", balls.words());
+        Self::with(gpu, buffers, (surfels, 0), (order::dealt(surfels, first), needs))
+    }
+
+    /// One with these buffers, and room for nothing yet of what is made of them.
+    fn with(
+        gpu: &Gpu,
+        mut buffers: Named,
+        (surfels, stand_for): (u64, u64),
+        (own, needs): (layout::Page, &SceneNeeds),
+    ) -> Result<Self> {
+        buffers.insert("page", Buffer::uniform(gpu, "page", &own)?.words());
+        let batches = surfels.div_ceil(BATCH.into());
+        let drawn = Buffer::indirect(gpu, "batches that are drawn", batches + u64::from(LIST_START))?;
+        // A row of a grid is a batch.
+        gpu.queue.write_buffer(&drawn.raw, 0, bytemuck::cast_slice(&[[BATCH / WORKGROUP, 0, 1]; 2]));
+        buffers.insert("drawn", drawn);
+        buffers.insert("rest", Buffer::storage(gpu, "batches that may be drawn", batches + 1)?);
+        // A binding holds one record at least.
+        buffers.insert("splats", Buffer::storage(gpu, "splats", splat_words(needs))?);
+        for (name, what) in [("queue", "queue of large splats"), ("rare", "list of rare splats")] {
+            buffers.insert(name, Buffer::indirect(gpu, what, QUEUE_START.into())?);
+        }
+        Ok(Self { buffers, surfels, stand_for, splat_words: splat_words(needs), slots: 0 })
+    }
+
+    /// Batches of surfels.
+    pub fn batches(&self) -> u64 {
+        self.surfels.div_ceil(BATCH.into())
+    }
+
+    /// The buffer of a name.
+    pub fn buffer(&self, name: &str) -> Option<&Buffer<u32>> {
+        self.buffers.get(kept(name))
+    }
+
+    /// Makes room for at least `slots` splats, and keeps all that is stored.
+    pub fn grow(&mut self, gpu: &Gpu, slots: u64) -> Result<()> {
+        if self.slots >= slots {
+            return Ok(());
+        }
+        let list = slots + u64::from(QUEUE_START);
+        for (name, what, words) in [
+            ("splats", "splats", slots * self.splat_words),
+            ("queue", "queue of large splats", list),
+            ("rare", "list of rare splats", list),
+        ] {
+            if let Some(buffer) = self.buffers.get_mut(name) {
+                buffer.grow(gpu, what, words)?;
+            }
+        }
+        self.slots = slots;
+        Ok(())
+    }
+}
+
+/// A branch of a tree ([`branches`](crate::passes::branches)).
+pub struct Branch {
+    pub(super) buffers: Named,
+    /// How many levels it has.
+    pub levels: u32,
+}
+
+/// What all branches share while a cut is made, one after the other.
+pub(super) fn of_selection(gpu: &Gpu, branches: &[BranchBuffers]) -> Result<Named> {
+    let most = |k: usize| branches.iter().map(|branch| branch.records[k]).max().unwrap_or(0);
+    let [records, nodes] = [most(0), most(1)];
+    let roots = branches.iter().map(|branch| branch.roots).sum();
+    let groups = nodes.div_ceil(WORKGROUP.into());
+    Ok(Named::from([
+        ("selection", Buffer::indirect(gpu, "state of a cut", SELECTION_WORDS)?),
+        ("frontier", Buffer::storage(gpu, "nodes that a cut comes to", nodes)?),
+        ("fates", Buffer::storage(gpu, "what becomes of nodes", nodes)?),
+        ("group_counts", Buffer::<[u32; 2]>::storage(gpu, "counts of a cut", groups)?.words()),
+        ("chosen", Buffer::storage(gpu, "surfels of a cut", records)?),
+        ("reached", Buffer::storage(gpu, "branches that a cut comes to", roots)?),
+    ]))
+}

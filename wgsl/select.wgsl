@@ -123,7 +123,7 @@ fn size_of(center: vec3<f32>, surfel: Surfel) -> f32 {
     return PI * select(abs(s.x * t.y - s.y * t.x), max(dot(s, s), dot(t, t)), MEASURES_EXTENT);
 }
 
-// What becomes of a node, what whose surfel's centre leaves out is `low`.
+// What becomes of a node whose surfel's centre leaves out `low`, world units.
 fn fate_of(node: TreeNode, surfel: Surfel, low: vec3<f32>) -> u32 {
     // In its own branch it is judged.
     if (kind_of(node) == OTHER_BRANCH) {

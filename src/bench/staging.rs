@@ -135,18 +135,22 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
         footprint_px = wanted;
     }
     if let Some(wanted) = point.footprint_px.filter(|_| !scene.surfels.is_empty() && footprint_px > 0.0) {
-        scene.hierarchy = None;
-        let factor = (wanted / footprint_px) as f32;
-        let scaled = |axis: [f32; 3]| axis.map(|c| c * factor);
-        for surfel in &mut scene.surfels {
-            *surfel = Surfel { s: scaled(surfel.s), t: scaled(surfel.t), ..*surfel };
-        }
+        enlarge(&mut scene, (wanted / footprint_px) as f32);
         footprint_px = wanted;
     }
     if definition.configs.iter().any(Config::cuts) && !scene.surfels.is_empty() {
         (scene, _) = hierarchy::build(scene, progress)?;
     }
     Ok(Staged { scene, cameras, surface, dressed: entry.shirt.is_some(), footprint_px })
+}
+
+/// Makes all disks so many times as large; levels of detail would be of the old ones.
+fn enlarge(scene: &mut Scene, factor: f32) {
+    scene.hierarchy = None;
+    let scaled = |axis: [f32; 3]| axis.map(|c| c * factor);
+    for surfel in &mut scene.surfels {
+        *surfel = Surfel { s: scaled(surfel.s), t: scaled(surfel.t), ..*surfel };
+    }
 }
 
 /// Points, and if a shirt is to be so far out along their normals, those of that.

@@ -55,6 +55,32 @@ pub const TILE: u32 = 16;
 /// Surfels of a batch: consecutive in memory, and left out together (`wgsl/cull.wgsl`).
 pub const BATCH: u32 = 64;
 
+/// Surfels of a run, which are dealt out together: whole batches. Of 64, 512 and 4096 the middle gave the shortest frames on a software adapter.
+pub const RUN: u32 = 512;
+
+/// Words of the state of a cut (`wgsl/select.wgsl`): where the grids of nodes that are judged, of nodes that are spread and of surfels that are
+/// copied start.
+pub const JUDGE_GRID: u32 = 7;
+/// See [`JUDGE_GRID`].
+pub const SPREAD_GRID: u32 = 10;
+/// See [`JUDGE_GRID`].
+pub const GATHER_GRID: u32 = 13;
+
+/// The last word of that state.
+pub const GATHERED_END: u32 = 17;
+
+/// The lowest bit of [`TreeNode::below`] that says of what kind a node is.
+pub const KIND_SHIFT: u32 = 30;
+
+/// A node with children.
+pub const INNER: u32 = 0;
+
+/// A node with surfels.
+pub const LEAF: u32 = 1;
+
+/// A node that leads to a root of another branch.
+pub const OTHER_BRANCH: u32 = 2;
+
 /// Words at the start of a list of batches: a grid of workgroups that draws all of them, and one that draws the far ones.
 pub const LIST_START: u32 = 6;
 

@@ -7,17 +7,11 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use crate::gpu::layout::TreeNode;
+use crate::gpu::layout::{INNER, KIND_SHIFT, LEAF, OTHER_BRANCH, TreeNode};
 use crate::scene::hierarchy::{Hierarchy, Node};
 
 /// The most surfels that one invocation copies the numbers of.
 const MOST_OF_LEAF: u32 = 4096;
-
-/// Kinds of nodes as the device sees them (`wgsl/select.wgsl`).
-const KIND_SHIFT: u32 = 30;
-const INNER: u32 = 0;
-const LEAF: u32 = 1;
-const OTHER_BRANCH: u32 = 2;
 
 /// Neighbouring subtrees.
 #[derive(Clone, Debug, PartialEq)]

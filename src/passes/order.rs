@@ -12,8 +12,8 @@ use crate::gpu::layout::{BATCH, Page};
 use crate::morton;
 use crate::scene::{Bounds, Cap, Clip, Colors, Scene, Surfel};
 
-/// Surfels of a run: whole batches. Of 64, 512 and 4096 the middle gave the shortest frames on a software adapter.
-const RUN: usize = 512;
+/// [`layout::RUN`](crate::gpu::layout::RUN).
+const RUN: usize = crate::gpu::layout::RUN as usize;
 const _: () = assert!(RUN.is_multiple_of(BATCH as usize));
 
 /// Bits of each coordinate on the curve.
@@ -72,7 +72,7 @@ fn content(scene: &Scene, index: usize) -> ([[u32; 3]; 8], [u32; 4]) {
 pub(crate) fn dealt(surfels: u64, first: u32) -> Page {
     let runs = surfels / RUN as u64;
     let stride = dealing(runs as usize) as u64;
-    // Of what leads to each run once, a power undoes itself: there are few runs, so it is looked for.
+    // The stride by which they are found again: there are few runs, so it is looked for.
     let back = (1..runs).find(|back| stride * back % runs == 1).unwrap_or(1);
     Page { first, runs: runs as u32, stride: stride as u32, back: back as u32 }
 }

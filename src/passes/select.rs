@@ -74,14 +74,6 @@ pub const GATHER: [Run; 2] =
 /// The dispatches that bound the batches of what was copied, which are then culled.
 pub const BALLS: Run = Run { kernel: Kernel::new("select_balls"), over: Over::BatchGroups };
 
-/// Words of [`Over`]'s grids in the state of a cut, `selection` (`wgsl/select.wgsl`).
-pub(crate) const JUDGE_GRID: u64 = 7;
-pub(crate) const SPREAD_GRID: u64 = 10;
-pub(crate) const GATHER_GRID: u64 = 13;
-
-/// Words of that state.
-pub(crate) const SELECTION_WORDS: u64 = 18;
-
 /// Which cut is wanted.
 #[derive(Clone, Copy, Debug)]
 pub struct Wanted {

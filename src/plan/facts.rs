@@ -77,8 +77,6 @@ pub struct Facts {
 /// What is known of the nodes of levels of detail.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LevelFacts {
-    /// How many there are.
-    pub nodes: u64,
     /// The longest half-axis, world units.
     pub largest_radius: f32,
     /// The longest shorter half-axis, world units.
@@ -90,11 +88,7 @@ impl LevelFacts {
     pub fn of(hierarchy: &Hierarchy) -> Self {
         let largest =
             |of: fn(&Surfel) -> f32| hierarchy.nodes.par_iter().map(|node| of(&node.surfel)).reduce(|| 0.0, f32::max);
-        Self {
-            nodes: hierarchy.nodes.len() as u64,
-            largest_radius: largest(Surfel::radius),
-            largest_shorter: largest(Surfel::shorter),
-        }
+        Self { largest_radius: largest(Surfel::radius), largest_shorter: largest(Surfel::shorter) }
     }
 }
 

@@ -4,9 +4,8 @@ use super::store::{Named, kept};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
-use crate::gpu::layout::{self, BATCH, LIST_START, QUEUE_START, WORKGROUP};
+use crate::gpu::layout::{self, BATCH, GATHERED_END, LIST_START, QUEUE_START, WORKGROUP};
 use crate::passes::order;
-use crate::passes::select::SELECTION_WORDS;
 use crate::passes::upload::{self, BranchBuffers};
 use crate::plan::{SceneNeeds, SurfelLayout, splat_words};
 use crate::scene::Surfel;
@@ -112,7 +111,7 @@ pub(super) fn of_selection(gpu: &Gpu, branches: &[BranchBuffers]) -> Result<Name
     let roots = branches.iter().map(|branch| branch.roots).sum();
     let groups = nodes.div_ceil(WORKGROUP.into());
     Ok(Named::from([
-        ("selection", Buffer::indirect(gpu, "state of a cut", SELECTION_WORDS)?),
+        ("selection", Buffer::indirect(gpu, "state of a cut", u64::from(GATHERED_END) + 1)?),
         ("frontier", Buffer::storage(gpu, "nodes that a cut comes to", nodes)?),
         ("fates", Buffer::storage(gpu, "what becomes of nodes", nodes)?),
         ("group_counts", Buffer::<[u32; 2]>::storage(gpu, "counts of a cut", groups)?.words()),

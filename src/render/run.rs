@@ -8,11 +8,12 @@ use crate::gpu::Gpu;
 use crate::gpu::buffers::{Buffer, counts};
 use crate::gpu::kernel::{Grid, grid};
 use crate::gpu::layout::{
-    BATCH, COVERED_GRID, COVERED_GRID_OF_EIGHTS, LIST_FAR, QUEUE_GRID, QUEUE_LISTING, TILE_WIDTH, WORKGROUP,
+    BATCH, COVERED_GRID, COVERED_GRID_OF_EIGHTS, GATHER_GRID, JUDGE_GRID, LIST_FAR, QUEUE_GRID, QUEUE_LISTING,
+    SPREAD_GRID, TILE_WIDTH, WORKGROUP,
 };
 use crate::gpu::timing::Timing;
 use crate::passes::tiles::{self, LONGEST, list_name};
-use crate::passes::{covered, long_lists, raster, resolve, select, triangles};
+use crate::passes::{covered, long_lists, raster, resolve, triangles};
 use crate::plan::known::{Known, Listed};
 use crate::plan::steps::{Clear, Kernel, Look, Over, Part, Stage, Step};
 use crate::plan::{Plan, RasterDepth};
@@ -321,9 +322,9 @@ pub(super) fn over<'a>(
             let word = if part == Part::Far { LIST_FAR } else { 0 };
             return counted(of_page.and_then(|page| page.buffer("drawn")), word.into());
         }
-        Over::Judged => return counted(store.buffer("selection"), select::JUDGE_GRID),
-        Over::Spread => return counted(store.buffer("selection"), select::SPREAD_GRID),
-        Over::Chosen => return counted(store.buffer("selection"), select::GATHER_GRID),
+        Over::Judged => return counted(store.buffer("selection"), JUDGE_GRID.into()),
+        Over::Spread => return counted(store.buffer("selection"), SPREAD_GRID.into()),
+        Over::Chosen => return counted(store.buffer("selection"), GATHER_GRID.into()),
         Over::Rare => return counted(of_page.and_then(|page| page.buffer("rare")), QUEUE_GRID.into()),
         Over::Large => return counted(queue(), QUEUE_GRID.into()),
         Over::LargeTriangles => return counted(store.buffer("large_triangles"), QUEUE_GRID.into()),

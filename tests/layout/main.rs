@@ -13,8 +13,9 @@ use common::modules;
 use epsplat::gpu::Sources;
 use epsplat::gpu::kernel::reflect;
 use epsplat::gpu::layout::{
-    AWAY, BATCH, BLOCK_SIDE, COVERED_GRID, COVERED_GRID_OF_EIGHTS, COVERED_LIST, LIST_ENDS, LIST_FAR, LIST_START,
-    MOST_GROUPS, OCCLUSION_TILE, ONE, QUEUE_GRID, QUEUE_LISTING, QUEUE_START, TILE, TILE_WIDTH, WORKGROUP,
+    AWAY, BATCH, BLOCK_SIDE, COVERED_GRID, COVERED_GRID_OF_EIGHTS, COVERED_LIST, GATHER_GRID, GATHERED_END, INNER,
+    JUDGE_GRID, KIND_SHIFT, LEAF, LIST_ENDS, LIST_FAR, LIST_START, MOST_GROUPS, OCCLUSION_TILE, ONE, OTHER_BRANCH,
+    QUEUE_GRID, QUEUE_LISTING, QUEUE_START, RUN, SPREAD_GRID, TILE, TILE_WIDTH, WORKGROUP,
 };
 use epsplat::gpu::sources::FILES;
 use epsplat::passes;
@@ -149,7 +150,18 @@ fn constants_agree() {
         assert_eq!(constant("OCCLUSION_TILE"), tile);
         let of_tiles = [("BLOCK_SIDE", BLOCK_SIDE), ("LIST_ENDS", LIST_ENDS)];
         let of_batches = [("LIST_START", LIST_START), ("LIST_FAR", LIST_FAR)];
-        for (exists, constants) in [(tiles, &of_tiles[..]), (needs.cull, &of_batches)] {
+        let of_cuts = [
+            ("RUN", RUN),
+            ("JUDGE_GRID", JUDGE_GRID),
+            ("SPREAD_GRID", SPREAD_GRID),
+            ("GATHER_GRID", GATHER_GRID),
+            ("GATHERED_END", GATHERED_END),
+            ("KIND_SHIFT", KIND_SHIFT),
+            ("INNER", INNER),
+            ("LEAF", LEAF),
+            ("OTHER_BRANCH", OTHER_BRANCH),
+        ];
+        for (exists, constants) in [(tiles, &of_tiles[..]), (needs.cull, &of_batches), (needs.levels, &of_cuts)] {
             for &(name, value) in constants {
                 assert_eq!(constant(name), exists.then_some(f64::from(value)), "{name}");
             }

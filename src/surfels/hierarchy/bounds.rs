@@ -25,6 +25,9 @@ const ROUNDED_ANGLE: f64 = 1e-3;
 /// What is rounded off a cosine.
 const ROUNDED_OFF: f64 = 1e-7;
 
+/// A disk is shown along its own normal too, unless that leans farther from the node's: the tangent of 76 degrees.
+const STEEPEST: f64 = 4.0;
+
 /// A direction and a shape: vectors of the plane across a normal, of which the second is `slimness` as long as the first.
 #[derive(Clone, Copy)]
 struct Shape {
@@ -61,7 +64,7 @@ impl Shape {
 /// What bounds surfels so far.
 #[derive(Clone, Copy)]
 struct Bound {
-    /// The largest |(u, v)| of a disk.
+    /// The largest |(u, v)| of a disk, shown in the node's plane along the node's normal and along its own.
     rim: f64,
     /// The largest distance from the centre.
     radius: f64,
@@ -134,17 +137,33 @@ impl Bounding<'_> {
         let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
         let own = normal_of(surfel);
         let height = self.scene.caps.get(index).map_or(0.0, Cap::highest);
-        let [at, u, v] = [offset, s, t].map(|vector| self.shape.seen(vector));
-        // A cap leans out as far as it is high.
-        let lean = self.shape.seen(own * height).abs();
-        // That of a circle around the disk is found sooner.
-        let (circle, lean) = (at.length() + longest([u.dot(u), u.dot(v), v.dot(v)]), lean.length());
-        let rim = if circle + lean > known { circle.min(farthest(at, [u, v])) + lean } else { 0.0 };
+        let across = self.leaning(own);
+        let rim = [DVec2::ZERO, across].into_iter().fold(0.0, |rim: f64, across| {
+            let shown = |vector: DVec3| self.shape.seen(vector) - across * vector.dot(self.normal);
+            let [at, u, v] = [offset, s, t].map(shown);
+            // A cap leans out as far as it is high.
+            let lean = shown(own * height).length();
+            // That of a circle around the disk is found sooner.
+            let circle = at.length() + longest([u.dot(u), u.dot(v), v.dot(v)]);
+            if circle + lean > known.max(rim) { rim.max(circle.min(farthest(at, [u, v])) + lean) } else { rim }
+        });
         Bound {
             rim,
             radius: offset.length() + longest([s.dot(s), s.dot(t), t.dot(t)]) + height,
             cosine: (own.dot(self.normal).clamp(-1.0, 1.0).acos() + tilt(self.scene, index)).min(PI).cos(),
         }
+    }
+
+    /// How far beside a point, in units of the half-axes, it is shown along a normal, by what it lies over the node's plane.
+    ///
+    /// Along the node's normal alone, neighbours whose planes bend away from each other would part where they are seen askew: each ends where
+    /// the other does, but above or below it. Shown along the disk's normal, which is the surface's, both reach the line in which they meet.
+    fn leaning(&self, own: DVec3) -> DVec2 {
+        let up = own.dot(self.normal);
+        let beside = (own - up * self.normal) * up.signum();
+        let most = STEEPEST / beside.length();
+        let slope = if up.abs() * most > 1.0 { up.abs().recip() } else { most };
+        if slope.is_finite() { self.shape.seen(beside * slope) } else { DVec2::ZERO }
     }
 
     /// What bounds all below a node, or more.
@@ -154,10 +173,13 @@ impl Bounding<'_> {
         let radius = f64::from(node.radius) * ROUNDED_UP;
         let angle = normal_of(&node.surfel).dot(self.normal).clamp(-1.0, 1.0).acos();
         let cone = f64::from(node.cone).clamp(-1.0, 1.0).acos() + ROUNDED_ANGLE;
+        let turned = angle + cone;
+        let slope = if turned < STEEPEST.atan() { turned.tan() } else { STEEPEST };
+        let high = offset.dot(self.normal).abs() + radius;
         Bound {
-            rim: (self.shape.seen(offset).length() + radius * self.scale) * ROUNDED_UP,
+            rim: (self.shape.seen(offset).length() + (radius + slope * high) * self.scale) * ROUNDED_UP,
             radius: (offset.length() + radius) * ROUNDED_UP,
-            cosine: (angle + cone).min(PI).cos(),
+            cosine: turned.min(PI).cos(),
         }
     }
 }

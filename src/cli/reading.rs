@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use epsplat::io::{self, ClassOpacities, Format, Mesh, Points, ReadOptions};
+use epsplat::io::las::Copc;
+use epsplat::io::{self, ClassOpacities, Format, Input, Mesh, Points, ReadOptions};
 use epsplat::surfels::Limits;
 use epsplat::{Error, Result};
 
@@ -97,13 +98,38 @@ impl Reading {
     }
 
     fn read(&self, path: &Path, bars: &Bars) -> Result<Points> {
-        let options = ReadOptions {
+        io::read_with(path, self.options(), bars)
+    }
+
+    fn options(&self) -> ReadOptions {
+        ReadOptions {
             format: self.input.input_format,
             keep_withheld: self.keep_withheld,
             flatten: self.flatten,
             classes: self.class_opacity.unwrap_or_default(),
-        };
-        io::read_with(path, options, bars)
+        }
+    }
+
+    /// The files, if all of them are COPC and can be read in parts: standard input is read once.
+    pub(super) fn octrees(&self, paths: &[PathBuf]) -> Result<Option<Vec<Copc>>> {
+        let mut files = Vec::new();
+        for path in paths {
+            let is_file = path.is_file() && path != Path::new("-");
+            let opened = if is_file { Copc::open(Input::open(path, self.input.input_format)?)? } else { None };
+            let Some(file) = opened else { return Ok(None) };
+            files.push(file);
+        }
+        Ok(Some(files))
+    }
+
+    /// The points of some nodes of each of several files.
+    pub(super) fn nodes<'a>(
+        &self,
+        files: impl Iterator<Item = (&'a Copc, &'a Vec<usize>)>,
+        bars: &Bars,
+    ) -> Result<Vec<Points>> {
+        let options = self.options();
+        files.map(|(file, nodes)| file.read(nodes, &options, bars)).collect()
     }
 
     /// Fails for opacities of classes if none of the inputs has classes.

@@ -1,38 +1,39 @@
 //! `epsplat render`: files in, a picture and its maps out, or one for each of many cameras.
 
 mod levels;
+mod octrees;
 mod options;
 mod output;
+mod scene;
 mod view;
 mod views;
 
-use std::collections::BTreeSet;
 use std::num::NonZeroU64;
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use epsplat::gpu::Gpu;
-use epsplat::io::{self, Mesh, Points, Texture};
 use epsplat::passes::unseen::{Unseen, is_empty};
-use epsplat::plan::{Accumulator, BackendName, BlendFormat, Organisation, RasterDepth};
+use epsplat::plan::{Accumulator, BackendName, BlendFormat, Organisation, RasterDepth, RenderOptions};
 use epsplat::render::{Backend, Report, render};
 use epsplat::scene::{
     Blend, Camera, Composite, Cull, Detail, Epsilon, Join, Kernel, Light, MAPS, Map, Outline, PointShape, PointSize,
-    Samples, Scene, Tail,
+    Samples, Tail,
 };
-use epsplat::surfels::{Preparation, with_triangles};
-use epsplat::{Error, Result, surfels};
+use epsplat::{Error, Result};
 use glam::DVec3;
 use serde::Serialize;
 
 use self::levels::MeasureName;
+use self::octrees::{Octrees, Read};
 use self::options::{for_scene, options};
 use self::output::{Format, note_overflows, summary};
+use self::scene::{Made, scene};
 use self::view::{ChosenView, View};
 use super::parse::{parse_color, parse_intrinsics, parse_pixels, parse_scale, parse_size, parse_up, parse_vector};
 use super::progress::Bars;
-use super::reading::{LimitArguments, Reading, help_of, named};
+use super::reading::{LimitArguments, Reading, help_of};
 use super::{note, outputs, write_json};
 
 /// Render point clouds and meshes to a PNG or EXR image.
@@ -298,12 +299,11 @@ fn one(arguments: &Arguments) -> Result<()> {
     let backend = backend(arguments)?;
 
     let bars = Bars::new();
-    let (scene, preparation) = scene(arguments, &bars)?;
-    let options = for_scene(arguments, options, &scene)?;
-    let scene = levels::made(scene, &options, &bars)?;
-    let (camera, chosen) = view.camera(&scene, Camera::default_near(&scene))?;
+    let Staged { made: (scene, preparation), options, camera, chosen, read } =
+        staged(arguments, options, &view, &bars)?;
     let chosen = chosen.map(|view| ChosenView::new(view, &scene, arguments.up, preparation.guessed_up));
     chosen.iter().for_each(|view| note(&view.sentence()));
+    read.iter().for_each(|read| note(&read.sentence()));
     let (frame, report) = render(&scene, &camera, &options, &backend, &bars)?;
     note_overflows(&report);
     if is_empty(&frame, &options) {
@@ -311,7 +311,7 @@ fn one(arguments: &Arguments) -> Result<()> {
     }
     format.write(&arguments.output, &frame)?;
     match &arguments.json {
-        Some(path) => write_json(path, &Outcome { report: &report, view: chosen }),
+        Some(path) => write_json(path, &Outcome { report: &report, view: chosen, read }),
         None => {
             note(&summary(&report, &arguments.output));
             Ok(())
@@ -327,83 +327,39 @@ struct Outcome<'a> {
     /// None where the arguments say where the camera is.
     #[serde(skip_serializing_if = "Option::is_none")]
     view: Option<ChosenView>,
+    /// None where all of the inputs was read.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    read: Option<Read>,
 }
 
-/// What all inputs hold, as one scene.
-fn scene(arguments: &Arguments, bars: &Bars) -> Result<(Scene, Preparation)> {
-    let inputs =
-        if arguments.inputs.is_empty() { Vec::new() } else { arguments.reading.all(&arguments.inputs, bars)? };
-    if arguments.inputs.is_empty() && !arguments.textures.is_empty() {
-        let what = "--texture paints surfels, and there are none: take --triangle-texture for triangles";
-        return Err(Error::Usage(what.into()));
-    }
-    if arguments.separate && arguments.inputs.len() < 2 {
-        note(
-            "--separate keeps the surfels of several files apart, and here is one of them at most: it changes nothing",
-        );
-    }
-    // What `epsplat hybrid` left of a mesh names itself.
-    let beside = inputs.iter().filter_map(|points| points.beside.clone());
-    let mut paths: Vec<PathBuf> = arguments.triangles.iter().cloned().chain(beside).collect();
-    // What two files of surfels name is drawn once.
-    let mut known = BTreeSet::new();
-    paths.retain(|path| known.insert(path.canonicalize().unwrap_or_else(|_| path.clone())));
-    let has_points = inputs.iter().any(|points| !points.positions.is_empty() || points.beside.is_none());
-    let of_surfels = if has_points { Some(surfels_of(arguments, inputs, bars)?) } else { None };
-    if paths.is_empty() {
-        if arguments.join.is_some() || arguments.triangle_texture.is_some() {
-            let what = "--join and --triangle-texture are of triangles, and there are none: name some by --triangles";
-            return Err(Error::Usage(what.into()));
-        }
-        return of_surfels.ok_or_else(|| Error::Usage("there is nothing to render: name a file".into()));
-    }
-    let meshes = paths.iter().map(|path| io::read_mesh(path, bars)).collect::<Result<Vec<_>>>()?;
-    let meshes = painted(meshes, &paths, arguments)?;
-    meshes.iter().flat_map(|mesh| &mesh.notes).for_each(|line| note(line));
-    let (scene, preparation) = of_surfels.unzip();
-    let (scene, of_triangles) = with_triangles(scene, &meshes).map_err(|error| named(error, &paths))?;
-    of_triangles.notes().iter().for_each(|line| note(line));
-    let guessed_up = of_triangles.guessed_up;
-    Ok((scene, preparation.unwrap_or_else(|| Preparation { guessed_up, ..Preparation::default() })))
+/// All that a single picture is made of.
+struct Staged {
+    made: Made,
+    options: RenderOptions,
+    camera: Camera,
+    /// Eye and target, where they were chosen.
+    chosen: Option<[DVec3; 2]>,
+    /// Of COPC files.
+    read: Option<Read>,
 }
 
-/// The meshes, those that no material paints with the image for triangles.
-fn painted(mut meshes: Vec<Mesh>, paths: &[PathBuf], arguments: &Arguments) -> Result<Vec<Mesh>> {
-    let Some(image) = &arguments.triangle_texture else { return Ok(meshes) };
-    let texture = Texture::read(image)?;
-    let bare = |mesh: &Mesh| mesh.materials.iter().all(|material| material.texture.is_none());
-    if !meshes.iter().any(bare) {
-        note("warning: every mesh has a texture of its own, so that --triangle-texture paints none");
+/// The scene of a single picture, which COPC files are read for as far as it takes them.
+fn staged(arguments: &Arguments, options: RenderOptions, view: &View, bars: &Bars) -> Result<Staged> {
+    let told = |(_, preparation): &Made| preparation.notes().iter().for_each(|line| note(line));
+    if let Some(octrees) = Octrees::of(arguments, &options, bars)? {
+        let (camera, chosen) = view.camera(&octrees.overview, Camera::default_near(&octrees.overview))?;
+        let (made, read) = octrees.scene(arguments, &camera, options.detail, bars)?;
+        told(&made);
+        let options = RenderOptions { detail: Detail::FINEST, ..options };
+        return Ok(Staged { made, options, camera, chosen, read: Some(read) });
     }
-    for (mesh, path) in meshes.iter_mut().zip(paths).filter(|(mesh, _)| bare(mesh)) {
-        if mesh.texture.is_none() {
-            return Err(Error::malformed(path, "its triangles have no texture coordinates, so they cannot be painted"));
-        }
-        mesh.paint(texture.clone());
-    }
-    Ok(meshes)
-}
-
-/// The surfels of all inputs.
-fn surfels_of(arguments: &Arguments, inputs: Vec<Points>, bars: &Bars) -> Result<(Scene, Preparation)> {
-    let textures = arguments.textures.iter().map(|image| Texture::read(image)).collect::<Result<Vec<_>>>()?;
-    let mut read = arguments.inputs.iter().zip(&inputs);
-    if !textures.is_empty()
-        && let Some((path, _)) = read.find(|(_, points)| points.texture.is_none() && !points.positions.is_empty())
-    {
-        let what = "its points have no texture coordinates, so they cannot be textured; `epsplat sample` gives surfels of a mesh some";
-        return Err(Error::malformed(path, what));
-    }
-    let limits = arguments.limits.limits();
-    let built = match arguments.facing {
-        Some(_) => surfels::build_facing(inputs, arguments.point_size, &limits, bars),
-        None => surfels::build_within(inputs, textures, &limits, bars),
-    };
-    let (scene, preparation) = built.map_err(|error| named(error, &arguments.inputs))?;
-    for line in preparation.notes() {
-        note(&line);
-    }
-    Ok((scene, preparation))
+    let made = scene(arguments, bars)?;
+    told(&made);
+    let (scene, preparation) = made;
+    let options = for_scene(arguments, options, &scene)?;
+    let scene = levels::made(scene, &options, bars)?;
+    let (camera, chosen) = view.camera(&scene, Camera::default_near(&scene))?;
+    Ok(Staged { made: (scene, preparation), options, camera, chosen, read: None })
 }
 
 fn backend(arguments: &Arguments) -> Result<Backend> {

@@ -154,7 +154,7 @@ fn bounded(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: &Wante
         let radius = f64::from(node.radius) + BALL_ROUNDING * center.length();
         let at = camera.rotation * center;
         let [turned, spread] = if backs_out { turned_away(node, (center, radius), camera) } else { [-1.0, 0.0] };
-        if at.z + radius < camera.near || is_beside(at, radius, camera, margin) || turned > spread + SINE_SLACK {
+        if at.z + radius < camera.near || camera.is_beside_image(at, radius, margin) || turned > spread + SINE_SLACK {
             return Fate::Unseen;
         }
         // The place of what reaches the near depth in the image says nothing.
@@ -164,23 +164,6 @@ fn bounded(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: &Wante
         if seen < size && turned <= 0.0 { Fate::Drawn } else { Fate::Divided }
     };
     Cut::of(hierarchy, most, fate)
-}
-
-/// Whether a ball around a place in camera space lies beside the image, farther than a margin of pixels: on the far side of a plane through the eye and
-/// an edge of the image, so that this is told of one that reaches the eye's plane too.
-fn is_beside(at: DVec3, radius: f64, camera: &Camera, margin: DVec2) -> bool {
-    let (focal, principal) = (DVec2::new(camera.fx, camera.fy), DVec2::new(camera.cx, camera.cy));
-    let size = DVec2::new(camera.width.into(), camera.height.into());
-    let (before, after) = (principal + margin, size + margin - principal);
-    let along = focal * at.truncate();
-    let out = match camera.projection {
-        Projection::Pinhole => {
-            let reach = |edge: DVec2| (focal * focal + edge * edge).map(f64::sqrt) * radius;
-            (along + before * at.z).cmplt(-reach(before)) | (along - after * at.z).cmpgt(reach(after))
-        }
-        Projection::Orthographic => (along + before).cmplt(-focal * radius) | (along - after).cmpgt(focal * radius),
-    };
-    out.any()
 }
 
 /// The sine by which a node's normal points away from the eye, and that past which all below it does, whatever point of the ball around it is looked

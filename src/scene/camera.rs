@@ -1,6 +1,6 @@
 //! The camera: intrinsics in pixels, a rigid pose in world units, and the view chosen when nobody chose one.
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 
 use super::{Samples, Scene, Up};
 use crate::error::{Error, Result};
@@ -268,6 +268,23 @@ impl Camera {
     /// Pixels of the image.
     pub fn pixels(&self) -> usize {
         self.width as usize * self.height as usize
+    }
+
+    /// Whether a ball around a place in camera space lies beside the image, farther than a margin of pixels: on the far side of a plane through the eye and
+    /// an edge of the image, so that this is told of one that reaches the eye's plane too.
+    pub(crate) fn is_beside_image(&self, at: DVec3, radius: f64, margin: DVec2) -> bool {
+        let (focal, principal) = (DVec2::new(self.fx, self.fy), DVec2::new(self.cx, self.cy));
+        let size = DVec2::new(self.width.into(), self.height.into());
+        let (before, after) = (principal + margin, size + margin - principal);
+        let along = focal * at.truncate();
+        let out = match self.projection {
+            Projection::Pinhole => {
+                let reach = |edge: DVec2| (focal * focal + edge * edge).map(f64::sqrt) * radius;
+                (along + before * at.z).cmplt(-reach(before)) | (along - after * at.z).cmpgt(reach(after))
+            }
+            Projection::Orthographic => (along + before).cmplt(-focal * radius) | (along - after).cmpgt(focal * radius),
+        };
+        out.any()
     }
 }
 

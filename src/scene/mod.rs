@@ -21,6 +21,7 @@ pub mod kernel;
 pub mod light;
 pub mod maps;
 pub mod mipmap;
+pub mod octree;
 pub mod options;
 pub mod outline;
 mod provenance;

@@ -6,20 +6,24 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use epsplat::frame::Frame;
 use epsplat::io::write_behind::write_behind;
 use epsplat::io::{atomic, cameras};
 use epsplat::passes::unseen::{Unseen, is_empty};
-use epsplat::render::{Renderer, Report};
-use epsplat::scene::{Camera, Maps};
+use epsplat::plan::RenderOptions;
+use epsplat::render::{Backend, Renderer, Report, render};
+use epsplat::scene::{Camera, Detail, Maps, Scene};
 use epsplat::{Error, Progress, Result};
 use serde::Serialize;
 
 use super::super::progress::Bars;
 use super::super::{note, outputs, write_json};
+use super::octrees::{Octrees, Read};
 use super::options::{for_scene, options};
 use super::output::{Format, note_overflows};
+use super::scene::scene;
 use super::view::{DEFAULT_SIZE, View};
-use super::{Arguments, backend, levels, scene};
+use super::{Arguments, backend, levels};
 
 /// Frames that wait for a writer or are in its hands take no more host memory than this, bytes, unless one frame does.
 const MOST_WAITING: u64 = 1 << 30;
@@ -34,6 +38,9 @@ struct Picture {
     file: PathBuf,
     #[serde(flatten)]
     report: Report,
+    /// None where all of the inputs was read.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    read: Option<Read>,
     /// Milliseconds of encoding and writing, while other pictures were rendered.
     write_ms: f64,
 }
@@ -50,6 +57,47 @@ struct Reports {
     total_ms: f64,
 }
 
+/// What the views show.
+enum Shown<'a> {
+    /// A scene that all of them share.
+    Whole(&'a Scene, RenderOptions, Box<Renderer<&'a Scene, &'a Backend>>),
+    /// What each takes of COPC files, which depends on nothing that another one takes.
+    Parts(Box<Octrees>, RenderOptions, &'a Backend),
+}
+
+/// A view's frame.
+struct Shot {
+    frame: Frame,
+    report: Report,
+    read: Option<Read>,
+    /// Why it is empty, if it is.
+    unseen: Option<Unseen>,
+}
+
+impl Shown<'_> {
+    fn picture(&mut self, arguments: &Arguments, view: &View, bars: &Bars) -> Result<Shot> {
+        let unseen = |scene: &Scene, camera: &Camera, options: &RenderOptions, frame: &Frame| {
+            is_empty(frame, options).then(|| Unseen::of(scene, camera, options))
+        };
+        match self {
+            Self::Whole(scene, options, renderer) => {
+                let (camera, _) = view.camera(scene, Camera::default_near(scene))?;
+                let (frame, report) = renderer.frame(&camera, &())?;
+                let unseen = unseen(scene, &camera, options, &frame);
+                Ok(Shot { frame, report, read: None, unseen })
+            }
+            Self::Parts(octrees, options, backend) => {
+                let (camera, _) = view.camera(&octrees.overview, Camera::default_near(&octrees.overview))?;
+                let ((scene, _), read) = octrees.scene(arguments, &camera, options.detail, bars)?;
+                let options = RenderOptions { detail: Detail::FINEST, ..options.clone() };
+                let (frame, report) = render(&scene, &camera, &options, backend, &())?;
+                let unseen = unseen(&scene, &camera, &options, &frame);
+                Ok(Shot { frame, report, read: Some(read), unseen })
+            }
+        }
+    }
+}
+
 /// Renders a picture of each camera of the set at `path`.
 pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
     let maps = !arguments.aov.is_empty();
@@ -60,42 +108,49 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
     let backend = backend(arguments)?;
 
     let bars = Bars::new();
-    let (scene, _) = scene(arguments, &bars)?;
-    let options = for_scene(arguments, options, &scene)?;
-    let scene = levels::made(scene, &options, &bars)?;
-    let near = Camera::default_near(&scene);
+    let octrees = Octrees::of(arguments, &options, &bars)?;
+    let (scene, options) = match &octrees {
+        Some(_) => (Scene::default(), options),
+        None => {
+            let (scene, preparation) = scene(arguments, &bars)?;
+            preparation.notes().iter().for_each(|line| note(line));
+            let options = for_scene(arguments, options, &scene)?;
+            (levels::made(scene, &options, &bars)?, options)
+        }
+    };
     let largest = views.iter().map(|(_, view)| view.pixels()).max().unwrap_or(1);
     let writers = writers(largest, options.maps);
-    let mut renderer = Renderer::new(&scene, &options, &backend)?;
+    let mut shown = match octrees {
+        Some(octrees) => Shown::Parts(Box::new(octrees), options.clone(), &backend),
+        None => Shown::Whole(&scene, options.clone(), Box::new(Renderer::new(&scene, &options, &backend)?)),
+    };
     let start = Instant::now();
     bars.begin("rendering views", views.len() as u64);
     // The first empty picture and why it is, and how many are.
     let empty = RefCell::new((None, 0));
     let frames = views.iter().map(|(file, view)| {
-        let frame = view.camera(&scene, near).and_then(|(camera, _)| {
-            let frame = renderer.frame(&camera, &())?;
-            if is_empty(&frame.0, &options) {
-                let (first, count) = &mut *empty.borrow_mut();
-                first.get_or_insert_with(|| (file, Unseen::of(&scene, &camera, &options)));
-                *count += 1;
-            }
-            Ok(frame)
-        });
-        frame.map(|(frame, report)| (file, frame, report)).map_err(|error| error.of_view(file))
+        let made = shown.picture(arguments, view, &bars).map_err(|error| error.of_view(file))?;
+        if let Some(unseen) = &made.unseen {
+            let (first, count) = &mut *empty.borrow_mut();
+            first.get_or_insert_with(|| (file, unseen.sentence()));
+            *count += 1;
+        }
+        Ok((file, made))
     });
-    let pictures = write_behind(writers, frames, |(file, frame, report)| {
+    let pictures = write_behind(writers, frames, |(file, made)| {
         let start = Instant::now();
         if let Some(folder) = file.parent() {
             std::fs::create_dir_all(folder).map_err(|error| Error::write(file, error))?;
         }
+        let Shot { frame, report, read, .. } = made;
         format.write(file, &frame)?;
         bars.advance(1);
-        Ok(Picture { file: file.clone(), report, write_ms: start.elapsed().as_secs_f64() * 1e3 })
+        Ok(Picture { file: file.clone(), report, read, write_ms: start.elapsed().as_secs_f64() * 1e3 })
     });
     bars.end();
     let pictures = pictures?;
     if let (Some((first, unseen)), count) = empty.into_inner() {
-        note(&format!("{} ({}, the first of {count} empty pictures)", unseen.sentence(), first.display()));
+        note(&format!("{} ({}, the first of {count} empty pictures)", unseen, first.display()));
     }
     let views = pictures;
     views.iter().for_each(|view| note_overflows(&view.report));

@@ -10,10 +10,10 @@ use las::raw::{Header, Vlr};
 use std::io::{BufReader, Read, Seek, SeekFrom};
 
 /// A decoded chunk larger than this is decoded by one thread, which needs no buffer for it.
-const CHUNK_LIMIT: u64 = 1 << 28;
+pub(super) const CHUNK_LIMIT: u64 = 1 << 28;
 
 /// No byte is more points than this: at its cheapest a point is a symbol of 64 whose probability is 1 - 63 / 2^15, 0.0028 bits.
-const MOST_A_BYTE: u64 = 1 << 12;
+pub(super) const MOST_A_BYTE: u64 = 1 << 12;
 
 /// Where a LASzip record has the points per chunk.
 const CHUNK_SIZE: usize = 12;
@@ -27,7 +27,7 @@ pub(super) enum Decoding {
     Parallel,
 }
 
-fn malformed<T>(what: impl Into<String>) -> Result<T, Fault> {
+pub(super) fn malformed<T>(what: impl Into<String>) -> Result<T, Fault> {
     Err(Fault::Malformed(what.into()))
 }
 
@@ -98,7 +98,7 @@ pub(super) fn check(file: &mut BufReader<Shown>, header: &Header, length: u64) -
 }
 
 /// The data of the record that says how the points are compressed, and where it lies.
-fn laszip_record(file: &mut (impl Read + Seek), header: &Header) -> Result<Option<(u64, Vec<u8>)>, Fault> {
+pub(super) fn laszip_record(file: &mut (impl Read + Seek), header: &Header) -> Result<Option<(u64, Vec<u8>)>, Fault> {
     file.seek(SeekFrom::Start(u64::from(header.header_size)))?;
     for _ in 0..header.number_of_variable_length_records {
         let Ok(record) = Vlr::read_from(&mut *file, false) else {
@@ -115,19 +115,19 @@ fn laszip_record(file: &mut (impl Read + Seek), header: &Header) -> Result<Optio
 
 /// How the points are compressed.
 #[derive(Debug)]
-struct Scheme {
+pub(super) struct Scheme {
     /// 1: one run of points, without chunks; 2: chunks; 3: chunks in layers.
-    compressor: u16,
+    pub(super) compressor: u16,
     /// Points per chunk; `None` where the chunk table gives them.
     chunk: Option<u32>,
     /// Bytes per decoded point.
-    record: u64,
+    pub(super) record: u64,
     /// Layers per chunk, where chunks are in layers.
     layers: u64,
 }
 
 impl Scheme {
-    fn parse(data: &[u8]) -> Option<Self> {
+    pub(super) fn parse(data: &[u8]) -> Option<Self> {
         let u16_at = |at: usize| data.get(at..)?.first_chunk().copied().map(u16::from_le_bytes);
         let chunk = u32::from_le_bytes(data.get(CHUNK_SIZE..)?.first_chunk().copied()?);
         let (compressor, items) = (u16_at(0)?, u16_at(32)?);
@@ -157,6 +157,19 @@ impl Scheme {
         }
         let chunk = Some(chunk).filter(|&chunk| chunk != 0 && chunk != u32::MAX);
         Some(Self { compressor, chunk, record, layers })
+    }
+
+    /// Bytes of a chunk in layers before these: its first point, how many it has, and how long each layer is.
+    pub(super) fn start(&self) -> u64 {
+        self.record + 4 + 4 * self.layers
+    }
+
+    /// The points that a chunk of so many bytes, which begins with these, says that it has; None if its layers do not fit in it.
+    pub(super) fn points_in(&self, start: &[u8], bytes: u64) -> Option<u64> {
+        let words = start.get(self.record as usize..self.start() as usize)?.as_chunks().0;
+        let mut words = words.iter().map(|word| u64::from(u32::from_le_bytes(*word)));
+        let count = words.next()?;
+        (self.start() + words.sum::<u64>() <= bytes).then_some(count)
     }
 }
 
@@ -228,18 +241,14 @@ fn check_layers(
     scheme: &Scheme,
     chunks: &mut [Chunk],
 ) -> Result<(), Fault> {
-    let mut sizes = vec![0; 4 * scheme.layers as usize];
+    let mut start = vec![0; scheme.start() as usize];
     for (index, chunk) in chunks.iter_mut().enumerate() {
-        let fixed = scheme.record + 4 + 4 * scheme.layers;
         if chunk.bytes > 0 || chunk.points > 0 {
-            file.seek(SeekFrom::Start(at + scheme.record))?;
-            let mut count = [0; 4];
-            let whole = file.read_exact(&mut count).and_then(|()| file.read_exact(&mut sizes)).is_ok();
-            let layers: u64 = sizes.as_chunks().0.iter().map(|size| u64::from(u32::from_le_bytes(*size))).sum();
-            if !whole || fixed + layers > chunk.bytes {
+            file.seek(SeekFrom::Start(at))?;
+            let whole = file.read_exact(&mut start).is_ok();
+            let Some(count) = scheme.points_in(&start, chunk.bytes).filter(|_| whole) else {
                 return malformed(format!("the layers of its chunk {} do not fit in it", index + 1));
-            }
-            let count = u64::from(u32::from_le_bytes(count));
+            };
             if count > 0 {
                 chunk.points = chunk.points.min(count);
             }

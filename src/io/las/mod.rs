@@ -3,6 +3,8 @@
 mod arithmetic;
 mod chunks;
 mod color;
+mod copc;
+mod nodes;
 mod shown;
 
 use crate::io::fault::{self, Fault, reserve, surviving};
@@ -15,6 +17,8 @@ use las::{PointData, PointDataBuilder, Reader, raw};
 use shown::Shown;
 use std::collections::BTreeMap;
 use std::io::{self, BufReader, Seek};
+
+pub use copc::Copc;
 
 /// Bytes of records that are decoded together.
 const BLOCK: u64 = 1 << 25;
@@ -124,14 +128,7 @@ fn decode(
         read += count;
         progress.advance(count);
     }
-    let Kept { positions, codes, intensities, classes, counts, left_out } = kept;
-    let colors = if format.has_color { color::from_rgb(codes) } else { intensity::grey(&intensities) };
-    let colors = read_options.classes.fade(colors, &classes);
-    let withheld = left_out.len() as u64;
-    let up = Some(Up::Z);
-    let mut points = Points { positions, colors, up, classes: counts, withheld, left_out, ..Points::default() };
-    leave_out_unseen(&mut points, &classes, read_options, read);
-    Ok(points)
+    Ok(kept.points(format.has_color, 0..read, read_options))
 }
 
 /// What is kept of the points so far.
@@ -148,6 +145,18 @@ struct Kept {
 }
 
 impl Kept {
+    /// As points, of which all that were read have these numbers, in order.
+    fn points(self, has_color: bool, numbers: impl Iterator<Item = u64>, options: &ReadOptions) -> Points {
+        let Self { positions, codes, intensities, classes, counts, left_out } = self;
+        let colors = if has_color { color::from_rgb(codes) } else { intensity::grey(&intensities) };
+        let colors = options.classes.fade(colors, &classes);
+        let withheld = left_out.len() as u64;
+        let up = Some(Up::Z);
+        let mut points = Points { positions, colors, up, classes: counts, withheld, left_out, ..Points::default() };
+        leave_out_unseen(&mut points, &classes, options, numbers);
+        points
+    }
+
     /// Adds the points of a block, the first of which has the number `first`, but for those that are deleted.
     fn take(&mut self, block: &PointData, first: u64, options: &ReadOptions) {
         let mut keeps = Vec::with_capacity(block.len());
@@ -174,8 +183,8 @@ impl Kept {
     }
 }
 
-/// Leaves out the points of these `classes` whose opacity is 0, of a file of `all` points: what colours mean was decided by all of them.
-fn leave_out_unseen(points: &mut Points, classes: &[u8], options: &ReadOptions, all: u64) {
+/// Leaves out the points of these `classes` whose opacity is 0, where all have these numbers: what colours mean was decided by all of them.
+fn leave_out_unseen(points: &mut Points, classes: &[u8], options: &ReadOptions, numbers: impl Iterator<Item = u64>) {
     let keep: Vec<bool> = classes.iter().map(|class| options.classes.of(*class) > 0.0).collect();
     points.unseen = keep.iter().filter(|keep| !**keep).count() as u64;
     if points.unseen == 0 {
@@ -184,7 +193,7 @@ fn leave_out_unseen(points: &mut Points, classes: &[u8], options: &ReadOptions, 
     let mut deleted = std::mem::take(&mut points.left_out).into_iter().peekable();
     let mut kept = keep.iter();
     let is_left_out = |number: &u64| deleted.next_if_eq(number).is_some() || kept.next() == Some(&false);
-    points.left_out = (0..all).filter(is_left_out).collect();
+    points.left_out = numbers.filter(is_left_out).collect();
     points.retain(&keep);
 }
 

@@ -44,6 +44,11 @@ impl Shown {
         Ok(shown)
     }
 
+    /// The file as it is.
+    pub(super) fn into_file(self) -> File {
+        self.file
+    }
+
     /// Lets `bytes` be read at `at` from now on.
     pub(super) fn show(&mut self, at: u64, bytes: &[u8]) {
         self.others.push((at, bytes.to_vec()));

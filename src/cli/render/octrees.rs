@@ -1,0 +1,86 @@
+//! `epsplat render --lod` of COPC files: a picture reads those of their nodes that it takes.
+
+use epsplat::io::Points;
+use epsplat::io::las::Copc;
+use epsplat::plan::RenderOptions;
+use epsplat::scene::octree::{PointOctree, taken};
+use epsplat::scene::{Camera, Detail, Scene};
+use epsplat::{Error, Result, surfels};
+use serde::Serialize;
+
+use super::super::progress::Bars;
+use super::super::reading::named;
+use super::Arguments;
+use super::scene::{Made, scene_of};
+
+/// COPC files that are one scene, and what tells where it is.
+pub(super) struct Octrees {
+    files: Vec<Copc>,
+    octrees: Vec<PointOctree>,
+    /// Of the coarsest nodes.
+    pub overview: Scene,
+}
+
+/// What a picture read of what there is: of all files together.
+#[derive(Clone, Copy, Serialize)]
+pub(super) struct Read {
+    nodes: [u64; 2],
+    points: [u64; 2],
+    /// Of compressed points.
+    bytes: [u64; 2],
+}
+
+impl Octrees {
+    /// The inputs, if a picture with `options` takes parts of them: if levels of detail are asked for and all are COPC files.
+    pub fn of(arguments: &Arguments, options: &RenderOptions, bars: &Bars) -> Result<Option<Self>> {
+        if options.detail.is_finest() || arguments.inputs.is_empty() {
+            return Ok(None);
+        }
+        let Some(files) = arguments.reading.octrees(&arguments.inputs)? else { return Ok(None) };
+        let octrees: Vec<PointOctree> = files.iter().map(|file| file.octree.clone()).collect();
+        let nodes: Vec<Vec<usize>> = octrees.iter().map(PointOctree::overview).collect();
+        let points = read(arguments, &files, &nodes, bars)?;
+        let built = surfels::build_within(points, Vec::new(), &arguments.limits.limits(), bars);
+        let (overview, _) = built.map_err(|error| named(error, &arguments.inputs))?;
+        Ok(Some(Self { files, octrees, overview }))
+    }
+
+    /// What the picture of `camera` takes, and what that was of all.
+    pub fn scene(&self, arguments: &Arguments, camera: &Camera, detail: Detail, bars: &Bars) -> Result<(Made, Read)> {
+        let nodes = taken(&self.octrees, camera, detail);
+        let sum = |of: &dyn Fn(usize) -> u64| (0..self.files.len()).map(of).sum::<u64>();
+        let all: Vec<Vec<usize>> = self.octrees.iter().map(|octree| (0..octree.nodes.len()).collect()).collect();
+        let of = |nodes: &[Vec<usize>]| {
+            let count = sum(&|file| nodes[file].len() as u64);
+            (
+                count,
+                sum(&|file| self.octrees[file].points(&nodes[file])),
+                sum(&|file| self.files[file].bytes(&nodes[file])),
+            )
+        };
+        let (read_of, of_all) = (of(&nodes), of(&all));
+        if read_of.1 == 0 {
+            let what = "no node of the octree is in view: move the camera, or leave it out for a view of all";
+            return Err(Error::EmptyScene(what.into()));
+        }
+        let made = scene_of(arguments, read(arguments, &self.files, &nodes, bars)?, bars)?;
+        let read = Read { nodes: [read_of.0, of_all.0], points: [read_of.1, of_all.1], bytes: [read_of.2, of_all.2] };
+        Ok((made, read))
+    }
+}
+
+impl Read {
+    /// One line.
+    pub fn sentence(&self) -> String {
+        let Self { nodes: [nodes, all_nodes], points: [points, all_points], bytes } = self;
+        let [bytes, all_bytes] = bytes.map(|bytes| bytes as f64 / 1e6);
+        format!(
+            "read {nodes} of {all_nodes} nodes of the octree, {points} of {all_points} points: {bytes:.1} of {all_bytes:.1} MB"
+        )
+    }
+}
+
+/// The points of these nodes of each file.
+fn read(arguments: &Arguments, files: &[Copc], nodes: &[Vec<usize>], bars: &Bars) -> Result<Vec<Points>> {
+    arguments.reading.nodes(files.iter().zip(nodes), bars)
+}

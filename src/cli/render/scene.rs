@@ -1,0 +1,95 @@
+//! The scene of a picture: all inputs, and the triangles beside them.
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+
+use epsplat::io::{self, Mesh, Points, Texture};
+use epsplat::scene::Scene;
+use epsplat::surfels::{Preparation, with_triangles};
+use epsplat::{Error, Result, surfels};
+
+use super::super::note;
+use super::super::progress::Bars;
+use super::super::reading::named;
+use super::Arguments;
+
+/// A scene, and what became of its points.
+pub(super) type Made = (Scene, Preparation);
+
+/// What all inputs hold, as one scene.
+pub(super) fn scene(arguments: &Arguments, bars: &Bars) -> Result<Made> {
+    let inputs =
+        if arguments.inputs.is_empty() { Vec::new() } else { arguments.reading.all(&arguments.inputs, bars)? };
+    scene_of(arguments, inputs, bars)
+}
+
+/// What was read of all inputs, and the triangles beside it, as one scene.
+pub(super) fn scene_of(arguments: &Arguments, inputs: Vec<Points>, bars: &Bars) -> Result<Made> {
+    if arguments.inputs.is_empty() && !arguments.textures.is_empty() {
+        let what = "--texture paints surfels, and there are none: take --triangle-texture for triangles";
+        return Err(Error::Usage(what.into()));
+    }
+    if arguments.separate && arguments.inputs.len() < 2 {
+        note(
+            "--separate keeps the surfels of several files apart, and here is one of them at most: it changes nothing",
+        );
+    }
+    // What `epsplat hybrid` left of a mesh names itself.
+    let beside = inputs.iter().filter_map(|points| points.beside.clone());
+    let mut paths: Vec<PathBuf> = arguments.triangles.iter().cloned().chain(beside).collect();
+    // What two files of surfels name is drawn once.
+    let mut known = BTreeSet::new();
+    paths.retain(|path| known.insert(path.canonicalize().unwrap_or_else(|_| path.clone())));
+    let has_points = inputs.iter().any(|points| !points.positions.is_empty() || points.beside.is_none());
+    let of_surfels = if has_points { Some(surfels_of(arguments, inputs, bars)?) } else { None };
+    if paths.is_empty() {
+        if arguments.join.is_some() || arguments.triangle_texture.is_some() {
+            let what = "--join and --triangle-texture are of triangles, and there are none: name some by --triangles";
+            return Err(Error::Usage(what.into()));
+        }
+        return of_surfels.ok_or_else(|| Error::Usage("there is nothing to render: name a file".into()));
+    }
+    let meshes = paths.iter().map(|path| io::read_mesh(path, bars)).collect::<Result<Vec<_>>>()?;
+    let meshes = painted(meshes, &paths, arguments)?;
+    meshes.iter().flat_map(|mesh| &mesh.notes).for_each(|line| note(line));
+    let (scene, preparation) = of_surfels.unzip();
+    let (scene, of_triangles) = with_triangles(scene, &meshes).map_err(|error| named(error, &paths))?;
+    of_triangles.notes().iter().for_each(|line| note(line));
+    let guessed_up = of_triangles.guessed_up;
+    Ok((scene, preparation.unwrap_or_else(|| Preparation { guessed_up, ..Preparation::default() })))
+}
+
+/// The meshes, those that no material paints with the image for triangles.
+fn painted(mut meshes: Vec<Mesh>, paths: &[PathBuf], arguments: &Arguments) -> Result<Vec<Mesh>> {
+    let Some(image) = &arguments.triangle_texture else { return Ok(meshes) };
+    let texture = Texture::read(image)?;
+    let bare = |mesh: &Mesh| mesh.materials.iter().all(|material| material.texture.is_none());
+    if !meshes.iter().any(bare) {
+        note("warning: every mesh has a texture of its own, so that --triangle-texture paints none");
+    }
+    for (mesh, path) in meshes.iter_mut().zip(paths).filter(|(mesh, _)| bare(mesh)) {
+        if mesh.texture.is_none() {
+            return Err(Error::malformed(path, "its triangles have no texture coordinates, so they cannot be painted"));
+        }
+        mesh.paint(texture.clone());
+    }
+    Ok(meshes)
+}
+
+/// The surfels of all inputs.
+fn surfels_of(arguments: &Arguments, inputs: Vec<Points>, bars: &Bars) -> Result<Made> {
+    let textures = arguments.textures.iter().map(|image| Texture::read(image)).collect::<Result<Vec<_>>>()?;
+    let mut read = arguments.inputs.iter().zip(&inputs);
+    if !textures.is_empty()
+        && let Some((path, _)) = read.find(|(_, points)| points.texture.is_none() && !points.positions.is_empty())
+    {
+        let what = "its points have no texture coordinates, so they cannot be textured; `epsplat sample` gives surfels of a mesh some";
+        return Err(Error::malformed(path, what));
+    }
+    let limits = arguments.limits.limits();
+    let built = match arguments.facing {
+        Some(_) => surfels::build_facing(inputs, arguments.point_size, &limits, bars),
+        None => surfels::build_within(inputs, textures, &limits, bars),
+    };
+    built.map_err(|error| named(error, &arguments.inputs))
+}

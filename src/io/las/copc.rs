@@ -1,0 +1,227 @@
+//! COPC 1.0: LAZ files whose chunks are the nodes of an octree, of which a picture takes few.
+
+use super::chunks::{MOST_A_BYTE, Scheme, laszip_record, malformed, promised};
+use super::shown::Shown;
+use super::{early, of_las};
+use crate::io::fault::{Fault, surviving};
+use crate::io::{Format, Input};
+use crate::scene::octree::{MOST_LEVELS, OctreeNode, PointOctree};
+use crate::{Error, Result};
+use glam::DVec3;
+use las::{Transform, Vector, raw};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::path::PathBuf;
+
+/// Where a COPC file says that it is one: the header of its first record, and what that holds.
+const RECORD: u64 = 375;
+const INFO: u64 = RECORD + 54;
+const INFO_SIZE: usize = 160;
+
+/// Bytes of an entry of the octree's pages.
+const ENTRY: u64 = 32;
+
+/// A COPC file, of which any nodes can be read.
+///
+/// The octree is checked when it is opened: each node is there once, below one that is there, and its chunk lies in the file.
+pub struct Copc {
+    pub(super) file: File,
+    pub(super) path: PathBuf,
+    /// Which nodes it has.
+    pub octree: PointOctree,
+    /// The chunk of each.
+    pub(super) chunks: Vec<Chunk>,
+    pub(super) scheme: Scheme,
+    /// The record that says how chunks are compressed.
+    pub(super) laszip: Vec<u8>,
+    pub(super) format: las::point::Format,
+    pub(super) transforms: Vector<Transform>,
+    /// Points of all nodes.
+    pub(super) count: u64,
+}
+
+/// Where the points of a node lie.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Chunk {
+    /// Bytes from the file's start.
+    pub offset: u64,
+    pub bytes: u64,
+    /// The number of its first point, as the file has them one after the other.
+    pub first: u64,
+}
+
+/// A node as pages have it.
+struct Entry {
+    offset: u64,
+    bytes: u64,
+    points: u64,
+}
+
+impl Copc {
+    /// Opens an input that is a COPC file; None if it is another one.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Read`] where the system cannot read, [`Error::Malformed`] where the file says that it is COPC and is not.
+    pub fn open(input: Input) -> Result<Option<Self>> {
+        let Input { file, length, path, format } = input;
+        let opened = surviving(|| {
+            if format != Format::Las || !says_copc(&file)? {
+                return Ok(None);
+            }
+            opened(file, path.clone(), length).map(Some).map_err(early)
+        });
+        opened.map_err(|fault| fault.of(&path))
+    }
+
+    /// Bytes of the chunks of these nodes.
+    pub fn bytes(&self, nodes: &[usize]) -> u64 {
+        nodes.iter().map(|&node| self.chunks[node].bytes).sum()
+    }
+
+    /// Points of all nodes.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// A failure that is the file's.
+    pub(super) fn fault(&self, fault: Fault) -> Error {
+        fault.of(&self.path)
+    }
+}
+
+/// Whether a file's first record is COPC's.
+fn says_copc(file: &File) -> Result<bool, Fault> {
+    let mut start = Vec::new();
+    file.take(INFO).read_to_end(&mut start)?;
+    let record = start.get(RECORD as usize..);
+    let named = record.is_some_and(|record| record[2..18].starts_with(b"copc\0") && record[18..20] == [1, 0]);
+    Ok(named && start.starts_with(b"LASF"))
+}
+
+fn opened(mut file: File, path: PathBuf, length: u64) -> Result<Copc, Fault> {
+    file.rewind()?;
+    let mut file = BufReader::new(Shown::new(file)?);
+    let header = raw::Header::read_from(&mut file).map_err(of_las)?;
+    let record = u64::from(header.point_data_record_length);
+    let format = header.point_data_record_format & 0x3f;
+    let laszip = laszip_record(&mut file, &header)?.map(|(_, data)| data);
+    let scheme = laszip.as_deref().and_then(Scheme::parse);
+    let (Some(laszip), Some(scheme)) = (laszip, scheme.filter(|scheme| scheme.compressor == 3)) else {
+        return malformed("it says that it is COPC, but its points are not compressed in layers");
+    };
+    let mut format = las::point::Format::new(format).map_err(of_las)?;
+    if scheme.record != record || record < u64::from(format.len()) {
+        return malformed("its LASzip record does not describe its points");
+    }
+    format.extra_bytes = (record - u64::from(format.len())) as u16;
+    let mut info = [0; INFO_SIZE];
+    file.seek(SeekFrom::Start(INFO))?;
+    file.read_exact(&mut info)?;
+    let (words, _) = info.as_chunks::<8>();
+    let [x, y, z, half, spacing] = [0, 1, 2, 3, 4].map(|at| f64::from_le_bytes(words[at]));
+    let (center, root) = (DVec3::new(x, y, z), [5, 6].map(|at| u64::from_le_bytes(words[at])));
+    if !(center.is_finite() && half.is_finite() && half > 0.0 && spacing.is_finite() && spacing > 0.0) {
+        return malformed("its octree has no place, no size or no spacing");
+    }
+    let entries = entries(&mut file, root, length)?;
+    let (nodes, chunks) = checked(entries, (&scheme, length))?;
+    let count = nodes.iter().map(|node| node.points).sum();
+    if count != promised(&header) {
+        return malformed(format!("its octree has {count} points, and its header promises {}", promised(&header)));
+    }
+    let transform = |scale, offset| Transform { scale, offset };
+    let transforms = Vector {
+        x: transform(header.x_scale_factor, header.x_offset),
+        y: transform(header.y_scale_factor, header.y_offset),
+        z: transform(header.z_scale_factor, header.z_offset),
+    };
+    let octree = PointOctree { center, half, spacing, nodes };
+    Ok(Copc { file: file.into_inner().into_file(), path, octree, chunks, scheme, laszip, format, transforms, count })
+}
+
+/// The entries of all pages, from the root's on, by their keys.
+fn entries(
+    file: &mut (impl Read + Seek),
+    root: [u64; 2],
+    length: u64,
+) -> Result<BTreeMap<(u32, [u32; 3]), Entry>, Fault> {
+    let mut entries = BTreeMap::new();
+    let mut pages = vec![root];
+    // Pages that name each other have more entries than the file can hold.
+    let mut left = length / ENTRY;
+    while let Some([offset, bytes]) = pages.pop() {
+        let within = offset.checked_add(bytes).is_some_and(|end| end <= length);
+        let Some(rest) = left.checked_sub(bytes / ENTRY).filter(|_| within && bytes % ENTRY == 0 && bytes > 0) else {
+            return malformed(format!(
+                "a page of its octree, {bytes} bytes at byte {offset}, does not fit in the file"
+            ));
+        };
+        left = rest;
+        file.seek(SeekFrom::Start(offset))?;
+        for _ in 0..bytes / ENTRY {
+            let mut entry = [0; ENTRY as usize];
+            file.read_exact(&mut entry)?;
+            let [level, x, y, z, _, _, bytes, points] =
+                std::array::from_fn(|at| i32::from_le_bytes(entry.as_chunks().0[at]));
+            let offset = u64::from_le_bytes(entry.as_chunks().0[2]);
+            let name = || format!("{level}-{x}-{y}-{z}");
+            let whole = [level, x, y, z].map(u32::try_from);
+            let ([Ok(level), Ok(x), Ok(y), Ok(z)], Ok(bytes)) = (whole, u64::try_from(bytes)) else {
+                return malformed(format!("node {} of its octree has no place or no size", name()));
+            };
+            if level >= MOST_LEVELS || [x, y, z].iter().any(|place| u64::from(*place) >> level > 0) {
+                return malformed(format!("node {} lies outside its octree", name()));
+            }
+            if points == -1 {
+                pages.push([offset, bytes]);
+                continue;
+            }
+            let Ok(points) = u64::try_from(points) else {
+                return malformed(format!("node {} of its octree has {points} points", name()));
+            };
+            if entries.insert((level, [x, y, z]), Entry { offset, bytes, points }).is_some() {
+                return malformed(format!("node {} is twice in its octree", name()));
+            }
+        }
+    }
+    Ok(entries)
+}
+
+/// The nodes in the order of their keys, each below one that is there, with chunks within the file.
+fn checked(
+    entries: BTreeMap<(u32, [u32; 3]), Entry>,
+    (scheme, length): (&Scheme, u64),
+) -> Result<(Vec<OctreeNode>, Vec<Chunk>), Fault> {
+    let (mut nodes, mut chunks) = (Vec::new(), Vec::new());
+    for (&(level, place), entry) in &entries {
+        let &Entry { offset, bytes, points } = entry;
+        let name = || format!("{level}-{}-{}-{}", place[0], place[1], place[2]);
+        if level > 0 && !entries.contains_key(&(level - 1, place.map(|place| place >> 1))) {
+            return malformed(format!("node {} of its octree is below none", name()));
+        }
+        let fits = offset.checked_add(bytes).is_some_and(|end| end <= length);
+        if points > 0 && !(fits && bytes >= scheme.start() && points / MOST_A_BYTE <= bytes) {
+            return malformed(format!(
+                "the {points} points of node {}, {bytes} bytes at byte {offset}, do not fit in the file",
+                name()
+            ));
+        }
+        nodes.push(OctreeNode { level, place, points });
+        chunks.push(Chunk { offset, bytes: if points > 0 { bytes } else { 0 }, first: 0 });
+    }
+    let mut in_file: Vec<usize> = (0..nodes.len()).filter(|&node| nodes[node].points > 0).collect();
+    in_file.sort_unstable_by_key(|&node| chunks[node].offset);
+    let mut first = 0u64;
+    for pair in in_file.windows(2) {
+        if chunks[pair[0]].offset + chunks[pair[0]].bytes > chunks[pair[1]].offset {
+            return malformed("two nodes of its octree have the same bytes");
+        }
+    }
+    for node in in_file {
+        chunks[node].first = first;
+        first += nodes[node].points;
+    }
+    Ok((nodes, chunks))
+}

@@ -1,0 +1,119 @@
+//! Nodes of a COPC file: their chunks are read in the order of the file, many at a time, and decoded by all threads.
+
+use super::chunks::{CHUNK_LIMIT, malformed};
+use super::copc::Copc;
+use super::{Kept, deep, early, of_las};
+use crate::io::fault::{self, Fault, reserve, surviving};
+use crate::io::{Points, ReadOptions};
+use crate::{Progress, Result};
+use las::{PointData, PointDataBuilder};
+use laz::LazVlr;
+use laz::record::{LayeredPointRecordDecompressor, RecordDecompressor};
+use rayon::prelude::*;
+use std::io::{Cursor, Read, Seek, SeekFrom};
+
+/// Bytes that are read and records that are decoded together, unless one node has more.
+const MOST_READ: u64 = 1 << 25;
+const MOST_DECODED: u64 = 1 << 27;
+
+impl Copc {
+    /// Reads the points of these nodes, by their indices in the octree, as [`read`](super::read) reads those of a whole file: in the order in
+    /// which the file has them. What 16-bit colours and intensities mean is told by those that are read.
+    ///
+    /// Points are numbered as in the file, if it has fewer than 2^32, else as they are read.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where a node cannot be decoded.
+    pub fn read(&self, nodes: &[usize], options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
+        let mut nodes: Vec<usize> = nodes.iter().copied().filter(|&node| self.octree.nodes[node].points > 0).collect();
+        nodes.sort_unstable_by_key(|&node| self.chunks[node].offset);
+        let bytes = self.bytes(&nodes);
+        progress.begin(&format!("reading {} MB of {}", bytes.div_ceil(1_000_000), fault::name(&self.path)), bytes);
+        let points = deep(|| self.decoded(&nodes, options, progress));
+        progress.end();
+        points.map_err(|fault| self.fault(fault))
+    }
+
+    fn decoded(&self, nodes: &[usize], options: &ReadOptions, progress: &dyn Progress) -> Result<Points, Fault> {
+        let vlr = LazVlr::from_buffer(&self.laszip).map_err(|error| of_las(error.into()))?;
+        let count = self.octree.points(nodes);
+        let mut kept = Kept::default();
+        reserve(&mut kept.positions, count)?;
+        for together in self.batches(nodes) {
+            let compressed = together.iter().map(|&node| self.compressed(node)).collect::<Result<Vec<_>, _>>()?;
+            let decode = |(&node, bytes): (&usize, Vec<u8>)| surviving(|| self.decode(node, &bytes, &vlr));
+            let decoded: Vec<PointData> =
+                together.par_iter().zip(compressed).map(decode).collect::<Result<_, Fault>>()?;
+            for (&node, block) in together.iter().zip(decoded) {
+                kept.take(&block, self.chunks[node].first, options);
+            }
+            progress.advance(self.bytes(together));
+        }
+        let numbers = || {
+            let of_node =
+                |&node: &usize| self.chunks[node].first..self.chunks[node].first + self.octree.nodes[node].points;
+            nodes.iter().flat_map(of_node)
+        };
+        let mut points = kept.points(self.format.has_color, numbers(), options);
+        let mut left_out = std::mem::take(&mut points.left_out).into_iter().peekable();
+        if u32::try_from(self.count).is_ok() {
+            let kept = numbers().filter(|number| left_out.next_if_eq(number).is_none());
+            points.numbers = Some(kept.map(|number| number as u32).collect());
+        }
+        Ok(points)
+    }
+
+    /// Runs of nodes that are read together.
+    fn batches<'a>(&self, nodes: &'a [usize]) -> Vec<&'a [usize]> {
+        let size = |&node: &usize| (self.chunks[node].bytes, self.octree.nodes[node].points * self.scheme.record);
+        let (mut batches, mut rest) = (Vec::new(), nodes);
+        while !rest.is_empty() {
+            let mut sum = (0, 0);
+            let fits = |node: &&usize| {
+                let (bytes, records) = size(node);
+                sum = (sum.0 + bytes, sum.1 + records);
+                sum.0 <= MOST_READ && sum.1 <= MOST_DECODED
+            };
+            let (batch, after) = rest.split_at(rest.iter().take_while(fits).count().max(1));
+            batches.push(batch);
+            rest = after;
+        }
+        batches
+    }
+
+    /// The chunk of a node, whose lengths are checked.
+    fn compressed(&self, node: usize) -> Result<Vec<u8>, Fault> {
+        let (chunk, points) = (self.chunks[node], self.octree.nodes[node].points);
+        if points * self.scheme.record > CHUNK_LIMIT {
+            return malformed(format!(
+                "a node of its octree has {points} points, more than are decoded at once: leave --lod out to read the whole file"
+            ));
+        }
+        let mut bytes = Vec::new();
+        reserve(&mut bytes, chunk.bytes)?;
+        let mut file = &self.file;
+        file.seek(SeekFrom::Start(chunk.offset))?;
+        file.take(chunk.bytes).read_to_end(&mut bytes)?;
+        match self.scheme.points_in(&bytes, bytes.len() as u64) {
+            Some(count) if count == points => Ok(bytes),
+            Some(count) => {
+                malformed(format!("a node of its octree has {count} points, not the {points} that it promises"))
+            }
+            None => malformed("the layers of a node of its octree do not fit in it"),
+        }
+    }
+
+    fn decode(&self, node: usize, bytes: &[u8], vlr: &LazVlr) -> Result<PointData, Fault> {
+        let failed = |error: laz::LasZipError| early(of_las(error.into()));
+        let mut decompressor = LayeredPointRecordDecompressor::new(Cursor::new(bytes));
+        decompressor.set_fields_from(vlr.items()).map_err(failed)?;
+        let size = self.octree.nodes[node].points * self.scheme.record;
+        let mut records = Vec::new();
+        reserve(&mut records, size)?;
+        records.resize(size as usize, 0);
+        decompressor.decompress_many(&mut records).map_err(|error| early(Fault::Io(error)))?;
+        let builder = PointDataBuilder::new().with_format(self.format).with_transforms(self.transforms);
+        builder.build_from_bytes(records).map_err(of_las)
+    }
+}

@@ -104,6 +104,8 @@ impl PointOctree {
             let at = camera.rotation * (self.center + place * self.half - camera.eye);
             let radius = 3f64.sqrt() * self.half * shrunk;
             let reach = radius + NEIGHBOURHOOD * spacing;
+            // Of the cube, not of the ball around it.
+            let deep = self.half * shrunk * camera.rotation.row(2).abs().element_sum();
             if at.z + reach < camera.near || camera.is_beside_image(at, reach, DVec2::ONE) {
                 continue;
             }
@@ -111,7 +113,7 @@ impl PointOctree {
             let pixels = camera.fx.max(camera.fy)
                 / match camera.projection {
                     // At the camera's plane nothing is small.
-                    Projection::Pinhole => (at.z - radius).max(0.0),
+                    Projection::Pinhole => (at.z - deep).max(0.0),
                     Projection::Orthographic => 1.0,
                 };
             if PI * (spacing * pixels).powi(2) >= size {
@@ -190,7 +192,8 @@ mod tests {
         let outside = octree.find(4, [0, 0, 15]).unwrap();
         assert!(!octree.taken(&close, 0.0).contains(&outside) && octree.taken(&camera, 0.0).contains(&outside));
         // What lies behind.
-        let turned = Camera { rotation: glam::DMat3::from_rotation_y(PI) * close.rotation, ..close.clone() };
+        let away = self::camera(DVec3::new(0.0, 0.0, 9.0), lens);
+        let turned = Camera { rotation: glam::DMat3::from_rotation_y(PI) * away.rotation, ..away };
         assert!(octree.taken(&turned, 0.0).is_empty());
     }
 

@@ -1,6 +1,7 @@
 //! The readers on files of every kind they promise to read, and on damaged ones.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod copc;
 mod e57;
 #[cfg(feature = "e57")]
 #[path = "../common/e57_page.rs"]

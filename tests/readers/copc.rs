@@ -1,0 +1,163 @@
+//! COPC files, of which nodes are read.
+
+use super::{Folder, Random, data, sentence};
+use epsplat::io::las::Copc;
+use epsplat::io::{self, Input, ReadOptions};
+use epsplat::scene::Colors;
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// Where the file says how its octree lies, and where its root page is.
+const INFO: usize = 375 + 54;
+const ROOT: usize = INFO + 40;
+
+fn bytes() -> Vec<u8> {
+    std::fs::read(data("simple.copc.laz")).unwrap()
+}
+
+fn open(path: &Path) -> Result<Option<Copc>, epsplat::Error> {
+    Copc::open(Input::open(path, None).unwrap())
+}
+
+/// Where the octree's first page begins.
+fn page(bytes: &[u8]) -> usize {
+    u64::from_le_bytes(*bytes[ROOT..].first_chunk().unwrap()) as usize
+}
+
+/// What opening these bytes, or reading all nodes of them, says.
+fn refusal(folder: &Folder, bytes: &[u8]) -> String {
+    let path = folder.path("a.copc.laz");
+    std::fs::write(&path, bytes).unwrap();
+    let read = open(&path).and_then(|copc| {
+        let copc = copc.unwrap();
+        let all: Vec<usize> = (0..copc.octree.nodes.len()).collect();
+        copc.read(&all, &ReadOptions::default(), &())
+    });
+    sentence(&read.unwrap_err(), &path)
+}
+
+#[test]
+fn all_nodes_are_the_file() {
+    let copc = open(&data("simple.copc.laz")).unwrap().unwrap();
+    let all: Vec<usize> = (0..copc.octree.nodes.len()).rev().collect();
+    for rules in ["", "2:0", "5:0.5"] {
+        let classes = if rules.is_empty() { Default::default() } else { rules.parse().unwrap() };
+        let options = ReadOptions { classes, ..ReadOptions::default() };
+        let whole = io::read_with(&data("simple.copc.laz"), options, &()).unwrap();
+        let mut read = copc.read(&all, &options, &()).unwrap();
+        // Numbers take the place of those that are left out.
+        let left_out: BTreeSet<u64> = whole.left_out.iter().copied().collect();
+        let kept = (0..1065).filter(|number| !left_out.contains(number)).map(|number| number as u32);
+        assert_eq!(read.numbers.take().unwrap(), kept.collect::<Vec<_>>());
+        assert_eq!((left_out.is_empty(), read.left_out.len()), (rules != "2:0", 0));
+        assert_eq!(read, io::Points { left_out: Vec::new(), ..whole });
+    }
+    assert_eq!((copc.count(), copc.octree.levels(), copc.octree.nodes.len()), (1065, 4, 65));
+}
+
+#[test]
+fn some_nodes_are_their_points() {
+    let copc = open(&data("simple.copc.laz")).unwrap().unwrap();
+    let whole = io::read(&data("simple.copc.laz"), &()).unwrap();
+    let (Some(Colors::Srgb8(colors)), octree) = (&whole.colors, &copc.octree) else { panic!() };
+    let mut numbers = BTreeSet::new();
+    for (index, node) in octree.nodes.iter().enumerate() {
+        let read = copc.read(&[index], &ReadOptions::default(), &()).unwrap();
+        assert_eq!(read.positions.len() as u64, node.points);
+        let Some(Colors::Srgb8(own)) = read.colors else { panic!() };
+        let edge = 2.0 * octree.half / f64::from(1u32 << node.level);
+        for ((number, position), color) in read.numbers.unwrap().into_iter().zip(read.positions).zip(own) {
+            assert_eq!((position, color), (whole.positions[number as usize], colors[number as usize]));
+            assert!(numbers.insert(number));
+            // Each lies in the node's cube.
+            let low = octree.center - octree.half + edge * glam::DVec3::from_array(node.place.map(f64::from));
+            let within = glam::DVec3::from_array(position) - low;
+            assert!(
+                within.cmpge(glam::DVec3::splat(-0.01)).all() && within.cmple(glam::DVec3::splat(edge + 0.01)).all()
+            );
+        }
+    }
+    assert_eq!(numbers.len(), 1065);
+    assert_eq!(copc.read(&[], &ReadOptions::default(), &()).unwrap().positions.len(), 0);
+}
+
+#[test]
+fn other_files_are_none() {
+    assert!(open(&data("autzen.laz")).unwrap().is_none() && open(&data("bunny.obj")).unwrap().is_none());
+}
+
+#[test]
+fn octrees_that_are_none_are_told() {
+    let (folder, whole) = (Folder::new(), bytes());
+    let page = page(&whole);
+    let with = |at: usize, value: &[u8]| {
+        let mut bytes = whole.clone();
+        bytes[at..at + value.len()].copy_from_slice(value);
+        refusal(&folder, &bytes)
+    };
+    let (word, entry) = (|value: i32| value.to_le_bytes(), |k: usize| page + 32 * k);
+    for (message, said) in [
+        (with(INFO + 24, &f64::NAN.to_le_bytes()), "has no place, no size or no spacing"),
+        (with(INFO + 32, &0f64.to_le_bytes()), "has no place, no size or no spacing"),
+        (with(ROOT, &u64::MAX.to_le_bytes()), "does not fit in the file"),
+        (with(ROOT + 8, &(1u64 << 40).to_le_bytes()), "does not fit in the file"),
+        (with(ROOT + 8, &33u64.to_le_bytes()), "does not fit in the file"),
+        (with(ROOT + 8, &64u64.to_le_bytes()), "its octree has 43 points, and its header promises 1065"),
+        (with(entry(0), &word(-1)), "node -1-0-0-0 of its octree has no place or no size"),
+        (with(entry(0), &word(1_000_000)), "node 1000000-0-0-0 lies outside"),
+        (with(entry(0) + 4, &word(1)), "node 0-1-0-0 lies outside"),
+        (with(entry(1) + 4, &word(1)), "node 1-1-0-0 is twice"),
+        (with(entry(1), &word(2)), "node 2-0-0-0 is twice"),
+        (with(entry(0), &word(5)), "below none"),
+        (with(entry(3) + 28, &word(-2)), "node 3-0-0-0 of its octree has -2 points"),
+        (with(entry(3) + 28, &word(0x7fff_ffff)), "do not fit in the file"),
+        (with(entry(3) + 16, &(1u64 << 60).to_le_bytes()), "do not fit in the file"),
+        (with(entry(3) + 24, &word(10)), "do not fit in the file"),
+        (with(entry(3) + 16, &28853u64.to_le_bytes()), "have the same bytes"),
+        // A page that is its own.
+        (
+            with(entry(0) + 16, &[&(page as u64).to_le_bytes()[..], &word(2080), &word(-1)].concat()),
+            "node 1-0-0-0 is twice",
+        ),
+        // A point more here, and one less there.
+        (with(entry(3) + 28, &[&word(18)[..]].concat()), "its octree has 1066 points"),
+    ] {
+        assert!(message.contains(said), "{message}");
+    }
+    let mut swapped = whole.clone();
+    swapped[entry(3) + 28..entry(3) + 32].copy_from_slice(&word(18));
+    swapped[entry(4) + 28..entry(4) + 32].copy_from_slice(&word(13));
+    let message = refusal(&folder, &swapped);
+    assert_eq!(message, "a node of its octree has 17 points, not the 18 that it promises");
+    // What is no longer there.
+    assert!(refusal(&folder, &whole[..30_000]).contains("2080 bytes at byte 31604, does not fit in the file"));
+}
+
+#[test]
+fn damaged_nodes_are_survived() {
+    let (folder, whole) = (Folder::new(), bytes());
+    let path = folder.path("a.copc.laz");
+    let mut random = Random(0x5b1);
+    let look = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).unwrap();
+        let Ok(Some(copc)) = open(&path).map_err(|error| sentence(&error, &path)) else { return };
+        let all: Vec<usize> = (0..copc.octree.nodes.len()).collect();
+        if let Err(error) = copc.read(&all, &ReadOptions::default(), &()) {
+            sentence(&error, &path);
+        }
+    };
+    // Each 32-bit word would be gigabytes of points, layers or records.
+    for at in (90..whole.len() - 4).step_by(151) {
+        let mut bytes = whole.clone();
+        bytes[at..at + 4].copy_from_slice(&0x7fff_ff00u32.to_le_bytes());
+        look(&bytes);
+    }
+    for _ in 0..100 {
+        let mut bytes = whole.clone();
+        for _ in 0..=random.below(3) {
+            let at = random.below(bytes.len());
+            bytes[at] = random.below(256) as u8;
+        }
+        look(&bytes);
+    }
+}

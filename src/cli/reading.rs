@@ -125,7 +125,7 @@ impl Reading {
     /// The points of some nodes of each of several files.
     pub(super) fn nodes<'a>(
         &self,
-        files: impl Iterator<Item = (&'a Copc, &'a Vec<usize>)>,
+        files: impl Iterator<Item = (&'a mut Copc, &'a Vec<usize>)>,
         bars: &Bars,
     ) -> Result<Vec<Points>> {
         let options = self.options();

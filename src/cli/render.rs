@@ -209,7 +209,7 @@ pub struct Arguments {
     #[arg(long, value_name = "SIZE", group = "cut")]
     lod: Option<Detail>,
     /// Draw a cut of no more surfels and nodes than this, and hardly fewer: --lod by a size that is found for each view. What reaches the
-    /// camera's plane is always drawn by its surfels
+    /// camera's plane is always drawn by its surfels; of COPC files whole nodes are read, the root at least
     #[arg(long, value_name = "N", group = "cut")]
     splats: Option<NonZeroU64>,
     /// How nodes are measured: extent, as disks as long as their images, or area, of their images, as in Pajarola 2003
@@ -327,7 +327,7 @@ struct Outcome<'a> {
     /// None where the arguments say where the camera is.
     #[serde(skip_serializing_if = "Option::is_none")]
     view: Option<ChosenView>,
-    /// None where all of the inputs was read.
+    /// None where the inputs were not read in parts.
     #[serde(skip_serializing_if = "Option::is_none")]
     read: Option<Read>,
 }
@@ -346,7 +346,7 @@ struct Staged {
 /// The scene of a single picture, which COPC files are read for as far as it takes them.
 fn staged(arguments: &Arguments, options: RenderOptions, view: &View, bars: &Bars) -> Result<Staged> {
     let told = |(_, preparation): &Made| preparation.notes().iter().for_each(|line| note(line));
-    if let Some(octrees) = Octrees::of(arguments, &options, bars)? {
+    if let Some(mut octrees) = Octrees::of(arguments, &options, bars)? {
         let (camera, chosen) = view.camera(&octrees.overview, Camera::default_near(&octrees.overview))?;
         let (made, read) = octrees.scene(arguments, &camera, options.detail, bars)?;
         told(&made);

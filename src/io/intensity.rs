@@ -2,9 +2,20 @@
 
 use crate::scene::Colors;
 
-/// Grey from intensities: the 99.9th percentile is white, so that a few glints do not blacken the rest. `None` where all
-/// intensities are the same.
+/// Grey from intensities: the 99.9th percentile is white. `None` where all intensities are the same.
 pub(super) fn grey(intensities: &[u16]) -> Option<Colors> {
+    white(intensities).map(|white| grey_below(intensities, white))
+}
+
+/// Grey from intensities of which this one is white.
+pub(super) fn grey_below(intensities: &[u16], white: u16) -> Colors {
+    let code = |&intensity: &u16| (f64::from(intensity) / f64::from(white) * 255.0).round() as u8;
+    let opaque = |grey| [grey, grey, grey, 255];
+    Colors::Srgb8(intensities.iter().map(code).map(opaque).collect())
+}
+
+/// The 99.9th percentile, so that a few glints do not blacken the rest. `None` where all intensities are the same.
+pub(super) fn white(intensities: &[u16]) -> Option<u16> {
     let mut counts = vec![0u64; 1 << 16];
     for &intensity in intensities {
         counts[usize::from(intensity)] += 1;
@@ -19,10 +30,7 @@ pub(super) fn grey(intensities: &[u16]) -> Option<Colors> {
         below >= rank
     });
     // Where nearly all are zero, the percentile is too: then any other intensity is white.
-    let white = percentile.unwrap_or(0).max(1) as f64;
-    let code = |&intensity: &u16| (f64::from(intensity) / white * 255.0).round() as u8;
-    let opaque = |grey| [grey, grey, grey, 255];
-    Some(Colors::Srgb8(intensities.iter().map(code).map(opaque).collect()))
+    Some(percentile.unwrap_or(0).max(1) as u16)
 }
 
 /// Intensities of any range as 16-bit codes: the largest becomes 65535; what is negative or no number, 0.

@@ -78,7 +78,7 @@ impl PointOctree {
         self.nodes.last().map_or(0, |node| node.level + 1)
     }
 
-    /// The nodes of the coarsest levels that have 50,000 points, or all: an overview, whatever the view.
+    /// The nodes of the coarsest levels that have 50,000 points or more together, or all: an overview, whatever the view.
     pub fn overview(&self) -> Vec<usize> {
         let of_level = |level: u32| self.nodes.iter().filter(move |node| node.level == level);
         let mut points = 0;
@@ -126,7 +126,7 @@ impl PointOctree {
 }
 
 /// The nodes of each of `octrees` that a picture with this detail takes. For a number of splats that is the finest size with which no more points are
-/// read, but for what reaches the camera's plane.
+/// read, but for roots, and for what reaches the camera's plane.
 pub fn taken(octrees: &[PointOctree], camera: &Camera, detail: Detail) -> Vec<Vec<usize>> {
     let of_size = |size: f64| octrees.iter().map(|octree| octree.taken(camera, size)).collect::<Vec<_>>();
     let Detail::Splats(most) = detail else { return of_size(detail.pixels(camera.pixels() as f64)) };

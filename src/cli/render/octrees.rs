@@ -5,7 +5,7 @@ use epsplat::io::las::Copc;
 use epsplat::plan::RenderOptions;
 use epsplat::scene::octree::{PointOctree, taken};
 use epsplat::scene::{Camera, Detail, Scene};
-use epsplat::{Error, Result, surfels};
+use epsplat::{Result, surfels};
 use serde::Serialize;
 
 use super::super::progress::Bars;
@@ -31,23 +31,34 @@ pub(super) struct Read {
 }
 
 impl Octrees {
-    /// The inputs, if a picture with `options` takes parts of them: if levels of detail are asked for and all are COPC files.
+    /// The inputs, if a picture with `options` takes parts of them: if levels of detail are asked for, all are COPC files, and nothing is asked that
+    /// only all of their points tell: which of them are outliers, or where they are beside triangles.
     pub fn of(arguments: &Arguments, options: &RenderOptions, bars: &Bars) -> Result<Option<Self>> {
-        if options.detail.is_finest() || arguments.inputs.is_empty() {
+        let all = arguments.limits.limits().outliers.is_some() || !arguments.triangles.is_empty();
+        if options.detail.is_finest() || arguments.inputs.is_empty() || all {
             return Ok(None);
         }
-        let Some(files) = arguments.reading.octrees(&arguments.inputs)? else { return Ok(None) };
+        let Some(mut files) = arguments.reading.octrees(&arguments.inputs)? else { return Ok(None) };
         let octrees: Vec<PointOctree> = files.iter().map(|file| file.octree.clone()).collect();
         let nodes: Vec<Vec<usize>> = octrees.iter().map(PointOctree::overview).collect();
-        let points = read(arguments, &files, &nodes, bars)?;
+        let points = read(arguments, &mut files, &nodes, bars)?;
         let built = surfels::build_within(points, Vec::new(), &arguments.limits.limits(), bars);
         let (overview, _) = built.map_err(|error| named(error, &arguments.inputs))?;
         Ok(Some(Self { files, octrees, overview }))
     }
 
-    /// What the picture of `camera` takes, and what that was of all.
-    pub fn scene(&self, arguments: &Arguments, camera: &Camera, detail: Detail, bars: &Bars) -> Result<(Made, Read)> {
-        let nodes = taken(&self.octrees, camera, detail);
+    /// What the picture of `camera` takes, or where that is nothing the overview; and what that was of all.
+    pub fn scene(
+        &mut self,
+        arguments: &Arguments,
+        camera: &Camera,
+        detail: Detail,
+        bars: &Bars,
+    ) -> Result<(Made, Read)> {
+        let mut nodes = taken(&self.octrees, camera, detail);
+        if self.octrees.iter().zip(&nodes).all(|(octree, nodes)| octree.points(nodes) == 0) {
+            nodes = self.octrees.iter().map(PointOctree::overview).collect();
+        }
         let sum = |of: &dyn Fn(usize) -> u64| (0..self.files.len()).map(of).sum::<u64>();
         let all: Vec<Vec<usize>> = self.octrees.iter().map(|octree| (0..octree.nodes.len()).collect()).collect();
         let of = |nodes: &[Vec<usize>]| {
@@ -59,11 +70,7 @@ impl Octrees {
             )
         };
         let (read_of, of_all) = (of(&nodes), of(&all));
-        if read_of.1 == 0 {
-            let what = "no node of the octree is in view: move the camera, or leave it out for a view of all";
-            return Err(Error::EmptyScene(what.into()));
-        }
-        let made = scene_of(arguments, read(arguments, &self.files, &nodes, bars)?, bars)?;
+        let made = scene_of(arguments, read(arguments, &mut self.files, &nodes, bars)?, bars)?;
         let read = Read { nodes: [read_of.0, of_all.0], points: [read_of.1, of_all.1], bytes: [read_of.2, of_all.2] };
         Ok((made, read))
     }
@@ -81,6 +88,6 @@ impl Read {
 }
 
 /// The points of these nodes of each file.
-fn read(arguments: &Arguments, files: &[Copc], nodes: &[Vec<usize>], bars: &Bars) -> Result<Vec<Points>> {
-    arguments.reading.nodes(files.iter().zip(nodes), bars)
+fn read(arguments: &Arguments, files: &mut [Copc], nodes: &[Vec<usize>], bars: &Bars) -> Result<Vec<Points>> {
+    arguments.reading.nodes(files.iter_mut().zip(nodes), bars)
 }

@@ -38,7 +38,7 @@ struct Picture {
     file: PathBuf,
     #[serde(flatten)]
     report: Report,
-    /// None where all of the inputs was read.
+    /// None where the inputs were not read in parts.
     #[serde(skip_serializing_if = "Option::is_none")]
     read: Option<Read>,
     /// Milliseconds of encoding and writing, while other pictures were rendered.
@@ -53,7 +53,7 @@ struct Reports {
     /// Milliseconds of rendering, and of encoding and writing, over all views.
     render_ms: f64,
     write_ms: f64,
-    /// Milliseconds from the scene in host memory to the last written picture.
+    /// Milliseconds from the scene in host memory, or of COPC files the overview, to the last written picture.
     total_ms: f64,
 }
 
@@ -61,8 +61,8 @@ struct Reports {
 enum Shown<'a> {
     /// A scene that all of them share.
     Whole(&'a Scene, RenderOptions, Box<Renderer<&'a Scene, &'a Backend>>),
-    /// What each takes of COPC files, which depends on nothing that another one takes.
-    Parts(Box<Octrees>, RenderOptions, &'a Backend),
+    /// What each takes of COPC files, which depends on nothing that another one takes; and whether the first one's notes have been told.
+    Parts(Box<Octrees>, RenderOptions, &'a Backend, bool),
 }
 
 /// A view's frame.
@@ -86,9 +86,12 @@ impl Shown<'_> {
                 let unseen = unseen(scene, &camera, options, &frame);
                 Ok(Shot { frame, report, read: None, unseen })
             }
-            Self::Parts(octrees, options, backend) => {
+            Self::Parts(octrees, options, backend, told) => {
                 let (camera, _) = view.camera(&octrees.overview, Camera::default_near(&octrees.overview))?;
-                let ((scene, _), read) = octrees.scene(arguments, &camera, options.detail, bars)?;
+                let ((scene, preparation), read) = octrees.scene(arguments, &camera, options.detail, bars)?;
+                if !std::mem::replace(told, true) {
+                    preparation.notes().iter().for_each(|line| note(line));
+                }
                 let options = RenderOptions { detail: Detail::FINEST, ..options.clone() };
                 let (frame, report) = render(&scene, &camera, &options, backend, &())?;
                 let unseen = unseen(&scene, &camera, &options, &frame);
@@ -121,7 +124,7 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
     let largest = views.iter().map(|(_, view)| view.pixels()).max().unwrap_or(1);
     let writers = writers(largest, options.maps);
     let mut shown = match octrees {
-        Some(octrees) => Shown::Parts(Box::new(octrees), options.clone(), &backend),
+        Some(octrees) => Shown::Parts(Box::new(octrees), options.clone(), &backend, false),
         None => Shown::Whole(&scene, options.clone(), Box::new(Renderer::new(&scene, &options, &backend)?)),
     };
     let start = Instant::now();

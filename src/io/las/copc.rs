@@ -2,7 +2,7 @@
 
 use super::chunks::{MOST_A_BYTE, Scheme, laszip_record, malformed, promised};
 use super::shown::Shown;
-use super::{early, of_las};
+use super::{Meaning, early, of_las};
 use crate::io::fault::{Fault, surviving};
 use crate::io::{Format, Input};
 use crate::scene::octree::{MOST_LEVELS, OctreeNode, PointOctree};
@@ -39,6 +39,8 @@ pub struct Copc {
     pub(super) transforms: Vector<Transform>,
     /// Points of all nodes.
     pub(super) count: u64,
+    /// What the colours are, once some have been read.
+    pub(super) meaning: Option<Meaning>,
 }
 
 /// Where the points of a node lie.
@@ -96,7 +98,9 @@ fn says_copc(file: &File) -> Result<bool, Fault> {
     let mut start = Vec::new();
     file.take(INFO).read_to_end(&mut start)?;
     let record = start.get(RECORD as usize..);
-    let named = record.is_some_and(|record| record[2..18].starts_with(b"copc\0") && record[18..20] == [1, 0]);
+    let named = record
+        .and_then(|record| record.get(2..20))
+        .is_some_and(|name| name.starts_with(b"copc\0") && name.ends_with(&[1, 0]));
     Ok(named && start.starts_with(b"LASF"))
 }
 
@@ -138,7 +142,18 @@ fn opened(mut file: File, path: PathBuf, length: u64) -> Result<Copc, Fault> {
         z: transform(header.z_scale_factor, header.z_offset),
     };
     let octree = PointOctree { center, half, spacing, nodes };
-    Ok(Copc { file: file.into_inner().into_file(), path, octree, chunks, scheme, laszip, format, transforms, count })
+    Ok(Copc {
+        file: file.into_inner().into_file(),
+        path,
+        octree,
+        chunks,
+        scheme,
+        laszip,
+        format,
+        transforms,
+        count,
+        meaning: None,
+    })
 }
 
 /// The entries of all pages, from the root's on, by their keys.

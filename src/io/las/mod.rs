@@ -12,6 +12,7 @@ use crate::io::intensity;
 use crate::io::values::one_line;
 use crate::io::{Input, Points, ReadOptions, Up};
 use crate::{Progress, Result};
+use color::Coding;
 use las::reader::{LazParallelism, ReaderOptions};
 use las::{PointData, PointDataBuilder, Reader, raw};
 use shown::Shown;
@@ -128,7 +129,16 @@ fn decode(
         read += count;
         progress.advance(count);
     }
-    Ok(kept.points(format.has_color, 0..read, read_options))
+    let meaning = kept.meaning(format.has_color);
+    Ok(kept.points(meaning, 0..read, read_options))
+}
+
+/// What the colours of a file are, which its format leaves open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Meaning {
+    Codes(Coding),
+    /// Intensities, the white one of which it is, if they differ.
+    Grey(Option<u16>),
 }
 
 /// What is kept of the points so far.
@@ -145,10 +155,22 @@ struct Kept {
 }
 
 impl Kept {
+    /// What the colours mean, as all that were read say.
+    fn meaning(&self, has_color: bool) -> Meaning {
+        if has_color {
+            Meaning::Codes(Coding::of(&self.codes))
+        } else {
+            Meaning::Grey(intensity::white(&self.intensities))
+        }
+    }
+
     /// As points, of which all that were read have these numbers, in order.
-    fn points(self, has_color: bool, numbers: impl Iterator<Item = u64>, options: &ReadOptions) -> Points {
+    fn points(self, meaning: Meaning, numbers: impl Iterator<Item = u64>, options: &ReadOptions) -> Points {
         let Self { positions, codes, intensities, classes, counts, left_out } = self;
-        let colors = if has_color { color::from_rgb(codes) } else { intensity::grey(&intensities) };
+        let colors = match meaning {
+            Meaning::Codes(coding) => color::from_rgb(codes, coding),
+            Meaning::Grey(white) => white.map(|white| intensity::grey_below(&intensities, white)),
+        };
         let colors = options.classes.fade(colors, &classes);
         let withheld = left_out.len() as u64;
         let up = Some(Up::Z);

@@ -18,14 +18,14 @@ const MOST_DECODED: u64 = 1 << 27;
 
 impl Copc {
     /// Reads the points of these nodes, by their indices in the octree, as [`read`](super::read) reads those of a whole file: in the order in
-    /// which the file has them. What 16-bit colours and intensities mean is told by those that are read.
+    /// which the file has them. What 16-bit colours and intensities mean is told by the first nodes that are read, for all later ones too.
     ///
-    /// Points are numbered as in the file, if it has fewer than 2^32, else as they are read.
+    /// Points are numbered as in the file, if it has fewer than 2^32, else as they are kept.
     ///
     /// # Errors
     ///
     /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where a node cannot be decoded.
-    pub fn read(&self, nodes: &[usize], options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
+    pub fn read(&mut self, nodes: &[usize], options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
         let mut nodes: Vec<usize> = nodes.iter().copied().filter(|&node| self.octree.nodes[node].points > 0).collect();
         nodes.sort_unstable_by_key(|&node| self.chunks[node].offset);
         let bytes = self.bytes(&nodes);
@@ -35,11 +35,12 @@ impl Copc {
         points.map_err(|fault| self.fault(fault))
     }
 
-    fn decoded(&self, nodes: &[usize], options: &ReadOptions, progress: &dyn Progress) -> Result<Points, Fault> {
+    fn decoded(&mut self, nodes: &[usize], options: &ReadOptions, progress: &dyn Progress) -> Result<Points, Fault> {
         let vlr = LazVlr::from_buffer(&self.laszip).map_err(|error| of_las(error.into()))?;
         let count = self.octree.points(nodes);
         let mut kept = Kept::default();
-        reserve(&mut kept.positions, count)?;
+        // No longer than the file, whatever it promises.
+        reserve(&mut kept.positions, count.min(self.bytes(nodes)))?;
         for together in self.batches(nodes) {
             let compressed = together.iter().map(|&node| self.compressed(node)).collect::<Result<Vec<_>, _>>()?;
             let decode = |(&node, bytes): (&usize, Vec<u8>)| surviving(|| self.decode(node, &bytes, &vlr));
@@ -55,12 +56,14 @@ impl Copc {
                 |&node: &usize| self.chunks[node].first..self.chunks[node].first + self.octree.nodes[node].points;
             nodes.iter().flat_map(of_node)
         };
-        let mut points = kept.points(self.format.has_color, numbers(), options);
+        let meaning = self.meaning.unwrap_or_else(|| kept.meaning(self.format.has_color));
+        let mut points = kept.points(meaning, numbers(), options);
         let mut left_out = std::mem::take(&mut points.left_out).into_iter().peekable();
         if u32::try_from(self.count).is_ok() {
             let kept = numbers().filter(|number| left_out.next_if_eq(number).is_none());
             points.numbers = Some(kept.map(|number| number as u32).collect());
         }
+        self.meaning = Some(meaning);
         Ok(points)
     }
 

@@ -3,6 +3,7 @@
 use crate::scene::Colors;
 
 /// Grey from intensities: the 99.9th percentile is white. `None` where all intensities are the same.
+#[cfg(any(feature = "e57", feature = "pcd", test))]
 pub(super) fn grey(intensities: &[u16]) -> Option<Colors> {
     white(intensities).map(|white| grey_below(intensities, white))
 }

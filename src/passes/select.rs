@@ -17,6 +17,7 @@ use crate::plan::pass::Pass;
 use crate::plan::steps::{Kernel, Over, Run};
 use crate::plan::{RenderOptions, SurfelLayout};
 use crate::scene::cut::Fate;
+use crate::scene::detail::finest;
 use crate::scene::hierarchy::Node;
 use crate::scene::{Camera, Cut, Detail, DetailMeasure, Hierarchy, Projection};
 
@@ -107,26 +108,9 @@ pub fn sized(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: &Wan
         let wanted = Wanted { detail: Detail::Pixels(size), ..*wanted };
         bounded(hierarchy, origin, camera, &wanted, splats).is_some()
     };
-    // Powers of two, from above, as cuts of small sizes take long to make.
-    let mut high = LARGEST;
-    while high > SMALLEST && fits((high - 1.0).exp2()) {
-        high -= 1.0;
-    }
-    let mut low = high - 1.0;
-    for _ in 0..STEPS {
-        let middle = 0.5 * (low + high);
-        (low, high) = if fits(middle.exp2()) { (low, middle) } else { (middle, high) };
-    }
     // What a device rounds to the other side of this size is drawn on this one.
-    Detail::Pixels(high.exp2() * SIZE_SLACK)
+    Detail::Pixels(finest(fits) * SIZE_SLACK)
 }
-
-/// Powers of two among which a size is looked for, square pixels.
-const LARGEST: f64 = 60.0;
-const SMALLEST: f64 = -30.0;
-
-/// How often the interval between two of them is halved: the size is found to a part in a million.
-const STEPS: u32 = 20;
 
 /// By how much a device may err in the size of a node.
 const SIZE_SLACK: f64 = 1.0 + 1e-5;

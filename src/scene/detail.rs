@@ -109,6 +109,28 @@ impl DetailMeasure {
     }
 }
 
+/// Powers of two among which a size is looked for, square pixels.
+const LARGEST: f64 = 60.0;
+const SMALLEST: f64 = -30.0;
+
+/// How often the interval between two of them is halved: the size is found to a part in a million.
+const HALVINGS: u32 = 20;
+
+/// The smallest size, square pixels, of which `fits` says that what is drawn is not too much, if it says so of all larger ones; or hardly a larger one.
+pub(crate) fn finest(fits: impl Fn(f64) -> bool) -> f64 {
+    // Powers of two, from above, as of small sizes much is drawn.
+    let mut high = LARGEST;
+    while high > SMALLEST && fits((high - 1.0).exp2()) {
+        high -= 1.0;
+    }
+    let mut low = high - 1.0;
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        (low, high) = if fits(middle.exp2()) { (low, middle) } else { (middle, high) };
+    }
+    high.exp2()
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]

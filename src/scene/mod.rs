@@ -10,7 +10,7 @@ pub mod color;
 pub mod composite;
 mod copies;
 pub mod cut;
-mod detail;
+pub(crate) mod detail;
 pub mod facing;
 pub mod framing;
 pub mod gaussian;

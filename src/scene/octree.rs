@@ -7,6 +7,7 @@ use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
 
+use super::detail::finest;
 use super::{Camera, Detail, Projection};
 
 /// The nodes of an octree, whose root is a cube.
@@ -41,10 +42,6 @@ const OVERVIEW: u64 = 50_000;
 
 /// How far from a picture points still change it, in spacings: as neighbours of what is seen, from which its shape is estimated.
 const NEIGHBOURHOOD: f64 = 3.0;
-
-/// Powers of two among which a size is looked for, square pixels, and how often the interval between two of them is halved.
-const SIZES: [i32; 2] = [-30, 60];
-const HALVINGS: u32 = 20;
 
 impl OctreeNode {
     /// What its order among the nodes follows from.
@@ -130,21 +127,10 @@ impl PointOctree {
 pub fn taken(octrees: &[PointOctree], camera: &Camera, detail: Detail) -> Vec<Vec<usize>> {
     let of_size = |size: f64| octrees.iter().map(|octree| octree.taken(camera, size)).collect::<Vec<_>>();
     let Detail::Splats(most) = detail else { return of_size(detail.pixels(camera.pixels() as f64)) };
-    let fits = |exponent: f64| {
-        let nodes = of_size(exponent.exp2());
+    of_size(finest(|size| {
+        let nodes = of_size(size);
         octrees.iter().zip(nodes).map(|(octree, nodes)| octree.points(&nodes)).sum::<u64>() <= most
-    };
-    let [smallest, largest] = SIZES.map(f64::from);
-    let mut high = largest;
-    while high > smallest && fits(high - 1.0) {
-        high -= 1.0;
-    }
-    let mut low = high - 1.0;
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (low + high);
-        (low, high) = if fits(middle) { (low, middle) } else { (middle, high) };
-    }
-    of_size(high.exp2())
+    }))
 }
 
 #[cfg(test)]

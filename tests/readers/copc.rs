@@ -53,6 +53,14 @@ fn all_nodes_are_the_file() {
         assert_eq!(read, io::Points { left_out: Vec::new(), ..whole });
     }
     assert_eq!((copc.count(), copc.octree.levels(), copc.octree.nodes.len()), (1065, 4, 65));
+    // Numbers of some nodes, with points left out, are those of the file too.
+    let whole = io::read(&data("simple.copc.laz"), &()).unwrap();
+    let options = ReadOptions { classes: "2:0".parse().unwrap(), ..ReadOptions::default() };
+    let some = copc.read(&[3, 10, 40, 64], &options, &()).unwrap();
+    let numbers = some.numbers.unwrap();
+    assert!(some.unseen > 0 && numbers.len() > 10 && numbers.len() == some.positions.len());
+    let of_file = numbers.iter().map(|&number| whole.positions[number as usize]);
+    assert!(of_file.eq(some.positions.iter().copied()));
 }
 
 #[test]

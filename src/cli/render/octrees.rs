@@ -59,24 +59,26 @@ impl Octrees {
         if self.octrees.iter().zip(&nodes).all(|(octree, nodes)| octree.points(nodes) == 0) {
             nodes = self.octrees.iter().map(PointOctree::overview).collect();
         }
-        let sum = |of: &dyn Fn(usize) -> u64| (0..self.files.len()).map(of).sum::<u64>();
-        let all: Vec<Vec<usize>> = self.octrees.iter().map(|octree| (0..octree.nodes.len()).collect()).collect();
-        let of = |nodes: &[Vec<usize>]| {
-            let count = sum(&|file| nodes[file].len() as u64);
-            (
-                count,
-                sum(&|file| self.octrees[file].points(&nodes[file])),
-                sum(&|file| self.files[file].bytes(&nodes[file])),
-            )
-        };
-        let (read_of, of_all) = (of(&nodes), of(&all));
         let made = scene_of(arguments, read(arguments, &mut self.files, &nodes, bars)?, bars)?;
-        let read = Read { nodes: [read_of.0, of_all.0], points: [read_of.1, of_all.1], bytes: [read_of.2, of_all.2] };
-        Ok((made, read))
+        Ok((made, Read::of(&self.files, &nodes)))
     }
 }
 
 impl Read {
+    /// These nodes of each file.
+    fn of(files: &[Copc], nodes: &[Vec<usize>]) -> Self {
+        let mut sum = Self { nodes: [0; 2], points: [0; 2], bytes: [0; 2] };
+        for (file, taken) in files.iter().zip(nodes) {
+            let all: Vec<usize> = (0..file.octree.nodes.len()).collect();
+            for (at, nodes) in [taken, &all].into_iter().enumerate() {
+                sum.nodes[at] += nodes.len() as u64;
+                sum.points[at] += file.octree.points(nodes);
+                sum.bytes[at] += file.bytes(nodes);
+            }
+        }
+        sum
+    }
+
     /// One line.
     pub fn sentence(&self) -> String {
         let Self { nodes: [nodes, all_nodes], points: [points, all_points], bytes } = self;

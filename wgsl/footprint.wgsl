@@ -47,7 +47,7 @@ fn footprint(splat: Splat, filter_: Filter, x: u32, y: u32) -> Fragment {
     let d = vec2<f32>(f32(i32(x) - splat.anchor_x), f32(i32(y) - splat.anchor_y));
     var fragment = met(splat, filter_, d);
     fragment.depth = sided(fragment.depth, is_away(splat, fragment));
-    return fragment;
+    return faded(fragment, splat.fade);
 }
 
 // Depths times this power of two lie in (0, 1).

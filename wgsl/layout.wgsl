@@ -88,6 +88,8 @@ struct Splat {
     clip: Clip,
     // How it curves; then a, b, c and a_low have other meanings (curved.wgsl).
     cap: Cap,
+    // How much of it there is.
+    fade: Fade,
 }
 
 // A page of surfels.

@@ -1,7 +1,7 @@
 // Stage 1: every surfel becomes a splat, once. One invocation a surfel; the rare ones that take longer (thin splats, disks
 // that reach the near depth, large splats) are listed and done together, so that the others of a subgroup need not wait.
 // Twin: src/passes/project.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x981b3ffac41670a6
+// All loops end, by 1 of src/gpu/loops.rs: 0xc7f299e9518f66eb
 
 @group(0) @binding(3) var<storage, read_write> splats: array<SplatRecord>;
 // Word 0 counts the large splats, word 1 all that are out of view; three words from QUEUE_GRID on are a grid with a workgroup
@@ -86,6 +86,7 @@ fn project_into(slot: u32, every: bool) -> u32 {
         splat.c = array<f32, 3>(h.c.x, h.c.y, h.c.z);
         splat.clip = clip_of(index, h.turn);
         splat.cap = cap;
+        splat.fade = fade_of(index);
         splat.a_low = array<f32, 3>(h.a_low.x, h.a_low.y, h.a_low.z);
     }
     if (visible && is_large(splat)) {

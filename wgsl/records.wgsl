@@ -1,7 +1,7 @@
 // A splat's record: sixteen words, which say of which surfel it is where that is not its slot (cull.wgsl), and those of its low-pass
-// its lines and its cap where there are some (filter.wgsl, clip.wgsl, curved.wgsl).
+// its lines, its cap and its fade where there are some (filter.wgsl, clip.wgsl, curved.wgsl, fade.wgsl).
 
-alias SplatRecord = array<Words, 4u + FILTER_ROWS + CLIP_ROWS + CAP_ROWS>;
+alias SplatRecord = array<Words, 4u + FILTER_ROWS + CLIP_ROWS + CAP_ROWS + FADE_ROWS>;
 
 fn splat_record(splat: Splat, surfel: u32, filter_: Filter) -> SplatRecord {
     var record: SplatRecord;
@@ -9,7 +9,7 @@ fn splat_record(splat: Splat, surfel: u32, filter_: Filter) -> SplatRecord {
     record[1] = words(bitcast<vec4<u32>>(vec4<f32>(splat.a[0], splat.a[1], splat.a[2], splat.b[0])));
     record[2] = words(bitcast<vec4<u32>>(vec4<f32>(splat.b[1], splat.b[2], splat.c[0], splat.c[1])));
     record[3] = words(bitcast<vec4<u32>>(vec4<f32>(splat.c[2], splat.a_low[0], splat.a_low[1], splat.a_low[2])));
-    return with_cap(with_clip(with_filter(record, filter_), splat.clip), splat.cap);
+    return with_fade(with_cap(with_clip(with_filter(record, filter_), splat.clip), splat.cap), splat.fade);
 }
 
 fn splat_of(record: SplatRecord) -> Splat {
@@ -29,5 +29,6 @@ fn splat_of(record: SplatRecord) -> Splat {
         array<f32, 3>(third.y, third.z, third.w),
         clip_in(record),
         cap_in(record),
+        fade_in(record),
     );
 }

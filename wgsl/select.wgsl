@@ -2,8 +2,9 @@
 // branch of the tree, and in each level by level from its roots down. The nodes of a level that are come to are a stretch of `frontier`: they
 // are judged, what they leave is counted by workgroups, and from these counts follows where each puts what it leaves. So the order of the cut, too,
 // depends on tree and camera alone. Then what was chosen is copied to where pages of surfels are drawn from.
+// Of cuts that fade into each other (select_fades.wgsl) all are made at once.
 // Host side and twin: src/passes/select.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x8f381480200150e4
+// All loops end, by 1 of src/gpu/loops.rs: 0xd3167911f26dceb2
 
 @group(0) @binding(72) var<uniform> branch: Branch;
 @group(0) @binding(73) var<storage, read> tree_nodes: array<TreeNode>;
@@ -23,6 +24,10 @@
 @group(0) @binding(81) var<storage, read> selected: array<u32>;
 // Where the cut is drawn from: a page of it.
 @group(0) @binding(82) var<storage, read_write> gathered_surfels: array<Surfel>;
+@group(0) @binding(84) var<storage, read_write> gathered_attributes: array<u32>;
+
+// Words of the attributes of a surfel or node of the tree.
+override TREE_WORDS: u32;
 
 // Surfels of the cut in all branches so far, in those before this one, and in this one.
 const CUT: u32 = 0u;
@@ -50,11 +55,10 @@ const COUNT_MASK: u32 = 0x3fffffffu;
 const INNER: u32 = 0u;
 const LEAF: u32 = 1u;
 const OTHER_BRANCH: u32 = 2u;
+const PART_OF_LEAF: u32 = 3u;
 
-// What becomes of a node.
-const UNSEEN: u32 = 0u;
-const DRAWN: u32 = 1u;
-const DIVIDED: u32 = 2u;
+// What becomes of a node: in how many cuts, the first of those that come to it, it is divided; or nothing.
+const UNSEEN: u32 = 0xffffffffu;
 
 // A node's size is that of a disk as long as its image, not that of its image.
 override MEASURES_EXTENT: bool;
@@ -125,9 +129,9 @@ fn size_of(center: vec3<f32>, surfel: Surfel) -> f32 {
 
 // What becomes of a node whose surfel's centre leaves out `low`, world units.
 fn fate_of(node: TreeNode, surfel: Surfel, low: vec3<f32>) -> u32 {
-    // In its own branch it is judged.
-    if (kind_of(node) == OTHER_BRANCH) {
-        return DIVIDED;
+    // In its own branch it is judged, or the whole leaf was.
+    if (kind_of(node) == OTHER_BRANCH || kind_of(node) == PART_OF_LEAF) {
+        return ALL_CUTS;
     }
     // Leading parts cancel, and what is left is as exact as the trailing ones.
     let relative = (vector(surfel.center) * held.unit - held.eye.xyz) + (low * held.unit - held.eye_low.xyz);
@@ -145,15 +149,26 @@ fn fate_of(node: TreeNode, surfel: Surfel, low: vec3<f32>) -> u32 {
         // The plane of one that faces away is left out, whatever is below it.
         faces = away.x <= 0.0;
     }
-    return select(DIVIDED, DRAWN, !reaches_near(ball) && faces && size_of(ball.center, surfel) < held.levels.x);
+    // One surfel is itself, with its lines and its cap.
+    let itself = kind_of(node) == LEAF && (node.below & COUNT_MASK) == 1u;
+    return select(cuts_that_divide(size_of(ball.center, surfel)), ALL_CUTS, reaches_near(ball) || !faces || itself);
 }
 
-// How many surfels of the cut a node leaves, and how many children for the next level.
-fn left_by(node: TreeNode, fate: u32) -> vec2<u32> {
-    let count = node.below & COUNT_MASK;
-    let divided = fate == DIVIDED;
-    let surfels = select(select(0u, count, divided && kind_of(node) == LEAF), 1u, fate == DRAWN);
-    return vec2<u32>(surfels, select(0u, count, divided && kind_of(node) == INNER));
+fn has_surfels(node: TreeNode) -> bool {
+    return kind_of(node) == LEAF || kind_of(node) == PART_OF_LEAF;
+}
+
+// How many surfels a node leaves that so many cuts come to, and how many children for the next level.
+fn left_by(node: TreeNode, fate: u32, reached_in: u32) -> vec2<u32> {
+    if (fate == UNSEEN) {
+        return vec2<u32>(0u);
+    }
+    let below = select(0u, node.below & COUNT_MASK, fate > 0u);
+    let itself = select(0u, 1u, fate < reached_in);
+    return vec2<u32>(
+        itself + select(0u, below, has_surfels(node)),
+        select(0u, below, kind_of(node) == INNER),
+    );
 }
 
 // The sum of the counts of the invocations before this one: of whole eights, and in its own. Few barriers, as each is dear on processors.
@@ -190,8 +205,13 @@ fn set_grid(at: u32, invocations: u32) {
 fn select_roots() {
     var end = 0u;
     for (var root = 0u; root < branch.roots; root++) {
-        if (branch.whole == 1u || reached[branch.first_root + root] == 1u) {
+        var cuts = ALL_CUTS;
+        if (branch.whole == 0u) {
+            cuts = reached[branch.first_root + root];
+        }
+        if (cuts > 0u) {
             frontier[end] = root;
+            set_cuts_that_reach(end, cuts);
             end++;
         }
     }
@@ -216,9 +236,13 @@ fn select_judge(
         let index = frontier[place];
         let node = tree_nodes[index];
         let record = branch.surfels + index;
-        let fate = fate_of(node, tree_surfels[record], low_part(record));
+        let cuts = cuts_that_reach(place);
+        var fate = fate_of(node, tree_surfels[record], low_part(record));
+        if (fate != UNSEEN) {
+            fate = min(fate, cuts);
+        }
         fates[place] = fate;
-        counts = left_by(node, fate);
+        counts = left_by(node, fate, cuts);
     }
     let before = sum_before(counts, local);
     if (local == WORKGROUP - 1u) {
@@ -271,31 +295,36 @@ fn select_spread(
     let exists = place < selected[LEVEL_END];
     var index = 0u;
     var fate = UNSEEN;
+    var cuts = 0u;
     if (exists) {
         index = frontier[place];
         fate = fates[place];
+        cuts = cuts_that_reach(place);
     }
     let node = tree_nodes[index];
-    let counts = left_by(node, fate);
+    let counts = left_by(node, fate, cuts);
     let before = sum_before(counts, local);
     if (fate == UNSEEN) {
         return;
     }
     let start = group_counts[workgroup.y * workgroups.x + workgroup.x] + before;
-    if (fate == DRAWN) {
-        // One surfel is itself, with its lines and its cap.
-        let itself = kind_of(node) == LEAF && (node.below & COUNT_MASK) == 1u;
-        chosen[start.x] = select(branch.surfels + index, node.first, itself);
-        return;
+    var at = start.x;
+    if (fate < cuts) {
+        chosen[at] = branch.surfels + index;
+        choose_fade(at, fate, cuts);
+        at++;
     }
     if (kind_of(node) == OTHER_BRANCH) {
-        reached[node.first] = 1u;
+        reached[node.first] = fate;
     }
-    for (var k = 0u; k < counts.x; k++) {
-        chosen[start.x + k] = node.first + k;
+    let surfels = start.x + counts.x - at;
+    for (var k = 0u; k < surfels; k++) {
+        chosen[at + k] = node.first + k;
+        choose_fade(at + k, 0u, fate);
     }
     for (var k = 0u; k < counts.y; k++) {
         frontier[start.y + k] = node.first + k;
+        set_cuts_that_reach(start.y + k, fate);
     }
 }
 
@@ -325,4 +354,5 @@ fn select_gather(
     let to = dealt(selected[CUT_BEFORE] + place - page.first, page.stride);
     gathered_surfels[to] = tree_surfels[chosen[place]];
     gather_attributes(chosen[place], to);
+    gather_fade(place, to);
 }

@@ -17,7 +17,11 @@ fn sided(depth: f32, away: bool) -> f32 {
 // Whether the fragment at `pixel` belongs to the surface whose nearest depth is `front`.
 fn is_shown(fragment: Fragment, front: f32, radius: f32, pixel: vec2<u32>) -> bool {
     let same_side = !SIDES || ((bitcast<u32>(fragment.depth) ^ bitcast<u32>(front)) & SIDE_BIT) == 0u;
-    return fragment.hit && same_side && fragment.depth <= farthest_shown(front, radius, vec2<f32>(pixel) + 0.5);
+    let image = vec2<f32>(pixel) + 0.5;
+    return fragment.hit
+        && same_side
+        && fragment.depth <= farthest_shown(front, radius, image)
+        && meets_front(fragment.depth, front, radius, image);
 }
 
 // -1 where a back is seen.

@@ -3,7 +3,7 @@
 // eight rows are drawn apart, each by the splats that reach them. The footprint, and so every bit, is that of visibility.wgsl
 // and accumulate.wgsl.
 // Host side: src/passes/tiles.rs.
-// All loops end, by 1, 3 of src/gpu/loops.rs: 0x470f5589b2a130cf
+// All loops end, by 1, 3 of src/gpu/loops.rs: 0xf29c387476faa087
 
 // The lists of the large splats.
 @group(0) @binding(27) var<storage, read> large_lists: array<u32>;
@@ -98,6 +98,7 @@ fn handed_splat(from_: u32) -> Splat {
     splat.a_low = handed_row(own_splat.a_low, from_);
     splat.clip = handed_clip(own_splat.clip, from_);
     splat.cap = handed_cap(own_splat.cap, from_);
+    splat.fade = handed_fade(own_splat.fade, from_);
     return splat;
 }
 
@@ -122,7 +123,8 @@ fn nearer(front: vec4<f32>, splat: Splat, filter_: Filter, x: u32, y: u32) -> ve
     var nearest_ = front;
     for (var k = 0u; k < 4u; k++) {
         let fragment = footprint(splat, filter_, x, y + k);
-        nearest_[k] = select(front[k], min(front[k], fragment.depth), fragment.hit);
+        let shows = fragment.hit && takes_sample(splat.fade, x, y + k);
+        nearest_[k] = select(front[k], min(front[k], fragment.depth), shows);
     }
     return nearest_;
 }

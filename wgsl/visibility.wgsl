@@ -1,13 +1,13 @@
 // Stage 2: the nearest depth at every pixel. One invocation a splat, one workgroup a large splat. Twin: src/passes/visibility.rs.
 // The least depth is the greatest kept one (layout.wgsl).
-// All loops end, by 1, 2 of src/gpu/loops.rs: 0xe7391c01740e8a3a
+// All loops end, by 1, 2 of src/gpu/loops.rs: 0x0036556a3decb52f
 
 @group(0) @binding(5) var<storage, read> projected: array<SplatRecord>;
 @group(0) @binding(6) var<storage, read_write> nearest: array<atomic<u32>>;
 
 fn cover(splat: Splat, filter_: Filter, mark: u32, x: u32, y: u32) {
     let fragment = footprint(splat, filter_, x, y);
-    if (fragment.hit) {
+    if (fragment.hit && takes_sample(splat.fade, x, y)) {
         keep_nearest(pixel_index(x, y), fragment, mark);
     }
 }

@@ -215,6 +215,9 @@ pub struct Arguments {
     /// How nodes are measured: extent, as disks as long as their images, or area, of their images, as in Pajarola 2003
     #[arg(long, value_enum, default_value_t = MeasureName::Extent, requires = "cut")]
     lod_measure: MeasureName,
+    /// Whether coarser and finer cuts fade into each other from view to view, so that nothing pops [default: on with --cameras, else off]
+    #[arg(long, value_name = "on|off", value_parser = on_off_parser(), requires = "cut")]
+    lod_fade: Option<bool>,
     /// A light, instead of the headlight: headlight[:INTENSITY] or the direction toward it, x,y,z[:INTENSITY]
     #[arg(long = "light", value_name = "LIGHT", allow_hyphen_values = true)]
     lights: Vec<Light>,
@@ -234,6 +237,10 @@ pub struct Arguments {
 /// A backend, or none for the best that there is.
 #[derive(Clone, Copy, PartialEq)]
 struct Chosen(Option<BackendName>);
+
+fn on_off_parser() -> impl TypedValueParser<Value = bool> {
+    PossibleValuesParser::new(["on", "off"]).map(|name| name == "on")
+}
 
 fn backend_parser() -> impl TypedValueParser<Value = Chosen> {
     PossibleValuesParser::new(["auto", "gpu", "raster", "reference"]).map(|name| Chosen(name.parse().ok()))

@@ -81,6 +81,9 @@ pub const LEAF: u32 = 1;
 /// A node that leads to a root of another branch.
 pub const OTHER_BRANCH: u32 = 2;
 
+/// One that has some surfels of a leaf.
+pub const PART_OF_LEAF: u32 = 3;
+
 /// Words at the start of a list of batches: a grid of workgroups that draws all of them, and one that draws the far ones.
 pub const LIST_START: u32 = 6;
 

@@ -43,7 +43,7 @@ use crate::plan::pass::Pass;
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
 use crate::plan::{Accumulator, Plan, RenderOptions, SceneNeeds, Winner, wide_bits};
 use crate::scene::kernel::LEAST_WEIGHT;
-use crate::scene::{Camera, Colors, Map, Scene};
+use crate::scene::{Camera, Colors, Fade, Map, Scene};
 
 /// The file that keeps the sums of `fixed`, by whether terms may reach past a word, because weights may be small
 /// ([`SceneNeeds::wide_sums`]) or one surfel stands for its copies ([`SceneNeeds::copies`]), and whether the adapter adds 64 bits at
@@ -188,14 +188,18 @@ pub fn reference<'a>(
                 let Some((at, gain)) = footprint(splat, camera, options.low_pass, x, y) else { continue };
                 let (pixel, back) = (row + x as usize, splat.shows_back(&at));
                 let front = nearest[pixel];
-                let behind = options.epsilon.farthest(front.depth, radius, camera.along_axis(x, y));
+                let along = camera.along_axis(x, y);
+                let behind = options.epsilon.farthest(front.depth, radius, along);
+                // Where cuts fade into each other, what is nearest in the one that the sample shows may lie behind other ones' surfels.
+                let reached = options.epsilon.farthest(at.depth, radius, along);
                 let sum = &mut sums[pixel];
                 if options.maps.has(Map::Decision) {
                     // What shows the other side is out unless it is nearest.
                     let behind = if back == front.back { behind } else { front.depth };
-                    sum.decision = sum.decision.min(decision(at, behind, camera.near));
+                    let before = if splat.fade == Fade::WHOLE { f64::INFINITY } else { reached / front.depth - 1.0 };
+                    sum.decision = sum.decision.min(decision(at, behind, camera.near).min(before.abs()));
                 }
-                if !(at.hit(camera) && front.shows(at.depth, back, behind)) {
+                if !(at.hit(camera) && front.shows(at.depth, back, behind) && reached >= front.depth) {
                     continue;
                 }
                 sum.back = front.back;

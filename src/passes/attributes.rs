@@ -51,6 +51,7 @@ pub const PASS: Pass = Pass {
             ("CAP_WORD", surfel.cap.into()),
             ("NORMAL_WORD", surfel.normal.into()),
             ("NUMBER_WORD", surfel.number.into()),
+            ("FADE_WORD", surfel.fade.into()),
             ("COLOR_CHANNELS", color_channels(making.needs).into()),
             ("TURNS", u32::from(making.needs.sides != Sides::Both).into()),
             ("NORMAL_CHANNEL", layout.normal_channel.into()),

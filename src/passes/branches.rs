@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use crate::gpu::layout::{INNER, KIND_SHIFT, LEAF, OTHER_BRANCH, TreeNode};
+use crate::gpu::layout::{INNER, KIND_SHIFT, LEAF, OTHER_BRANCH, PART_OF_LEAF, TreeNode};
 use crate::scene::hierarchy::{Hierarchy, Node};
 
 /// The most surfels that one invocation copies the numbers of.
@@ -37,7 +37,7 @@ pub struct Branch {
 enum Item {
     /// A node and what is below it.
     Node(u32),
-    /// Some surfels of a leaf that has too many: what becomes of it is what became of the leaf.
+    /// Some surfels of a leaf that has too many, which is judged whole: a node above them.
     Part { leaf: u32, first: u32, count: u32 },
     /// A root of another branch, by its number.
     Other { root: u32, node: u32 },
@@ -165,7 +165,7 @@ fn laid_out(
             (levels, level_end) = (levels + 1, items.len());
         }
         let (number, kind, first, count) = match items[nodes.len()] {
-            Item::Part { leaf, first, count } => (leaf, LEAF, first - surfels.start, count),
+            Item::Part { leaf, first, count } => (leaf, PART_OF_LEAF, first - surfels.start, count),
             Item::Other { root, node } => (node, OTHER_BRANCH, root, 1),
             Item::Node(number) => {
                 let node = &tree.nodes[number as usize];
@@ -228,7 +228,7 @@ mod tests {
         assert!(depth < 2 * of.levels + branches[0].levels);
         let node = &of.nodes[row as usize];
         match kind(node) {
-            (LEAF, count) => into.extend((node.first..node.first + count).map(|place| of.surfels.start + place)),
+            (LEAF | PART_OF_LEAF, count) => into.extend((node.first..node.first + count).map(|place| of.surfels.start + place)),
             (OTHER_BRANCH, _) => {
                 let holds = |b: &Branch| !b.whole && (b.first_root..b.first_root + b.roots).contains(&node.first);
                 let other = branches.iter().position(holds).unwrap();
@@ -257,7 +257,7 @@ mod tests {
             let mut found = Vec::new();
             below(&all, (0, 0), 0, &mut found);
             assert!(found.iter().copied().eq(0..(count + copies) as u32), "{count} {copies}");
-            let leaves = all.iter().flat_map(|branch| &branch.nodes).map(kind).filter(|(kind, _)| *kind == LEAF);
+            let leaves = all.iter().flat_map(|branch| &branch.nodes).map(kind).filter(|(kind, _)| [LEAF, PART_OF_LEAF].contains(kind));
             assert!(leaves.map(|(_, count)| count).max().unwrap() <= MOST_OF_LEAF);
             if most == 500 {
                 assert!(all.len() > 6 && all.len() < 30, "{}", all.len());

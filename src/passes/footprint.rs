@@ -62,6 +62,11 @@ pub const PASS: Pass = Pass {
 /// Where the ray through the centre of pixel (x, y) meets the splat's plane, or its low-pass, and the factor on the
 /// kernel's weight; `None` behind the camera.
 pub fn footprint(splat: &Splat, camera: &Camera, low_pass: LowPass, x: u32, y: u32) -> Option<(Intersection, f64)> {
+    met(splat, camera, low_pass, x, y).map(|(at, gain)| (at, gain * splat.fade.weight()))
+}
+
+/// The same of all of the splat.
+fn met(splat: &Splat, camera: &Camera, low_pass: LowPass, x: u32, y: u32) -> Option<(Intersection, f64)> {
     let (dx, dy) = ((i64::from(x) - splat.anchor[0]) as f64, (i64::from(y) - splat.anchor[1]) as f64);
     if let Some(curve) = &splat.curve {
         let (cap, plane) = curved::meet(curve, splat, camera, DVec2::new(dx, dy));

@@ -15,7 +15,7 @@ use crate::plan::pass::{Making, Pass};
 use crate::plan::steps::{Clear, Kernel, Over, Part, Run, Stage, Twin};
 use crate::plan::{Facts, RenderOptions, Sides, composited, culls_back};
 use crate::plan::{Organisation, Plan, tuning};
-use crate::scene::{Camera, Cap, Clip, Composite, LowPass, Scene, Surfel, copies, has_copies};
+use crate::scene::{Camera, Cap, Clip, Composite, Fade, LowPass, Scene, Surfel, copies, has_copies};
 
 /// A surfel with its index; and its cap, in a scene in which some surfel curves.
 pub type Indexed<'a> = (u32, &'a Surfel, Option<Cap>);
@@ -98,6 +98,7 @@ pub(super) fn projected(
         curve,
         point,
         copies: 1,
+        fade: Fade::WHOLE,
     })
 }
 
@@ -122,6 +123,7 @@ pub fn reference_all(scene: &Scene, camera: &Camera, options: &RenderOptions) ->
             let normal = given.unwrap_or(splat.normal);
             Splat {
                 copies,
+                fade: scene.fades.get(index).copied().unwrap_or(Fade::WHOLE),
                 clip: scene.clips.get(index).copied().filter(|_| splat.point.is_none()).unwrap_or_default(),
                 outline: options.outline,
                 sides,

@@ -4,6 +4,10 @@
 //! asked for is drawn, but where backs are left out none that would be though some of what is below would not; of a leaf that is not, its surfels
 //! are; and of other nodes what is below. The cut depends on the tree, the camera and on whether backs are left out alone.
 //!
+//! Where views fade, the cuts of [`STEPS`](crate::scene::fade::STEPS) sizes from half of that on are drawn at once: a node or surfel is in those of its [`Fade`](crate::scene::Fade), which follows
+//! from its size and from those of the nodes above it. So what a view shows changes by a part of so many when a node comes to its next size, and what
+//! is larger than the size asked for is drawn by none.
+//!
 //! On a device the tree lies in [`branches`](super::branches), which are gone through one after the other, and what was chosen of each is copied to the
 //! pages that surfels are drawn from: nothing that follows knows of trees.
 
@@ -18,6 +22,7 @@ use crate::plan::steps::{Kernel, Over, Run};
 use crate::plan::{RenderOptions, SurfelLayout};
 use crate::scene::cut::Fate;
 use crate::scene::detail::finest;
+use crate::scene::fade::STEPS;
 use crate::scene::hierarchy::Node;
 use crate::scene::{Camera, Cut, Detail, DetailMeasure, Hierarchy, Projection};
 
@@ -25,11 +30,12 @@ use crate::scene::{Camera, Cut, Detail, DetailMeasure, Hierarchy, Projection};
 pub const PASS: Pass = Pass {
     name: "select",
     files: |needs| {
-        let gather = if SurfelLayout::of(needs).words > 0 { "gather.wgsl" } else { "gather_absent.wgsl" };
+        let gather = if SurfelLayout::of_tree(needs) > 0 { "gather.wgsl" } else { "gather_absent.wgsl" };
         let low = if needs.doubled { "low_part.wgsl" } else { "low_part_absent.wgsl" };
+        let fades = if needs.fades { "select_fades.wgsl" } else { "select_fades_absent.wgsl" };
         match (needs.levels, needs.cull) {
-            (true, true) => vec!["select.wgsl", gather, low, "select_balls.wgsl"],
-            (true, false) => vec!["select.wgsl", gather, low],
+            (true, true) => vec!["select.wgsl", fades, gather, low, "select_balls.wgsl"],
+            (true, false) => vec!["select.wgsl", fades, gather, low],
             (false, _) => vec!["select_absent.wgsl"],
         }
     },
@@ -43,7 +49,11 @@ pub const PASS: Pass = Pass {
     },
     constants: |making| match making.needs.levels {
         true => {
-            vec![("MEASURES_EXTENT", u32::from(making.options.detail_measure == DetailMeasure::Extent).into())]
+            let extent = making.options.detail_measure == DetailMeasure::Extent;
+            vec![
+                ("MEASURES_EXTENT", u32::from(extent).into()),
+                ("TREE_WORDS", SurfelLayout::of_tree(making.needs).into()),
+            ]
         }
         false => Vec::new(),
     },
@@ -84,6 +94,8 @@ pub struct Wanted {
     pub measure: DetailMeasure,
     /// Surfels that face away are left out.
     pub backs_out: bool,
+    /// Coarser and finer cuts fade into each other.
+    pub fades: bool,
     /// How far beside the image a node may be seen and not be left out, pixels: as far as a low-pass reaches ([`cull::filter_reach`]), and two samples.
     pub margin: DVec2,
 }
@@ -93,7 +105,8 @@ impl Wanted {
     pub fn of(options: &RenderOptions, backs_out: bool) -> Self {
         let samples = DVec2::new(options.samples.across.into(), options.samples.down.into());
         let margin = (cull::filter_reach(&Design::of(options)) + 2.0) / samples;
-        Self { detail: options.detail, measure: options.detail_measure, backs_out, margin }
+        let RenderOptions { detail, detail_measure: measure, detail_fades: fades, .. } = *options;
+        Self { detail, measure, backs_out, fades, margin }
     }
 }
 
@@ -128,7 +141,7 @@ pub fn reference(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: 
 
 /// The same, or None if it has more than `most` surfels and nodes.
 fn bounded(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: &Wanted, most: u64) -> Option<Cut> {
-    let Wanted { detail, measure, backs_out, margin } = *wanted;
+    let Wanted { detail, measure, backs_out, fades, margin } = *wanted;
     let eye = camera.eye - origin;
     let size = detail.pixels(camera.pixels() as f64);
     let fate = |index: u32| {
@@ -145,9 +158,20 @@ fn bounded(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: &Wante
         let near = at.z - radius <= camera.near;
         let seen = if near { f64::INFINITY } else { measure.of(&node.surfel, center, camera) };
         // The plane of one that faces away is left out, whatever is below it.
-        if seen < size && turned <= 0.0 { Fate::Drawn } else { Fate::Divided }
+        if turned <= 0.0 { Fate::Divided(divided(seen, size, fades)) } else { Fate::DIVIDED }
     };
     Cut::of(hierarchy, most, fate)
+}
+
+/// In how many cuts, the first ones, a node that is `seen` so large is divided, where the largest of their sizes is `size`; all or none if they do not
+/// fade into each other, and are one.
+fn divided(seen: f64, size: f64, fades: bool) -> u8 {
+    let steps = f64::from(STEPS);
+    match fades {
+        true => (steps * (2.0 * seen / size - 1.0) + 1.0).floor().clamp(0.0, steps) as u8,
+        false if seen < size => 0,
+        false => STEPS,
+    }
 }
 
 /// The sine by which a node's normal points away from the eye, and that past which all below it does, whatever point of the ball around it is looked
@@ -214,9 +238,9 @@ mod tests {
             for size in [0.0, 250.0, 1000.0, 6000.0, 1e9] {
                 for measure in [DetailMeasure::Area, DetailMeasure::Extent] {
                     let cut = reference(&tree, DVec3::ZERO, &camera, &wanted(Detail::Pixels(size), measure, false));
-                    let drawn = cut.surfels.iter().flat_map(Clone::clone);
+                    let drawn = cut.surfels.iter().flat_map(|(range, _)| range.clone());
                     let mut all: Vec<u32> =
-                        cut.nodes.iter().flat_map(|&index| below(&tree, index)).chain(drawn).collect();
+                        cut.nodes.iter().flat_map(|&(index, _)| below(&tree, index)).chain(drawn).collect();
                     all.sort_unstable();
                     assert!(all.iter().copied().eq(0..8000), "{size}");
                     let seen = |index: &u32| {
@@ -226,7 +250,7 @@ mod tests {
                             &camera,
                         )
                     };
-                    assert!(cut.nodes.iter().all(|index| seen(index) < size));
+                    assert!(cut.nodes.iter().all(|(index, _)| seen(index) < size));
                     if measure == DetailMeasure::Extent {
                         assert!(cut.len() < last || size == 0.0, "{size}: {}", cut.len());
                         last = cut.len();
@@ -268,7 +292,7 @@ mod tests {
         {
             let camera = camera(eye, Lens::Fov(40.0));
             let cut = reference(&tree, DVec3::ZERO, &camera, &wanted(Detail::FINEST, DetailMeasure::Area, back));
-            let drawn: std::collections::BTreeSet<u32> = cut.surfels.iter().flat_map(Clone::clone).collect();
+            let drawn: std::collections::BTreeSet<u32> = cut.surfels.iter().flat_map(|(range, _)| range.clone()).collect();
             assert!(cut.nodes.is_empty() && drawn.len() < 5000 && drawn.len() > 50, "{}", drawn.len());
             for index in (0..8000u32).filter(|index| !drawn.contains(index)) {
                 let surfel = &scene.surfels[index as usize];

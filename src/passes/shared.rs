@@ -18,6 +18,7 @@ pub const PASS: Pass = Pass {
             "rows.wgsl",
             pick(needs.doubled, "center_doubled.wgsl", "center.wgsl"),
             pick(needs.copies, "copies.wgsl", "copies_absent.wgsl"),
+            pick(needs.fades, "fade.wgsl", "fade_absent.wgsl"),
         ]
     },
     kernels: |_| Vec::new(),

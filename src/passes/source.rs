@@ -14,7 +14,7 @@ use crate::gpu::layout::BATCH;
 use crate::plan::{ColorNeed, Facts, SceneNeeds, SurfelLayout};
 use crate::scene::color::srgb8;
 use crate::scene::hierarchy::{Hierarchy, Node};
-use crate::scene::{Cap, Clip, Colors, Mipmap, Provenance, Scene, Surfel, Triangles, copies};
+use crate::scene::{Cap, Clip, Colors, Fade, Mipmap, Provenance, Scene, Surfel, Triangles, copies};
 
 /// Surfels, page by page.
 pub trait Source: Send + Sync {
@@ -58,7 +58,7 @@ pub trait Page {
     /// The surfels of a range.
     fn surfels(&self, range: Range<usize>) -> Vec<Surfel>;
 
-    /// The attributes of a range, as records of [`SurfelLayout::words`].
+    /// The attributes of a range, as records of [`SurfelLayout::words`], of a branch's of [`SurfelLayout::of_tree`].
     fn attributes(&self, range: Range<usize>) -> Vec<u32>;
 
     /// The bounding ball of each batch: centre and radius, world units relative to the origin.
@@ -126,6 +126,7 @@ impl Source for Scene {
             nodes: None,
             needs: *needs,
             layout: SurfelLayout::of(needs),
+            words: SurfelLayout::of(needs).words,
             indices: indices.into(),
             copies: copies.clone(),
         };
@@ -161,6 +162,7 @@ impl Source for Scene {
             nodes: self.levels(),
             needs: *needs,
             layout: SurfelLayout::of(needs),
+            words: SurfelLayout::of_tree(needs),
             indices: branch.surfels.clone().chain(nodes).collect(),
             copies: None,
         }))
@@ -181,6 +183,8 @@ struct ScenePage<'a> {
     nodes: Option<&'a Hierarchy>,
     needs: SceneNeeds,
     layout: SurfelLayout,
+    /// Of a record.
+    words: u32,
     indices: Box<[u32]>,
     /// Of every surfel of the scene; 0 of those that another stands for.
     copies: Option<Arc<[u32]>>,
@@ -261,6 +265,10 @@ impl ScenePage<'_> {
         if let (true, Some(cap)) = (self.needs.curved, self.scene.caps.get(index)) {
             write(&cap.0, &mut into[self.layout.cap as usize..]);
         }
+        // In a tree fades are no surfels', but a view's.
+        if let Some(fade) = into.get_mut(self.layout.fade as usize) {
+            *fade = self.scene.fades.get(index).copied().unwrap_or(Fade::WHOLE).word();
+        }
     }
 }
 
@@ -274,7 +282,7 @@ impl Page for ScenePage<'_> {
     }
 
     fn attributes(&self, range: Range<usize>) -> Vec<u32> {
-        let words = self.layout.words as usize;
+        let words = self.words as usize;
         let mut values = vec![0; range.len() * words];
         let records = values.par_chunks_exact_mut(words.max(1)).zip(&self.indices[range]);
         records.for_each(|(into, index)| self.write_attributes(*index as usize, into));

@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use super::curved::Curve;
 use super::facing::Point;
 use crate::plan::Sides;
-use crate::scene::{Camera, Clip, Outline};
+use crate::scene::{Camera, Clip, Fade, Outline};
 
 /// A projected surfel in f64: the twin of [`crate::gpu::layout::Splat`], in world units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,6 +43,8 @@ pub struct Splat {
     pub point: Option<Point>,
     /// Surfels that it stands for.
     pub copies: u32,
+    /// How much of it there is.
+    pub fade: Fade,
 }
 
 /// A splat's filter: the twin of [`crate::gpu::layout::Filter`], depths in world units.

@@ -34,6 +34,7 @@ pub const PASS: Pass = Pass {
             "tile_reach.wgsl",
             pick(needs.low_pass == LowPass::None, "tile_filter_absent.wgsl", "tile_filter.wgsl"),
             pick(needs.clips, "tile_clip.wgsl", "tile_clip_absent.wgsl"),
+            pick(needs.fades, "tile_fade.wgsl", "tile_fade_absent.wgsl"),
             pick(needs.color == ColorNeed::Textured, "tile_texture.wgsl", "tile_plain.wgsl"),
             pick(needs.facing.is_some(), "tile_facing.wgsl", pick(needs.curved, "tile_curved.wgsl", "tile_flat.wgsl")),
             pick(needs.gather, "tile_small.wgsl", "tile_small_absent.wgsl"),

@@ -72,7 +72,7 @@ pub fn upload(
 
 /// The branches of the levels of detail that `source` has.
 fn branches(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds, progress: &dyn Progress) -> Result<Vec<BranchBuffers>> {
-    let words = SurfelLayout::of(needs).words as usize;
+    let words = SurfelLayout::of_tree(needs) as usize;
     let most = gpu.adapter.page_len(size_of::<Surfel>().max(4 * words));
     let tree = source.levels().ok_or_else(|| gpu.error("a scene has no levels of detail"))?;
     let tree = branches::branches(tree, most);

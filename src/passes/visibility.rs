@@ -54,7 +54,8 @@ pub fn reference<'a>(
         for y in splat.first[1].max(first_row)..=splat.last[1].min(first_row + rows - 1) {
             let row = (y - first_row) as usize * camera.width as usize;
             for x in splat.first[0]..=splat.last[0] {
-                if let Some((hit, _)) = footprint(splat, camera, low_pass, x, y).filter(|(i, _)| i.hit(camera)) {
+                let hit = footprint(splat, camera, low_pass, x, y).filter(|(at, _)| at.hit(camera));
+                if let Some((hit, _)) = hit.filter(|_| splat.fade.takes(x, y)) {
                     let pixel = &mut nearest[row + x as usize];
                     *pixel = pixel.with(hit.depth, splat.shows_back(&hit));
                 }

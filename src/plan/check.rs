@@ -91,6 +91,26 @@ fn levels(options: &RenderOptions) -> Result<()> {
         _ if options.maps.has(Map::Index) => {
             usage("the map index names points, and nodes are none: leave the map out, or --lod and --splats")
         }
+        _ if options.detail_fades => fades(options),
+        _ => Ok(()),
+    }
+}
+
+/// Fails for options by which cuts of levels of detail do not fade into each other: they do in weighted sums of the nearest surface.
+///
+/// # Errors
+/// [`Error::Usage`].
+pub fn fades(options: &RenderOptions) -> Result<()> {
+    match options {
+        _ if options.composite != Composite::Opaque => {
+            usage("cuts fade into each other on the nearest surface alone: take --lod-fade off with --composite")
+        }
+        _ if options.blend == Blend::Nearest => {
+            usage("--blend nearest sums nothing that could fade: take --lod-fade off with it")
+        }
+        _ if options.raster.is_some() => {
+            usage("the rasteriser's depths are of one cut: take --lod-fade off, or render by compute")
+        }
         _ => Ok(()),
     }
 }

@@ -64,6 +64,8 @@ pub struct Facts {
     pub caps: bool,
     /// Surfels have normals of their own, [`Scene::normals`].
     pub own_normals: bool,
+    /// There is less than all of some surfel, [`Scene::fades`].
+    pub fades: bool,
     /// Centres have trailing parts, [`Scene::low`].
     pub doubled: bool,
     /// One surfel has many copies, which can be drawn as one.
@@ -141,6 +143,7 @@ impl Facts {
             clips: !scene.clips.is_empty(),
             caps: !scene.caps.is_empty(),
             own_normals: !scene.normals.is_empty(),
+            fades: !scene.fades.is_empty(),
             doubled: !scene.low.is_empty(),
             copies: has_copies(scene),
             levels: scene.hierarchy.as_deref().map(LevelFacts::of),

@@ -32,6 +32,8 @@ pub struct SceneNeeds {
     pub copies: bool,
     /// A cut of levels of detail is drawn.
     pub levels: bool,
+    /// There is less than all of some surfel, as cuts fade into each other.
+    pub fades: bool,
     /// Batches of surfels that are out of view or hidden are left out: there are enough surfels for the image's pixels, all of which are looked at for what hides ([`tuning::PIXELS_A_CULLED_SURFEL`]).
     pub cull: bool,
     /// Large splats, at least, are drawn by tiles: the accumulator is `fixed`, and the options do not say scatter.
@@ -258,6 +260,7 @@ impl SceneNeeds {
             doubled: facts.doubled,
             copies: false,
             levels: facts.nodes_of(options).is_some(),
+            fades: facts.fades || (facts.nodes_of(options).is_some() && options.detail_fades),
             cull: false,
             tiles: fixed && lists.is_none() && oit.is_none() && options.organisation != Organisation::Scatter,
             gather: false,
@@ -408,6 +411,7 @@ impl SceneNeeds {
             (self.doubled, "doubled"),
             (self.copies, "copies"),
             (self.levels, "levels"),
+            (self.fades, "fades"),
             (self.cull, "cull"),
             (self.tiles, "tiles"),
             (self.gather, "gather"),

@@ -76,6 +76,8 @@ pub struct RenderOptions {
     pub detail: Detail,
     /// How that is measured.
     pub detail_measure: DetailMeasure,
+    /// Coarser and finer cuts fade into each other from view to view, in place of a switch from one to the next.
+    pub detail_fades: bool,
     /// Samples of a pixel's colour. Maps are of its centre, however many there are: a depth between two surfaces is of none.
     pub samples: Samples,
     /// Surfels are points that face the camera; else each lies in its own plane.
@@ -156,6 +158,7 @@ impl Default for RenderOptions {
             cull: Cull::Auto,
             detail: Detail::FINEST,
             detail_measure: DetailMeasure::default(),
+            detail_fades: false,
             samples: Samples::ONE,
             facing: None,
             outline: None,

@@ -22,6 +22,8 @@ pub struct SurfelLayout {
     pub normal: u32,
     /// Its place in a tree.
     pub number: u32,
+    /// How much of it there is: the last word, which trees do without.
+    pub fade: u32,
 }
 
 impl SurfelLayout {
@@ -40,16 +42,23 @@ impl SurfelLayout {
         let cap = clip + if needs.clips { 6 } else { 0 };
         let normal = cap + if needs.curved { 3 } else { 0 };
         let number = normal + if needs.own_normals { 3 } else { 0 };
-        Self { words: number + u32::from(needs.numbers_surfels()), copies, low, clip, cap, normal, number }
+        let fade = number + u32::from(needs.numbers_surfels());
+        Self { words: fade + u32::from(needs.fades), copies, low, clip, cap, normal, number, fade }
+    }
+
+    /// Words of the records of a tree whose cuts are drawn with `needs`.
+    pub fn of_tree(needs: &SceneNeeds) -> u32 {
+        Self::of(needs).fade
     }
 }
 
-/// Words of a splat's record, of which those of its low-pass, its lines and its cap come last.
+/// Words of a splat's record, of which those of its low-pass, its lines, its cap and its fade come last.
 pub fn splat_words(needs: &SceneNeeds) -> u64 {
     let filter = if needs.low_pass == LowPass::None { 0 } else { size_of::<Filter>() };
     let clip = if needs.clips { CLIP_WORDS } else { 0 };
     let cap = if needs.curved { CAP_WORDS } else { 0 };
-    (size_of::<Splat>() + filter) as u64 / 4 + clip + cap
+    let fade = if needs.fades { FADE_WORDS } else { 0 };
+    (size_of::<Splat>() + filter) as u64 / 4 + clip + cap + fade
 }
 
 /// Words of a splat's lines: whole rows of four, as all of its record.
@@ -57,3 +66,6 @@ const CLIP_WORDS: u64 = 8;
 
 /// Words of a splat's cap.
 const CAP_WORDS: u64 = 8;
+
+/// Words of a splat's fade: a row, of which one is used.
+const FADE_WORDS: u64 = 4;

@@ -105,17 +105,19 @@ pub struct Branch {
 }
 
 /// What all branches share while a cut is made, one after the other.
-pub(super) fn of_selection(gpu: &Gpu, branches: &[BranchBuffers]) -> Result<Named> {
+pub(super) fn of_selection(gpu: &Gpu, branches: &[BranchBuffers], needs: &SceneNeeds) -> Result<Named> {
     let most = |k: usize| branches.iter().map(|branch| branch.records[k]).max().unwrap_or(0);
     let [records, nodes] = [most(0), most(1)];
     let roots = branches.iter().map(|branch| branch.roots).sum();
     let groups = nodes.div_ceil(WORKGROUP.into());
+    // In the second ones, how much there is of what is in the first.
+    let halves = if needs.fades { 2 } else { 1 };
     Ok(Named::from([
         ("selection", Buffer::indirect(gpu, "state of a cut", u64::from(GATHERED_END) + 1)?),
-        ("frontier", Buffer::storage(gpu, "nodes that a cut comes to", nodes)?),
+        ("frontier", Buffer::storage(gpu, "nodes that a cut comes to", halves * nodes)?),
         ("fates", Buffer::storage(gpu, "what becomes of nodes", nodes)?),
         ("group_counts", Buffer::<[u32; 2]>::storage(gpu, "counts of a cut", groups)?.words()),
-        ("chosen", Buffer::storage(gpu, "surfels of a cut", records)?),
+        ("chosen", Buffer::storage(gpu, "surfels of a cut", halves * records)?),
         ("reached", Buffer::storage(gpu, "branches that a cut comes to", roots)?),
     ]))
 }

@@ -140,7 +140,7 @@ impl Store {
         let pages = pages.collect::<Result<_>>()?;
         let mut shared = Named::from_iter(uploaded.shared);
         if needs.levels {
-            shared.extend(of_selection(gpu, &uploaded.branches)?);
+            shared.extend(of_selection(gpu, &uploaded.branches, needs)?);
         }
         let branches = uploaded
             .branches

@@ -22,6 +22,7 @@ impl Scene {
             clips: at(&self.clips, indices),
             caps: at(&self.caps, indices),
             normals: at(&self.normals, indices),
+            fades: at(&self.fades, indices),
             colors: match &self.colors {
                 Colors::Constant(color) => Colors::Constant(*color),
                 Colors::Srgb8(codes) => Colors::Srgb8(at(codes, indices)),

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{Cap, Clip, Colors, Hierarchy, Provenance, Surfel, Triangles};
+use super::{Cap, Clip, Colors, Fade, Hierarchy, Provenance, Surfel, Triangles};
 
 /// The world axis that points up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -62,6 +62,8 @@ pub struct Scene {
     pub caps: Vec<Cap>,
     /// The unit normals that light sees, where they are others than those of the disks' planes: one for each surfel, or none at all.
     pub normals: Vec<[f32; 3]>,
+    /// How much of each surfel there is: one for each, or none at all where all are whole.
+    pub fades: Vec<Fade>,
     /// One colour for all, or one for each surfel in the same order.
     pub colors: Colors,
     /// They are codes of sRGB, as displays take them, instead of linear light, and are composited as they are: the surfels are Gaussians

@@ -61,6 +61,7 @@ pub(super) fn options(arguments: &Arguments, format: Format) -> Result<RenderOpt
         cull: arguments.cull,
         detail: arguments.splats.map(|splats| Detail::Splats(splats.get())).or(arguments.lod).unwrap_or(default.detail),
         detail_measure: arguments.lod_measure.into(),
+        detail_fades: arguments.lod_fade == Some(true),
         samples: arguments.samples.unwrap_or(SAMPLES),
         facing: facing(arguments),
         outline: arguments.outline,
@@ -91,7 +92,13 @@ pub(super) fn options(arguments: &Arguments, format: Format) -> Result<RenderOpt
     if !arguments.textures.is_empty() {
         check::textured(&options, arguments.backend.0 == Some(BackendName::Reference))?;
     }
-    Ok(options)
+    Ok(faded(arguments, options))
+}
+
+/// Of many views neighbouring cuts fade into each other where they can, unless something else was chosen.
+fn faded(arguments: &Arguments, options: RenderOptions) -> RenderOptions {
+    let default = arguments.cameras.is_some() && check::fades(&options).is_ok();
+    RenderOptions { detail_fades: arguments.lod_fade.unwrap_or(default), ..options }
 }
 
 /// The options for a scene: Gaussians are drawn by the rules that their files are trained with ([`gaussian`]), but for what was chosen.
@@ -128,6 +135,7 @@ pub(super) fn for_scene(arguments: &Arguments, options: RenderOptions, scene: &S
         samples: arguments.samples.unwrap_or(Samples::ONE),
         ..options
     };
+    let options = faded(arguments, options);
     check::options(&options, arguments.backend.0 == Some(BackendName::Reference))?;
     Ok(options)
 }

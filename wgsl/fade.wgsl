@@ -1,0 +1,51 @@
+// Splats of cuts that fade into each other: of which of them, by two numbers in a word, the first and one more than the last (src/scene/fade.rs).
+// A fragment weighs as many parts as these are; depths have no weights, and each sample shows that of one cut.
+// Same interface as fade_absent.wgsl.
+
+// Which word of a surfel's attributes.
+override FADE_WORD: u32;
+
+// How many cuts.
+const FADE_STEPS: f32 = 64.0;
+
+struct Fade {
+    cuts: u32,
+}
+
+fn fade_of(index: u32) -> Fade {
+    return Fade(attribute_word(index, FADE_WORD));
+}
+
+// Its row in a splat's record, the last one.
+const FADE_ROWS: u32 = 1u;
+
+fn with_fade(record: SplatRecord, fade: Fade) -> SplatRecord {
+    var faded_ = record;
+    faded_[4u + FILTER_ROWS + CLIP_ROWS + CAP_ROWS] = words(vec4<u32>(fade.cuts, 0u, 0u, 0u));
+    return faded_;
+}
+
+fn fade_in(record: SplatRecord) -> Fade {
+    return Fade(each_word(record[4u + FILTER_ROWS + CLIP_ROWS + CAP_ROWS]).x);
+}
+
+fn faded(fragment: Fragment, fade: Fade) -> Fragment {
+    var less = fragment;
+    less.gain *= f32((fade.cuts >> 8u) - (fade.cuts & 0xffu)) / FADE_STEPS;
+    return less;
+}
+
+// Whether the cut that the sample shows has the splat.
+fn takes_sample(fade: Fade, x: u32, y: u32) -> bool {
+    // The lowest three digits of both, from the lowest on: those of the number of a cut from the highest on.
+    let differ = x ^ y;
+    let cut = ((differ & 1u) << 5u) | ((y & 1u) << 4u)
+        | ((differ & 2u) << 2u) | ((y & 2u) << 1u)
+        | ((differ & 4u) >> 1u) | ((y & 4u) >> 2u);
+    return cut >= (fade.cuts & 0xffu) && cut < (fade.cuts >> 8u);
+}
+
+// Whether what is nearest lies within epsilon of a fragment, which other cuts may have before it, or where nothing is in this one.
+fn meets_front(depth: f32, front: f32, radius: f32, image: vec2<f32>) -> bool {
+    return farthest_shown(depth, radius, image) >= front;
+}

@@ -1,0 +1,17 @@
+// One cut. Same interface as select_fades.wgsl.
+
+const ALL_CUTS: u32 = 1u;
+
+fn cuts_that_reach(place: u32) -> u32 {
+    return ALL_CUTS;
+}
+
+fn set_cuts_that_reach(place: u32, cuts: u32) {}
+
+fn cuts_that_divide(size: f32) -> u32 {
+    return select(ALL_CUTS, 0u, size < held.levels.x);
+}
+
+fn choose_fade(place: u32, first: u32, end: u32) {}
+
+fn gather_fade(place: u32, to: u32) {}

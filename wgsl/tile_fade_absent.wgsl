@@ -1,0 +1,3 @@
+fn handed_fade(own: Fade, from_: u32) -> Fade {
+    return own;
+}

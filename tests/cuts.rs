@@ -4,74 +4,17 @@
 
 mod common;
 
-use std::borrow::Cow;
-
 use common::bits;
+use common::levels::{cut, frame, levels, tree};
 use common::scenes::{shuffled, sphere, sphere_camera};
 use epsplat::frame::Frame;
 use epsplat::gpu::{Gpu, Sources};
-use epsplat::passes::select::{self, Wanted};
-use epsplat::passes::source::{Page, Source};
-use epsplat::plan::{Facts, RenderOptions, SceneNeeds};
+use epsplat::plan::RenderOptions;
 use epsplat::render::{Backend, Renderer, render};
 use epsplat::scene::{
-    Camera, Clip, Colors, Composite, Cull, Detail, DetailMeasure, Hierarchy, Lens, Map, Maps, Mipmap, Projection,
-    Provenance, Samples, Scene, Up,
+    Camera, Clip, Colors, Composite, Cull, Detail, DetailMeasure, Lens, Map, Maps, Projection, Samples, Scene, Up,
 };
-use epsplat::surfels::hierarchy;
 use glam::DVec3;
-
-/// The twin's cut as a scene of its own, with what is known of all that it is a cut of: then kernels work in the same units.
-struct Cut {
-    scene: Scene,
-    facts: Facts,
-}
-
-impl Source for Cut {
-    fn facts(&self) -> Facts {
-        self.facts.clone()
-    }
-
-    fn pages<'a>(&'a self, needs: &SceneNeeds, most: usize, ordered: Option<&Facts>) -> Vec<Box<dyn Page + 'a>> {
-        self.scene.pages(needs, most, ordered)
-    }
-
-    fn textures(&self) -> &[Mipmap] {
-        &[]
-    }
-
-    fn provenance(&self) -> Cow<'_, Provenance> {
-        Cow::Borrowed(&self.scene.provenance)
-    }
-
-    fn whole(&self) -> Option<&Scene> {
-        Some(&self.scene)
-    }
-}
-
-fn levels(scene: Scene) -> Scene {
-    hierarchy::build(scene, &()).unwrap().0
-}
-
-fn tree(scene: &Scene) -> &Hierarchy {
-    scene.hierarchy.as_ref().unwrap()
-}
-
-/// What the twin draws, and how.
-fn cut(scene: &Scene, camera: &Camera, options: &RenderOptions) -> (Cut, RenderOptions) {
-    let back = options.cull == Cull::Back;
-    let cut =
-        select::reference(tree(scene), scene.origin, camera, &Wanted::of(options, back)).scene(scene, tree(scene));
-    let whole = Facts::of(scene);
-    let (largest_radius, largest_shorter) = (whole.drawn_radius(options), whole.drawn_shorter(options));
-    let surfels = cut.surfels.len() as u64;
-    let facts = Facts { surfels, largest_radius, largest_shorter, levels: None, copies: false, ..whole };
-    (Cut { scene: cut, facts }, RenderOptions { detail: Detail::FINEST, ..options.clone() })
-}
-
-fn frame(source: &dyn Source, camera: &Camera, options: &RenderOptions, backend: &Backend) -> Frame {
-    render(source, camera, options, backend, &()).unwrap().0
-}
 
 /// One whose buffers hold 1,900 surfels and nodes, so that a tree has several branches.
 fn small() -> Gpu {
@@ -82,6 +25,11 @@ const MAPS: Maps = Maps::of(&[Map::Depth, Map::Normal, Map::Weight, Map::Count])
 
 fn at(pixels: f64) -> RenderOptions {
     RenderOptions { detail: Detail::Pixels(pixels), cull: Cull::None, maps: MAPS, ..RenderOptions::default() }
+}
+
+/// The same, but that cuts fade into each other.
+fn fading(options: &RenderOptions) -> RenderOptions {
+    RenderOptions { detail_fades: true, ..options.clone() }
 }
 
 /// Spheres in all that a surfel may have, and one of which a part lies far off.
@@ -133,11 +81,14 @@ fn a_device_makes_the_cut_of_its_twin() {
         ];
         // All that there is of one scene; of the others what they add.
         let (ways, adapters) = if name == "plain" { (4, 4) } else { (1, 2) };
-        for (projection, options) in options.into_iter().take(ways) {
+        let options = options.into_iter().take(ways);
+        let fading = options.clone().map(|(projection, options)| (projection, fading(&options)));
+        for (projection, options) in options.chain(fading) {
             let camera = sphere_camera(100, projection);
             let (twins, flat) = cut(&scene, &camera, &options);
             let (drawn, all) = (twins.scene.surfels.len(), scene.surfels.len());
-            assert!(drawn > 50 && drawn < 3 * all / 4, "{name}: {drawn} {options:?}");
+            assert!(drawn > 50 && drawn < all, "{name}: {drawn} {options:?}");
+            assert_eq!(twins.scene.fades.len(), if options.detail_fades { drawn } else { 0 }, "{name} {options:?}");
             for (on, backend) in backends.iter().take(adapters) {
                 let (shown, report) = render(&scene, &camera, &options, backend, &()).unwrap();
                 assert_eq!(report.cut, Some(drawn as u64), "{name} {on} {options:?}");
@@ -262,6 +213,15 @@ fn crowded_leaves_are_drawn_whole() {
         let (shown, report) = render(&scene, &camera, &options, &backend, &()).unwrap();
         assert_eq!(report.cut, Some(11_000));
         assert!(bits(&shown) == bits(&frame(&twins, &camera, &flat, &backend)));
+        // In some of the cuts the leaf is divided, in others not.
+        let both =
+            (7..12).map(|k| fading(&RenderOptions { detail: Detail::Pixels(f64::from(k).exp2()), ..options.clone() }));
+        for options in both {
+            let (twins, flat) = cut(&scene, &camera, &options);
+            let (shown, report) = render(&scene, &camera, &options, &backend, &()).unwrap();
+            assert_eq!(report.cut, Some(twins.scene.surfels.len() as u64), "{options:?}");
+            assert!(bits(&shown) == bits(&frame(&twins, &camera, &flat, &backend)), "{options:?}");
+        }
         let coarse = RenderOptions { detail: Detail::Pixels(1e7), ..options.clone() };
         let few = cut(&scene, &camera, &coarse).0.scene.surfels.len() as u64;
         assert_eq!(render(&scene, &camera, &coarse, &backend, &()).unwrap().1.cut, Some(few));
@@ -331,15 +291,11 @@ fn broken_kernels_are_noticed() {
         bits(&shown)
     });
     for (file, from, to) in [
-        (
-            "select.wgsl",
-            "size_of(ball.center, surfel) < held.levels.x",
-            "size_of(ball.center, surfel) < 1.2 * held.levels.x",
-        ),
+        ("select_fades_absent.wgsl", "size < held.levels.x", "size < 1.2 * held.levels.x"),
         ("select.wgsl", "if (away.x > away.y) {", "if (away.x > away.y - 0.5) {"),
         ("select.wgsl", "return before;", "return before + counts;"),
         ("select.wgsl", "vec2<u32>(here, end);", "vec2<u32>(0u, end);"),
-        ("select.wgsl", "reached[node.first] = 1u;", "reached[node.first] = 0u;"),
+        ("select.wgsl", "reached[node.first] = fate;", "reached[node.first] = 0u;"),
         (
             "select.wgsl",
             "page.first + dealt(index, page.back) < selected[CUT]",
@@ -352,7 +308,7 @@ fn broken_kernels_are_noticed() {
         ),
         ("select.wgsl", "let to = dealt(selected[CUT_BEFORE] + place - page.first, page.stride);", "let to = place;"),
         ("select_balls.wgsl", "* (1.0 + BALL_SLACK);", "* 0.1;"),
-        ("gather.wgsl", "tree_attributes[from_ * ATTRIBUTE_WORDS + word]", "tree_attributes[word]"),
+        ("gather.wgsl", "tree_attributes[from_ * TREE_WORDS + word]", "tree_attributes[word]"),
     ] {
         let sources = Sources::default().replace(file, from, to).unwrap();
         let noticed =

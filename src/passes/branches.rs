@@ -228,7 +228,9 @@ mod tests {
         assert!(depth < 2 * of.levels + branches[0].levels);
         let node = &of.nodes[row as usize];
         match kind(node) {
-            (LEAF | PART_OF_LEAF, count) => into.extend((node.first..node.first + count).map(|place| of.surfels.start + place)),
+            (LEAF | PART_OF_LEAF, count) => {
+                into.extend((node.first..node.first + count).map(|place| of.surfels.start + place))
+            }
             (OTHER_BRANCH, _) => {
                 let holds = |b: &Branch| !b.whole && (b.first_root..b.first_root + b.roots).contains(&node.first);
                 let other = branches.iter().position(holds).unwrap();
@@ -257,7 +259,11 @@ mod tests {
             let mut found = Vec::new();
             below(&all, (0, 0), 0, &mut found);
             assert!(found.iter().copied().eq(0..(count + copies) as u32), "{count} {copies}");
-            let leaves = all.iter().flat_map(|branch| &branch.nodes).map(kind).filter(|(kind, _)| [LEAF, PART_OF_LEAF].contains(kind));
+            let leaves = all
+                .iter()
+                .flat_map(|branch| &branch.nodes)
+                .map(kind)
+                .filter(|(kind, _)| [LEAF, PART_OF_LEAF].contains(kind));
             assert!(leaves.map(|(_, count)| count).max().unwrap() <= MOST_OF_LEAF);
             if most == 500 {
                 assert!(all.len() > 6 && all.len() < 30, "{}", all.len());

@@ -195,7 +195,7 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::scene::{Colors, Lens, Scene, Surfel, Up};
+    use crate::scene::{Colors, Fade, Lens, Scene, Surfel, Up};
     use crate::surfels::analytic::{Shape, generate};
     use crate::surfels::hierarchy;
 
@@ -263,6 +263,31 @@ mod tests {
         }
     }
 
+    /// What is in a cut of those that fade into each other is the cut by its size alone.
+    #[test]
+    fn cuts_that_fade_are_cuts_of_sizes_from_half_on() {
+        let (_, tree) = sphere();
+        let camera = camera(DVec3::new(0.0, 0.7, 2.0), Lens::Fov(50.0));
+        let of = |size: f64, fades: bool| {
+            let wanted = Wanted { fades, ..wanted(Detail::Pixels(size), DetailMeasure::Extent, false) };
+            reference(&tree, DVec3::ZERO, &camera, &wanted)
+        };
+        for size in [1000.0, 4000.0] {
+            let all = of(size, true);
+            let mut sizes = std::collections::BTreeSet::new();
+            for number in 0..STEPS {
+                let has = |fade: &Fade| (fade.from..fade.to).contains(&number);
+                let nodes = all.nodes.iter().filter(|(_, fade)| has(fade)).map(|(node, _)| (*node, Fade::WHOLE));
+                let surfels = all.surfels.iter().filter(|(_, fade)| has(fade));
+                let surfels = surfels.map(|(range, _)| (range.clone(), Fade::WHOLE));
+                let one = Cut { nodes: nodes.collect(), surfels: surfels.collect() };
+                assert_eq!(one, of(size * (0.5 + f64::from(number) / 128.0), false), "{size} {number}");
+                sizes.insert(one.len());
+            }
+            assert!(sizes.len() > 20, "{sizes:?}");
+        }
+    }
+
     /// No more than asked for are drawn, and hardly fewer; of a hundredth more the cut is another one.
     #[test]
     fn a_number_of_splats_is_kept() {
@@ -292,7 +317,8 @@ mod tests {
         {
             let camera = camera(eye, Lens::Fov(40.0));
             let cut = reference(&tree, DVec3::ZERO, &camera, &wanted(Detail::FINEST, DetailMeasure::Area, back));
-            let drawn: std::collections::BTreeSet<u32> = cut.surfels.iter().flat_map(|(range, _)| range.clone()).collect();
+            let drawn: std::collections::BTreeSet<u32> =
+                cut.surfels.iter().flat_map(|(range, _)| range.clone()).collect();
             assert!(cut.nodes.is_empty() && drawn.len() < 5000 && drawn.len() > 50, "{}", drawn.len());
             for index in (0..8000u32).filter(|index| !drawn.contains(index)) {
                 let surfel = &scene.surfels[index as usize];

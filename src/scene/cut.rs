@@ -5,8 +5,8 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::color::srgb8;
-use super::hierarchy::{Hierarchy, Node};
 use super::fade::STEPS;
+use super::hierarchy::{Hierarchy, Node};
 use super::{Cap, Clip, Colors, Fade, Scene, Surfel};
 
 /// What is drawn of a tree.

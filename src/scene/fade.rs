@@ -53,8 +53,7 @@ mod tests {
     #[test]
     fn thresholds_are_spread_in_squares_of_any_size() {
         let spread = |side: u32, x: u32, y: u32| {
-            let mut all: Vec<u8> =
-                (0..side * side).map(|k| Fade::threshold(x + k % side, y + k / side)).collect();
+            let mut all: Vec<u8> = (0..side * side).map(|k| Fade::threshold(x + k % side, y + k / side)).collect();
             all.sort_unstable();
             all.windows(2).map(|pair| pair[1] - pair[0]).min()
         };
@@ -68,7 +67,8 @@ mod tests {
 
     #[test]
     fn parts_that_follow_each_other_take_each_sample_once() {
-        let parts = [Fade { from: 0, to: 7 }, Fade { from: 7, to: 7 }, Fade { from: 7, to: 40 }, Fade { from: 40, to: 64 }];
+        let parts =
+            [Fade { from: 0, to: 7 }, Fade { from: 7, to: 7 }, Fade { from: 7, to: 40 }, Fade { from: 40, to: 64 }];
         for k in 0..64 {
             assert_eq!(parts.iter().filter(|part| part.takes(k % 8, k / 8)).count(), 1);
         }

@@ -6,6 +6,7 @@ pub mod command;
 pub mod enclosure;
 pub mod gaussians;
 pub mod judged;
+pub mod levels;
 pub mod meshes;
 pub mod modules;
 mod random;
@@ -287,8 +288,12 @@ fn cut(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
     let of_disks = |needs: &&SceneNeeds| needs.facing.is_none() && !needs.separate && !needs.maps.has(Map::Index);
     let with_colors =
         |needs: &&SceneNeeds| matches!(needs.color, ColorNeed::Constant | ColorNeed::Srgb8 | ColorNeed::Linear);
-    let of = |needs: &SceneNeeds| SceneNeeds { levels: true, ..*needs };
-    all.iter().filter(of_disks).filter(with_colors).filter(|needs| !needs.copies).step_by(3).map(of).collect()
+    let of = |(step, needs): (usize, &SceneNeeds)| {
+        let fades = step % 2 == 0 && needs.sums_by_compute() && needs.oit.is_none();
+        SceneNeeds { levels: true, fades, ..*needs }
+    };
+    let disks = all.iter().filter(of_disks).filter(with_colors).filter(|needs| !needs.copies);
+    disks.step_by(3).enumerate().map(of).collect()
 }
 
 /// Those of the rasteriser that peels layers.

@@ -1,0 +1,71 @@
+//! Levels of detail: cuts as scenes of their own.
+
+use std::borrow::Cow;
+
+use epsplat::frame::Frame;
+use epsplat::passes::select::{self, Wanted};
+use epsplat::passes::source::{Page, Source};
+use epsplat::plan::{Facts, RenderOptions, SceneNeeds};
+use epsplat::render::{Backend, render};
+use epsplat::scene::{Camera, Cull, Detail, Hierarchy, Mipmap, Provenance, Scene};
+use epsplat::surfels::hierarchy;
+
+/// The twin's cut as a scene of its own, with what is known of all that it is a cut of: then kernels work in the same units.
+pub struct Cut {
+    pub scene: Scene,
+    facts: Facts,
+}
+
+impl Source for Cut {
+    fn facts(&self) -> Facts {
+        self.facts.clone()
+    }
+
+    fn pages<'a>(&'a self, needs: &SceneNeeds, most: usize, ordered: Option<&Facts>) -> Vec<Box<dyn Page + 'a>> {
+        self.scene.pages(needs, most, ordered)
+    }
+
+    fn textures(&self) -> &[Mipmap] {
+        &[]
+    }
+
+    fn provenance(&self) -> Cow<'_, Provenance> {
+        Cow::Borrowed(&self.scene.provenance)
+    }
+
+    fn whole(&self) -> Option<&Scene> {
+        Some(&self.scene)
+    }
+}
+
+pub fn levels(scene: Scene) -> Scene {
+    hierarchy::build(scene, &()).unwrap().0
+}
+
+pub fn tree(scene: &Scene) -> &Hierarchy {
+    scene.hierarchy.as_ref().unwrap()
+}
+
+/// What the twin draws, and how.
+pub fn cut(scene: &Scene, camera: &Camera, options: &RenderOptions) -> (Cut, RenderOptions) {
+    let back = options.cull == Cull::Back;
+    let cut =
+        select::reference(tree(scene), scene.origin, camera, &Wanted::of(options, back)).scene(scene, tree(scene));
+    let whole = Facts::of(scene);
+    let (largest_radius, largest_shorter) = (whole.drawn_radius(options), whole.drawn_shorter(options));
+    let surfels = cut.surfels.len() as u64;
+    let facts = Facts {
+        surfels,
+        largest_radius,
+        largest_shorter,
+        levels: None,
+        copies: false,
+        fades: options.detail_fades,
+        ..whole
+    };
+    (Cut { scene: cut, facts }, RenderOptions { detail: Detail::FINEST, ..options.clone() })
+}
+
+pub fn frame(source: &dyn Source, camera: &Camera, options: &RenderOptions, backend: &Backend) -> Frame {
+    render(source, camera, options, backend, &()).unwrap().0
+}

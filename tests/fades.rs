@@ -1,0 +1,259 @@
+//! Cuts of levels of detail that fade into each other: each sample shows one of them, weights are shared, and nothing pops.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use std::collections::BTreeSet;
+
+use common::bits;
+use common::command::{Folder, fails, succeeds, text};
+use common::levels::{frame, levels};
+use common::scenes::{shuffled, sphere, sphere_camera};
+use epsplat::frame::Frame;
+use epsplat::gpu::{Gpu, Sources};
+use epsplat::plan::{ACCUMULATORS, Organisation, RenderOptions};
+use epsplat::render::{Backend, Renderer, render};
+use epsplat::scene::{
+    Camera, Colors, Composite, Cull, Detail, Fade, Lens, LowPass, Map, Maps, Projection, Samples, Scene, Surfel, Up,
+};
+use epsplat::surfels::analytic::{Shape, generate};
+use glam::{DVec3, Vec3};
+
+/// Nodes of up to so many square pixels, which fade.
+fn fading(pixels: f64) -> RenderOptions {
+    RenderOptions { detail: Detail::Pixels(pixels), detail_fades: true, cull: Cull::None, ..RenderOptions::default() }
+}
+
+/// A pixel has something exactly where the cut of its number has, whose size is one of 64 from half of the largest on.
+#[test]
+fn a_sample_shows_the_cut_of_its_number() {
+    let Some(gpu) = common::gpu() else { return };
+    let backend = Backend::gpu(gpu);
+    let (scene, camera) = (levels(sphere(6000, 1.1)), sphere_camera(96, Projection::Pinhole));
+    let options = fading(250.0);
+    let [device, reference] =
+        [&backend, &Backend::Reference].map(|backend| frame(&scene, &camera, &options, backend).color);
+    let covers = |pixels: &[[f32; 4]]| pixels.iter().map(|color| color[3] == 1.0).collect::<Vec<bool>>();
+    let mut outlines = BTreeSet::new();
+    let (mut some, mut others) = (0, 0);
+    for number in 0..64 {
+        let size = 250.0 * (0.5 + f64::from(number) / 128.0);
+        let plain = RenderOptions { detail_fades: false, ..fading(size) };
+        let expected = covers(&frame(&scene, &camera, &plain, &backend).color);
+        for (index, expected) in expected.iter().enumerate() {
+            let of_cut = Fade::threshold(index as u32 % 96, index as u32 / 96) == number;
+            let shows = [&device, &reference].map(|color| color[index][3] == 1.0);
+            assert!(!of_cut || shows == [*expected; 2], "{number}: {index}");
+            // A number that is not the pixel's does not always do.
+            others += usize::from(!of_cut && shows[0] != *expected);
+            some += usize::from(of_cut);
+        }
+        outlines.insert(expected);
+    }
+    assert_eq!(some, 96 * 96);
+    assert!(others > 100 && outlines.len() > 20, "{others} {}", outlines.len());
+}
+
+fn differ(shown: &Frame, truth: &Frame) -> usize {
+    let near = |(a, b): (&[f32; 4], &[f32; 4])| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 2e-5);
+    shown.color.iter().zip(&truth.color).filter(|pair| !near(*pair)).count()
+}
+
+/// However it is drawn: by tiles or one by one, with a low-pass, in samples, by every accumulator, in any order.
+#[test]
+fn fades_are_those_of_the_twin_in_every_organisation() {
+    let Some(gpu) = common::gpu() else { return };
+    let backend = Backend::gpu(gpu);
+    let flat = sphere(6000, 1.7);
+    let (scene, camera) = (levels(flat.clone()), sphere_camera(100, Projection::Pinhole));
+    for low_pass in [LowPass::None, LowPass::Max, LowPass::Ewa] {
+        let options = RenderOptions { low_pass, samples: Samples { across: 2, down: 2 }, ..fading(60.0) };
+        let reference = frame(&scene, &camera, &options, &Backend::Reference);
+        let by = |organisation| RenderOptions { organisation, ..options.clone() };
+        let all = [Organisation::Auto, Organisation::Scatter, Organisation::Tile].map(|organisation| {
+            let (shown, report) = render(&scene, &camera, &by(organisation), &backend, &()).unwrap();
+            assert!(report.needs.contains(&"fades"));
+            shown
+        });
+        assert!(all.iter().all(|shown| bits(shown) == bits(&all[0])), "{low_pass:?}");
+        assert!(bits(&all[0]) == bits(&frame(&levels(shuffled(&flat, 3)), &camera, &options, &backend)));
+        let wrong = differ(&all[0], &reference);
+        assert!(wrong < 4, "{low_pass:?}: {wrong}");
+        // A size of a hundredth more makes other fades.
+        let other = RenderOptions { detail: Detail::Pixels(60.6), ..options.clone() };
+        let others = differ(&frame(&scene, &camera, &other, &backend), &reference);
+        assert!(others > 100, "{low_pass:?}: {others}");
+    }
+    let maps = RenderOptions { maps: Maps::of(&[Map::Depth, Map::Normal, Map::Weight, Map::Count]), ..fading(250.0) };
+    let reference = frame(&scene, &camera, &maps, &Backend::Reference);
+    let counted = |shown: &Frame| shown.map(Map::Count).unwrap().to_vec();
+    let mut sums = 0;
+    for row in ACCUMULATORS {
+        // Not every adapter has all of them.
+        let options = RenderOptions { accumulator: row.of, ..maps.clone() };
+        let Ok((shown, _)) = render(&scene, &camera, &options, &backend, &()) else { continue };
+        sums += 1;
+        let counts = counted(&shown).iter().zip(&counted(&reference)).filter(|(a, b)| a != b).count();
+        assert!(counts < 4, "{}: {counts}", row.name);
+        let far = shown.map(Map::Depth).unwrap().iter().zip(reference.map(Map::Depth).unwrap());
+        let far =
+            far.filter(|(a, b)| a.is_finite() != b.is_finite() || (a.is_finite() && (*a - *b).abs() > 1e-4)).count();
+        assert!(far < 4, "{}: {far}", row.name);
+    }
+    assert!(sums >= 3, "{sums}");
+}
+
+/// A plane of 64x64 squares that fills the view.
+fn squares(count: usize) -> Scene {
+    let side = (count as f64).sqrt();
+    let all: Vec<_> = generate(Shape::Plane, count as u64).collect();
+    let surfel = |place: [f64; 3]| Surfel::disk(DVec3::from_array(place).as_vec3(), Vec3::Z, (2.0 / side * 0.9) as f32);
+    let dark = |[x, y, _]: [f64; 3]| ((x * 32.0).floor() + (y * 32.0).floor()).rem_euclid(2.0) == 0.0;
+    let code = |place: [f64; 3]| if dark(place) { [40, 60, 90, 255] } else { [230, 220, 180, 255] };
+    Scene {
+        surfels: all.iter().map(|sample| surfel(sample.position)).collect(),
+        colors: Colors::Srgb8(all.iter().map(|sample| code(sample.position)).collect()),
+        oriented: true,
+        up: Up::Z,
+        ..Scene::default()
+    }
+}
+
+/// Views of a dolly, each nearer by the same part.
+fn dolly(size: u32, views: u32) -> Vec<Camera> {
+    let view = |k: u32| {
+        let distance = 1.6 * 0.7f64.powf(f64::from(k) / f64::from(views - 1));
+        let target = DVec3::new(0.05, 0.03, 0.0);
+        let eye = target + DVec3::new(0.1, 0.7, 0.9).normalize() * distance;
+        Camera::look_at((size, size), Lens::Fov(20.0), eye, target, None, Up::Z, 1e-3).unwrap()
+    };
+    (0..views).map(view).collect()
+}
+
+/// The largest change of a pixel from a view to the next, and the largest of its parts that are beyond the full cloud's.
+fn changes(shown: &[Frame], full: &[Frame]) -> [f32; 2] {
+    let mut most = [0.0f32; 2];
+    for (views, all) in shown.windows(2).zip(full.windows(2)) {
+        for pixel in 0..views[0].color.len() {
+            for k in 0..3 {
+                let step = |views: &[Frame]| views[1].color[pixel][k] - views[0].color[pixel][k];
+                let (of_cut, of_all) = (step(views), step(all));
+                most = [most[0].max(of_cut.abs()), most[1].max((of_cut - of_all).abs())];
+            }
+        }
+    }
+    most
+}
+
+/// Along a dolly of 120 views no pixel of the cut changes more than one and a half times as much as one of the full cloud does, and what is beyond
+/// the same pixel's change is less than half of what it is without fades.
+#[test]
+fn nothing_pops_along_a_dolly() {
+    let Some(gpu) = common::gpu() else { return };
+    let backend = Backend::gpu(gpu);
+    let scene = levels(squares(250_000));
+    let options = RenderOptions { samples: Samples { across: 2, down: 2 }, ..fading(16.0) };
+    let views = dolly(128, 120);
+    let along = |options: &RenderOptions| {
+        let mut renderer = Renderer::new(&scene, options, &backend).unwrap();
+        views.iter().map(|camera| renderer.frame(camera, &()).unwrap()).unzip()
+    };
+    let (full, _): (Vec<Frame>, Vec<_>) = along(&RenderOptions { detail: Detail::FINEST, ..options.clone() });
+    let (fading, reports) = along(&options);
+    let (popping, _) = along(&RenderOptions { detail_fades: false, ..options.clone() });
+    let coarse = reports.iter().filter(|report| report.cut.unwrap() < 60_000).count();
+    assert!(coarse > 100, "{coarse}");
+    let [of_all, none] = changes(&full, &full);
+    assert_eq!(none, 0.0);
+    let ([largest, beyond], [of_pops, popped]) = (changes(&fading, &full), changes(&popping, &full));
+    assert!(largest <= 1.5 * of_all, "{largest} {of_all}");
+    assert!(of_pops > largest && popped > 2.0 * beyond, "{of_pops} {largest} {popped} {beyond}");
+}
+
+/// What fades wrongly is noticed.
+#[test]
+fn broken_fades_are_noticed() {
+    let Some(gpu) = common::gpu() else { return };
+    let small = || common::gpu().unwrap().with_buffer_limit(70_000);
+    let (scene, camera) = (levels(sphere(6000, 1.7)), sphere_camera(100, Projection::Pinhole));
+    // By tiles all splats or large ones alone, and one by one, then from several branches and pages.
+    let organisations = [Organisation::Tile, Organisation::Auto, Organisation::Scatter];
+    let ways = organisations.map(|organisation| RenderOptions { organisation, ..fading(250.0) });
+    let backends = [Backend::gpu(gpu), Backend::gpu(small()), Backend::gpu(small())];
+    let right = [0, 1, 2].map(|way| bits(&frame(&scene, &camera, &ways[way], &backends[way])));
+    assert!(right[0] == right[1] && right[0] == right[2]);
+    for (file, from, to) in [
+        ("fade.wgsl", "(fade.cuts & 0xffu)) / FADE_STEPS;", "0u) / FADE_STEPS;"),
+        ("fade.wgsl", "cut < (fade.cuts >> 8u);", "true;"),
+        ("fade.wgsl", "return farthest_shown(depth, radius, image) >= front;", "return true;"),
+        ("fade.wgsl", "let differ = x ^ y;", "let differ = x;"),
+        ("tile.wgsl", "fragment.hit && takes_sample(splat.fade, x, y + k)", "fragment.hit"),
+        ("visibility.wgsl", "fragment.hit && takes_sample(splat.fade, x, y)", "fragment.hit"),
+        ("select.wgsl", "fate = min(fate, cuts);", ""),
+        ("select.wgsl", "reached[node.first] = fate;", "reached[node.first] = ALL_CUTS;"),
+        ("select.wgsl", "choose_fade(at + k, 0u, fate);", "choose_fade(at + k, 0u, ALL_CUTS);"),
+        ("select_fades.wgsl", "floor(steps *", "floor(0.9 * steps *"),
+    ] {
+        let sources = Sources::default().replace(file, from, to).unwrap();
+        let gpus: [Gpu; 3] = [common::gpu().unwrap(), small(), small()];
+        let noticed = gpus.into_iter().zip(&ways).zip(&right).any(|((gpu, way), right)| {
+            let backend = Backend::Gpu { gpu: Box::new(gpu), sources: sources.clone() };
+            render(&scene, &camera, way, &backend, &()).is_ok_and(|(shown, _)| bits(&shown) != *right)
+        });
+        assert!(noticed, "{file}: {to}");
+    }
+}
+
+/// Where nothing can fade that is said, and `--cameras` switches from one cut to the next.
+#[test]
+fn what_does_not_fade_is_refused() {
+    for options in [
+        RenderOptions { composite: Composite::Layers(2), ..fading(9.0) },
+        RenderOptions { composite: Composite::Weighted, ..fading(9.0) },
+        RenderOptions { raster: Some(Default::default()), ..fading(9.0) },
+    ] {
+        let refused = render(
+            &levels(sphere(100, 1.7)),
+            &sphere_camera(20, Projection::Pinhole),
+            &options,
+            &Backend::Reference,
+            &(),
+        );
+        assert!(refused.unwrap_err().to_string().contains("--lod-fade off"), "{options:?}");
+    }
+}
+
+/// Views of a set of cameras fade, those of one camera do not, and both as it is asked for.
+#[test]
+fn views_of_many_cameras_fade() {
+    let folder = Folder::new();
+    let (surfels, levels) = (folder.path("sphere.ply"), folder.path("levels.ply"));
+    succeeds(&["generate", "sphere", "--count", "4000", "-o", text(&surfels)]);
+    succeeds(&["lod", text(&surfels), "-o", text(&levels)]);
+    let cameras = folder.file(
+        "transforms.json",
+        r#"{"w": 64, "h": 64, "fl_x": 70, "frames": [{"file_path": "a", "transform_matrix":
+        [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 3], [0, 0, 0, 1]]}]}"#,
+    );
+    let picture = |more: &[&str]| {
+        let views = folder.path("views");
+        let base = ["render", text(&levels), "--backend", "reference", "--lod", "60px", "-o"];
+        if more.contains(&"--cameras") {
+            succeeds(&[&base[..], &[text(&views)], more].concat());
+            return std::fs::read(views.join("a.png")).unwrap();
+        }
+        let one = folder.path("one.png");
+        succeeds(&[&base[..], &[text(&one), "--size", "64x64", "--eye", "0,0,3"], more].concat());
+        std::fs::read(&one).unwrap()
+    };
+    let many = |more: &[&str]| picture(&[&["--cameras", text(&cameras)], more].concat());
+    assert!(many(&[]) == many(&["--lod-fade", "on"]) && many(&[]) != many(&["--lod-fade", "off"]));
+    assert!(picture(&[]) == picture(&["--lod-fade", "off"]) && picture(&[]) != picture(&["--lod-fade", "on"]));
+    // What cannot fade does not, unless it is asked to.
+    many(&["--composite", "layers:2"]);
+    let output = folder.path("no");
+    let base = ["render", text(&levels), "-o", text(&output), "--cameras", text(&cameras), "--lod-fade", "on"];
+    fails(&[&base[..], &["--lod", "60px", "--composite", "layers:2"]].concat(), 2, &["--lod-fade off"]);
+    fails(&base, 2, &["--lod"]);
+}

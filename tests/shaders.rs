@@ -156,8 +156,24 @@ const PAINTLESS: &[&str] = &[
 ];
 
 /// Needs that no render has together (`src/plan/check.rs`, `src/plan/needs.rs`).
-const EXCLUSIVE: [(&str, &[&str]); 35] = [
+const EXCLUSIVE: [(&str, &[&str]); 38] = [
     ("levels", &["facing", "separate", "index", "color-textured", "color-harmonics", "copies", "texz-map"]),
+    (
+        "fades",
+        &[
+            "facing",
+            "separate",
+            "index",
+            "color-textured",
+            "color-harmonics",
+            "copies",
+            "texz-map",
+            "surfaces",
+            "nearest",
+        ],
+    ),
+    ("fades", &["lists-layers", "lists-sorted", "long-lists", "veils", "oit-weighted", "oit-moments", "peels"]),
+    ("fades", &["raster-exact", "raster-offset"]),
     ("painted-triangles", MESHLESS),
     ("triangles", MESHLESS),
     ("join", MESHLESS),

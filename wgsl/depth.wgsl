@@ -1,5 +1,5 @@
 // Depth. Accepted fragments lie between the nearest depth and the tolerance behind it, so their place in that interval
-// is what is summed: its error is 2^-24 of epsilon, not of the scene.
+// is what is summed: its error is 2^-24 of epsilon, not of the scene. Those of other cuts, which may lie before it (fade.wgsl), count as nearest.
 // Twin: src/passes/accumulate.rs, src/passes/resolve.rs.
 
 override DEPTH_CHANNEL: u32;

@@ -1,4 +1,4 @@
-// Splats of cuts that fade into each other: of which of them, by two numbers in a word, the first and one more than the last (src/scene/fade.rs).
+// Splats of cuts that fade into each other, and in which of them they are (src/scene/fade.rs).
 // A fragment weighs as many parts as these are; depths have no weights, and each sample shows that of one cut.
 // Same interface as fade_absent.wgsl.
 
@@ -9,11 +9,14 @@ override FADE_WORD: u32;
 const FADE_STEPS: f32 = 64.0;
 
 struct Fade {
-    cuts: u32,
+    // The first, and one more than the last.
+    first: u32,
+    end: u32,
 }
 
 fn fade_of(index: u32) -> Fade {
-    return Fade(attribute_word(index, FADE_WORD));
+    let word = attribute_word(index, FADE_WORD);
+    return Fade(word & 0xffu, word >> 8u);
 }
 
 // Its row in a splat's record, the last one.
@@ -21,17 +24,18 @@ const FADE_ROWS: u32 = 1u;
 
 fn with_fade(record: SplatRecord, fade: Fade) -> SplatRecord {
     var faded_ = record;
-    faded_[4u + FILTER_ROWS + CLIP_ROWS + CAP_ROWS] = words(vec4<u32>(fade.cuts, 0u, 0u, 0u));
+    faded_[4u + FILTER_ROWS + CLIP_ROWS + CAP_ROWS] = words(vec4<u32>(fade.first, fade.end, 0u, 0u));
     return faded_;
 }
 
 fn fade_in(record: SplatRecord) -> Fade {
-    return Fade(each_word(record[4u + FILTER_ROWS + CLIP_ROWS + CAP_ROWS]).x);
+    let row = each_word(record[4u + FILTER_ROWS + CLIP_ROWS + CAP_ROWS]);
+    return Fade(row.x, row.y);
 }
 
 fn faded(fragment: Fragment, fade: Fade) -> Fragment {
     var less = fragment;
-    less.gain *= f32((fade.cuts >> 8u) - (fade.cuts & 0xffu)) / FADE_STEPS;
+    less.gain *= f32(fade.end - fade.first) / FADE_STEPS;
     return less;
 }
 
@@ -42,7 +46,7 @@ fn takes_sample(fade: Fade, x: u32, y: u32) -> bool {
     let cut = ((differ & 1u) << 5u) | ((y & 1u) << 4u)
         | ((differ & 2u) << 2u) | ((y & 2u) << 1u)
         | ((differ & 4u) >> 1u) | ((y & 4u) >> 2u);
-    return cut >= (fade.cuts & 0xffu) && cut < (fade.cuts >> 8u);
+    return cut >= fade.first && cut < fade.end;
 }
 
 // Whether what is nearest lies within epsilon of a fragment, which other cuts may have before it, or where nothing is in this one.

@@ -222,7 +222,8 @@ pub fn reference<'a>(
                     *total += weight * value;
                 }
                 let depth_weight = if compares_depth { weight * once.max(LEAST_MIDDLE) } else { weight };
-                sum.depth += depth_weight * at.depth;
+                // Surfels of other cuts that lie before it count as nearest: a term is clamped.
+                sum.depth += depth_weight * at.depth.max(front.depth);
                 sum.depth_weight += depth_weight;
                 sum.count += splat.copies;
             }

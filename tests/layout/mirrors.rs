@@ -256,12 +256,12 @@ pub fn differences(module: &Module, accumulator: &str) -> Vec<String> {
         let filtered = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some("Filter"));
         let filtered =
             filtered.is_some_and(|(_, ty)| matches!(&ty.inner, TypeInner::Struct { members, .. } if members.len() > 1));
-        // And so do its lines and its cap, in two rows of four words each.
+        // And so do its lines and its cap, in two rows of four words each, and its fade in one.
         let has = |name: &str| {
             let found = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some(name));
             found.is_some_and(|(_, ty)| matches!(&ty.inner, TypeInner::Struct { members, .. } if members.len() > 1))
         };
-        let rows = 32 * (usize::from(has("Clip")) + usize::from(has("Cap")));
+        let rows = 32 * (usize::from(has("Clip")) + usize::from(has("Cap"))) + 16 * usize::from(has("Fade"));
         let beside = if filtered { mirrors["Filter"].size } else { 0 } + rows;
         let record = |of: &str| mirrors[of].size + if of == "Splat" { beside } else { 0 };
         match (&module.types[ty].inner, element) {
@@ -324,10 +324,10 @@ fn compare(
     found: &mut Vec<String>,
 ) {
     let mut device = Vec::new();
-    // The lines and the cap of a splat are members in WGSL alone: in its record they come after its filter.
+    // The lines, the cap and the fade of a splat are members in WGSL alone: in its record they come after its filter.
     let (members, span) = match members {
-        [own @ .., clip, cap]
-            if name == "Splat" && [clip, cap].map(|m| m.name.as_deref()) == [Some("clip"), Some("cap")] =>
+        [own @ .., clip, cap, fade]
+            if name == "Splat" && [clip, cap, fade].map(|m| m.name.as_deref()) == ["clip", "cap", "fade"].map(Some) =>
         {
             let end = own
                 .last()

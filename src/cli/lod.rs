@@ -76,7 +76,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let divided = seconds();
     let surfels = scene.surfels.len() as u64;
     let mut points = match arguments.cut {
-        Some(length) => hierarchy::points(&Cut::by_length(&tree, length).scene(&scene, &tree)),
+        Some(length) => hierarchy::points(&Cut::by_length(&tree, length).scene(&scene, &tree, true)),
         None => hierarchy::points(&scene),
     };
     drop(scene);

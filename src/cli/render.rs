@@ -215,6 +215,9 @@ pub struct Arguments {
     /// How nodes are measured: extent, as disks as long as their images, or area, of their images, as in Pajarola 2003
     #[arg(long, value_enum, default_value_t = MeasureName::Extent, requires = "cut")]
     lod_measure: MeasureName,
+    /// What nodes are: cap (curved as the surface is below them, or but for that of the rasteriser and of --lowpass ewa) or disk (in their planes)
+    #[arg(long, value_enum, default_value_t = NodeShape::Cap, requires = "cut")]
+    lod_shape: NodeShape,
     /// Whether coarser and finer cuts fade into each other from view to view, so that nothing pops [default: on with --cameras, else off]
     #[arg(long, value_name = "on|off", value_parser = on_off_parser(), requires = "cut")]
     lod_fade: Option<bool>,
@@ -237,6 +240,13 @@ pub struct Arguments {
 /// A backend, or none for the best that there is.
 #[derive(Clone, Copy, PartialEq)]
 struct Chosen(Option<BackendName>);
+
+/// What nodes of levels of detail are drawn as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum NodeShape {
+    Cap,
+    Disk,
+}
 
 fn on_off_parser() -> impl TypedValueParser<Value = bool> {
     PossibleValuesParser::new(["on", "off"]).map(|name| name == "on")

@@ -48,7 +48,17 @@ impl Tree {
             }
             let TreeRow { cone, first, count, leaf } = *row;
             let surfel = Surfel::ellipse(rounded, along.as_vec3(), across.as_vec3());
-            all.nodes.push(Node { surfel, color, radius, cone, first, count, leaf });
+            let cap = self.nodes.caps.as_ref().and_then(|caps| caps.get(index)).copied().unwrap_or_default();
+            all.nodes.push(Node {
+                surfel,
+                cap: cap.usable(along.length().max(across.length())),
+                color,
+                radius,
+                cone,
+                first,
+                count,
+                leaf,
+            });
             all.low.push((center - rounded.as_dvec3()).as_vec3().to_array());
         }
         Some(all)
@@ -87,6 +97,7 @@ impl Tree {
             positions: nodes.iter().enumerate().map(position).collect(),
             axes: Some(nodes.iter().map(|node| [node.surfel.s, node.surfel.t]).collect()),
             radii: Some(nodes.iter().map(|node| node.radius).collect()),
+            caps: Some(nodes.iter().map(|node| node.cap).collect()),
             colors: Some(match coded {
                 true => Colors::Srgb8(nodes.iter().map(|node| srgb8(node.color)).collect()),
                 false => Colors::Linear(nodes.iter().map(|node| node.color).collect()),

@@ -255,7 +255,7 @@ mod tests {
                         assert!(cut.len() < last || size == 0.0, "{size}: {}", cut.len());
                         last = cut.len();
                     }
-                    let drawn = cut.scene(&scene, &tree);
+                    let drawn = cut.scene(&scene, &tree, true);
                     assert_eq!((drawn.surfels.len(), drawn.colors.linear(cut.len() - 1)[3]), (cut.len(), 1.0));
                 }
             }

@@ -206,7 +206,7 @@ impl ScenePage<'_> {
         self.node(index).map_or_else(|| self.scene.surfels[index], |(_, node)| node.surfel)
     }
 
-    /// Those of a node: it is flat, and ends at no lines.
+    /// Those of a node: it ends at no lines.
     fn write_node(&self, (number, node): (usize, &Node), into: &mut [u32]) {
         match self.needs.color {
             ColorNeed::Srgb8 => into[0] = u32::from_le_bytes(srgb8(node.color)),
@@ -224,7 +224,8 @@ impl ScenePage<'_> {
             write(Clip::NONE.0.as_flattened(), &mut into[self.layout.clip as usize..]);
         }
         if self.needs.curved {
-            write(&Cap::FLAT.0, &mut into[self.layout.cap as usize..]);
+            let cap = if self.needs.node_caps { node.cap } else { Cap::FLAT };
+            write(&cap.0, &mut into[self.layout.cap as usize..]);
         }
     }
 

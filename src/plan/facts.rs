@@ -4,6 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{MeshFacts, RenderOptions};
+use crate::scene::hierarchy::Node;
 use crate::scene::texture::PlaceRange;
 use crate::scene::{Atlas, Bounds, Colors, Hierarchy, Scene, Surfel, has_copies};
 
@@ -79,18 +80,23 @@ pub struct Facts {
 /// What is known of the nodes of levels of detail.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LevelFacts {
-    /// The longest half-axis, world units.
+    /// The longest half-axis with the height of its cap, world units.
     pub largest_radius: f32,
     /// The longest shorter half-axis, world units.
     pub largest_shorter: f32,
+    /// Some have caps.
+    pub caps: bool,
 }
 
 impl LevelFacts {
     /// Those of `hierarchy`.
     pub fn of(hierarchy: &Hierarchy) -> Self {
-        let largest =
-            |of: fn(&Surfel) -> f32| hierarchy.nodes.par_iter().map(|node| of(&node.surfel)).reduce(|| 0.0, f32::max);
-        Self { largest_radius: largest(Surfel::radius), largest_shorter: largest(Surfel::shorter) }
+        let largest = |of: fn(&Node) -> f32| hierarchy.nodes.par_iter().map(of).reduce(|| 0.0, f32::max);
+        Self {
+            largest_radius: largest(|node| node.surfel.radius() + node.cap.highest() as f32),
+            largest_shorter: largest(|node| node.surfel.shorter()),
+            caps: hierarchy.nodes.par_iter().any(|node| !node.cap.is_flat()),
+        }
     }
 }
 

@@ -32,6 +32,8 @@ pub struct SceneNeeds {
     pub copies: bool,
     /// A cut of levels of detail is drawn.
     pub levels: bool,
+    /// Nodes of the cut curve.
+    pub node_caps: bool,
     /// There is less than all of some surfel, as cuts fade into each other.
     pub fades: bool,
     /// Batches of surfels that are out of view or hidden are left out: there are enough surfels for the image's pixels, all of which are looked at for what hides ([`tuning::PIXELS_A_CULLED_SURFEL`]).
@@ -250,6 +252,7 @@ impl SceneNeeds {
         let peels = lists.and(peel::layers(options));
         let oit = Oit::of(options);
         let separate = options.separate && facts.individuals.len() > 1;
+        let node_caps = options.draws_node_caps() && facts.nodes_of(options).is_some_and(|nodes| nodes.caps);
         let unblended = if options.raster.is_some() { Winner::Rasterised } else { Winner::Second };
         Self {
             projection: camera.projection,
@@ -260,6 +263,7 @@ impl SceneNeeds {
             doubled: facts.doubled,
             copies: false,
             levels: facts.nodes_of(options).is_some(),
+            node_caps,
             fades: facts.fades || (facts.nodes_of(options).is_some() && options.detail_fades),
             cull: false,
             tiles: fixed && lists.is_none() && oit.is_none() && options.organisation != Organisation::Scatter,
@@ -294,7 +298,7 @@ impl SceneNeeds {
             cull_back: culls_back(facts, camera, options),
             clips: (facts.clips || options.outline.is_some()) && options.facing.is_none(),
             outline: options.outline.is_some(),
-            curved: facts.caps && options.draws_caps(),
+            curved: node_caps || (facts.caps && options.draws_caps()),
             facing: options.facing.map(|facing| facing.shape),
             samples: options.samples,
             shading: options.shading,
@@ -411,6 +415,7 @@ impl SceneNeeds {
             (self.doubled, "doubled"),
             (self.copies, "copies"),
             (self.levels, "levels"),
+            (self.node_caps, "node-caps"),
             (self.fades, "fades"),
             (self.cull, "cull"),
             (self.tiles, "tiles"),

@@ -76,6 +76,8 @@ pub struct RenderOptions {
     pub detail: Detail,
     /// How that is measured.
     pub detail_measure: DetailMeasure,
+    /// Nodes curve as what is below them does, in place of lying flat in their planes.
+    pub detail_caps: bool,
     /// Coarser and finer cuts fade into each other from view to view, in place of a switch from one to the next.
     pub detail_fades: bool,
     /// Samples of a pixel's colour. Maps are of its centre, however many there are: a depth between two surfaces is of none.
@@ -133,6 +135,11 @@ impl RenderOptions {
         self.low_pass != LowPass::Ewa && self.raster.is_none() && self.facing.is_none()
     }
 
+    /// Nodes that curve are drawn so.
+    pub fn draws_node_caps(&self) -> bool {
+        self.detail_caps && self.draws_caps()
+    }
+
     /// Light falls on splats, whose lit colours are blended, and not on pixels: there a mean of the normals of several surfaces is that of none.
     pub fn lights_splats(&self) -> bool {
         let at_splats = self.shading_at == ShadingAt::Splat || self.composite.is_order_free();
@@ -158,6 +165,7 @@ impl Default for RenderOptions {
             cull: Cull::Auto,
             detail: Detail::FINEST,
             detail_measure: DetailMeasure::default(),
+            detail_caps: true,
             detail_fades: false,
             samples: Samples::ONE,
             facing: None,

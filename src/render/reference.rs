@@ -92,7 +92,7 @@ pub(super) fn cut(
     let backs_out = culls_back(facts, camera, options);
     let cut = select::reference(tree, scene.origin, camera, &Wanted::of(options, backs_out));
     let cull = if backs_out { Cull::Back } else { Cull::None };
-    Some((cut.scene(scene, tree), RenderOptions { cull, ..options.clone() }))
+    Some((cut.scene(scene, tree, options.draws_node_caps()), RenderOptions { cull, ..options.clone() }))
 }
 
 /// What the steps of `plan` have twins for: before there are bands, and in each of them.

@@ -86,8 +86,9 @@ impl Cut {
         self.len() == 0
     }
 
-    /// The surfels of leaves and then the nodes, as a scene like `scene`, which they are cut from. Nodes end at no lines and are flat.
-    pub fn scene(&self, scene: &Scene, hierarchy: &Hierarchy) -> Scene {
+    /// The surfels of leaves and then the nodes, as a scene like `scene`, which they are cut from. Nodes end at no lines, and are flat unless they have
+    /// their `caps`.
+    pub fn scene(&self, scene: &Scene, hierarchy: &Hierarchy, caps: bool) -> Scene {
         let indices: Vec<u32> = self.surfels.iter().flat_map(|(range, _)| range.clone()).collect();
         let nodes = || self.nodes.iter().map(|&(index, _)| &hierarchy.nodes[index as usize]);
         let mut cut = scene.taken(&indices);
@@ -99,8 +100,10 @@ impl Cut {
         if !scene.clips.is_empty() {
             cut.clips.resize(count, Clip::NONE);
         }
-        if !scene.caps.is_empty() {
-            cut.caps.resize(count, Cap::FLAT);
+        let curved = caps && nodes().any(|node| !node.cap.is_flat());
+        if curved || !scene.caps.is_empty() {
+            cut.caps.resize(count - self.nodes.len(), Cap::FLAT);
+            cut.caps.extend(nodes().map(|node| if caps { node.cap } else { Cap::FLAT }));
         }
         let plane = |surfel: &Surfel| surfel.normal().normalize_or_zero().to_array();
         if !scene.normals.is_empty() {

@@ -1,6 +1,6 @@
 //! Levels of detail: a tree of surfels, each of which stands for all below it.
 
-use super::Surfel;
+use super::{Cap, Surfel};
 
 /// The most surfels of a leaf that do not all lie at one position (Pajarola 2003, section 3.2).
 pub const FAN_OUT: usize = 8;
@@ -13,6 +13,8 @@ pub const DEEPEST: usize = 63;
 pub struct Node {
     /// The ellipse that stands for its surfels: it bounds their disks, seen along its normal.
     pub surfel: Surfel,
+    /// How it curves as they do.
+    pub cap: Cap,
     /// Their mean colour, linear, straight alpha.
     pub color: [f32; 4],
     /// A sphere of this radius around the centre holds them, world units.
@@ -122,7 +124,7 @@ mod tests {
 
     fn node(leaf: bool, first: u32, count: u32) -> Node {
         let surfel = Surfel { center: [0.0; 3], s: [1.0, 0.0, 0.0], t: [0.0, 1.0, 0.0] };
-        Node { surfel, color: [1.0; 4], radius: 1.0, cone: 1.0, first, count, leaf }
+        Node { surfel, cap: Cap::FLAT, color: [1.0; 4], radius: 1.0, cone: 1.0, first, count, leaf }
     }
 
     #[test]

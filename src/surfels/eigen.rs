@@ -62,6 +62,13 @@ impl Symmetric3 {
         sum
     }
 
+    /// Its product with a vector.
+    pub fn times(self, v: DVec3) -> DVec3 {
+        let Self { xx, yy, zz, xy, xz, yz } = self;
+        let [x, y, z] = v.to_array();
+        DVec3::new(xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z)
+    }
+
     /// Eigenvalues in ascending order and their orthonormal eigenvectors, by cyclic Jacobi rotations (Golub and
     /// Van Loan, Matrix Computations, section 8.5). Only `+ - * / sqrt` are used, so that every machine that follows
     /// IEEE 754 gets the same bits. Entries of 1e-150 to 1e150 in size (or zero) neither overflow nor underflow.

@@ -49,11 +49,16 @@ pub fn tree(scene: &Scene) -> &Hierarchy {
 /// What the twin draws, and how.
 pub fn cut(scene: &Scene, camera: &Camera, options: &RenderOptions) -> (Cut, RenderOptions) {
     let back = options.cull == Cull::Back;
-    let cut =
-        select::reference(tree(scene), scene.origin, camera, &Wanted::of(options, back)).scene(scene, tree(scene));
+    let cut = select::reference(tree(scene), scene.origin, camera, &Wanted::of(options, back)).scene(
+        scene,
+        tree(scene),
+        options.draws_node_caps(),
+    );
     let whole = Facts::of(scene);
     let (largest_radius, largest_shorter) = (whole.drawn_radius(options), whole.drawn_shorter(options));
     let surfels = cut.surfels.len() as u64;
+    // As kernels of the whole scene have it.
+    let caps = whole.caps || (options.draws_node_caps() && whole.levels.is_some_and(|levels| levels.caps));
     let facts = Facts {
         surfels,
         largest_radius,
@@ -61,6 +66,7 @@ pub fn cut(scene: &Scene, camera: &Camera, options: &RenderOptions) -> (Cut, Ren
         levels: None,
         copies: false,
         fades: options.detail_fades,
+        caps,
         ..whole
     };
     (Cut { scene: cut, facts }, RenderOptions { detail: Detail::FINEST, ..options.clone() })

@@ -9,7 +9,7 @@ use epsplat::{Error, Result};
 
 use super::super::note;
 use super::output::Format;
-use super::{Arguments, LowPassName, ShadingAtName, ShadingName};
+use super::{Arguments, LowPassName, NodeShape, ShadingAtName, ShadingName};
 
 /// Samples of a pixel.
 const SAMPLES: Samples = Samples { across: 2, down: 2 };
@@ -61,6 +61,7 @@ pub(super) fn options(arguments: &Arguments, format: Format) -> Result<RenderOpt
         cull: arguments.cull,
         detail: arguments.splats.map(|splats| Detail::Splats(splats.get())).or(arguments.lod).unwrap_or(default.detail),
         detail_measure: arguments.lod_measure.into(),
+        detail_caps: arguments.lod_shape == NodeShape::Cap,
         detail_fades: arguments.lod_fade == Some(true),
         samples: arguments.samples.unwrap_or(SAMPLES),
         facing: facing(arguments),

@@ -6,6 +6,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::Made;
+use super::curvature;
 use super::octree::{Octree, Set};
 use super::sums::{Scales, Sums, normal_of};
 use crate::scene::hierarchy::Node;
@@ -42,12 +43,7 @@ impl Shape {
     /// get an ellipse several times as long as both.
     fn of(covariance: Symmetric3, normal: DVec3) -> Self {
         let (e1, e2) = normal.any_orthonormal_pair();
-        let Symmetric3 { xx, yy, zz, xy, xz, yz } = covariance;
-        let columns = |v: DVec3| {
-            let [x, y, z] = v.to_array();
-            DVec3::new(xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z)
-        };
-        let plane = [e1.dot(columns(e1)), e1.dot(columns(e2)), e2.dot(columns(e2))];
+        let plane = [e1.dot(covariance.times(e1)), e1.dot(covariance.times(e2)), e2.dot(covariance.times(e2))];
         let ([x, y], slimness) = shape(plane).unwrap_or(([1.0, 0.0], 1.0));
         let s = e1 * x + e2 * y;
         let rounded = |v: DVec3| v.as_vec3().as_dvec3();
@@ -214,28 +210,43 @@ pub(super) fn node(scene: &Scene, set: &Set, sums: &Sums, below: Below<'_>, scal
         let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
         let radius = ((longest([s.dot(s), s.dot(t), t.dot(t)]) + height) * ROUNDED_UP) as f32;
         return (
-            Node { surfel, color, radius, cone: cone(tilt(scene, range.start).cos()), first, count, leaf: true },
+            Node {
+                surfel,
+                cap: scene.caps.get(range.start).copied().unwrap_or_default(),
+                color,
+                radius,
+                cone: cone(tilt(scene, range.start).cos()),
+                first,
+                count,
+                leaf: true,
+            },
             low,
         );
     }
     let lattice = &below.tree.lattices[set.lattice as usize];
     let mean = lattice.position(sums.moments.mean());
     // As a file in world coordinates has it, so that what is read back is the same.
+    let covariance = sums.covariance(lattice, scale);
+    let shape = Shape::of(covariance, normal);
+    let stored = shape.s.cross(shape.t).normalize();
+    let plane = [shape.s.normalize(), shape.t.normalize(), stored];
+    let heights = curvature::heights(scene, set, below, mean, plane);
+    // A paraboloid with its top at the mean would lie off the surface by the mean height: that much to the other side it does not.
+    let mean = mean - stored * curvature::mean_height(heights, covariance, plane);
     let mean = (scene.origin + mean) - scene.origin;
     let rounded = ((scene.origin + mean.as_vec3().as_dvec3()) - scene.origin).as_vec3();
     let low = if scene.low.is_empty() { DVec3::ZERO } else { mean - rounded.as_dvec3() }.as_vec3();
     let center = rounded.as_dvec3() + low.as_dvec3();
-    let shape = Shape::of(sums.covariance(lattice, scale), normal);
-    // As what is stored has it.
-    let stored = shape.s.cross(shape.t).normalize();
     let longer = shape.seen.map(DVec3::length);
     let bounding = Bounding { scene, center, normal: stored, shape, scale: longer[0].hypot(longer[1]) };
     let all = bound(&bounding, set, below, sided);
     let factor = all.rim * ROUNDED_UP;
     let [s, t] = [shape.s, shape.t].map(|axis| (axis * factor).as_vec3().to_array());
     let surfel = Surfel { center: rounded.to_array(), s, t };
-    let radius = (all.radius.max(factor) * ROUNDED_UP) as f32;
-    (Node { surfel, color, radius, cone: cone(all.cosine), first, count, leaf: true }, low.to_array())
+    let lengths = [shape.s, shape.t].map(|axis| axis.length() * factor);
+    let cap = curvature::cap(heights, lengths);
+    let radius = (all.radius.max(factor + cap.highest()) * ROUNDED_UP) as f32;
+    (Node { surfel, cap, color, radius, cone: cone(all.cosine), first, count, leaf: true }, low.to_array())
 }
 
 /// What bounds all surfels of a set: those that could change it are looked at, and what is below a node that could not is passed over. What comes

@@ -5,6 +5,7 @@
 //! Everything is a sum of whole numbers, a minimum or a maximum, so a tree depends on the set of surfels alone, and not on their order or on the number of threads.
 
 mod bounds;
+mod curvature;
 mod lattice;
 mod moments;
 mod octree;
@@ -24,7 +25,7 @@ use self::octree::{Element, Octree, Set};
 pub use self::points::points;
 use self::sums::{Scales, Sums};
 use crate::scene::hierarchy::Node;
-use crate::scene::{Colors, Hierarchy, Scene, Surfel, by_content};
+use crate::scene::{Cap, Colors, Hierarchy, Scene, Surfel, by_content};
 use crate::{Error, Progress, Result};
 
 /// The scene with levels of detail, which are told too, and its surfels in the order of the tree.
@@ -80,7 +81,16 @@ type Made = (Node, [f32; 3]);
 fn nodes(tree: &Octree, scene: &Scene, progress: &dyn Progress) -> Hierarchy {
     let scale = Scales::of(scene);
     let nothing = Surfel { center: [0.0; 3], s: [0.0; 3], t: [0.0; 3] };
-    let nothing = Node { surfel: nothing, color: [0.0; 4], radius: 0.0, cone: 0.0, first: 0, count: 0, leaf: true };
+    let nothing = Node {
+        surfel: nothing,
+        color: [0.0; 4],
+        radius: 0.0,
+        cone: 0.0,
+        cap: Cap::FLAT,
+        first: 0,
+        count: 0,
+        leaf: true,
+    };
     let mut all: Vec<Made> = vec![(nothing, [0.0; 3]); tree.sets.len()];
     let mut below: Vec<Option<Box<Sums>>> = Vec::new();
     progress.begin("bounding nodes", tree.sets.len() as u64);

@@ -1,0 +1,69 @@
+//! How the surface that a node stands for curves: the linear field of normals that is nearest to those of what is right below it, and with it a
+//! paraboloid whose normals these are.
+//!
+//! Pajarola 2003 (section 5.2) tilts the normals at a coarse splat's corners outward by the angle of its cone, as if all surfaces were convex and curved
+//! as much in any direction. Here a symmetric matrix is fitted, which tells hollows, saddles and cylinders.
+
+use glam::{DMat3, DVec2, DVec3};
+
+use super::bounds::Below;
+use super::octree::Set;
+use super::sums::normal_of;
+use crate::scene::{Cap, Scene};
+use crate::surfels::eigen::Symmetric3;
+
+/// A normal that leans farther from the node's counts as one that leans so far: the cosine of 76 degrees.
+const LEAST_COSINE: f64 = 0.25;
+
+/// What is added to the squares that the fit divides by, of their sum: where points lie on a line nothing is told across it.
+const RIDGE: f64 = 1e-3;
+
+/// Heights over a plane, `(xx x² + 2 xy x y + yy y²) / 2` along its normal for x and y along two of its directions: xx, xy, yy, 1 / world unit.
+pub(super) type Heights = [f64; 3];
+
+/// Those of the node of a set of `scene` with the centre `center`, over the plane of these unit directions and of this normal.
+pub(super) fn heights(scene: &Scene, set: &Set, below: Below<'_>, center: DVec3, plane: [DVec3; 3]) -> Heights {
+    if set.is_leaf() {
+        let of = |index: usize| (scene.center(index) - center, normal_of(&scene.surfels[index]), 1.0);
+        return fitted(set.range().map(of), plane);
+    }
+    let of = |child: u32| {
+        let (node, low) = &below.nodes[child as usize];
+        let [place, low] = [node.surfel.center, *low].map(|part| DVec3::from_array(part.map(f64::from)));
+        (place + low - center, normal_of(&node.surfel), below.tree.sets[child as usize].range().len() as f64)
+    };
+    fitted((set.first_child..set.first_child + set.children).map(of), plane)
+}
+
+/// Those of a node whose plane has these unit directions and this normal, of the normals and places of what is right below it.
+fn fitted(below: impl Iterator<Item = (DVec3, DVec3, f64)>, [along, across, normal]: [DVec3; 3]) -> Heights {
+    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    let mut right = DVec3::ZERO;
+    for (offset, own, weight) in below {
+        let (x, y) = (offset.dot(along), offset.dot(across));
+        let up = own.dot(normal);
+        // Normals without a side are on either.
+        let own = own * up.signum() / up.abs().max(LEAST_COSINE);
+        let slope = -DVec2::new(own.dot(along), own.dot(across));
+        (xx, xy, yy) = (xx + weight * x * x, xy + weight * x * y, yy + weight * y * y);
+        right += weight * DVec3::new(x * slope.x, y * slope.x + x * slope.y, y * slope.y);
+    }
+    let ridge = RIDGE * (xx + yy);
+    let squares = DMat3::from_cols_array(&[xx + ridge, xy, 0.0, xy, xx + yy + ridge, xy, 0.0, xy, yy + ridge]);
+    let heights = (squares.inverse() * right).to_array();
+    if heights.iter().all(|height| height.is_finite()) { heights } else { [0.0; 3] }
+}
+
+/// The mean of these heights over points with this covariance about the centre, world units, and no more than half of how far these are spread: normals of
+/// what is far from flat tell no heights.
+pub(super) fn mean_height([xx, xy, yy]: Heights, covariance: Symmetric3, [along, across, _]: [DVec3; 3]) -> f64 {
+    let of = |a: DVec3, b: DVec3| a.dot(covariance.times(b));
+    let (a, b, c) = (of(along, along), of(along, across), of(across, across));
+    let most = 0.5 * (a + c).max(0.0).sqrt();
+    (0.5 * (xx * a + 2.0 * xy * b + yy * c)).clamp(-most, most)
+}
+
+/// The cap of a disk with half-axes of these lengths along the plane's directions.
+pub(super) fn cap([xx, xy, yy]: Heights, [s, t]: [f64; 2]) -> Cap {
+    Cap([xx * s * s, xy * s * t, yy * t * t].map(|height| height as f32)).usable(s.max(t))
+}

@@ -151,10 +151,15 @@ fn cuts_are_composited_and_rasterised() {
         let alike = || expected == bits(&frame(&twins, &camera, &flat, &own));
         assert!(!matches!(composite, Composite::Layers(_)) || alike(), "{composite:?}");
         let reference = frame(&scene, &camera, &options, &Backend::Reference);
-        assert!(differ(&frame(&scene, &camera, &options, &own), &reference) < 5, "{composite:?}");
+        let wrong = differ(&frame(&scene, &camera, &options, &own), &reference);
+        // What lies at nearly one depth may be sorted the other way: as in a scene of the cut alone.
+        let alone = differ(&frame(&twins, &camera, &flat, &own), &frame(&twins, &camera, &flat, &Backend::Reference));
+        assert!(wrong < 5 + alone && alone < 10, "{composite:?}: {wrong} {alone}");
     }
     let raster = RenderOptions { raster: Some(Default::default()), maps: Maps::of(&[Map::Depth]), ..at(100.0) };
-    let reference = frame(&scene, &camera, &RenderOptions { raster: None, ..raster.clone() }, &Backend::Reference);
+    // It draws flat disks.
+    let disks = RenderOptions { raster: None, detail_caps: false, ..raster.clone() };
+    let reference = frame(&scene, &camera, &disks, &Backend::Reference);
     assert!(differ(&frame(&scene, &camera, &raster, &own), &reference) < 5);
 }
 

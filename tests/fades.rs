@@ -15,7 +15,8 @@ use epsplat::gpu::Sources;
 use epsplat::plan::{ACCUMULATORS, Organisation, RenderOptions};
 use epsplat::render::{Backend, Renderer, render};
 use epsplat::scene::{
-    Camera, Colors, Composite, Cull, Detail, Fade, Lens, LowPass, Map, Maps, Projection, Samples, Scene, Surfel, Up,
+    Blend, Camera, Colors, Composite, Cull, Detail, Fade, Lens, LowPass, Map, Maps, Projection, Samples, Scene,
+    Shading, Surfel, Up,
 };
 use epsplat::surfels::analytic::{Shape, generate};
 use glam::{DVec3, Vec3};
@@ -31,7 +32,8 @@ fn a_sample_shows_the_cut_of_its_number() {
     let Some(gpu) = common::gpu() else { return };
     let backend = Backend::gpu(gpu);
     let (scene, camera) = (levels(sphere(6000, 1.1)), sphere_camera(96, Projection::Pinhole));
-    let options = fading(250.0);
+    // Of flat nodes, as outlines of caps are nearly the same at any size.
+    let options = RenderOptions { detail_caps: false, ..fading(250.0) };
     let [device, reference] =
         [&backend, &Backend::Reference].map(|backend| frame(&scene, &camera, &options, backend).color);
     let covers = |pixels: &[[f32; 4]]| pixels.iter().map(|color| color[3] == 1.0).collect::<Vec<bool>>();
@@ -39,7 +41,7 @@ fn a_sample_shows_the_cut_of_its_number() {
     let (mut some, mut others) = (0, 0);
     for number in 0..64 {
         let size = 250.0 * (0.5 + f64::from(number) / 128.0);
-        let plain = RenderOptions { detail_fades: false, ..fading(size) };
+        let plain = RenderOptions { detail: Detail::Pixels(size), detail_fades: false, ..options.clone() };
         let expected = covers(&frame(&scene, &camera, &plain, &backend).color);
         for (index, expected) in expected.iter().enumerate() {
             let of_cut = Fade::threshold(index as u32 % 96, index as u32 / 96) == number;
@@ -96,6 +98,10 @@ fn fades_are_those_of_the_twin_in_every_organisation() {
         sums += 1;
         let counts = counted(&shown).iter().zip(&counted(&reference)).filter(|(a, b)| a != b).count();
         assert!(counts < 4, "{}: {counts}", row.name);
+        // Of 24 bits the rim of a 64th of a disk has 9.
+        let colors = shown.color.as_flattened().iter().zip(reference.color.as_flattened());
+        let off = colors.filter(|(a, b)| (*a - *b).abs() > 2e-3).count();
+        assert!(off < 4, "{}: {off}", row.name);
         let far = shown.map(Map::Depth).unwrap().iter().zip(reference.map(Map::Depth).unwrap());
         let far =
             far.filter(|(a, b)| a.is_finite() != b.is_finite() || (a.is_finite() && (*a - *b).abs() > 1e-4)).count();
@@ -190,13 +196,15 @@ fn broken_fades_are_noticed() {
     for (file, from, to) in [
         ("fade.wgsl", "fade.end - fade.first", "fade.end"),
         ("fade.wgsl", "cut < fade.end;", "true;"),
-        ("fade.wgsl", "return farthest_shown(depth, radius, image) >= front;", "return true;"),
+        ("fade.wgsl", "return front > 0.0 && farthest_shown(depth, radius, image) >= front;", "return true;"),
         ("fade.wgsl", "let differ = x ^ y;", "let differ = x;"),
         ("tile.wgsl", "fragment.hit && takes_sample(splat.fade, x, y + k)", "fragment.hit"),
         ("visibility.wgsl", "fragment.hit && takes_sample(splat.fade, x, y)", "fragment.hit"),
         ("select.wgsl", "fate = min(fate, cuts);", ""),
         ("select.wgsl", "reached[node.first] = fate;", "reached[node.first] = ALL_CUTS;"),
         ("select.wgsl", "choose_fade(at + k, 0u, fate);", "choose_fade(at + k, 0u, ALL_CUTS);"),
+        ("select.wgsl", "choose_fade(at, fate, cuts);", "choose_fade(at, 0u, cuts);"),
+        ("select.wgsl", "gather_fade(place, to);", "gather_fade(place + 1u, to);"),
         ("select_fades.wgsl", "floor(steps *", "floor(0.9 * steps *"),
     ] {
         let sources = Sources::default().replace(file, from, to).unwrap();
@@ -214,6 +222,7 @@ fn what_does_not_fade_is_refused() {
     for options in [
         RenderOptions { composite: Composite::Layers(2), ..fading(9.0) },
         RenderOptions { composite: Composite::Weighted, ..fading(9.0) },
+        RenderOptions { blend: Blend::Nearest, shading: Shading::Unlit, ..fading(9.0) },
         RenderOptions { raster: Some(Default::default()), ..fading(9.0) },
     ] {
         let refused = render(

@@ -156,7 +156,7 @@ const PAINTLESS: &[&str] = &[
 ];
 
 /// Needs that no render has together (`src/plan/check.rs`, `src/plan/needs.rs`).
-const EXCLUSIVE: [(&str, &[&str]); 38] = [
+const EXCLUSIVE: [(&str, &[&str]); 39] = [
     ("levels", &["facing", "separate", "index", "color-textured", "color-harmonics", "copies", "texz-map"]),
     (
         "fades",
@@ -174,6 +174,7 @@ const EXCLUSIVE: [(&str, &[&str]); 38] = [
     ),
     ("fades", &["lists-layers", "lists-sorted", "long-lists", "veils", "oit-weighted", "oit-moments", "peels"]),
     ("fades", &["raster-exact", "raster-offset"]),
+    ("node-caps", &["facing", "separate", "index", "color-textured", "color-harmonics", "copies", "texz-map"]),
     ("painted-triangles", MESHLESS),
     ("triangles", MESHLESS),
     ("join", MESHLESS),

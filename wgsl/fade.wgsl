@@ -49,7 +49,7 @@ fn takes_sample(fade: Fade, x: u32, y: u32) -> bool {
     return cut >= fade.first && cut < fade.end;
 }
 
-// Whether what is nearest lies within epsilon of a fragment, which other cuts may have before it, or where nothing is in this one.
+// Whether what is nearest lies within epsilon behind a fragment, which may be of another cut; not where this cut has nothing, infinitely far or (tile.wgsl) at 0.
 fn meets_front(depth: f32, front: f32, radius: f32, image: vec2<f32>) -> bool {
-    return farthest_shown(depth, radius, image) >= front;
+    return front > 0.0 && farthest_shown(depth, radius, image) >= front;
 }

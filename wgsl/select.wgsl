@@ -10,14 +10,14 @@
 @group(0) @binding(73) var<storage, read> tree_nodes: array<TreeNode>;
 // Its surfels, and those of its nodes.
 @group(0) @binding(74) var<storage, read> tree_surfels: array<Surfel>;
-// Numbers of nodes that are come to, level after level, and what becomes of each.
+// Numbers of nodes that are come to, level after level, and what becomes of each. This and `chosen` have a second half where cuts fade (select_fades.wgsl).
 @group(0) @binding(75) var<storage, read_write> frontier: array<u32>;
 @group(0) @binding(76) var<storage, read_write> fates: array<u32>;
 // Of each workgroup: how many surfels its nodes leave, and how many children; then where these start.
 @group(0) @binding(77) var<storage, read_write> group_counts: array<vec2<u32>>;
 // The surfels of this branch that are drawn, nodes' among them, by their places in tree_surfels.
 @group(0) @binding(78) var<storage, read_write> chosen: array<u32>;
-// The roots of branches that are come to.
+// By how many cuts the roots of branches are come to.
 @group(0) @binding(79) var<storage, read_write> reached: array<u32>;
 // The words below.
 @group(0) @binding(80) var<storage, read_write> selection: array<u32>;

@@ -218,7 +218,7 @@ pub struct Arguments {
     /// What nodes are: cap (curved as the surface is below them, or but for that of the rasteriser and of --lowpass ewa) or disk (in their planes)
     #[arg(long, value_enum, default_value_t = NodeShape::Cap, requires = "cut")]
     lod_shape: NodeShape,
-    /// Whether coarser and finer cuts fade into each other from view to view, so that nothing pops [default: on with --cameras, else off]
+    /// Whether coarser and finer cuts fade into each other from view to view, so that nothing pops [default: on with --cameras, else off; never of COPC files]
     #[arg(long, value_name = "on|off", value_parser = on_off_parser(), requires = "cut")]
     lod_fade: Option<bool>,
     /// A light, instead of the headlight: headlight[:INTENSITY] or the direction toward it, x,y,z[:INTENSITY]

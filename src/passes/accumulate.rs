@@ -197,7 +197,7 @@ pub fn reference<'a>(
                     // What shows the other side is out unless it is nearest.
                     let behind = if back == front.back { behind } else { front.depth };
                     let before = if splat.fade == Fade::WHOLE { f64::INFINITY } else { reached / front.depth - 1.0 };
-                    sum.decision = sum.decision.min(decision(at, behind, camera.near).min(before.abs()));
+                    sum.decision = sum.decision.min(decision_beside(at, behind, camera.near, before));
                 }
                 if !(at.hit(camera) && front.shows(at.depth, back, behind) && reached >= front.depth) {
                     continue;
@@ -235,8 +235,13 @@ pub fn reference<'a>(
 /// The relative distance to the nearest decision that could turn the fragment's fate: it is in or out by rim, near
 /// depth and epsilon together, so a fragment that fails one of them clearly is not undecided by the others.
 pub(super) fn decision(at: Intersection, behind: f64, near: f64) -> f64 {
+    decision_beside(at, behind, near, f64::INFINITY)
+}
+
+/// The same, where a fragment is out by another margin, too.
+fn decision_beside(at: Intersection, behind: f64, near: f64, beside: f64) -> f64 {
     let before = if behind.is_finite() { behind / at.depth - 1.0 } else { f64::INFINITY };
-    let margins = [1.0 - at.rho2.sqrt(), at.inside, at.depth / near - 1.0, before];
+    let margins = [1.0 - at.rho2.sqrt(), at.inside, at.depth / near - 1.0, before, beside];
     if margins.iter().any(|m| *m < -NEARBY) {
         f64::INFINITY
     } else {

@@ -54,8 +54,8 @@ pub fn order(scene: &Scene, core: &Bounds) -> Vec<u32> {
     dealt.chain(rest).map(|place| *place as u32).collect()
 }
 
-/// The bits of a surfel and its colour.
-fn content(scene: &Scene, index: usize) -> ([[u32; 3]; 8], [u32; 4]) {
+/// The bits of a surfel, its colour and its fade.
+fn content(scene: &Scene, index: usize) -> ([[u32; 3]; 8], [u32; 4], Option<u32>) {
     let Surfel { center, s, t } = scene.surfels[index];
     let low = scene.low.get(index).copied().unwrap_or_default();
     let normal = scene.normals.get(index).copied().unwrap_or_default();
@@ -65,7 +65,11 @@ fn content(scene: &Scene, index: usize) -> ([[u32; 3]; 8], [u32; 4]) {
         Colors::Harmonics(harmonics) => harmonics.colors()[index],
         colors => colors.linear(index),
     };
-    ([center, low, s, t, first, second, cap, normal].map(|part| part.map(f32::to_bits)), color.map(f32::to_bits))
+    (
+        [center, low, s, t, first, second, cap, normal].map(|part| part.map(f32::to_bits)),
+        color.map(f32::to_bits),
+        scene.fades.get(index).map(|fade| fade.word()),
+    )
 }
 
 /// How the surfels of a cut that a page has room for are dealt out over it (`wgsl/select.wgsl`), those of pages before it being `first`.

@@ -114,16 +114,21 @@ impl Wanted {
 ///
 /// The fewer square pixels, the more is drawn but for few nodes at the image's edges of which less is in view than they stand for, so that going down by
 /// powers of two and then halving an interval finds a size with which no more are drawn than asked for, and hardly fewer. What reaches the near
-/// depth is divided at any size, and may be more.
+/// depth is divided at any size, and may be more. Where cuts fade into each other more than all surfels may be drawn of some sizes: if there is room for all
+/// of them the size is the smallest.
 pub fn sized(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: &Wanted) -> Detail {
     let Detail::Splats(splats) = wanted.detail else { return wanted.detail };
+    // What a device rounds to the other side of this size is drawn on this one.
     let fits = |size: f64| {
-        let wanted = Wanted { detail: Detail::Pixels(size), ..*wanted };
+        let wanted = Wanted { detail: Detail::Pixels(size * SIZE_SLACK), ..*wanted };
         bounded(hierarchy, origin, camera, &wanted, splats).is_some()
     };
-    // What a device rounds to the other side of this size is drawn on this one.
-    Detail::Pixels(finest(fits) * SIZE_SLACK)
+    let size = if wanted.fades && fits(SMALLEST) { SMALLEST } else { finest(fits) };
+    Detail::Pixels(size * SIZE_SLACK)
 }
+
+/// Square pixels that no node is seen as small as.
+const SMALLEST: f64 = 1e-30;
 
 /// By how much a device may err in the size of a node.
 const SIZE_SLACK: f64 = 1.0 + 1e-5;
@@ -168,6 +173,8 @@ fn bounded(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: &Wante
 fn divided(seen: f64, size: f64, fades: bool) -> u8 {
     let steps = f64::from(STEPS);
     match fades {
+        // So is it of no size.
+        true if seen >= size => STEPS,
         true => (steps * (2.0 * seen / size - 1.0) + 1.0).floor().clamp(0.0, steps) as u8,
         false if seen < size => 0,
         false => STEPS,
@@ -293,9 +300,11 @@ mod tests {
     fn a_number_of_splats_is_kept() {
         let (_, tree) = sphere();
         let camera = camera(DVec3::new(0.0, 0.7, 3.0), Lens::Fov(50.0));
-        for (splats, least) in [(1, 1), (10, 1), (300, 250), (2000, 1900), (7999, 7900), (8000, 8000), (1 << 40, 8000)]
-        {
-            let options = RenderOptions { detail: Detail::Splats(splats), ..RenderOptions::default() };
+        let few = [(1, 1), (10, 1), (300, 250), (2000, 1900), (7999, 7900), (8000, 8000), (1 << 40, 8000)];
+        let fading = [(1, 1), (10, 1), (300, 220), (2000, 1900), (8000, 8000), (9000, 8000)];
+        let all = few.map(|case| (case, false)).into_iter().chain(fading.map(|case| (case, true)));
+        for ((splats, least), detail_fades) in all {
+            let options = RenderOptions { detail: Detail::Splats(splats), detail_fades, ..RenderOptions::default() };
             let wanted = Wanted::of(&options, false);
             let detail = sized(&tree, DVec3::ZERO, &camera, &wanted);
             let drawn = reference(&tree, DVec3::ZERO, &camera, &Wanted { detail, ..wanted }).len() as u64;

@@ -293,6 +293,9 @@ pub fn scene(facts: &Facts, options: &RenderOptions, reference: bool) -> Result<
             "the scene has no levels of detail to take: leave --lod and --splats out, or make some with epsplat lod",
         );
     }
+    if facts.fades && facts.nodes_of(options).is_none() {
+        fades(options)?;
+    }
     // A scene may say how it is composited, so that this is asked where both are known.
     let told_apart = options.composite != Composite::Opaque && !options.composite.is_order_free();
     if options.maps.has(Map::Surfaces) && !told_apart {

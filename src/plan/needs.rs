@@ -189,7 +189,8 @@ fn mesh(facts: &Facts, options: &RenderOptions) -> Option<MeshNeeds> {
     })
 }
 
-/// Terms of at least this weight keep 23 of the 32 bits that `fixed` has, as f32 would.
+/// Terms of at least this weight keep 23 of the 32 bits that `fixed` has, as f32 would; where cuts fade into each other, of those that a 64th of a splat alone
+/// has, 17.
 pub const SMALL_WEIGHT: f64 = 1.0 / 512.0;
 
 fn may_be_small(options: &RenderOptions) -> bool {
@@ -264,7 +265,7 @@ impl SceneNeeds {
             copies: false,
             levels: facts.nodes_of(options).is_some(),
             node_caps,
-            fades: facts.fades || (facts.nodes_of(options).is_some() && options.detail_fades),
+            fades: if facts.nodes_of(options).is_some() { options.detail_fades } else { facts.fades },
             cull: false,
             tiles: fixed && lists.is_none() && oit.is_none() && options.organisation != Organisation::Scatter,
             gather: false,
@@ -326,6 +327,7 @@ impl SceneNeeds {
             && picture.oit.is_none()
             && !picture.separate
             && !picture.levels
+            && !picture.fades
             && picture.color != ColorNeed::Textured;
         // Of copies tiles would make long lists.
         let tiles = picture.tiles && !copies;

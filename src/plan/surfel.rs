@@ -67,5 +67,5 @@ const CLIP_WORDS: u64 = 8;
 /// Words of a splat's cap.
 const CAP_WORDS: u64 = 8;
 
-/// Words of a splat's fade: a row, of which one is used.
+/// Words of a splat's fade: a row, of which two are used.
 const FADE_WORDS: u64 = 4;

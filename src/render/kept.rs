@@ -147,7 +147,7 @@ impl Kept {
             accumulator: raster.map_or(plan.needs.accumulator.name(), |raster| raster.format.name()),
             overflows: self.known.overflows,
             surfels: self.facts.surfels,
-            splats_drawn: tally.drawn.min(self.facts.surfels),
+            splats_drawn: tally.drawn.min(tally.cut.unwrap_or(self.facts.surfels)),
             cut: tally.cut,
             triangles: self.facts.mesh.triangles,
             width: camera.width,

@@ -11,9 +11,9 @@ pub const STEPS: u8 = 64;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fade {
     /// The first.
-    pub from: u8,
+    pub(crate) from: u8,
     /// One more than the last.
-    pub to: u8,
+    pub(crate) to: u8,
 }
 
 impl Fade {

@@ -5,7 +5,7 @@ use epsplat::io::las::Copc;
 use epsplat::plan::RenderOptions;
 use epsplat::scene::octree::{PointOctree, taken};
 use epsplat::scene::{Camera, Detail, Scene};
-use epsplat::{Result, surfels};
+use epsplat::{Error, Result, surfels};
 use serde::Serialize;
 
 use super::super::progress::Bars;
@@ -39,6 +39,11 @@ impl Octrees {
             return Ok(None);
         }
         let Some(mut files) = arguments.reading.octrees(&arguments.inputs)? else { return Ok(None) };
+        if arguments.lod_fade == Some(true) {
+            return Err(Error::Usage(
+                "the nodes of COPC files do not fade into each other: take --lod-fade off".into(),
+            ));
+        }
         let octrees: Vec<PointOctree> = files.iter().map(|file| file.octree.clone()).collect();
         let nodes: Vec<Vec<usize>> = octrees.iter().map(PointOctree::overview).collect();
         let points = read(arguments, &mut files, &nodes, bars)?;

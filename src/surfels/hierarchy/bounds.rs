@@ -224,18 +224,18 @@ pub(super) fn node(scene: &Scene, set: &Set, sums: &Sums, below: Below<'_>, scal
         );
     }
     let lattice = &below.tree.lattices[set.lattice as usize];
-    let mean = lattice.position(sums.moments.mean());
-    // As a file in world coordinates has it, so that what is read back is the same.
-    let covariance = sums.covariance(lattice, scale);
-    let shape = Shape::of(covariance, normal);
+    let shape = Shape::of(sums.covariance(lattice, scale), normal);
+    // As what is stored has it.
     let stored = shape.s.cross(shape.t).normalize();
     let plane = [shape.s.normalize(), shape.t.normalize(), stored];
+    let mean = lattice.position(sums.moments.mean());
     let heights = curvature::heights(scene, set, below, mean, plane);
     // A paraboloid with its top at the mean would lie off the surface by the mean height: that much to the other side it does not.
-    let mean = mean - stored * curvature::mean_height(heights, covariance, plane);
-    let mean = (scene.origin + mean) - scene.origin;
-    let rounded = ((scene.origin + mean.as_vec3().as_dvec3()) - scene.origin).as_vec3();
-    let low = if scene.low.is_empty() { DVec3::ZERO } else { mean - rounded.as_dvec3() }.as_vec3();
+    let top = mean - stored * curvature::mean_height(heights, sums.covariance_of_centers(lattice), plane);
+    // As a file in world coordinates has it, so that what is read back is the same.
+    let top = (scene.origin + top) - scene.origin;
+    let rounded = ((scene.origin + top.as_vec3().as_dvec3()) - scene.origin).as_vec3();
+    let low = if scene.low.is_empty() { DVec3::ZERO } else { top - rounded.as_dvec3() }.as_vec3();
     let center = rounded.as_dvec3() + low.as_dvec3();
     let longer = shape.seen.map(DVec3::length);
     let bounding = Bounding { scene, center, normal: stored, shape, scale: longer[0].hypot(longer[1]) };

@@ -67,3 +67,84 @@ pub(super) fn mean_height([xx, xy, yy]: Heights, covariance: Symmetric3, [along,
 pub(super) fn cap([xx, xy, yy]: Heights, [s, t]: [f64; 2]) -> Cap {
     Cap([xx * s * s, xy * s * t, yy * t * t].map(|height| height as f32)).usable(s.max(t))
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use glam::Vec3;
+
+    use super::super::build;
+    use super::*;
+    use crate::scene::Surfel;
+    use crate::scene::hierarchy::Node;
+
+    /// Surfels of a height field, by its heights and slopes.
+    fn field(height: impl Fn(f64, f64) -> (f64, DVec2), oriented: bool) -> Scene {
+        let surfel = |k: usize| {
+            let [x, y] = [k % 50, k / 50].map(|k| (k as f64 + 0.5) / 25.0 - 1.0);
+            let (z, slope) = height(x, y);
+            let side = if oriented || k % 3 > 0 { 1.0 } else { -1.0 };
+            let normal = DVec3::new(-slope.x, -slope.y, 1.0) * side;
+            Surfel::disk(Vec3::new(x as f32, y as f32, z as f32), normal.normalize().as_vec3(), 0.04)
+        };
+        Scene { surfels: (0..2500).map(surfel).collect(), oriented, ..Scene::default() }
+    }
+
+    /// A paraboloid's nodes have its curvature, wherever it bends and however normals point; a plane's have none.
+    #[test]
+    fn nodes_curve_as_the_surface_does() {
+        for oriented in [true, false] {
+            for [xx, xy, yy] in [[0.0; 3], [0.1, 0.0, 0.1], [-0.1, 0.0, 0.0], [0.08, 0.05, -0.06]] {
+                let heights = |x: f64, y: f64| {
+                    let slope = DVec2::new(xx * x + xy * y, xy * x + yy * y);
+                    (0.5 * slope.dot(DVec2::new(x, y)), slope)
+                };
+                let (_, tree) = build(field(heights, oriented), &()).unwrap();
+                let mut looked_at = 0;
+                // Of points on a line nothing is told across it.
+                let wide = |node: &&Node| node.surfel.shorter() > 0.6 * node.surfel.radius();
+                for node in tree.nodes.iter().filter(|node| node.count > 3).filter(wide) {
+                    let [s, t] = [node.surfel.s, node.surfel.t].map(|axis| Vec3::from_array(axis).as_dvec3());
+                    let up = s.cross(t).z.signum();
+                    let along =
+                        |a: DVec3, b: DVec3| up * (xx * a.x * b.x + xy * (a.x * b.y + a.y * b.x) + yy * a.y * b.y);
+                    let expected = [along(s, s), along(s, t), along(t, t)];
+                    let most = 0.02 * s.length_squared() * 0.1 + 1e-6;
+                    let off = node.cap.0.iter().zip(expected).map(|(a, b)| (f64::from(*a) - b).abs());
+                    assert!(off.fold(0.0, f64::max) < most, "{:?} {expected:?} {oriented}", node.cap);
+                    // And they lie on it.
+                    let [x, y, z] = node.surfel.center.map(f64::from);
+                    assert!(
+                        (z - heights(x, y).0).abs() < 0.02 * 0.1 * s.length_squared() + 1e-6,
+                        "{z} {:?}",
+                        heights(x, y)
+                    );
+                    looked_at += 1;
+                }
+                assert!(looked_at > 50, "{looked_at}");
+            }
+        }
+    }
+
+    /// Normals that are far from the node's, or none, leave numbers.
+    #[test]
+    fn what_is_no_surface_has_numbers() {
+        let across = [DVec3::X, DVec3::Y, DVec3::Z];
+        let at = |x: f64, y: f64, normal: DVec3| (DVec3::new(x, y, 0.0), normal, 1.0);
+        for below in [
+            vec![],
+            vec![at(0.0, 0.0, DVec3::Z)],
+            vec![at(1.0, 0.0, DVec3::X), at(-1.0, 0.0, DVec3::NEG_X)],
+            vec![at(1.0, 0.0, DVec3::NEG_Z), at(1e150, 0.0, DVec3::new(1e-9, 0.0, 1.0))],
+        ] {
+            let heights = fitted(below.into_iter(), across);
+            let Cap(made) = cap(heights, [1.0, 0.5]);
+            assert!(heights.iter().all(|height| height.is_finite()) && made.iter().all(|height| height.is_finite()));
+        }
+        let straight = fitted(
+            [at(1.0, 0.0, DVec3::new(-0.1, 0.0, 1.0)), at(-1.0, 0.0, DVec3::new(0.1, 0.0, 1.0))].into_iter(),
+            across,
+        );
+        assert!((straight[0] - 0.1).abs() < 1e-3 && straight[1] == 0.0 && straight[2] == 0.0, "{straight:?}");
+    }
+}

@@ -114,14 +114,19 @@ impl Sums {
         self.disks.iter_mut().zip(other.disks).for_each(|(sum, other)| *sum += other);
     }
 
-    /// The covariance of the disks' points about their mean, square world units: that of the centres (EQ 2), and the mean of each disk's own, which
+    /// The covariance of the centres about their mean (EQ 2), square world units.
+    pub fn covariance_of_centers(&self, lattice: &Lattice) -> Symmetric3 {
+        let step = 1.0 / lattice.steps;
+        self.moments.covariance() * (step * step)
+    }
+
+    /// The covariance of the disks' points about their mean, square world units: that of the centres, and the mean of each disk's own, which
     /// is (s sᵀ + t tᵀ) / 4.
     pub fn covariance(&self, lattice: &Lattice, scale: &Scales) -> Symmetric3 {
         let unit = scale.longest / AXIS_ONE;
         let mean = unit * unit / (4.0 * self.moments.count as f64);
         let [xx, yy, zz, xy, xz, yz] = self.disks.map(|sum| sum as f64 * mean);
-        let step = 1.0 / lattice.steps;
-        self.moments.covariance() * (step * step) + Symmetric3 { xx, yy, zz, xy, xz, yz }
+        self.covariance_of_centers(lattice) + Symmetric3 { xx, yy, zz, xy, xz, yz }
     }
 
     /// The unit normal, and whether it tells sides: the mean of the normals, or where these have no side or cancel, the direction that is

@@ -48,6 +48,11 @@ pub struct Config {
     /// How that is measured: area or extent.
     #[serde(default, deserialize_with = "parsed")]
     pub lod_measure: Option<DetailMeasure>,
+    /// Nodes curve as what is below them does, which they do unless this is false.
+    pub lod_caps: Option<bool>,
+    /// Coarser and finer cuts fade into each other.
+    #[serde(default)]
+    pub lod_fade: bool,
     /// Samples of a pixel: 1, 4, 8 or 16.
     #[serde(default, deserialize_with = "parsed")]
     pub samples: Option<Samples>,
@@ -115,6 +120,8 @@ impl Config {
             cull: self.cull.unwrap_or(default.cull),
             detail: self.lod.unwrap_or(default.detail),
             detail_measure: self.lod_measure.unwrap_or_default(),
+            detail_caps: self.lod_caps.unwrap_or(default.detail_caps),
+            detail_fades: self.lod_fade,
             samples: self.samples.unwrap_or(default.samples),
             outline: self.outline,
             facing: self.facing.map(|shape| Facing { shape, pixels: self.pixels.unwrap_or(Facing::LIMITS) }),

@@ -83,7 +83,7 @@ mod tests {
         let surfel = |k: usize| {
             let [x, y] = [k % 50, k / 50].map(|k| (k as f64 + 0.5) / 25.0 - 1.0);
             let (z, slope) = height(x, y);
-            let side = if oriented || k % 3 > 0 { 1.0 } else { -1.0 };
+            let side = if oriented || !k.is_multiple_of(3) { 1.0 } else { -1.0 };
             let normal = DVec3::new(-slope.x, -slope.y, 1.0) * side;
             Surfel::disk(Vec3::new(x as f32, y as f32, z as f32), normal.normalize().as_vec3(), 0.04)
         };

@@ -4,7 +4,7 @@
 //! asked for is drawn, but where backs are left out none that would be though some of what is below would not; of a leaf that is not, its surfels
 //! are; and of other nodes what is below. The cut depends on the tree, the camera and on whether backs are left out alone.
 //!
-//! Where views fade, the cuts of [`STEPS`](crate::scene::fade::STEPS) sizes from half of that on are drawn at once: a node or surfel is in those of its [`Fade`](crate::scene::Fade), which follows
+//! Where views fade, the cuts of [`STEPS`] sizes from half of that on are drawn at once: a node or surfel is in those of its [`Fade`](crate::scene::Fade), which follows
 //! from its size and from those of the nodes above it. So what a view shows changes by a part of so many when a node comes to its next size, and what
 //! is larger than the size asked for is drawn by none.
 //!

@@ -14,6 +14,7 @@ mod run;
 pub mod sequence;
 mod store;
 pub mod sums;
+mod taken;
 mod targets;
 
 use std::borrow::Borrow;
@@ -29,6 +30,7 @@ use crate::progress::Progress;
 use crate::scene::{Camera, Detail};
 use kept::Kept;
 pub use report::{DeviceBytes, Report, Tail};
+pub use taken::taken;
 
 /// Who renders.
 pub enum Backend {

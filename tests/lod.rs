@@ -119,12 +119,14 @@ fn broken_trees_are_told() {
         points.tree = Some(own);
     });
     assert!(told.contains("no numbers"), "{told}");
-    // Cut off.
+    // Cut off in what it says of all points, and in its nodes.
     ply::write_points(&path, &whole, &()).unwrap();
     let bytes = std::fs::read(&path).unwrap();
-    std::fs::write(&path, &bytes[..bytes.len() - 40]).unwrap();
-    let (code, _, told) = epsplat(&["info", path.to_str().unwrap()]);
-    assert!(code == 1 && told.contains("node"), "{told}");
+    for (less, element) in [(40, "scene"), (400, "node")] {
+        std::fs::write(&path, &bytes[..bytes.len() - less]).unwrap();
+        let (code, _, told) = epsplat(&["info", path.to_str().unwrap()]);
+        assert!(code == 1 && told.contains(element), "{told}");
+    }
     std::fs::write(&path, &bytes).unwrap();
     let (code, text, _) = epsplat(&["info", path.to_str().unwrap()]);
     assert!(code == 0 && text.contains("nodes in"), "{text}");
@@ -231,4 +233,48 @@ fn cuts_of_closed_scenes_are_whole() {
     let outside = ["--eye", "9,7,8", "--target", "0,0,0", "--fov", "20"];
     let [all, cut] = [&[][..], &["--lod", "40px"]].map(|lod| covered(&draw(&outside, lod)));
     assert!(all > 4000 && cut + 60 > all && cut < all + 400, "{all} {cut}");
+}
+
+/// With a bound for memory what a picture takes is read, whatever the size of the file, for the same picture; and what does not go with that is told.
+#[test]
+fn memory_is_bounded() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| path_in(&folder, name);
+    let [surfels, levels] = spheres(&folder, "20000");
+    assert_eq!(epsplat(&["lod", &surfels, "-o", &levels]).0, 0);
+    let view = ["--size", "90x90", "--backend", "reference", "--eye", "2,1,9", "--target", "0,0,0", "--json", "-"];
+    let draw = |name: &str, more: &[&str]| {
+        let output = path(name);
+        let all = [&["render", &levels, "-o", &output], &view[..], more].concat();
+        let (code, text, told) = epsplat(&all);
+        assert_eq!(code, 0, "{told}");
+        (image::open(&output).unwrap().to_rgba8(), serde_json::from_str::<serde_json::Value>(&text).unwrap())
+    };
+    let (whole, report) = draw("whole.png", &["--lod", "10px"]);
+    assert!(report["read"].is_null());
+    let (part, report) = draw("part.png", &["--lod", "10px", "--memory", "1GiB"]);
+    assert!(whole == part && report["surfels"] == 20000, "{report}");
+    let [taken, all] = [0, 1].map(|k| report["read"]["nodes"][k].as_u64().unwrap());
+    assert!(taken > 100 && taken < all && report["read"]["points"][0].as_u64().unwrap() < 20000, "{report}");
+    for (arguments, words) in [
+        (&["--lod", "10px", "--memory", "324MiB"][..], "less than the 0."),
+        (&["--lod", "0.0001px", "--memory", "330MiB"], "take --lod of a larger size"),
+        (&["--lod", "10px", "--memory", "2"], "no size of memory"),
+        (&["--lod", "0", "--memory", "2GiB"], "above 0"),
+        (&["--memory", "2GiB"], "--lod"),
+        (&["--lod", "10px", "--memory", "2GiB", "--outliers", "3"], "--outliers"),
+        (&["--lod", "10px", "--memory", "2GiB", "--separate"], "--separate"),
+        (&["--lod", "10px", "--memory", "2GiB", &surfels], "one file"),
+    ] {
+        let output = path("refused.png");
+        let all =
+            [&["render", &levels, "-o", &output, "--size", "300x300", "--backend", "reference"], arguments].concat();
+        let (code, _, told) = epsplat(&all);
+        assert!(code == 2 && told.contains(words) && !Path::new(&output).exists(), "{arguments:?}: {told}");
+    }
+    // From where nothing shows, why is told as of the whole.
+    let away = ["--lod", "10px", "--memory", "1GiB", "--eye", "0,0,9", "--target", "0,0,12"];
+    let output = path("away.png");
+    let (code, _, told) = epsplat(&[&["render", &levels, "-o", &output, "--backend", "reference"], &away[..]].concat());
+    assert!(code == 0 && told.contains("all lie behind the camera"), "{told}");
 }

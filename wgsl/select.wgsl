@@ -4,7 +4,7 @@
 // depends on tree and camera alone. Then what was chosen is copied to where pages of surfels are drawn from.
 // Of cuts that fade into each other (select_fades.wgsl) all are made at once.
 // Host side and twin: src/passes/select.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xd3167911f26dceb2
+// All loops end, by 1 of src/gpu/loops.rs: 0xd16ca4c19a18d206
 
 @group(0) @binding(72) var<uniform> branch: Branch;
 @group(0) @binding(73) var<storage, read> tree_nodes: array<TreeNode>;
@@ -149,9 +149,10 @@ fn fate_of(node: TreeNode, surfel: Surfel, low: vec3<f32>) -> u32 {
         // The plane of one that faces away is left out, whatever is below it.
         faces = away.x <= 0.0;
     }
-    // One surfel is itself, with its lines and its cap.
-    let itself = kind_of(node) == LEAF && (node.below & COUNT_MASK) == 1u;
-    return select(cuts_that_divide(size_of(ball.center, surfel)), ALL_CUTS, reaches_near(ball) || !faces || itself);
+    // One surfel is itself, with its lines and its cap; and where the surfels of a part of a tree are not there, no picture divides their leaf.
+    let held = select(2u, node.below & COUNT_MASK, kind_of(node) == LEAF);
+    let divided = reaches_near(ball) || !faces || held == 1u;
+    return select(select(cuts_that_divide(size_of(ball.center, surfel)), ALL_CUTS, divided), 0u, held == 0u);
 }
 
 fn has_surfels(node: TreeNode) -> bool {

@@ -83,6 +83,19 @@ pub(super) fn parse_orientation(text: &str) -> Result<Orientation, String> {
     }
 }
 
+/// Bytes of memory: `2GiB`, `512MiB` or `4GB`.
+pub(super) fn parse_memory(text: &str) -> Result<u64, String> {
+    let units = [("KiB", 10), ("MiB", 20), ("GiB", 30), ("TiB", 40)].map(|(unit, power)| (unit, 2f64.powi(power)));
+    let decimal = [("MB", 1e6), ("GB", 1e9), ("TB", 1e12)];
+    let mut all = units.into_iter().chain(decimal);
+    let number = |unit: &str| text.strip_suffix(unit).and_then(|number| number.trim_end().parse::<f64>().ok());
+    let bytes = all.find_map(|(unit, size)| Some(number(unit)? * size));
+    let bytes = bytes.filter(|bytes| *bytes > 0.0 && *bytes < 1e18);
+    bytes
+        .map(|bytes| bytes as u64)
+        .ok_or_else(|| format!("'{text}' is no size of memory: a number and a unit, 2GiB or 512MiB"))
+}
+
 /// `FX,FY,CX,CY`, pixels.
 pub(super) fn parse_intrinsics(text: &str) -> Result<[f64; 4], String> {
     parse_numbers(text)?.try_into().map_err(|_| "four numbers are needed: FX,FY,CX,CY".into())

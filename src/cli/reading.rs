@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use epsplat::io::las::Copc;
+use epsplat::io::ply::Levels;
 use epsplat::io::{self, ClassOpacities, Format, Input, Mesh, Points, ReadOptions};
 use epsplat::surfels::Limits;
-use epsplat::{Error, Result};
+use epsplat::{Error, Progress, Result};
 
 use super::progress::Bars;
 
@@ -30,7 +31,7 @@ pub(super) struct Reading {
     /// Opacities of a LAS file's points by their classes: CLASS:A or FIRST-LAST:A, with commas between them, such as 3-5:0.3,7:0 for thin
     /// trees and no noise. A class of opacity 0 is left out and counted; others show through with render --composite
     #[arg(long, value_name = "RULES")]
-    class_opacity: Option<ClassOpacities>,
+    pub(super) class_opacity: Option<ClassOpacities>,
     /// Draw the Gaussians of a 3DGS file as surfels, without their shortest axis, even if they are not flat
     #[arg(long)]
     flatten: bool,
@@ -122,14 +123,20 @@ impl Reading {
         Ok(Some(files))
     }
 
+    /// The file, if it has levels of detail and can be read in parts.
+    pub(super) fn levels(&self, path: &Path) -> Result<Option<Levels>> {
+        let is_file = path.is_file() && path != Path::new("-");
+        if is_file { Levels::open(Input::open(path, self.input.input_format)?) } else { Ok(None) }
+    }
+
     /// The points of some nodes of each of several files.
     pub(super) fn nodes<'a>(
         &self,
         files: impl Iterator<Item = (&'a mut Copc, &'a Vec<usize>)>,
-        bars: &Bars,
+        progress: &dyn Progress,
     ) -> Result<Vec<Points>> {
         let options = self.options();
-        files.map(|(file, nodes)| file.read(nodes, &options, bars)).collect()
+        files.map(|(file, nodes)| file.read(nodes, &options, progress)).collect()
     }
 
     /// Fails for opacities of classes if none of the inputs has classes.

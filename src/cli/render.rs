@@ -1,10 +1,13 @@
 //! `epsplat render`: files in, a picture and its maps out, or one for each of many cameras.
 
 mod levels;
+mod memory;
 mod octrees;
 mod options;
 mod output;
+mod parts;
 mod scene;
+mod tree;
 mod view;
 mod views;
 
@@ -26,12 +29,14 @@ use glam::DVec3;
 use serde::Serialize;
 
 use self::levels::MeasureName;
-use self::octrees::{Octrees, Read};
 use self::options::{for_scene, options};
 use self::output::{Format, note_overflows, summary};
+use self::parts::{Part, Parts, Read};
 use self::scene::{Made, scene};
 use self::view::{ChosenView, View};
-use super::parse::{parse_color, parse_intrinsics, parse_pixels, parse_scale, parse_size, parse_up, parse_vector};
+use super::parse::{
+    parse_color, parse_intrinsics, parse_memory, parse_pixels, parse_scale, parse_size, parse_up, parse_vector,
+};
 use super::progress::Bars;
 use super::reading::{LimitArguments, Reading, help_of};
 use super::{note, outputs, write_json};
@@ -221,6 +226,10 @@ pub struct Arguments {
     /// Whether coarser and finer cuts fade into each other from view to view, so that nothing pops [default: on with --cameras, else off; never of COPC files]
     #[arg(long, value_name = "on|off", value_parser = on_off_parser(), requires = "cut")]
     lod_fade: Option<bool>,
+    /// The most memory that host and device may take together, 2GiB: of one file of `epsplat lod` what the picture takes is read, and it ends with an error where that is
+    /// more than fits
+    #[arg(long, value_name = "SIZE", value_parser = parse_memory, requires = "cut")]
+    memory: Option<u64>,
     /// A light, instead of the headlight: headlight[:INTENSITY] or the direction toward it, x,y,z[:INTENSITY]
     #[arg(long = "light", value_name = "LIGHT", allow_hyphen_values = true)]
     lights: Vec<Light>,
@@ -356,18 +365,17 @@ struct Staged {
     camera: Camera,
     /// Eye and target, where they were chosen.
     chosen: Option<[DVec3; 2]>,
-    /// Of COPC files.
+    /// Of files that were read in parts.
     read: Option<Read>,
 }
 
-/// The scene of a single picture, which COPC files are read for as far as it takes them.
+/// The scene of a single picture, for which files with levels of detail are read as far as it takes them.
 fn staged(arguments: &Arguments, options: RenderOptions, view: &View, bars: &Bars) -> Result<Staged> {
     let told = |(_, preparation): &Made| preparation.notes().iter().for_each(|line| note(line));
-    if let Some(mut octrees) = Octrees::of(arguments, &options, bars)? {
-        let (camera, chosen) = view.camera(&octrees.overview, Camera::default_near(&octrees.overview))?;
-        let (made, read) = octrees.scene(arguments, &camera, options.detail, bars)?;
+    if let Some(mut parts) = Parts::of(arguments, &options, bars)? {
+        let (camera, chosen) = view.camera(parts.overview(), Camera::default_near(parts.overview()))?;
+        let Part { made, options, read } = parts.scene(arguments, (&camera, 1), &options, bars)?;
         told(&made);
-        let options = RenderOptions { detail: Detail::FINEST, ..options };
         return Ok(Staged { made, options, camera, chosen, read: Some(read) });
     }
     let made = scene(arguments, bars)?;
@@ -389,6 +397,7 @@ fn backend(arguments: &Arguments) -> Result<Backend> {
     match Gpu::open(arguments.adapter.as_deref()) {
         Ok(gpu) => {
             note(&format!("rendering on {} ({}, {})", gpu.adapter.name, gpu.adapter.api, gpu.adapter.kind));
+            let gpu = if arguments.memory.is_some() { gpu.with_buffer_limit(memory::BUFFER) } else { gpu };
             Ok(Backend::gpu(gpu))
         }
         Err(Error::NoAdapter(why)) if arguments.backend.0.is_none() && arguments.adapter.is_none() => {

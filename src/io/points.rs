@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::Tree;
 pub use crate::scene::Up;
 use crate::scene::color::srgb_to_linear;
-use crate::scene::{Cap, Clip, Colors};
+use crate::scene::{Cap, Clip, Colors, Whole};
 
 /// Points as a file gives them: f64 world coordinates and whatever attributes exist.
 ///
@@ -47,6 +47,8 @@ pub struct Points {
     pub faces: Option<Faces>,
     /// Their levels of detail; they are in the order of the tree.
     pub tree: Option<Tree>,
+    /// What a reader of a part of them and of their levels of detail must know of all; where there is a tree.
+    pub whole: Option<Box<Whole>>,
     /// They have normals that tell no sides.
     pub unsided: bool,
     /// A mesh that they are drawn beside: what is left of the one that they were made of.
@@ -129,6 +131,7 @@ impl Points {
     pub(crate) fn retain(&mut self, keep: &[bool]) {
         self.closed &= keep.iter().all(|keep| *keep);
         self.tree = self.tree.take().filter(|_| keep.iter().all(|keep| *keep));
+        self.whole = self.whole.take().filter(|_| self.tree.is_some());
         retain(&mut self.positions, keep);
         self.normals.iter_mut().for_each(|all| retain(all, keep));
         self.radii.iter_mut().for_each(|all| retain(all, keep));
@@ -160,6 +163,7 @@ pub(crate) fn taken(points: Points, of: Vec<u32>) -> Points {
         texture_slopes: points.texture_slopes.map(|slopes| each(&slopes, &of)),
         numbers: Some(of),
         tree: None,
+        whole: None,
         ..points
     }
 }

@@ -4,6 +4,7 @@ use super::Points;
 use crate::scene::color::srgb8;
 use crate::scene::hierarchy::{Fault, Hierarchy, Node};
 use crate::scene::{Colors, Surfel};
+use rayon::prelude::*;
 
 /// The largest number of a node, as for coordinates of points.
 const LARGEST: f32 = 1e18;
@@ -94,12 +95,12 @@ impl Tree {
             (origin + (center + low)).to_array()
         };
         let points = Points {
-            positions: nodes.iter().enumerate().map(position).collect(),
+            positions: nodes.par_iter().enumerate().map(position).collect(),
             axes: Some(nodes.iter().map(|node| [node.surfel.s, node.surfel.t]).collect()),
             radii: Some(nodes.iter().map(|node| node.radius).collect()),
             caps: Some(nodes.iter().map(|node| node.cap).collect()),
             colors: Some(match coded {
-                true => Colors::Srgb8(nodes.iter().map(|node| srgb8(node.color)).collect()),
+                true => Colors::Srgb8(nodes.par_iter().map(|node| srgb8(node.color)).collect()),
                 false => Colors::Linear(nodes.iter().map(|node| node.color).collect()),
             }),
             ..Points::default()

@@ -118,11 +118,12 @@ impl Wanted {
 /// of them the size is the smallest.
 pub fn sized(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: &Wanted) -> Detail {
     let Detail::Splats(splats) = wanted.detail else { return wanted.detail };
-    // What a device rounds to the other side of this size is drawn on this one.
-    let fits = |size: f64| {
-        let wanted = Wanted { detail: Detail::Pixels(size * SIZE_SLACK), ..*wanted };
+    let fits_at = |size: f64| {
+        let wanted = Wanted { detail: Detail::Pixels(size), ..*wanted };
         bounded(hierarchy, origin, camera, &wanted, splats).is_some()
     };
+    // The size that is found is hardly above that of a node, which a device may round to the other side of it, but not of one so much larger.
+    let fits = |size: f64| fits_at(size) && fits_at(size * SIZE_SLACK);
     let size = if wanted.fades && fits(SMALLEST) { SMALLEST } else { finest(fits) };
     Detail::Pixels(size * SIZE_SLACK)
 }
@@ -146,26 +147,35 @@ pub fn reference(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: 
 
 /// The same, or None if it has more than `most` surfels and nodes.
 fn bounded(hierarchy: &Hierarchy, origin: DVec3, camera: &Camera, wanted: &Wanted, most: u64) -> Option<Cut> {
-    let Wanted { detail, measure, backs_out, fades, margin } = *wanted;
-    let eye = camera.eye - origin;
-    let size = detail.pixels(camera.pixels() as f64);
-    let fate = |index: u32| {
-        let node = &hierarchy.nodes[index as usize];
-        let low = hierarchy.low.get(index as usize).map_or(DVec3::ZERO, |low| DVec3::from_array(low.map(f64::from)));
-        let center = DVec3::from_array(node.surfel.center.map(f64::from)) + low - eye;
-        let radius = f64::from(node.radius) + BALL_ROUNDING * center.length();
-        let at = camera.rotation * center;
-        let [turned, spread] = if backs_out { turned_away(node, (center, radius), camera) } else { [-1.0, 0.0] };
-        if at.z + radius < camera.near || camera.is_beside_image(at, radius, margin) || turned > spread + SINE_SLACK {
-            return Fate::Unseen;
-        }
-        // The place of what reaches the near depth in the image says nothing.
-        let near = at.z - radius <= camera.near;
-        let seen = if near { f64::INFINITY } else { measure.of(&node.surfel, center, camera) };
-        // The plane of one that faces away is left out, whatever is below it.
-        if turned <= 0.0 { Fate::Divided(divided(seen, size, fades)) } else { Fate::DIVIDED }
-    };
+    let fate = |index: u32| fate(&hierarchy.nodes[index as usize], hierarchy.low(index), (origin, camera), wanted, 0.0);
     Cut::of(hierarchy, most, fate)
+}
+
+/// Whether a picture may come to what is below a node of a tree about `origin` in the view of `camera`: whether a device, which may err, or the twin
+/// may divide it in some of the cuts that are wanted. `low` is what its f32 centre leaves out.
+pub fn may_divide(node: &Node, low: DVec3, at: (DVec3, &Camera), wanted: &Wanted) -> bool {
+    // One surfel is always itself.
+    matches!(fate(node, low, at, wanted, 1.0), Fate::Divided(cuts) if cuts > 0 || (node.leaf && node.count == 1))
+}
+
+/// What becomes of a node: with so much `slack`, in units of what a device may err, what is nearly seen is, and what is nearly divided.
+fn fate(node: &Node, low: DVec3, (origin, camera): (DVec3, &Camera), wanted: &Wanted, slack: f64) -> Fate {
+    let Wanted { detail, measure, backs_out, fades, margin } = *wanted;
+    let size = detail.pixels(camera.pixels() as f64);
+    let center = DVec3::from_array(node.surfel.center.map(f64::from)) + low - (camera.eye - origin);
+    let radius = f64::from(node.radius) + (1.0 + slack) * BALL_ROUNDING * center.length();
+    let at = camera.rotation * center;
+    let [turned, spread] = if backs_out { turned_away(node, (center, radius), camera) } else { [-1.0, 0.0] };
+    let outside = at.z + radius < camera.near || camera.is_beside_image(at, radius, margin * (1.0 + slack));
+    if outside || turned > spread + (1.0 + slack) * SINE_SLACK {
+        return Fate::Unseen;
+    }
+    // The place of what reaches the near depth in the image says nothing.
+    let near = at.z - radius <= camera.near;
+    let seen = if near { f64::INFINITY } else { measure.of(&node.surfel, center, camera) };
+    let seen = seen * (1.0 + slack * (SIZE_SLACK - 1.0));
+    // The plane of one that faces away is left out, whatever is below it.
+    if turned <= -slack * SINE_SLACK { Fate::Divided(divided(seen, size, fades)) } else { Fate::DIVIDED }
 }
 
 /// In how many cuts, the first ones, a node that is `seen` so large is divided, where the largest of their sizes is `size`; all or none if they do not

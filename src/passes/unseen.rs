@@ -6,7 +6,7 @@ use super::lowpass::Design;
 use super::project::{Missed, projected};
 use crate::frame::Frame;
 use crate::plan::{Facts, RenderOptions, culls_back};
-use crate::scene::{Camera, Scene, Surfel};
+use crate::scene::{Camera, Cut, Fade, Scene, Surfel};
 
 /// The surfels of a scene in a view that shows none of them, by the reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -26,8 +26,15 @@ pub struct Unseen {
 }
 
 impl Unseen {
-    /// Those of `scene` in the view of `camera`.
+    /// Those of `scene` in the view of `camera`; of one that holds a part of a scene the surfels and nodes that it has in place of all.
     pub fn of(scene: &Scene, camera: &Camera, options: &RenderOptions) -> Self {
+        if let (Some(_), Some(tree)) = (&scene.part_of, &scene.hierarchy) {
+            let nodes = (0..tree.nodes.len() as u32).filter(|&index| tree.nodes[index as usize].count == 0);
+            let nodes = nodes.map(|index| (index, Fade::WHOLE)).collect();
+            let all = Cut { nodes, surfels: vec![(0..scene.surfels.len() as u32, Fade::WHOLE)] };
+            let held = Scene { part_of: None, hierarchy: None, ..all.scene(scene, tree, false) };
+            return Self::of(&held, camera, options);
+        }
         let eye = camera.eye - scene.origin;
         let design = Design::of(options);
         let cull_back = culls_back(&Facts::of(scene), camera, options);

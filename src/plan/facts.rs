@@ -1,12 +1,10 @@
 //! What a renderer must know of all surfels together, looked up once and not for each frame. No view is in it.
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::{MeshFacts, RenderOptions};
-use crate::scene::hierarchy::Node;
 use crate::scene::texture::PlaceRange;
-use crate::scene::{Atlas, Bounds, Colors, Hierarchy, Scene, Surfel, has_copies};
+use crate::scene::{Atlas, Bounds, Colors, LevelFacts, Scene, Surfel, has_copies};
 
 /// Where a surfel's colour comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -31,7 +29,7 @@ const SAMPLED: usize = 1024;
 pub struct Facts {
     /// [`Scene::origin`].
     pub origin: DVec3,
-    /// Its surfels.
+    /// Its surfels; where the scene holds a part of them, all.
     pub surfels: u64,
     /// The surfels of each of its inputs that has some ([`Scene::provenance`]), in their order.
     pub individuals: Vec<u64>,
@@ -77,29 +75,6 @@ pub struct Facts {
     pub sample: Vec<(Surfel, DVec3)>,
 }
 
-/// What is known of the nodes of levels of detail.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LevelFacts {
-    /// The longest half-axis with the height of its cap, world units.
-    pub largest_radius: f32,
-    /// The longest shorter half-axis, world units.
-    pub largest_shorter: f32,
-    /// Some have caps.
-    pub caps: bool,
-}
-
-impl LevelFacts {
-    /// Those of `hierarchy`.
-    pub fn of(hierarchy: &Hierarchy) -> Self {
-        let largest = |of: fn(&Node) -> f32| hierarchy.nodes.par_iter().map(of).reduce(|| 0.0, f32::max);
-        Self {
-            largest_radius: largest(|node| node.surfel.radius() + node.cap.highest() as f32),
-            largest_shorter: largest(|node| node.surfel.shorter()),
-            caps: hierarchy.nodes.par_iter().any(|node| !node.cap.is_flat()),
-        }
-    }
-}
-
 impl Facts {
     /// The longest half-axis of what may be drawn, world units.
     pub fn drawn_radius(&self, options: &RenderOptions) -> f32 {
@@ -118,11 +93,11 @@ impl Facts {
 
     /// Those of `scene`.
     pub fn of(scene: &Scene) -> Self {
-        let (low, high) = scene.color_range();
+        let ((low, high), has) = (scene.color_range(), scene.has());
         let step = scene.surfels.len().div_ceil(SAMPLED).max(1);
         Self {
             origin: scene.origin,
-            surfels: scene.surfels.len() as u64,
+            surfels: scene.part_of.as_ref().map_or(scene.surfels.len() as u64, |whole| whole.surfels.into()),
             individuals: scene.provenance.ranges(scene.surfels.len() as u64).map(|own| own.end - own.start).collect(),
             mesh: MeshFacts::of(&scene.triangles),
             bounds: scene.bounds(),
@@ -146,13 +121,16 @@ impl Facts {
             largest_shorter: scene.largest_shorter(),
             oriented: scene.oriented,
             closed: scene.closed,
-            clips: !scene.clips.is_empty(),
-            caps: !scene.caps.is_empty(),
-            own_normals: !scene.normals.is_empty(),
+            clips: has.clips,
+            caps: has.caps,
+            own_normals: has.normals,
             fades: !scene.fades.is_empty(),
-            doubled: !scene.low.is_empty(),
+            doubled: has.low,
             copies: has_copies(scene),
-            levels: scene.hierarchy.as_deref().map(LevelFacts::of),
+            levels: match &scene.part_of {
+                Some(whole) => Some(whole.levels),
+                None => scene.hierarchy.as_deref().map(LevelFacts::of),
+            },
             sample: (0..scene.surfels.len()).step_by(step).map(|k| (scene.surfels[k], scene.center(k))).collect(),
         }
     }

@@ -23,7 +23,7 @@ mod view;
 pub use accumulator::{ACCUMULATORS, Accumulator, AccumulatorRow, Features, wide_bits};
 pub use composited::composited;
 pub use cuts::{Band, bands, page_surfels};
-pub use facts::{ColorNeed, Facts, LevelFacts};
+pub use facts::{ColorNeed, Facts};
 pub use fragment::{FragmentLayout, KEY_WORDS};
 pub use known::Known;
 pub use mesh::{MeshFacts, MeshNeeds, texture_words};

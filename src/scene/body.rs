@@ -29,8 +29,13 @@ pub(crate) const SMALLEST_SCENE: f64 = 1e-15;
 /// the core, which holds all but one in 64 beyond each side, is that of a sample chosen by the coordinates' own bits. Positions
 /// that are not finite are in no box.
 pub(crate) fn body(count: usize, position: impl Fn(usize) -> DVec3 + Sync) -> (Bounds, u64) {
-    let all = box_of(count, &position, |_| true).0;
-    let Some(core) = core(count, &position) else { return (all, 0) };
+    body_around(core(count, &position), count, &position)
+}
+
+/// The same, where the core is known.
+fn body_around(core: Option<Bounds>, count: usize, position: &(impl Fn(usize) -> DVec3 + Sync)) -> (Bounds, u64) {
+    let all = box_of(count, position, |_| true).0;
+    let Some(core) = core else { return (all, 0) };
     let far = FAR * core.extent().max_element();
     let (low, high) = (core.min - far, core.max + far);
     let holds = |p: DVec3| p.cmpge(low).all() && p.cmple(high).all();
@@ -38,19 +43,25 @@ pub(crate) fn body(count: usize, position: impl Fn(usize) -> DVec3 + Sync) -> (B
     if far < FAR * SMALLEST_SCENE || all.is_empty() || holds(all.min) && holds(all.max) {
         return (all, 0);
     }
-    box_of(count, &position, holds)
+    box_of(count, position, holds)
 }
 
 /// The box of what the default view shows of `count` points, each with its radius, and how many are not in it: those that stray
 /// from the body, and those few that lie [apart](super::apart) from it.
 pub(crate) fn framed(count: usize, at: impl Fn(usize) -> (DVec3, f64) + Sync) -> (Bounds, u64) {
-    let (body, strays) = body(count, |index| at(index).0);
-    let Some(core) = core(count, &|index| at(index).0) else { return (body, strays) };
-    if core.extent().max_element() < SMALLEST_SCENE || body.is_empty() {
-        return (body, strays);
-    }
+    let (_, framed, left_out) = body_and_framed(count, at);
+    (framed, left_out)
+}
+
+/// The body, the box of what the default view shows, and how many are not in that.
+pub(crate) fn body_and_framed(count: usize, at: impl Fn(usize) -> (DVec3, f64) + Sync) -> (Bounds, Bounds, u64) {
+    let core = core(count, &|index| at(index).0);
+    let (body, strays) = body_around(core, count, &|index| at(index).0);
+    let Some(core) = core.filter(|core| core.extent().max_element() >= SMALLEST_SCENE && !body.is_empty()) else {
+        return (body, body, strays);
+    };
     let (bounds, apart) = without_apart((&core, &body), count, at);
-    (bounds, strays + apart)
+    (body, bounds, strays + apart)
 }
 
 /// The box of the finite positions that are wanted, and how many are not.

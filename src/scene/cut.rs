@@ -45,8 +45,13 @@ impl Cut {
             for ((index, to), fate) in frontier.into_iter().zip(fates) {
                 let Node { first, count, leaf, .. } = hierarchy.nodes[index as usize];
                 let Fate::Divided(divided) = fate else { continue };
-                // One surfel is itself, with its lines and its cap.
-                let from = if leaf && count == 1 { to } else { divided.min(to) };
+                let from = match count {
+                    // One surfel is itself, with its lines and its cap.
+                    1 if leaf => to,
+                    // Where the surfels of a part of a tree are not there, no picture divides their leaf.
+                    0 => 0,
+                    _ => divided.min(to),
+                };
                 if from < to {
                     cut.nodes.push((index, Fade { from, to }));
                 }
@@ -94,19 +99,20 @@ impl Cut {
         let mut cut = scene.taken(&indices);
         cut.surfels.extend(nodes().map(|node| node.surfel));
         let count = cut.surfels.len();
-        if !scene.low.is_empty() {
+        let has = scene.has();
+        if has.low {
             cut.low.extend(self.nodes.iter().map(|&(index, _)| hierarchy.low[index as usize]));
         }
-        if !scene.clips.is_empty() {
+        if has.clips {
             cut.clips.resize(count, Clip::NONE);
         }
         let curved = caps && nodes().any(|node| !node.cap.is_flat());
-        if curved || !scene.caps.is_empty() {
+        if curved || has.caps {
             cut.caps.resize(count - self.nodes.len(), Cap::FLAT);
             cut.caps.extend(nodes().map(|node| if caps { node.cap } else { Cap::FLAT }));
         }
         let plane = |surfel: &Surfel| surfel.normal().normalize_or_zero().to_array();
-        if !scene.normals.is_empty() {
+        if has.normals {
             cut.normals.extend(nodes().map(|node| plane(&node.surfel)));
         }
         let of_surfels = self.surfels.iter().flat_map(|(range, fade)| std::iter::repeat_n(*fade, range.len()));

@@ -1,5 +1,7 @@
 //! Levels of detail: a tree of surfels, each of which stands for all below it.
 
+use glam::DVec3;
+
 use super::{Cap, Surfel};
 
 /// The most surfels of a leaf that do not all lie at one position (Pajarola 2003, section 3.2).
@@ -103,6 +105,11 @@ impl Hierarchy {
             }
         }
         if reached == elements { Ok(()) } else { Err(Fault::Loose) }
+    }
+
+    /// What the f32 centre of a node leaves out, world units.
+    pub fn low(&self, index: u32) -> DVec3 {
+        self.low.get(index as usize).map_or(DVec3::ZERO, |low| DVec3::from_array(low.map(f64::from)))
     }
 
     /// How many levels there are.

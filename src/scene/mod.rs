@@ -33,6 +33,7 @@ mod srgb;
 pub mod surfel;
 pub mod texture;
 pub mod triangles;
+pub mod whole;
 
 pub use atlas::Atlas;
 pub(crate) use body::{SMALLEST_SCENE, body, framed};
@@ -60,3 +61,4 @@ pub use scene::{Bounds, Scene, Up};
 pub use surfel::Surfel;
 pub use texture::{Place, Texture, Textured};
 pub use triangles::{Triangle, Triangles};
+pub use whole::{LevelFacts, Whole};

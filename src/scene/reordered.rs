@@ -33,6 +33,7 @@ impl Scene {
             hierarchy: None,
             triangles: self.triangles.clone(),
             provenance,
+            part_of: self.part_of.clone(),
             ..*self
         }
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{Cap, Clip, Colors, Fade, Hierarchy, Provenance, Surfel, Triangles};
+use super::{Cap, Clip, Colors, Fade, Hierarchy, Provenance, Surfel, Triangles, Whole};
 
 /// The world axis that points up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -75,6 +75,8 @@ pub struct Scene {
     pub closed: bool,
     /// Levels of detail of the surfels, which are in the order of the tree.
     pub hierarchy: Option<Arc<Hierarchy>>,
+    /// Surfels and levels are a part of this: its bounds and ranges are those of the scene.
+    pub part_of: Option<Box<Whole>>,
     /// Triangles beside the surfels.
     pub triangles: Triangles,
     /// The axis a camera without instructions takes as up.
@@ -159,6 +161,9 @@ impl Scene {
     /// The box of the surfel centres and the triangles' corners without those few that stray, world units relative to [`Scene::origin`], and how many
     /// do: a point strays that lies farther from the box of nearly all than sixteen times its longest edge.
     pub fn body(&self) -> (Bounds, u64) {
+        if let Some(whole) = &self.part_of {
+            return (whole.body, 0);
+        }
         super::body(self.places(), |index| self.place(index).0)
     }
 
@@ -166,18 +171,27 @@ impl Scene {
     /// that [stray](Self::body), and groups of at most 16 points, and a thousandth of all, that lie farther than a quarter of the
     /// longest edge of the box of nearly all from that box and from all others.
     pub fn framed(&self) -> (Bounds, u64) {
+        if let Some(whole) = &self.part_of {
+            return (whole.framed, 0);
+        }
         super::framed(self.places(), |index| self.place(index))
     }
 
     /// The box of the finite surfel centres and of the triangles' corners, world units relative to [`Scene::origin`]; disks reach past it by up to
     /// [`Scene::largest_radius`].
     pub fn bounds(&self) -> Bounds {
+        if let Some(whole) = &self.part_of {
+            return whole.bounds;
+        }
         Bounds::of((0..self.places()).into_par_iter().with_min_len(4096).map(|index| self.place(index).0))
     }
 
     /// A box of nearly all finite surfel centres, or of all corners where there are only triangles, in the same space: those few that lie far from all others, as scanners' stray
     /// points do, do not widen it. Of a sample, the same each time.
     pub fn core(&self) -> Bounds {
+        if let Some(whole) = &self.part_of {
+            return whole.core;
+        }
         let step = self.surfels.len().div_ceil(CORE_SAMPLE).max(1);
         let sampled = self.surfels.iter().step_by(step).map(|surfel| surfel.center);
         let sampled: Vec<_> = sampled.filter(|center| center.iter().all(|x| x.is_finite())).collect();
@@ -201,6 +215,9 @@ impl Scene {
     /// every product rounded to f32 once. Of harmonics the range that no view exceeds. The same for any order of surfels; zero for a
     /// scene without surfels.
     pub fn color_range(&self) -> ([f32; 4], [f32; 4]) {
+        if let Some(whole) = &self.part_of {
+            return whole.color;
+        }
         if self.surfels.is_empty() {
             return ([0.0; 4], [0.0; 4]);
         }
@@ -240,12 +257,18 @@ impl Scene {
 
     /// The largest [`Surfel::shorter`], world units; zero for a scene without surfels.
     pub fn largest_shorter(&self) -> f32 {
+        if let Some(whole) = &self.part_of {
+            return whole.largest_shorter;
+        }
         self.surfels.par_iter().map(Surfel::shorter).reduce(|| 0.0, f32::max)
     }
 
     /// The largest [`Surfel::radius`] with the height of its cap, world units: no point of a surfel is farther from its centre. Zero for
     /// a scene without surfels.
     pub fn largest_radius(&self) -> f32 {
+        if let Some(whole) = &self.part_of {
+            return whole.largest_radius;
+        }
         let height = |index: usize| self.caps.get(index).map_or(0.0, |cap| cap.highest() as f32);
         let reach = |(index, surfel): (usize, &Surfel)| surfel.radius() + height(index);
         self.surfels.par_iter().enumerate().map(reach).reduce(|| 0.0, f32::max)

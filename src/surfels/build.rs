@@ -141,7 +141,9 @@ pub(super) type Built = ((Scene, Preparation), Coordinates);
 pub(super) fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Progress) -> Result<Built> {
     let bounds = Bounds::of(gathered.points.positions.par_iter().map(|position| DVec3::from_array(*position)));
     let (body, _) = body(gathered.points.positions.len(), |index| DVec3::from_array(gathered.points.positions[index]));
-    let origin = origin_for(&body);
+    // That of the file's nodes, or else of the points, which may be rounded about that one.
+    let of_tree = gathered.points.whole.as_ref().filter(|whole| gathered.points.tree.is_some() && whole.is_near());
+    let origin = of_tree.map_or_else(|| origin_for(&body), |whole| whole.origin);
     let up = gathered.points.up.unwrap_or_else(|| guess_up(&body));
     let sorted = |positions: &[[f64; 3]]| {
         progress.begin("sorting points", 0);
@@ -222,14 +224,22 @@ fn laid(center: Vec3, axes: [[f32; 3]; 2], normal: Vec3) -> Surfel {
 /// A given normal that is turned by less from the half-axes' is theirs, radians.
 const LEAST_TURN: f32 = 1e-3;
 
+/// The unit normal of a surfel's plane.
+fn plane_of(surfel: &Surfel) -> Vec3 {
+    unit(surfel.normal().to_array()).unwrap_or(Vec3::Z)
+}
+
+/// The normal that is given beside half-axes, if it is another one than theirs; else that of their plane.
+pub(super) fn own_normal(given: &Given<'_>, i: usize, surfel: &Surfel) -> [f32; 3] {
+    let normal = given.axes(i).and_then(|_| given.normal(i));
+    let plane = plane_of(surfel);
+    normal.filter(|normal| normal.angle_between(plane) > LEAST_TURN).unwrap_or(plane).to_array()
+}
+
 /// The normals that are given beside half-axes, where they are others than theirs.
 fn own_normals(given: &Given<'_>, surfels: &[Surfel]) -> Vec<[f32; 3]> {
-    let plane = |surfel: &Surfel| unit(surfel.normal().to_array()).unwrap_or(Vec3::Z);
-    let own = |(i, surfel): (usize, &Surfel)| {
-        let normal = given.axes(i).and_then(|_| given.normal(i));
-        normal.filter(|normal| normal.angle_between(plane(surfel)) > LEAST_TURN).unwrap_or(plane(surfel)).to_array()
-    };
-    let differs = |(i, surfel): (usize, &Surfel)| own((i, surfel)) != plane(surfel).to_array();
+    let own = |(i, surfel): (usize, &Surfel)| own_normal(given, i, surfel);
+    let differs = |(i, surfel): (usize, &Surfel)| own((i, surfel)) != plane_of(surfel).to_array();
     if given.0.points.normals.is_none() || given.0.points.axes.is_none() || !surfels.par_iter().enumerate().any(differs)
     {
         return Vec::new();
@@ -238,7 +248,7 @@ fn own_normals(given: &Given<'_>, surfels: &[Surfel]) -> Vec<[f32; 3]> {
 }
 
 /// What points have that is usable.
-struct Given<'a>(&'a Gathered);
+pub(super) struct Given<'a>(pub(super) &'a Gathered);
 
 impl Given<'_> {
     fn axes(&self, i: usize) -> Option<[Vec3; 2]> {
@@ -259,13 +269,13 @@ impl Given<'_> {
     }
 
     /// Those that are given; none where no input has any.
-    fn caps(&self) -> Vec<Cap> {
+    pub(super) fn caps(&self) -> Vec<Cap> {
         let count = self.0.points.caps.as_ref().map_or(0, Vec::len);
         (0..count).map(|i| self.cap(i).unwrap_or_default()).collect()
     }
 
     /// The points' surfels, of which what is lacking was `estimated`, about `origin`.
-    fn surfels(&self, estimated: Option<&Estimated>, origin: DVec3) -> Vec<Surfel> {
+    pub(super) fn surfels(&self, estimated: Option<&Estimated>, origin: DVec3) -> Vec<Surfel> {
         let estimate_of = |i: usize| estimated.map_or_else(Estimate::default, |all| all.of_point(i));
         let surfel = |(i, position): (usize, &[f64; 3])| {
             // Adding +0 makes -0 the same coordinate as 0.
@@ -286,7 +296,7 @@ impl Given<'_> {
         self.0.points.positions.par_iter().enumerate().map(surfel).collect()
     }
 
-    fn lacks_normal(&self, i: usize) -> bool {
+    pub(super) fn lacks_normal(&self, i: usize) -> bool {
         self.normal(i).is_none() && self.axes(i).is_none()
     }
 
@@ -296,7 +306,7 @@ impl Given<'_> {
 }
 
 /// What was estimated for the points that lack something.
-struct Estimated {
+pub(super) struct Estimated {
     distinct: DistinctPositions,
     of_position: Vec<Estimate>,
     graph: NeighbourGraph,

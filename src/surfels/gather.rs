@@ -74,6 +74,7 @@ fn join(all: &mut Points, mut input: Points) {
     append(&mut all.texture, before, input.texture, count);
     append(&mut all.texture_numbers, before, input.texture_numbers, count);
     all.tree = input.tree.filter(|_| before == 0).or(all.tree.take().filter(|_| count == 0));
+    all.whole = input.whole.filter(|_| before == 0).or(all.whole.take().filter(|_| count == 0));
     all.unsided |= input.unsided;
     append(&mut all.texture_slopes, before, input.texture_slopes, count);
     all.closed &= input.closed || count == 0;

@@ -25,6 +25,7 @@ mod neighbours;
 mod orient;
 mod outliers;
 mod painting;
+pub mod part;
 mod positions;
 mod preparation;
 pub mod sampling;

@@ -5,13 +5,13 @@ use epsplat::io::las::Copc;
 use epsplat::plan::RenderOptions;
 use epsplat::scene::octree::{PointOctree, taken};
 use epsplat::scene::{Camera, Detail, Scene};
-use epsplat::{Error, Result, surfels};
-use serde::Serialize;
+use epsplat::{Error, Progress, Result, surfels};
 
 use super::super::progress::Bars;
 use super::super::reading::named;
 use super::Arguments;
-use super::scene::{Made, scene_of};
+use super::parts::{Part, Read};
+use super::scene::scene_of;
 
 /// COPC files that are one scene, and what tells where it is.
 pub(super) struct Octrees {
@@ -21,21 +21,12 @@ pub(super) struct Octrees {
     pub overview: Scene,
 }
 
-/// What a picture read of what there is: of all files together.
-#[derive(Clone, Copy, Serialize)]
-pub(super) struct Read {
-    nodes: [u64; 2],
-    points: [u64; 2],
-    /// Of compressed points.
-    bytes: [u64; 2],
-}
-
 impl Octrees {
-    /// The inputs, if a picture with `options` takes parts of them: if levels of detail are asked for, all are COPC files, and nothing is asked that
+    /// The inputs, if a picture that asks for levels of detail takes parts of them: if all are COPC files, and nothing is asked that
     /// only all of their points tell: which of them are outliers, or where they are beside triangles.
-    pub fn of(arguments: &Arguments, options: &RenderOptions, bars: &Bars) -> Result<Option<Self>> {
+    pub fn of(arguments: &Arguments, bars: &Bars) -> Result<Option<Self>> {
         let all = arguments.limits.limits().outliers.is_some() || !arguments.triangles.is_empty();
-        if options.detail.is_finest() || arguments.inputs.is_empty() || all {
+        if arguments.inputs.is_empty() || all {
             return Ok(None);
         }
         let Some(mut files) = arguments.reading.octrees(&arguments.inputs)? else { return Ok(None) };
@@ -57,44 +48,40 @@ impl Octrees {
         &mut self,
         arguments: &Arguments,
         camera: &Camera,
-        detail: Detail,
-        bars: &Bars,
-    ) -> Result<(Made, Read)> {
-        let mut nodes = taken(&self.octrees, camera, detail);
+        options: &RenderOptions,
+        progress: &dyn Progress,
+    ) -> Result<Part> {
+        let mut nodes = taken(&self.octrees, camera, options.detail);
         if self.octrees.iter().zip(&nodes).all(|(octree, nodes)| octree.points(nodes) == 0) {
             nodes = self.octrees.iter().map(PointOctree::overview).collect();
         }
-        let made = scene_of(arguments, read(arguments, &mut self.files, &nodes, bars)?, bars)?;
-        Ok((made, Read::of(&self.files, &nodes)))
+        let made = scene_of(arguments, read(arguments, &mut self.files, &nodes, progress)?, progress)?;
+        // What was read is drawn whole.
+        let options = RenderOptions { detail: Detail::FINEST, ..options.clone() };
+        Ok(Part { made, options, read: read_of(&self.files, &nodes) })
     }
 }
 
-impl Read {
-    /// These nodes of each file.
-    fn of(files: &[Copc], nodes: &[Vec<usize>]) -> Self {
-        let mut sum = Self { nodes: [0; 2], points: [0; 2], bytes: [0; 2] };
-        for (file, taken) in files.iter().zip(nodes) {
-            let all: Vec<usize> = (0..file.octree.nodes.len()).collect();
-            for (at, nodes) in [taken, &all].into_iter().enumerate() {
-                sum.nodes[at] += nodes.len() as u64;
-                sum.points[at] += file.octree.points(nodes);
-                sum.bytes[at] += file.bytes(nodes);
-            }
+/// What these nodes of each file are of all.
+fn read_of(files: &[Copc], nodes: &[Vec<usize>]) -> Read {
+    let mut sum = Read { nodes: [0; 2], points: [0; 2], bytes: [0; 2] };
+    for (file, taken) in files.iter().zip(nodes) {
+        let all: Vec<usize> = (0..file.octree.nodes.len()).collect();
+        for (at, nodes) in [taken, &all].into_iter().enumerate() {
+            sum.nodes[at] += nodes.len() as u64;
+            sum.points[at] += file.octree.points(nodes);
+            sum.bytes[at] += file.bytes(nodes);
         }
-        sum
     }
-
-    /// One line.
-    pub fn sentence(&self) -> String {
-        let Self { nodes: [nodes, all_nodes], points: [points, all_points], bytes } = self;
-        let [bytes, all_bytes] = bytes.map(|bytes| bytes as f64 / 1e6);
-        format!(
-            "read {nodes} of {all_nodes} nodes of the octree, {points} of {all_points} points: {bytes:.1} of {all_bytes:.1} MB"
-        )
-    }
+    sum
 }
 
 /// The points of these nodes of each file.
-fn read(arguments: &Arguments, files: &mut [Copc], nodes: &[Vec<usize>], bars: &Bars) -> Result<Vec<Points>> {
-    arguments.reading.nodes(files.iter_mut().zip(nodes), bars)
+fn read(
+    arguments: &Arguments,
+    files: &mut [Copc],
+    nodes: &[Vec<usize>],
+    progress: &dyn Progress,
+) -> Result<Vec<Points>> {
+    arguments.reading.nodes(files.iter_mut().zip(nodes), progress)
 }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use epsplat::io::{self, Mesh, Points, Texture};
 use epsplat::scene::Scene;
 use epsplat::surfels::{Preparation, with_triangles};
-use epsplat::{Error, Result, surfels};
+use epsplat::{Error, Progress, Result, surfels};
 
 use super::super::note;
 use super::super::progress::Bars;
@@ -24,7 +24,7 @@ pub(super) fn scene(arguments: &Arguments, bars: &Bars) -> Result<Made> {
 }
 
 /// What was read of all inputs, and the triangles beside it, as one scene.
-pub(super) fn scene_of(arguments: &Arguments, inputs: Vec<Points>, bars: &Bars) -> Result<Made> {
+pub(super) fn scene_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dyn Progress) -> Result<Made> {
     if arguments.inputs.is_empty() && !arguments.textures.is_empty() {
         let what = "--texture paints surfels, and there are none: take --triangle-texture for triangles";
         return Err(Error::Usage(what.into()));
@@ -41,7 +41,7 @@ pub(super) fn scene_of(arguments: &Arguments, inputs: Vec<Points>, bars: &Bars) 
     let mut known = BTreeSet::new();
     paths.retain(|path| known.insert(path.canonicalize().unwrap_or_else(|_| path.clone())));
     let has_points = inputs.iter().any(|points| !points.positions.is_empty() || points.beside.is_none());
-    let of_surfels = if has_points { Some(surfels_of(arguments, inputs, bars)?) } else { None };
+    let of_surfels = if has_points { Some(surfels_of(arguments, inputs, progress)?) } else { None };
     if paths.is_empty() {
         if arguments.join.is_some() || arguments.triangle_texture.is_some() {
             let what = "--join and --triangle-texture are of triangles, and there are none: name some by --triangles";
@@ -49,7 +49,7 @@ pub(super) fn scene_of(arguments: &Arguments, inputs: Vec<Points>, bars: &Bars) 
         }
         return of_surfels.ok_or_else(|| Error::Usage("there is nothing to render: name a file".into()));
     }
-    let meshes = paths.iter().map(|path| io::read_mesh(path, bars)).collect::<Result<Vec<_>>>()?;
+    let meshes = paths.iter().map(|path| io::read_mesh(path, progress)).collect::<Result<Vec<_>>>()?;
     let meshes = painted(meshes, &paths, arguments)?;
     meshes.iter().flat_map(|mesh| &mesh.notes).for_each(|line| note(line));
     let (scene, preparation) = of_surfels.unzip();
@@ -77,7 +77,7 @@ fn painted(mut meshes: Vec<Mesh>, paths: &[PathBuf], arguments: &Arguments) -> R
 }
 
 /// The surfels of all inputs.
-fn surfels_of(arguments: &Arguments, inputs: Vec<Points>, bars: &Bars) -> Result<Made> {
+fn surfels_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dyn Progress) -> Result<Made> {
     let textures = arguments.textures.iter().map(|image| Texture::read(image)).collect::<Result<Vec<_>>>()?;
     let mut read = arguments.inputs.iter().zip(&inputs);
     if !textures.is_empty()
@@ -88,8 +88,8 @@ fn surfels_of(arguments: &Arguments, inputs: Vec<Points>, bars: &Bars) -> Result
     }
     let limits = arguments.limits.limits();
     let built = match arguments.facing {
-        Some(_) => surfels::build_facing(inputs, arguments.point_size, &limits, bars),
-        None => surfels::build_within(inputs, textures, &limits, bars),
+        Some(_) => surfels::build_facing(inputs, arguments.point_size, &limits, progress),
+        None => surfels::build_within(inputs, textures, &limits, progress),
     };
     built.map_err(|error| named(error, &arguments.inputs))
 }

@@ -12,15 +12,15 @@ use epsplat::io::{atomic, cameras};
 use epsplat::passes::unseen::{Unseen, is_empty};
 use epsplat::plan::RenderOptions;
 use epsplat::render::{Backend, Renderer, Report, render};
-use epsplat::scene::{Camera, Detail, Maps, Scene};
+use epsplat::scene::{Camera, Maps, Scene};
 use epsplat::{Error, Progress, Result};
 use serde::Serialize;
 
 use super::super::progress::Bars;
 use super::super::{note, outputs, write_json};
-use super::octrees::{Octrees, Read};
 use super::options::{for_scene, options};
 use super::output::{Format, note_overflows};
+use super::parts::{Part, Parts, Read};
 use super::scene::scene;
 use super::view::{DEFAULT_SIZE, View};
 use super::{Arguments, backend, levels};
@@ -28,9 +28,10 @@ use super::{Arguments, backend, levels};
 /// Frames that wait for a writer or are in its hands take no more host memory than this, bytes, unless one frame does.
 const MOST_WAITING: u64 = 1 << 30;
 
-/// What a frame takes of host memory on its way to a file, bytes a pixel; each value of a map takes [`VALUE`] more.
-const PIXEL: u64 = 48;
-const VALUE: u64 = 8;
+/// What a frame takes of host memory on its way to a file, bytes a pixel: each value of a map takes more.
+pub(super) fn pixel_bytes(maps: Maps) -> u64 {
+    48 + 8 * maps.iter().map(|map| map.width() as u64).sum::<u64>()
+}
 
 /// A view's picture, and what rendering it did.
 #[derive(Serialize)]
@@ -53,7 +54,7 @@ struct Reports {
     /// Milliseconds of rendering, and of encoding and writing, over all views.
     render_ms: f64,
     write_ms: f64,
-    /// Milliseconds from the scene in host memory, or of COPC files the overview, to the last written picture.
+    /// Milliseconds from the scene in host memory, or of files that are read in parts the overview, to the last written picture.
     total_ms: f64,
 }
 
@@ -61,8 +62,16 @@ struct Reports {
 enum Shown<'a> {
     /// A scene that all of them share.
     Whole(&'a Scene, RenderOptions, Box<Renderer<&'a Scene, &'a Backend>>),
-    /// What each takes of COPC files, which depends on nothing that another one takes; and whether the first one's notes have been told.
-    Parts(Box<Octrees>, RenderOptions, &'a Backend, bool),
+    /// What each takes of files, which depends on nothing that another one takes.
+    Parts {
+        parts: Box<Parts>,
+        options: RenderOptions,
+        backend: &'a Backend,
+        /// The first one's notes have been told.
+        told: bool,
+        /// Frames that there may be at once.
+        frames: u64,
+    },
 }
 
 /// A view's frame.
@@ -75,7 +84,7 @@ struct Shot {
 }
 
 impl Shown<'_> {
-    fn picture(&mut self, arguments: &Arguments, view: &View, bars: &Bars) -> Result<Shot> {
+    fn picture(&mut self, arguments: &Arguments, view: &View) -> Result<Shot> {
         let unseen = |scene: &Scene, camera: &Camera, options: &RenderOptions, frame: &Frame| {
             is_empty(frame, options).then(|| Unseen::of(scene, camera, options))
         };
@@ -86,13 +95,13 @@ impl Shown<'_> {
                 let unseen = unseen(scene, &camera, options, &frame);
                 Ok(Shot { frame, report, read: None, unseen })
             }
-            Self::Parts(octrees, options, backend, told) => {
-                let (camera, _) = view.camera(&octrees.overview, Camera::default_near(&octrees.overview))?;
-                let ((scene, preparation), read) = octrees.scene(arguments, &camera, options.detail, bars)?;
+            Self::Parts { parts, options, backend, told, frames } => {
+                let (camera, _) = view.camera(parts.overview(), Camera::default_near(parts.overview()))?;
+                let Part { made: (scene, preparation), options, read } =
+                    parts.scene(arguments, (&camera, *frames), options, &())?;
                 if !std::mem::replace(told, true) {
                     preparation.notes().iter().for_each(|line| note(line));
                 }
-                let options = RenderOptions { detail: Detail::FINEST, ..options.clone() };
                 let (frame, report) = render(&scene, &camera, &options, backend, &())?;
                 let unseen = unseen(&scene, &camera, &options, &frame);
                 Ok(Shot { frame, report, read: Some(read), unseen })
@@ -111,8 +120,8 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
     let backend = backend(arguments)?;
 
     let bars = Bars::new();
-    let octrees = Octrees::of(arguments, &options, &bars)?;
-    let (scene, options) = match &octrees {
+    let parts = Parts::of(arguments, &options, &bars)?;
+    let (scene, options) = match &parts {
         Some(_) => (Scene::default(), options),
         None => {
             let (scene, preparation) = scene(arguments, &bars)?;
@@ -123,8 +132,11 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
     };
     let largest = views.iter().map(|(_, view)| view.pixels()).max().unwrap_or(1);
     let writers = writers(largest, options.maps);
-    let mut shown = match octrees {
-        Some(octrees) => Shown::Parts(Box::new(octrees), options.clone(), &backend, false),
+    let mut shown = match parts {
+        Some(parts) => {
+            let frames = writers.get() as u64 + 1;
+            Shown::Parts { parts: Box::new(parts), options: options.clone(), backend: &backend, told: false, frames }
+        }
         None => Shown::Whole(&scene, options.clone(), Box::new(Renderer::new(&scene, &options, &backend)?)),
     };
     let start = Instant::now();
@@ -132,7 +144,7 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
     // The first empty picture and why it is, and how many are.
     let empty = RefCell::new((None, 0));
     let frames = views.iter().map(|(file, view)| {
-        let made = shown.picture(arguments, view, &bars).map_err(|error| error.of_view(file))?;
+        let made = shown.picture(arguments, view).map_err(|error| error.of_view(file))?;
         if let Some(unseen) = &made.unseen {
             let (first, count) = &mut *empty.borrow_mut();
             first.get_or_insert_with(|| (file, unseen.sentence()));
@@ -241,8 +253,7 @@ fn check_folder(output: &Path, cameras: &Path) -> Result<()> {
 /// How many threads write frames of so many pixels.
 fn writers(pixels: u64, maps: Maps) -> NonZeroUsize {
     let threads = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
-    let values: u64 = maps.iter().map(|map| map.width() as u64).sum();
-    let frame = pixels * (PIXEL + VALUE * values);
+    let frame = pixels * pixel_bytes(maps);
     let most = usize::try_from(MOST_WAITING / frame.max(1)).unwrap_or(usize::MAX);
     NonZeroUsize::new(threads.min(most)).unwrap_or(NonZeroUsize::MIN)
 }

@@ -22,7 +22,7 @@ pub(super) fn read(
     progress: &dyn Progress,
 ) -> Result<Contents, Fault> {
     let mut tokens = Tokens { reader, line: header.lines + 1, line_end: header.line_end, token: Vec::new() };
-    let mut contents = Contents { faces, points: Points::default(), tree: None };
+    let mut contents = Contents { faces, points: Points::default(), tree: None, whole: None };
     for element in needed(&header.elements) {
         if element.name == "vertex" {
             (contents.points, _) = vertices(&mut tokens, element, length, progress)?;

@@ -4,6 +4,7 @@ use super::contents::{Contents, ends_early, negative_list};
 use super::faces::{Faces, Role, needed};
 use super::header::{Element, Header, Kind, Scalar};
 use super::vertex::{Layout, Vertices, is_tree};
+use super::whole::{self, is_whole};
 use crate::Progress;
 use crate::io::fault::Fault;
 use crate::io::{Points, Tree, TreeRow};
@@ -20,13 +21,19 @@ pub(super) fn read<const BIG: bool>(
     faces: Faces,
     progress: &dyn Progress,
 ) -> Result<Contents, Fault> {
-    let mut contents = Contents { faces, points: Points::default(), tree: None };
+    let mut contents = Contents { faces, points: Points::default(), tree: None, whole: None };
     for element in needed(&header.elements) {
         if element.name == "vertex" {
             (contents.points, _) = vertices::<BIG>(&mut reader, element, length, progress)?;
         } else if is_tree(element) {
             let (nodes, rows) = vertices::<BIG>(&mut reader, element, length, &())?;
             contents.tree = Some(Tree { nodes: Box::new(nodes), rows });
+        } else if is_whole(element) && !BIG {
+            let mut row = [0; whole::BYTES];
+            if read_until_end(&mut reader, &mut row)? < row.len() {
+                return Err(ends_early(element, 0));
+            }
+            contents.whole = Some(whole::parse(&row, 0, 0));
         } else if Faces::are(element) {
             self::faces::<BIG>(&mut reader, element, &mut contents.faces)?;
         } else {
@@ -36,7 +43,8 @@ pub(super) fn read<const BIG: bool>(
     Ok(contents)
 }
 
-fn vertices<const BIG: bool>(
+/// The rows of an element with places, and of nodes what else they have.
+pub(super) fn vertices<const BIG: bool>(
     mut reader: impl BufRead,
     vertex: &Element,
     length: u64,

@@ -5,12 +5,14 @@ use super::header::Element;
 use crate::io::fault::Fault;
 use crate::io::values::shown;
 use crate::io::{Points, Tree};
+use crate::scene::Whole;
 
 /// What is read of a file.
 pub(super) struct Contents {
     pub(super) points: Points,
     pub(super) faces: Faces,
     pub(super) tree: Option<Tree>,
+    pub(super) whole: Option<Whole>,
 }
 
 /// The file ended inside an element.

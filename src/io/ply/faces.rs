@@ -2,6 +2,7 @@
 
 use super::header::{Element, Kind, Property};
 use super::vertex::is_tree;
+use super::whole::is_whole;
 use crate::io::fault::Fault;
 use crate::io::polygon;
 use glam::DVec3;
@@ -55,9 +56,10 @@ pub(super) struct Faces {
     odd: bool,
 }
 
-/// The elements up to the last one that is read.
+/// The elements up to the last one that is read, by some reader: what ends before it is told.
 pub(super) fn needed(elements: &[Element]) -> &[Element] {
-    let read = |element: &Element| element.name == "vertex" || is_tree(element) || Faces::are(element);
+    let read =
+        |element: &Element| element.name == "vertex" || is_tree(element) || is_whole(element) || Faces::are(element);
     &elements[..elements.iter().rposition(read).map_or(0, |last| last + 1)]
 }
 

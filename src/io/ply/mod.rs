@@ -16,7 +16,8 @@
 //!
 //! Levels of detail are another element `node` after the vertices, which are in the order of the tree: `x y z`, `radius` of the sphere around what is
 //! below, half-axes, caps and colour as above, `cone`, the smallest cosine of the angle between a normal below and its own (-1: normals have no
-//! side), and `first`, `count` and `leaf`, which nodes, or of a leaf which vertices, are below it ([`Hierarchy`](crate::scene::Hierarchy)).
+//! side), and `first`, `count` and `leaf`, which nodes, or of a leaf which vertices, are below it ([`Hierarchy`](crate::scene::Hierarchy)). A third
+//! element `scene` says of all vertices together what one who reads a part must know: origin, bounds, ranges ([`Whole`](crate::scene::Whole)).
 //!
 //! The header has a comment `up y` or `up z` where that is known, `closed` for surfels that cover a closed surface, `unsided` where normals tell no sides, and `triangles NAME`
 //! for those that are drawn beside a mesh: no other program says it in a PLY file, and none stumbles over it.
@@ -32,12 +33,15 @@ mod contents;
 mod faces;
 mod gaussian;
 mod header;
+mod levels;
 mod read;
 mod vertex;
+mod whole;
 mod write;
 mod write_gaussians;
 mod write_mesh;
 
+pub use levels::Levels;
 pub(super) use read::companions;
 pub use read::{read, read_mesh};
 pub use write::{Color, ColorProperties, Properties, Vertex, check_extension, write, write_points};

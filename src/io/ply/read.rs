@@ -7,6 +7,7 @@ use super::{ascii, binary, gaussian};
 use crate::io::fault::{self, Fault};
 use crate::io::{Input, Material, Mesh, Points, Texture};
 use crate::io::{closed, triangles};
+use crate::scene::Whole;
 use crate::{Progress, Result};
 use std::fs::File;
 use std::io::BufReader;
@@ -137,7 +138,7 @@ fn contents(
         Encoding::BigEndian => binary::read::<true>(reader, &header, length, Faces::new(surface), progress),
     };
     progress.end();
-    let Contents { mut points, faces, tree } = contents.map_err(in_file)?;
+    let Contents { mut points, faces, tree, whole } = contents.map_err(in_file)?;
     gaussian::check(&points, flatten).map_err(in_file)?;
     points.up = header.comments.up;
     points.closed = header.comments.closed;
@@ -146,6 +147,9 @@ fn contents(
         if let Some(what) = tree.fault(points.positions.len()) {
             return Err(in_file(Fault::Malformed(format!("its levels of detail (element node) are no tree: {what}"))));
         }
+        let count = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
+        let (surfels, nodes) = (count(points.positions.len()), count(tree.rows.len()));
+        points.whole = whole.map(|whole| Box::new(Whole { surfels, nodes, ..whole }));
         points.tree = Some(tree);
     }
     points.beside = header.comments.beside.map(|name| beside(path.parent().unwrap_or(Path::new("")), &name));

@@ -188,6 +188,11 @@ impl Layout {
         })
     }
 
+    /// Whether all that a row is, is an ellipse with what belongs to it: neither a Gaussian nor a place in a texture.
+    pub(super) fn has_axes_alone(&self) -> bool {
+        self.axes.is_some() && self.gaussian.is_none() && self.texture.is_none()
+    }
+
     /// Whether colours stay the 8-bit codes they are in the file.
     fn is_srgb8(&self) -> bool {
         self.color.iter().flatten().chain(&self.alpha).all(|(_, coding)| *coding == Coding::Code8)

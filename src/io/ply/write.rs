@@ -1,12 +1,14 @@
 //! From surfels to PLY bytes.
 
 use super::vertex::{CAP_NAMES, CLIP_NAMES, NODE_NAMES, NUMBER_NAME, SLOPE_NAMES};
+use super::whole;
 use super::write_gaussians;
 use crate::io::atomic::{Output, write_whole};
-use crate::io::{Points, Tree, Up};
+use crate::io::{Points, Tree, TreeRow, Up};
 use crate::scene::color::{DEFAULT_COLOR, SRGB8_TO_LINEAR, srgb8};
 use crate::scene::{Cap, Clip, Colors};
 use crate::{Error, Progress, Result};
+use rayon::prelude::*;
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -243,29 +245,8 @@ pub fn write(
     count: u64,
     vertices: impl IntoIterator<Item = Vertex>,
 ) -> Result<()> {
-    write_beside(path, (properties, count, vertices), None, None)
-}
-
-/// The same, drawn beside the mesh of a file, with levels of detail.
-fn write_beside(
-    path: &Path,
-    (properties, count, vertices): (Properties, u64, impl IntoIterator<Item = Vertex>),
-    beside: Option<&Path>,
-    tree: Option<&Tree>,
-) -> Result<()> {
-    let comments: Vec<String> = beside.map(|mesh| format!("triangles {}", mesh.display())).into_iter().collect();
     write_whole(path, |out| {
-        properties.write_header(out, count, &comments)?;
-        let nodes = tree.map(|tree| (tree, node_properties(tree)));
-        if let Some((tree, properties)) = nodes {
-            writeln!(out, "element node {}", tree.rows.len())?;
-            properties.write_properties(out)?;
-            let [cone, first, count, leaf] = NODE_NAMES;
-            write!(
-                out,
-                "property float {cone}\nproperty uint {first}\nproperty uint {count}\nproperty uchar {leaf}\n"
-            )?;
-        }
+        properties.write_header(out, count, &[])?;
         out.write_all(b"end_header\n")?;
         let mut written = 0;
         let mut row = Vec::with_capacity(96);
@@ -278,22 +259,8 @@ fn write_beside(
         if written != count {
             return Err(io::Error::other(format!("{count} vertices were announced, but {written} came")));
         }
-        for (index, node) in nodes.iter().flat_map(|(tree, _)| tree.rows.iter().enumerate()) {
-            row.clear();
-            let points = nodes.map(|(tree, properties)| (&tree.nodes, properties));
-            points.into_iter().for_each(|(points, properties)| properties.encode(&vertex(points, index), &mut row));
-            row.extend(node.cone.to_le_bytes());
-            row.extend([node.first, node.count].map(u32::to_le_bytes).as_flattened());
-            row.push(node.leaf.into());
-            out.write_all(&row)?;
-        }
         Ok(())
     })
-}
-
-/// A node has no normal but its half-axes', and a radius that is its sphere's.
-fn node_properties(tree: &Tree) -> Properties {
-    Properties { normals: false, ..Properties::of(&tree.nodes) }
 }
 
 /// Writes all that `points` hold, so that [`read`](super::read) gives them back; Gaussians as files of 2D Gaussian splatting have them, in f32.
@@ -304,22 +271,75 @@ fn node_properties(tree: &Tree) -> Properties {
 ///
 /// [`Error::Write`](crate::Error::Write) where the system cannot write.
 pub fn write_points(path: &Path, points: &Points, progress: &dyn Progress) -> Result<()> {
-    const TOLD: usize = 1 << 16;
     if points.encoded {
         return write_gaussians::write(path, points, progress);
     }
-    let count = points.positions.len();
+    let (properties, count) = (Properties::of(points), points.positions.len());
+    let comments: Vec<String> = points.beside.iter().map(|mesh| format!("triangles {}", mesh.display())).collect();
+    let nodes = points.tree.as_ref().map(|tree| (tree, node_properties(tree)));
+    let whole = points.whole.as_ref().filter(|_| nodes.is_some());
     progress.begin("writing points", count as u64);
-    let vertices = (0..count).map(|index| {
-        if index % TOLD == TOLD - 1 {
-            progress.advance(TOLD as u64);
+    let written = write_whole(path, |out| {
+        properties.write_header(out, count as u64, &comments)?;
+        if let Some((tree, properties)) = nodes {
+            writeln!(out, "element node {}", tree.rows.len())?;
+            properties.write_properties(out)?;
+            let [cone, first, count, leaf] = NODE_NAMES;
+            write!(
+                out,
+                "property float {cone}\nproperty uint {first}\nproperty uint {count}\nproperty uchar {leaf}\n"
+            )?;
         }
-        vertex(points, index)
+        if whole.is_some() {
+            out.write_all(whole::lines().as_bytes())?;
+        }
+        out.write_all(b"end_header\n")?;
+        let of_point = |index: usize, rows: &mut Vec<u8>| properties.encode(&vertex(points, index), rows);
+        write_rows(out, count, of_point, progress)?;
+        if let Some((tree, properties)) = nodes {
+            write_rows(out, tree.rows.len(), |index, rows| encode_node(tree, properties, index, rows), &())?;
+        }
+        whole.map_or(Ok(()), |whole| out.write_all(&whole::bytes(whole)))
     });
-    let all = (Properties::of(points), count as u64, vertices);
-    let written = write_beside(path, all, points.beside.as_deref(), points.tree.as_ref());
     progress.end();
     written
+}
+
+/// A node has no normal but its half-axes', and a radius that is its sphere's.
+fn node_properties(tree: &Tree) -> Properties {
+    Properties { normals: false, ..Properties::of(&tree.nodes) }
+}
+
+/// Appends the bytes of a node.
+fn encode_node(tree: &Tree, properties: Properties, index: usize, rows: &mut Vec<u8>) {
+    properties.encode(&vertex(&tree.nodes, index), rows);
+    let TreeRow { cone, first, count, leaf } = tree.rows[index];
+    rows.extend(cone.to_le_bytes());
+    rows.extend([first, count].map(u32::to_le_bytes).as_flattened());
+    rows.push(leaf.into());
+}
+
+/// Writes `count` rows, which `encode` appends the bytes of, some blocks at a time by all threads.
+fn write_rows(
+    out: &mut Output<'_>,
+    count: usize,
+    encode: impl Fn(usize, &mut Vec<u8>) + Sync,
+    progress: &dyn Progress,
+) -> io::Result<()> {
+    const BLOCK: usize = 1 << 14;
+    let starts: Vec<usize> = (0..count).step_by(BLOCK).collect();
+    for starts in starts.chunks(2 * rayon::current_num_threads()) {
+        let block = |start: &usize| {
+            let mut rows = Vec::new();
+            (*start..count.min(start + BLOCK)).for_each(|index| encode(index, &mut rows));
+            rows
+        };
+        let blocks: Vec<Vec<u8>> = starts.par_iter().map(block).collect();
+        blocks.iter().try_for_each(|rows| out.write_all(rows))?;
+        let end = starts.last().map_or(0, |start| count.min(start + BLOCK));
+        progress.advance((end - starts[0]) as u64);
+    }
+    Ok(())
 }
 
 /// What is written of a point.

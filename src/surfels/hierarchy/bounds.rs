@@ -20,8 +20,8 @@ const MANY: usize = 1 << 16;
 /// What half-axes and radii are longer by than was found, as they are rounded to f32.
 const ROUNDED_UP: f64 = 1.0 + 1.0 / (1u64 << 21) as f64;
 
-/// What the angle of a cone is larger by than was found, as cosines near 1 tell it badly.
-const ROUNDED_ANGLE: f64 = 1e-3;
+/// Cosine and sine of what the angle of a cone is larger by than was found, as cosines near 1 tell it badly: a thousandth of a radian.
+const ROUNDED_ANGLE: DVec2 = DVec2::new(1.0 - 5e-7, 1e-3);
 
 /// What is rounded off a cosine.
 const ROUNDED_OFF: f64 = 1e-7;
@@ -80,9 +80,14 @@ impl Bound {
     }
 }
 
+/// That of a vector whose squares neither overflow nor vanish.
+fn length(x: f64, y: f64) -> f64 {
+    (x * x + y * y).sqrt()
+}
+
 /// The longer half-axis of the ellipse with the half-axes s and t, of whose products these are: the larger singular value of [s t].
 fn longest([ss, st, tt]: [f64; 3]) -> f64 {
-    (0.5 * (ss + tt + (ss - tt).hypot(2.0 * st))).sqrt()
+    (0.5 * (ss + tt + length(ss - tt, 2.0 * st))).sqrt()
 }
 
 /// The largest distance from 0 of a point of the ellipse around `at` with these half-axes, or hardly more.
@@ -91,7 +96,7 @@ fn longest([ss, st, tt]: [f64; 3]) -> f64 {
 /// eigenvalues of `MᵀM`, greatest first, and b is `Mᵀa` along its eigenvectors: each λ gives a bound, and where the derivative is 0 the least.
 fn farthest(at: DVec2, [u, v]: [DVec2; 2]) -> f64 {
     let (uu, uv, vv) = (u.dot(u), u.dot(v), v.dot(v));
-    let (mean, half) = (0.5 * (uu + vv), (0.5 * (uu - vv)).hypot(uv));
+    let (mean, half) = (0.5 * (uu + vv), length(0.5 * (uu - vv), uv));
     let [first, second] = [mean + half, mean - half];
     // The longer of the eigenvector's two forms does not cancel; of a circle each direction is one.
     let (one, other) = (DVec2::new(first - vv, uv), DVec2::new(uv, first - uu));
@@ -146,7 +151,10 @@ impl Bounding<'_> {
         Bound {
             rim,
             radius: offset.length() + longest([s.dot(s), s.dot(t), t.dot(t)]) + height,
-            cosine: (own.dot(self.normal).clamp(-1.0, 1.0).acos() + tilt(self.scene, index)).min(PI).cos(),
+            cosine: match tilt(self.scene, index) {
+                0.0 => own.dot(self.normal).clamp(-1.0, 1.0),
+                tilt => (own.dot(self.normal).clamp(-1.0, 1.0).acos() + tilt).min(PI).cos(),
+            },
         }
     }
 
@@ -167,15 +175,19 @@ impl Bounding<'_> {
         let [center, low] = [node.surfel.center, low].map(|part| DVec3::from_array(part.map(f64::from)));
         let offset = center + low - self.center;
         let radius = f64::from(node.radius) * ROUNDED_UP;
-        let angle = normal_of(&node.surfel).dot(self.normal).clamp(-1.0, 1.0).acos();
-        let cone = f64::from(node.cone).clamp(-1.0, 1.0).acos() + ROUNDED_ANGLE;
-        let turned = angle + cone;
-        let slope = if turned < STEEPEST.atan() { turned.tan() } else { STEEPEST };
+        // Cosine and sine of the angle between the normals, of that and the cone's, and of these and what is rounded off.
+        let turned = |by: DVec2, cosine: f64| by.rotate(DVec2::new(cosine, (1.0 - cosine * cosine).max(0.0).sqrt()));
+        let angle = turned(DVec2::X, normal_of(&node.surfel).dot(self.normal).clamp(-1.0, 1.0));
+        let angles = turned(angle, f64::from(node.cone).clamp(-1.0, 1.0));
+        let turned = ROUNDED_ANGLE.rotate(angles);
+        // A sum of angles past the half circle has a sine below 0, before what is rounded off is added or after; that of a whole cone is one.
+        let beyond = node.cone <= -1.0 || angles.y < 0.0 || turned.y < 0.0;
+        let slope = if !beyond && turned.y < STEEPEST * turned.x { turned.y / turned.x } else { STEEPEST };
         let high = offset.dot(self.normal).abs() + radius;
         Bound {
             rim: (self.shape.seen(offset).length() + (radius + slope * high) * self.scale) * ROUNDED_UP,
             radius: (offset.length() + radius) * ROUNDED_UP,
-            cosine: turned.min(PI).cos(),
+            cosine: if beyond { -1.0 } else { turned.x },
         }
     }
 }
@@ -289,4 +301,34 @@ fn bound_from(of: &Bounding<'_>, set: &Set, below: Below<'_>, sided: bool) -> Bo
         }
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The angles of a node's normals add up to a cosine, up to the half circle and past it.
+    #[test]
+    fn angles_of_nodes_add_up() {
+        let shape = Shape { s: DVec3::X, t: DVec3::Y, seen: [DVec3::X, DVec3::Y] };
+        let scene = Scene::default();
+        let bounding = Bounding { scene: &scene, center: DVec3::ZERO, normal: DVec3::Z, shape, scale: 1.0 };
+        let of = |angle: f64, cone: f32| {
+            let (sine, cosine) = angle.sin_cos();
+            let surfel = Surfel { center: [0.0; 3], s: [cosine as f32, 0.0, -sine as f32], t: [0.0, 1.0, 0.0] };
+            let (cap, color) = (Cap::FLAT, [1.0; 4]);
+            bounding.of_node(&Node { surfel, cap, color, radius: 1.0, cone, first: 0, count: 1, leaf: true }, [0.0; 3])
+        };
+        for angle in (0..=32).map(|k| f64::from(k) * PI / 32.0) {
+            for cone in (0..=32).map(|k| f64::from(k) * PI / 32.0) {
+                let bound = of(angle, cone.cos() as f32);
+                let expected = (angle + cone + 1e-3).min(PI);
+                assert!((bound.cosine - expected.cos()).abs() < 1e-6, "{angle} {cone}: {}", bound.cosine);
+                let slope = if expected < STEEPEST.atan() { expected.tan() } else { STEEPEST };
+                assert!((bound.rim / (1.0 + slope) - 1.0).abs() < 1e-4, "{angle} {cone}: {}", bound.rim);
+            }
+            // A whole cone has every normal, whatever its own is.
+            assert_eq!(of(angle, -1.0).cosine, -1.0);
+        }
+    }
 }

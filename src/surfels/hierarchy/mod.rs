@@ -17,6 +17,7 @@ mod tests;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use self::bounds::Below;
@@ -45,6 +46,7 @@ pub fn build(scene: Scene, progress: &dyn Progress) -> Result<(Scene, Arc<Hierar
             "levels of detail are of surfels with a colour each: Gaussians, and surfels that a texture paints, have none yet".into(),
         ));
     }
+    let scene = as_in_a_file(scene);
     progress.begin("dividing points", count.into());
     let mut tree = Octree::grow(count, |index| scene.center(index as usize), |points| progress.advance(points));
     progress.end();
@@ -54,6 +56,19 @@ pub fn build(scene: Scene, progress: &dyn Progress) -> Result<(Scene, Arc<Hierar
     drop(order);
     let hierarchy = Arc::new(nodes(&tree, &scene, progress));
     Ok((Scene { hierarchy: Some(hierarchy.clone()), ..scene }, hierarchy))
+}
+
+/// The scene with the centres that a file in world coordinates gives back.
+fn as_in_a_file(mut scene: Scene) -> Scene {
+    let origin = scene.origin;
+    let written = |index: usize| (origin + scene.center(index)) - origin;
+    let centers: Vec<DVec3> = (0..scene.surfels.len()).into_par_iter().map(written).collect();
+    scene.surfels.par_iter_mut().zip(&centers).for_each(|(surfel, center)| surfel.center = center.as_vec3().to_array());
+    let rest = |(low, (surfel, center)): (&mut [f32; 3], (&Surfel, &DVec3))| {
+        *low = (center - DVec3::from_array(surfel.center.map(f64::from))).as_vec3().to_array();
+    };
+    scene.low.par_iter_mut().zip(scene.surfels.par_iter().zip(&centers)).for_each(rest);
+    scene
 }
 
 /// Puts the points of each leaf in an order of their own.

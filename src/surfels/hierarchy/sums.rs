@@ -50,7 +50,7 @@ impl Scales {
         let premultiplied = [r * a, g * a, b * a, a].map(f64::from);
         std::array::from_fn(|k| {
             let part = if self.span[k] > 0.0 { (premultiplied[k] - self.low[k]) / self.span[k] } else { 0.0 };
-            (part * COLOR_ONE).round() as i64
+            whole(part * COLOR_ONE)
         })
     }
 
@@ -76,6 +76,12 @@ pub(super) struct Sums {
     disks: [i128; 6],
 }
 
+/// A whole number next to one below 2^62, from which it is half a unit away, or hardly more, or one from 2^52 on: the standard library's rounding, and its way to 128 bits,
+/// are functions and not instructions on many processors.
+fn whole(value: f64) -> i64 {
+    (value + 0.5f64.copysign(value)) as i64
+}
+
 /// The unit normal of a surfel's plane; of one without a plane the world's z.
 pub(super) fn normal_of(surfel: &Surfel) -> DVec3 {
     let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
@@ -90,16 +96,13 @@ impl Sums {
         for index in first..first + elements.len() {
             let surfel = &scene.surfels[index];
             let n = normal_of(surfel);
-            let units = |value: f64, one: f64| (value * one).round() as i64;
-            all.normal.iter_mut().zip(n.to_array()).for_each(|(sum, value)| *sum += units(value, NORMAL_ONE));
+            all.normal.iter_mut().zip(n.to_array()).for_each(|(sum, value)| *sum += whole(value * NORMAL_ONE));
             for axis in [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from))) {
                 let part = if scale.longest > 0.0 { axis / scale.longest } else { DVec3::ZERO };
-                all.disks
-                    .iter_mut()
-                    .zip(products(part * AXIS_ONE))
-                    .for_each(|(sum, value)| *sum += value.round() as i128);
+                let products = products(part * AXIS_ONE);
+                all.disks.iter_mut().zip(products).for_each(|(sum, value)| *sum += i128::from(whole(value)));
             }
-            all.axial.iter_mut().zip(products(n)).for_each(|(sum, value)| *sum += units(value, PRODUCT_ONE));
+            all.axial.iter_mut().zip(products(n)).for_each(|(sum, value)| *sum += whole(value * PRODUCT_ONE));
             let color = scale.units(scene.colors.linear(index));
             all.color.iter_mut().zip(color).for_each(|(sum, value)| *sum += value);
         }

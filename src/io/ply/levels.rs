@@ -1,0 +1,199 @@
+//! PLY files with levels of detail, of which a picture reads the nodes and points that it takes.
+
+use super::binary;
+use super::header::{self, Element, Encoding, Kind};
+use super::vertex::{Layout, is_tree};
+use super::whole;
+use crate::Result;
+use crate::io::fault::Fault;
+use crate::io::{Format, Input, Points, Tree, TreeRow};
+use crate::scene::{Hierarchy, Up, Whole};
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// What is read ahead of what was asked for, bytes: rows that lie nearer than that are read together.
+const AHEAD: usize = 1 << 18;
+
+/// Numbers of places and ranges are no larger.
+const LARGEST: f64 = 1e30;
+
+/// A file that `epsplat lod` wrote, of which any nodes and points can be read.
+///
+/// When it is opened, where everything lies is checked against its length. Nodes and points are checked as they are read.
+pub struct Levels {
+    file: BufReader<File>,
+    path: PathBuf,
+    vertex: Rows,
+    node: Rows,
+    /// What it says of all points together.
+    pub whole: Whole,
+    /// Which way it says is up.
+    pub up: Option<Up>,
+    /// Its surfels cover a closed surface.
+    pub closed: bool,
+    /// Its normals tell no sides.
+    pub unsided: bool,
+}
+
+/// Where the rows of an element lie.
+struct Rows {
+    element: Element,
+    /// Bytes from the file's start.
+    start: u64,
+    /// Bytes of each.
+    size: u64,
+}
+
+impl Levels {
+    /// Opens an input that is a binary PLY file with levels of detail and with what a reader of a part must know; None if it is another one, or is
+    /// drawn beside a mesh.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where what the file says of all points is no number.
+    pub fn open(input: Input) -> Result<Option<Self>> {
+        let Input { file, length, path, format } = input;
+        if format != Format::Ply {
+            return Ok(None);
+        }
+        opened(file, length, &path).map_err(|fault| fault.of(&path))
+    }
+
+    /// Bytes of so many points and nodes.
+    pub fn bytes(&self, points: u64, nodes: u64) -> u64 {
+        points * self.vertex.size + nodes * self.node.size
+    }
+
+    /// Its name.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What the file is found to be.
+    pub fn malformed(&self, what: impl Into<String>) -> crate::Error {
+        Fault::Malformed(what.into()).of(&self.path)
+    }
+
+    /// The nodes of these ranges of numbers, which ascend.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Read`](crate::Error::Read), or [`Error::Malformed`](crate::Error::Malformed) where a node has no place or extent, or the ranges are no nodes.
+    pub fn nodes(&mut self, numbers: &[Range<u32>]) -> Result<Hierarchy> {
+        let (points, rows) = self.read(numbers, |levels| &levels.node)?;
+        let hierarchy = Tree { nodes: Box::new(points), rows }.hierarchy(self.whole.origin);
+        hierarchy.ok_or_else(|| self.malformed("a node of its levels of detail has no place, no extent or no colour"))
+    }
+
+    /// The points of these ranges of numbers, which ascend.
+    ///
+    /// # Errors
+    ///
+    /// As [`nodes`](Self::nodes).
+    pub fn points(&mut self, numbers: &[Range<u32>]) -> Result<Points> {
+        self.read(numbers, |levels| &levels.vertex).map(|(points, _)| points)
+    }
+
+    fn read(&mut self, numbers: &[Range<u32>], of: impl Fn(&Self) -> &Rows) -> Result<(Points, Vec<TreeRow>)> {
+        let Rows { element, start, size } = of(self);
+        let (start, size) = (*start, *size);
+        let inside = numbers.iter().all(|range| range.start <= range.end && u64::from(range.end) <= element.count);
+        if !inside {
+            return Err(self.malformed("a node of its levels of detail names what does not exist"));
+        }
+        let count = numbers.iter().map(|range| u64::from(range.end - range.start)).sum();
+        let element = Element { count, ..element.clone() };
+        let pieces = numbers
+            .iter()
+            .map(|range| (start + u64::from(range.start) * size, u64::from(range.end - range.start) * size));
+        let pieces = Pieces::new(&mut self.file, pieces).map_err(|error| Fault::Io(error).of(&self.path))?;
+        let read = binary::vertices::<false>(BufReader::new(pieces), &element, count * size, &());
+        read.map_err(|fault| fault.of(&self.path))
+    }
+}
+
+fn opened(file: File, length: u64, path: &Path) -> Result<Option<Levels>, Fault> {
+    let mut file = BufReader::with_capacity(AHEAD, file);
+    let header = header::read(&mut file)?;
+    let comments = &header.comments;
+    if header.encoding != Encoding::LittleEndian || comments.beside.is_some() {
+        return Ok(None);
+    }
+    let (mut vertex, mut node, mut scene) = (None, None, None);
+    let mut start = file.stream_position()?;
+    for element in header.elements {
+        let scalars = element.properties.iter().map(|property| match property.kind {
+            Kind::Scalar(scalar) => Some(scalar.size() as u64),
+            Kind::List { .. } => None,
+        });
+        // Where rows differ in length, what is behind them lies nobody knows where.
+        let Some(size) = scalars.sum::<Option<u64>>() else { return Ok(None) };
+        let bytes = element.count.checked_mul(size).and_then(|bytes| bytes.checked_add(start));
+        // What ends early is told by who reads all of it.
+        let Some(end) = bytes.filter(|end| *end <= length) else { return Ok(None) };
+        let into = match element.name.as_str() {
+            "vertex" => &mut vertex,
+            _ if is_tree(&element) => &mut node,
+            _ if whole::is_whole(&element) => &mut scene,
+            _ => &mut None,
+        };
+        into.get_or_insert(Rows { element, start, size });
+        start = end;
+    }
+    let (Some(vertex), Some(node), Some(scene)) = (vertex, node, scene) else { return Ok(None) };
+    let layout = Layout::of(&vertex.element)?;
+    let counts = [&vertex, &node].map(|rows| u32::try_from(rows.element.count).ok().filter(|count| *count > 0));
+    let ([Some(surfels), Some(nodes)], true) = (counts, layout.has_axes_alone()) else { return Ok(None) };
+    file.seek(SeekFrom::Start(scene.start))?;
+    let mut row = [0; whole::BYTES];
+    file.read_exact(&mut row)?;
+    let (words, _) = row.as_chunks::<8>();
+    if !words.iter().all(|word| f64::from_le_bytes(*word).abs() <= LARGEST) {
+        return Err(Fault::Malformed("what its element 'scene' says is no number, or too large".into()));
+    }
+    let whole = whole::parse(&row, surfels, nodes);
+    // Who reads all of it passes over that, too.
+    if !whole.is_near() {
+        return Ok(None);
+    }
+    let (up, closed, unsided) = (comments.up, comments.closed, comments.unsided);
+    Ok(Some(Levels { file, path: path.to_owned(), vertex, node, whole, up, closed, unsided }))
+}
+
+/// Pieces of a file one after the other.
+struct Pieces<'a, I> {
+    file: &'a mut BufReader<File>,
+    /// Where each starts, and its bytes.
+    pieces: I,
+    /// Bytes from the file's start.
+    at: u64,
+    /// Bytes of this one.
+    left: u64,
+}
+
+impl<'a, I: Iterator<Item = (u64, u64)>> Pieces<'a, I> {
+    fn new(file: &'a mut BufReader<File>, pieces: I) -> io::Result<Self> {
+        let at = file.stream_position()?;
+        Ok(Self { file, pieces, at, left: 0 })
+    }
+}
+
+impl<I: Iterator<Item = (u64, u64)>> Read for Pieces<'_, I> {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        while self.left == 0 {
+            let Some((start, bytes)) = self.pieces.next() else { return Ok(0) };
+            // What is in the buffer stays there.
+            self.file.seek_relative(start as i64 - self.at as i64)?;
+            (self.at, self.left) = (start, bytes);
+        }
+        let most = into.len().min(usize::try_from(self.left).unwrap_or(usize::MAX));
+        let available = self.file.fill_buf()?;
+        let count = most.min(available.len());
+        into[..count].copy_from_slice(&available[..count]);
+        self.file.consume(count);
+        (self.at, self.left) = (self.at + count as u64, self.left - count as u64);
+        Ok(count)
+    }
+}

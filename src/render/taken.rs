@@ -1,0 +1,36 @@
+//! What a picture takes of a file with levels of detail.
+
+use super::encoded;
+use super::parts::parts;
+use crate::io::ply::Levels;
+use crate::passes::select::{self, Wanted};
+use crate::plan::{Facts, RenderOptions, culls_back};
+use crate::scene::{Camera, Detail, Hierarchy, Scene};
+use crate::surfels::part::{self, Taken};
+use crate::{Progress, Result};
+
+/// The part of a file that the picture of `camera` with `options` is made of, to the bit as of all of it. It depends on the camera and the file alone.
+///
+/// # Errors
+///
+/// [`Error::Read`](crate::Error::Read) and [`Error::Malformed`](crate::Error::Malformed) of the file, and whatever `fits` says of how much is taken so far.
+pub fn taken(
+    levels: &mut Levels,
+    camera: &Camera,
+    options: &RenderOptions,
+    fits: impl Fn(&Taken) -> Result<()>,
+    progress: &dyn Progress,
+) -> Result<(Scene, Taken)> {
+    let (facts, origin) = (Facts::of(&part::nothing(levels)), levels.whole.origin);
+    // The size for a number of splats follows from all nodes in view.
+    let detail = if matches!(options.detail, Detail::Splats(_)) { Detail::FINEST } else { options.detail };
+    let wanted = |part: &RenderOptions| Wanted { detail, ..Wanted::of(part, culls_back(&facts, camera, part)) };
+    // Renders for colour and maps may leave out other backs, and look as far as their own samples.
+    let renders = parts(&facts, &encoded::of(&facts, options));
+    let all: Vec<Wanted> = renders.iter().map(wanted).collect();
+    let any = |tree: &Hierarchy, index: u32| {
+        all.iter()
+            .any(|wanted| select::may_divide(&tree.nodes[index as usize], tree.low(index), (origin, camera), wanted))
+    };
+    part::part(levels, any, fits, progress)
+}

@@ -1,0 +1,135 @@
+//! What is known of all surfels of a scene that holds a part of them.
+
+use glam::DVec3;
+
+use super::body::body_and_framed;
+use super::hierarchy::{Hierarchy, Node};
+use super::{Bounds, Scene};
+use rayon::prelude::*;
+
+/// A scene with levels of detail as it is when all of it is there. A picture of a part of it is that of the whole to the bit, and some of what pictures
+/// follow from is told by all surfels alone: the unit of sums, the nearest depth, whether centres need trailing parts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Whole {
+    /// Its surfels.
+    pub surfels: u32,
+    /// Its nodes.
+    pub nodes: u32,
+    /// [`Scene::origin`].
+    pub origin: DVec3,
+    /// [`Scene::bounds`].
+    pub bounds: Bounds,
+    /// The box of [`Scene::body`].
+    pub body: Bounds,
+    /// [`Scene::core`].
+    pub core: Bounds,
+    /// The box of [`Scene::framed`].
+    pub framed: Bounds,
+    /// [`Scene::color_range`].
+    pub color: ([f32; 4], [f32; 4]),
+    /// [`Scene::largest_radius`].
+    pub largest_radius: f32,
+    /// [`Scene::largest_shorter`].
+    pub largest_shorter: f32,
+    /// Of its nodes.
+    pub levels: LevelFacts,
+    /// What surfels have.
+    pub has: Has,
+}
+
+/// What is known of the nodes of levels of detail.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LevelFacts {
+    /// The longest half-axis with the height of its cap, world units.
+    pub largest_radius: f32,
+    /// The longest shorter half-axis, world units.
+    pub largest_shorter: f32,
+    /// Some have caps.
+    pub caps: bool,
+}
+
+impl LevelFacts {
+    /// Those of `hierarchy`.
+    pub fn of(hierarchy: &Hierarchy) -> Self {
+        let largest = |of: fn(&Node) -> f32| hierarchy.nodes.par_iter().map(of).reduce(|| 0.0, f32::max);
+        Self {
+            largest_radius: largest(|node| node.surfel.radius() + node.cap.highest() as f32),
+            largest_shorter: largest(|node| node.surfel.shorter()),
+            caps: hierarchy.nodes.par_iter().any(|node| !node.cap.is_flat()),
+        }
+    }
+}
+
+/// Which of the lists that may be empty a scene has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Has {
+    /// [`Scene::low`].
+    pub low: bool,
+    /// [`Scene::clips`].
+    pub clips: bool,
+    /// [`Scene::caps`].
+    pub caps: bool,
+    /// [`Scene::normals`].
+    pub normals: bool,
+}
+
+impl Scene {
+    /// Which lists it has; where it holds a part of a scene, that has, though they are empty where it holds no surfel.
+    pub fn has(&self) -> Has {
+        let own = Has {
+            low: !self.low.is_empty(),
+            clips: !self.clips.is_empty(),
+            caps: !self.caps.is_empty(),
+            normals: !self.normals.is_empty(),
+        };
+        self.part_of.as_ref().map_or(own, |whole| whole.has)
+    }
+}
+
+impl Whole {
+    /// That of a scene that has all of its surfels and of their nodes; None of one without nodes.
+    pub fn of(scene: &Scene) -> Option<Self> {
+        let hierarchy = scene.hierarchy.as_deref()?;
+        let (body, framed, _) = body_and_framed(scene.places(), |index| scene.place(index));
+        Some(Self {
+            surfels: scene.surfels.len().try_into().ok()?,
+            nodes: hierarchy.nodes.len().try_into().ok()?,
+            origin: scene.origin,
+            bounds: scene.bounds(),
+            body,
+            core: scene.core(),
+            framed,
+            color: scene.color_range(),
+            largest_radius: scene.largest_radius(),
+            largest_shorter: scene.largest_shorter(),
+            levels: LevelFacts::of(hierarchy),
+            has: scene.has(),
+        })
+    }
+
+    /// Whether the surfels and nodes of a scene, which is not known to be a part of another, are within what this says of all.
+    pub fn holds(&self, part: &Scene) -> bool {
+        let (own, (low, high)) = (part.bounds(), part.color_range());
+        let least = |all: [f32; 4], own: [f32; 4]| all.iter().zip(own).all(|(all, own)| *all <= own);
+        let levels = part.hierarchy.as_deref().map(LevelFacts::of);
+        let nodes = levels.is_none_or(|own| {
+            own.largest_radius <= self.levels.largest_radius
+                && own.largest_shorter <= self.levels.largest_shorter
+                && (self.levels.caps || !own.caps)
+        });
+        let surfels = part.surfels.is_empty() || least(self.color.0, low) && least(high, self.color.1);
+        nodes
+            && surfels
+            && (own.is_empty() || self.bounds.union(own) == self.bounds)
+            && part.largest_radius() <= self.largest_radius
+            && part.largest_shorter() <= self.largest_shorter
+    }
+
+    /// Whether its origin is one that a scene with this body may have: f32 coordinates about it have the digits that they should.
+    pub fn is_near(&self) -> bool {
+        let Bounds { min, max } = self.body;
+        let most = 4.0 * (max - min).max_element();
+        let finite = self.origin.is_finite() && min.is_finite() && max.is_finite() && min.cmple(max).all();
+        finite && (most == 0.0 || min.abs().max(max.abs()).max_element() <= most)
+    }
+}

@@ -1,0 +1,281 @@
+//! The part of a file with levels of detail that a picture takes, as a scene whose picture is that of all of it, to the bit.
+//!
+//! From the root down, level by level: what is below a node is read where the picture may come to it. A node where it cannot is a leaf without surfels, so
+//! the part is a tree, too, of which the same nodes are drawn as of the whole.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::build::{Given, own_normal};
+use super::gather::gather;
+use crate::io::Points;
+use crate::io::ply::Levels;
+use crate::scene::hierarchy::{DEEPEST, FAN_OUT, Hierarchy, Node};
+use crate::scene::{Cap, Clip, Colors, Scene, Whole};
+use crate::{Progress, Result};
+
+/// Nodes or points that are read at once: what is made of them on the way takes no more memory.
+const BLOCK: u32 = 1 << 18;
+
+/// How much of a file a part is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Taken {
+    /// Nodes.
+    pub nodes: u64,
+    /// Surfels.
+    pub surfels: u64,
+    /// Bytes that these have in the file.
+    pub bytes: u64,
+}
+
+/// Nothing of a file but what all of its surfels say together.
+pub fn nothing(levels: &Levels) -> Scene {
+    let whole = levels.whole;
+    let oriented = !levels.unsided;
+    Scene {
+        origin: whole.origin,
+        oriented,
+        closed: levels.closed && oriented,
+        up: levels.up.unwrap_or_default(),
+        part_of: Some(Box::new(whole)),
+        ..Scene::default()
+    }
+}
+
+/// The part of a file that has the surfels and the children of those of its nodes that `may_be_divided`: a tree of nodes about the file's origin, and the
+/// number of one of them.
+///
+/// # Errors
+///
+/// [`Error::Read`](crate::Error::Read) and [`Error::Malformed`](crate::Error::Malformed) of the file, and whatever `fits` says of how much is taken so far.
+pub fn part(
+    levels: &mut Levels,
+    may_be_divided: impl Fn(&Hierarchy, u32) -> bool + Sync,
+    fits: impl Fn(&Taken) -> Result<()>,
+    progress: &dyn Progress,
+) -> Result<(Scene, Taken)> {
+    progress.begin("reading levels of detail", 0);
+    let grown = grown(levels, may_be_divided, fits, progress);
+    progress.end();
+    let (mut tree, taken) = grown?;
+    let numbers = in_order(&mut tree)
+        .ok_or_else(|| levels.malformed("the points of its levels of detail do not follow each other"))?;
+    progress.begin("reading surfels", taken.surfels);
+    let scene = scene(levels, &numbers, tree, progress);
+    progress.end();
+    Ok((scene?, taken))
+}
+
+/// The nodes of a part, of which leaves name surfels of the file, and how much it is.
+fn grown(
+    levels: &mut Levels,
+    may_be_divided: impl Fn(&Hierarchy, u32) -> bool + Sync,
+    fits: impl Fn(&Taken) -> Result<()>,
+    progress: &dyn Progress,
+) -> Result<(Hierarchy, Taken)> {
+    let (mut tree, mut taken) = (Hierarchy::default(), Taken { nodes: 0, surfels: 0, bytes: 0 });
+    // Those of a level, by their numbers in the file, which ascend.
+    let mut numbers: Vec<Range<u32>> = std::iter::once(0..1).collect();
+    for _ in 0..=DEEPEST {
+        let Some(last) = numbers.last() else { break };
+        let place = tree.nodes.len() + numbers.iter().map(Range::len).sum::<usize>();
+        let mut below = Below { numbers: Vec::new(), reached: last.end, place: place as u32, surfels: 0 };
+        for block in blocks(&numbers) {
+            let nodes = levels.nodes(&block)?;
+            let judged = (0..nodes.nodes.len() as u32).into_par_iter().with_min_len(256);
+            let divided: Vec<bool> = judged.map(|index| may_be_divided(&nodes, index)).collect();
+            progress.advance(divided.len() as u64);
+            taken.nodes += divided.len() as u64;
+            let added = below.append(&mut tree, nodes, &divided);
+            added.ok_or_else(|| levels.malformed("its levels of detail (element node) are no tree"))?;
+            fits(&Taken { surfels: taken.surfels + below.surfels, ..taken })?;
+        }
+        taken.surfels += below.surfels;
+        numbers = below.numbers;
+    }
+    if !numbers.is_empty() {
+        return Err(levels.malformed("its levels of detail (element node) are no tree: it is too deep"));
+    }
+    taken.bytes = levels.bytes(taken.surfels, taken.nodes);
+    Ok((tree, taken))
+}
+
+/// What is below a level.
+struct Below {
+    /// The numbers in the file of the children of its nodes that are divided.
+    numbers: Vec<Range<u32>>,
+    /// Those of the next ones are no smaller.
+    reached: u32,
+    /// The place in the part of the next one.
+    place: u32,
+    /// How many surfels its leaves have that are divided.
+    surfels: u64,
+}
+
+impl Below {
+    /// Appends nodes of the level to a tree: the children of those that are divided come next, and others are leaves without surfels. None if they
+    /// are no nodes of a tree.
+    fn append(&mut self, tree: &mut Hierarchy, nodes: Hierarchy, divided: &[bool]) -> Option<()> {
+        for (node, divided) in nodes.nodes.into_iter().zip(divided) {
+            if node.count == 0 || (!node.leaf && node.count as usize > FAN_OUT) {
+                return None;
+            }
+            tree.nodes.push(match (divided, node.leaf) {
+                (false, _) => Node { first: 0, count: 0, leaf: true, ..node },
+                (true, true) => {
+                    self.surfels += u64::from(node.count);
+                    node
+                }
+                (true, false) if node.first < self.reached => return None,
+                (true, false) => {
+                    self.reached = node.first.checked_add(node.count)?;
+                    push(&mut self.numbers, node.first..self.reached);
+                    let first = self.place;
+                    self.place += node.count;
+                    Node { first, ..node }
+                }
+            });
+        }
+        tree.low.extend(nodes.low);
+        Some(())
+    }
+}
+
+/// Ranges in blocks of so many numbers as are read at once.
+fn blocks(ranges: &[Range<u32>]) -> Vec<Vec<Range<u32>>> {
+    let (mut all, mut room) = (Vec::new(), 0);
+    for range in ranges {
+        let mut rest = range.clone();
+        while !rest.is_empty() {
+            if room == 0 {
+                all.push(Vec::new());
+                room = BLOCK;
+            }
+            let next = rest.start..rest.end.min(rest.start.saturating_add(room));
+            (room, rest.start) = (room - next.len() as u32, next.end);
+            all.last_mut().into_iter().for_each(|block| block.push(next.clone()));
+        }
+    }
+    all
+}
+
+/// Adds a range after all others.
+fn push(ranges: &mut Vec<Range<u32>>, next: Range<u32>) {
+    match ranges.last_mut() {
+        Some(last) if last.end == next.start => last.end = next.end,
+        _ => ranges.push(next),
+    }
+}
+
+/// The numbers in the file of the leaves' surfels from left to right, which get their places in the part; None if they do not ascend.
+fn in_order(tree: &mut Hierarchy) -> Option<Vec<Range<u32>>> {
+    let (mut all, mut reached, mut held) = (Vec::new(), 0, 0);
+    let mut open = vec![0];
+    while let Some(index) = open.pop() {
+        let node: &mut Node = &mut tree.nodes[index as usize];
+        let own = node.first..node.first.checked_add(node.count)?;
+        if !node.leaf {
+            // Children have larger numbers, so this ends.
+            open.extend(own.rev());
+            continue;
+        }
+        if !own.is_empty() {
+            if own.start < reached {
+                return None;
+            }
+            reached = own.end;
+            push(&mut all, own);
+        }
+        // Ranges that ascend have fewer than 2^32 numbers together.
+        (node.first, held) = (held, held + node.count);
+    }
+    Some(all)
+}
+
+/// The surfels of these numbers and the tree over them.
+fn scene(levels: &mut Levels, numbers: &[Range<u32>], tree: Hierarchy, progress: &dyn Progress) -> Result<Scene> {
+    let whole = levels.whole;
+    let mut scene = Scene { hierarchy: Some(Arc::new(tree)), part_of: None, ..nothing(levels) };
+    // Colours as the file has them, if it has none of a surfel.
+    scene.colors = levels.points(&[])?.colors.unwrap_or_default();
+    for block in blocks(numbers) {
+        let points = levels.points(&block)?;
+        progress.advance(points.positions.len() as u64);
+        add(&mut scene, points, &whole)
+            .ok_or_else(|| levels.malformed("a point of its levels of detail has no place or no half-axes"))?;
+    }
+    if !whole.holds(&scene) {
+        return Err(levels.malformed("its element 'scene' leaves out points or nodes that it has"));
+    }
+    Ok(Scene { part_of: Some(Box::new(whole)), ..scene })
+}
+
+/// Adds the surfels of some points; None if one of them is none.
+fn add(scene: &mut Scene, points: Points, whole: &Whole) -> Option<()> {
+    let count = points.positions.len();
+    let gathered = gather(vec![points]).ok().filter(|gathered| gathered.points.positions.len() == count)?;
+    let given = Given(&gathered);
+    if (0..count).into_par_iter().any(|i| given.lacks_normal(i)) {
+        return None;
+    }
+    let surfels = given.surfels(None, whole.origin);
+    let each = |has: bool| if has { 0..count } else { 0..0 };
+    let relative = |i: usize| DVec3::from_array(gathered.points.positions[i]) - whole.origin;
+    let rest = |i: usize| (relative(i) - DVec3::from_array(surfels[i].center.map(f64::from))).as_vec3().to_array();
+    let cap = |(i, cap): (usize, Cap)| cap.usable(surfels[i].radius().into());
+    let clips = gathered.points.clips.iter().flatten().copied().filter(|_| whole.has.clips);
+    scene.low.extend(each(whole.has.low).map(rest));
+    scene.clips.extend(clips.map(Clip::usable));
+    scene.caps.extend(given.caps().into_iter().enumerate().filter(|_| whole.has.caps).map(cap));
+    scene.normals.extend(each(whole.has.normals).map(|i| own_normal(&given, i, &surfels[i])));
+    match (&mut scene.colors, gathered.points.colors) {
+        (Colors::Srgb8(all), Some(Colors::Srgb8(own))) => all.extend(own),
+        (Colors::Linear(all), Some(Colors::Linear(own))) => all.extend(own),
+        // A file without colours.
+        _ => {}
+    }
+    scene.surfels.extend(surfels);
+    Some(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Surfel;
+
+    /// Leaves whose points are those of others, however many they say they are.
+    #[test]
+    fn points_follow_each_other() {
+        let node = |leaf: bool, first: u32, count: u32| {
+            let surfel = Surfel { center: [0.0; 3], s: [1.0, 0.0, 0.0], t: [0.0, 1.0, 0.0] };
+            Node { surfel, cap: Cap::FLAT, color: [1.0; 4], radius: 1.0, cone: 1.0, first, count, leaf }
+        };
+        let of = |one: (u32, u32), other: (u32, u32)| {
+            let leaf = |(first, count): (u32, u32)| node(true, first, count);
+            let nodes = vec![node(false, 1, 3), leaf(one), node(true, 0, 0), leaf(other)];
+            let mut tree = Hierarchy { nodes, low: Vec::new() };
+            in_order(&mut tree).map(|ranges| (ranges, tree.nodes[3].first))
+        };
+        assert_eq!(of((4, 2), (9, 3)), Some((vec![4..6, 9..12], 2)));
+        assert_eq!(of((4, 2), (6, 3)), Some((std::iter::once(4..9).collect(), 2)));
+        assert_eq!(of((4, 2), (5, 3)), None);
+        assert_eq!(of((0, u32::MAX), (5, 10)), None);
+        assert_eq!(of((4, 2), (u32::MAX, 2)), None);
+    }
+
+    #[test]
+    fn blocks_have_all_numbers_once() {
+        for ranges in
+            [vec![], vec![3..4], vec![0..BLOCK, BLOCK + 9..BLOCK + 12], vec![5..3 * BLOCK + 1, u32::MAX - 3..u32::MAX]]
+        {
+            let blocks = blocks(&ranges);
+            assert!(blocks.iter().flatten().cloned().flatten().eq(ranges.iter().cloned().flatten()));
+            let counts: Vec<usize> = blocks.iter().map(|block| block.iter().map(Range::len).sum()).collect();
+            assert!(counts.iter().rev().skip(1).all(|count| *count == BLOCK as usize), "{counts:?}");
+            assert!(counts.last().is_none_or(|count| (1..=BLOCK as usize).contains(count)), "{counts:?}");
+        }
+    }
+}

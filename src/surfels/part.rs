@@ -268,9 +268,12 @@ mod tests {
 
     #[test]
     fn blocks_have_all_numbers_once() {
-        for ranges in
-            [vec![], vec![3..4], vec![0..BLOCK, BLOCK + 9..BLOCK + 12], vec![5..3 * BLOCK + 1, u32::MAX - 3..u32::MAX]]
-        {
+        for ranges in [
+            vec![],
+            std::iter::once(3..4).collect(),
+            vec![0..BLOCK, BLOCK + 9..BLOCK + 12],
+            vec![5..3 * BLOCK + 1, u32::MAX - 3..u32::MAX],
+        ] {
             let blocks = blocks(&ranges);
             assert!(blocks.iter().flatten().cloned().flatten().eq(ranges.iter().cloned().flatten()));
             let counts: Vec<usize> = blocks.iter().map(|block| block.iter().map(Range::len).sum()).collect();

@@ -3,7 +3,7 @@
 use epsplat::io::ply::Levels;
 use epsplat::plan::RenderOptions;
 use epsplat::render::taken;
-use epsplat::scene::{Camera, Scene};
+use epsplat::scene::{Camera, Scene, Surfel};
 use epsplat::surfels::part::{Taken, nothing};
 use epsplat::surfels::{Limits, Preparation};
 use epsplat::{Error, Progress, Result};
@@ -21,7 +21,7 @@ const OVERVIEW: u32 = 50_000;
 /// A file that is a scene.
 pub(super) struct Tree {
     levels: Levels,
-    /// Its coarsest nodes as surfels.
+    /// The places of its coarsest nodes.
     pub overview: Scene,
 }
 
@@ -51,7 +51,8 @@ impl Tree {
         let nodes = levels.nodes(std::slice::from_ref(&coarsest))?;
         // Those that stand for what is not here.
         let lowest = nodes.nodes.iter().filter(|node| node.leaf || node.first as usize >= nodes.nodes.len());
-        let surfels = lowest.map(|node| node.surfel).collect();
+        // Nodes reach past what is below them, and few of them farther than a margin of the view.
+        let surfels = lowest.map(|node| Surfel { s: [0.0; 3], t: [0.0; 3], ..node.surfel }).collect();
         let overview = Scene { surfels, ..nothing(&levels) };
         Ok(Some(Self { levels, overview }))
     }

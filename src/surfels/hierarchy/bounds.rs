@@ -241,7 +241,8 @@ pub(super) fn node(scene: &Scene, set: &Set, sums: &Sums, below: Below<'_>, scal
     let stored = shape.s.cross(shape.t).normalize();
     let plane = [shape.s.normalize(), shape.t.normalize(), stored];
     let mean = lattice.position(sums.moments.mean());
-    let heights = curvature::heights(scene, set, below, mean, plane);
+    let curves = sums.alignment((normal, sided)) >= curvature::LEAST_ALIGNMENT;
+    let heights = if curves { curvature::heights(scene, set, below, mean, plane) } else { curvature::FLAT };
     // A paraboloid with its top at the mean would lie off the surface by the mean height: that much to the other side it does not.
     let top = mean - stored * curvature::mean_height(heights, sums.covariance_of_centers(lattice), plane);
     // As a file in world coordinates has it, so that what is read back is the same.

@@ -144,6 +144,16 @@ impl Sums {
         (nearest, false)
     }
 
+    /// How far the normals point in one direction, along which `normal` is: from 0 to 1, where all are parallel.
+    pub fn alignment(&self, (normal, sided): (DVec3, bool)) -> f64 {
+        let count = self.moments.count as f64;
+        if sided {
+            return DVec3::from_array(self.normal.map(|value| value as f64 / NORMAL_ONE)).length() / count;
+        }
+        let [xx, yy, zz, xy, xz, yz] = self.axial.map(|value| value as f64 / PRODUCT_ONE);
+        (normal.dot(Symmetric3 { xx, yy, zz, xy, xz, yz }.times(normal)) / count).max(0.0).sqrt()
+    }
+
     /// The mean colour, linear, straight alpha.
     pub fn color(&self, scale: &Scales) -> [f32; 4] {
         scale.color(self.color.map(|sum| sum as f64 / self.moments.count as f64))

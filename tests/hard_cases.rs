@@ -124,7 +124,7 @@ fn a_broken_kernel_fails_a_hard_case() {
             "sheets 3e-6 about epsilon",
         ),
         ("epsilon_ray.wgsl", " * along_axis(image)", "", "epsilon along the ray"),
-        ("side.wgsl", "same_side && ", "", "fronts and backs that cross"),
+        ("side.wgsl", "&& same_side", "", "fronts and backs that cross"),
         ("side.wgsl", "select(0u, SIDE_BIT,", "select(SIDE_BIT, 0u,", "fronts and backs that cross"),
         ("side.wgsl", "~SIDE_BIT", "~(64u * SIDE_BIT)", "fronts and backs that cross"),
         (

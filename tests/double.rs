@@ -79,7 +79,13 @@ fn pairs() -> Vec<[f32; 4]> {
 /// entered (the sum) or to the result (product and quotient); last, the largest trailing part over its leading one.
 fn errors(gpu: &Gpu, double: &str) -> [f64; 6] {
     let layout = FILES.iter().find(|(name, _)| *name == "layout.wgsl").unwrap().1;
-    let text = [layout, "struct Clip { nothing: u32 } struct Cap { nothing: u32 } struct Fade { nothing: u32 }", double, KERNEL].join("\n");
+    let text = [
+        layout,
+        "struct Clip { nothing: u32 } struct Cap { nothing: u32 } struct Fade { nothing: u32 }",
+        double,
+        KERNEL,
+    ]
+    .join("\n");
     let pairs = pairs();
     let results: Vec<[f32; 2]> = evaluate(gpu, &text, &View::zeroed(), &pairs, 5 * pairs.len() as u64).unwrap();
     let wide = |high: f32, low: f32| f64::from(high) + f64::from(low);

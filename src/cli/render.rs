@@ -210,7 +210,7 @@ pub struct Arguments {
     #[arg(long = "texture", value_name = "IMAGE")]
     textures: Vec<PathBuf>,
     /// Draw a cut of levels of detail: nodes that are seen smaller than this in place of the surfels below them. Square pixels, 16px, or a part of
-    /// the image, 0.01%; 0 draws all surfels. `epsplat lod` keeps the levels in a file, else they are made first; of COPC files only the nodes that it takes are read
+    /// the image, 0.01%; 0 draws all surfels. `epsplat lod` keeps the levels in a file, else they are made first; of COPC files, and of files of `epsplat lod` with 500,000 surfels or more, only what it takes is read
     #[arg(long, value_name = "SIZE", group = "cut")]
     lod: Option<Detail>,
     /// Draw a cut of no more surfels and nodes than this, and hardly fewer: --lod by a size that is found for each view. What reaches the

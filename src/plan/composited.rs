@@ -1,4 +1,4 @@
-//! Whether surfaces show through each other at all.
+//! Whether surfaces show through each other at all, and what becomes of their fragments if they do.
 
 use super::{Facts, RenderOptions};
 use crate::scene::{Composite, Map};
@@ -12,5 +12,45 @@ pub fn composited(facts: &Facts, options: &RenderOptions) -> Composite {
             Composite::Opaque
         }
         chosen => chosen,
+    }
+}
+
+/// What becomes of the lists of pixels' fragments ([`fragments`](crate::passes::fragments)).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Lists {
+    /// Surfaces, blended each and composited ([`layers`](crate::passes::layers)).
+    Layers,
+    /// They are composited one by one ([`sorted`](crate::passes::sorted)).
+    Sorted,
+}
+
+/// What weighs a fragment beside its kernel, where all of a pixel are summed in any order ([`oit`](crate::passes::oit)).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Oit {
+    /// Its depth.
+    Weighted,
+    /// What the moments of all fragments say of its depth ([`moments`](crate::passes::moments)).
+    Moments,
+}
+
+impl Oit {
+    /// That of a picture, if it has one.
+    pub(super) fn of(options: &RenderOptions) -> Option<Self> {
+        match options.composite {
+            Composite::Weighted => Some(Self::Weighted),
+            Composite::Moments => Some(Self::Moments),
+            _ => None,
+        }
+    }
+}
+
+impl Lists {
+    /// Those of a picture, whoever renders it.
+    pub(super) fn of(facts: &Facts, options: &RenderOptions) -> Option<Self> {
+        match composited(facts, options) {
+            Composite::Opaque | Composite::Weighted | Composite::Moments => None,
+            Composite::Layers(_) => Some(Self::Layers),
+            Composite::Sorted | Composite::Gaussians => Some(Self::Sorted),
+        }
     }
 }

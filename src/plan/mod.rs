@@ -21,13 +21,13 @@ pub mod tuning;
 mod view;
 
 pub use accumulator::{ACCUMULATORS, Accumulator, AccumulatorRow, Features, wide_bits};
-pub use composited::composited;
+pub use composited::{Lists, Oit, composited};
 pub use cuts::{Band, bands, page_surfels};
 pub use facts::{ColorNeed, Facts};
 pub use fragment::{FragmentLayout, KEY_WORDS};
 pub use known::Known;
 pub use mesh::{MeshFacts, MeshNeeds, texture_words};
-pub use needs::{EpsilonForm, Lists, Oit, SMALL_WEIGHT, SceneNeeds, Sides, Winner, culls_back};
+pub use needs::{EpsilonForm, SMALL_WEIGHT, SceneNeeds, Sides, Winner, culls_back};
 pub use optimisation::Optimisation;
 pub use options::{BackendName, Organisation, RenderOptions};
 pub use pixel::{COLOR_CHANNEL, PixelLayout, color_channels};

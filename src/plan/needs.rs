@@ -1,8 +1,8 @@
 //! What a scene and its options need, computed once: the only variant key of the kernels.
 
 use super::{
-    Accumulator, ColorNeed, Facts, MeshNeeds, Optimisation, Organisation, Raster, RasterDepth, RenderOptions,
-    composited, tuning,
+    Accumulator, ColorNeed, Facts, Lists, MeshNeeds, Oit, Optimisation, Organisation, Raster, RasterDepth,
+    RenderOptions, composited, tuning,
 };
 use crate::gpu::adapter::AdapterDescription;
 use crate::passes::peel;
@@ -135,45 +135,6 @@ pub enum Winner {
     Second,
     /// By the rasteriser's depth test.
     Rasterised,
-}
-
-/// What becomes of the lists of pixels' fragments ([`fragments`](crate::passes::fragments)).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Lists {
-    /// Surfaces, blended each and composited ([`layers`](crate::passes::layers)).
-    Layers,
-    /// They are composited one by one ([`sorted`](crate::passes::sorted)).
-    Sorted,
-}
-
-/// What weighs a fragment beside its kernel, where all of a pixel are summed in any order ([`oit`](crate::passes::oit)).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Oit {
-    /// Its depth.
-    Weighted,
-    /// What the moments of all fragments say of its depth ([`moments`](crate::passes::moments)).
-    Moments,
-}
-
-impl Oit {
-    fn of(options: &RenderOptions) -> Option<Self> {
-        match options.composite {
-            Composite::Weighted => Some(Self::Weighted),
-            Composite::Moments => Some(Self::Moments),
-            _ => None,
-        }
-    }
-}
-
-impl Lists {
-    /// Those of a picture, whoever renders it.
-    pub(super) fn of(facts: &Facts, options: &RenderOptions) -> Option<Self> {
-        match composited(facts, options) {
-            Composite::Opaque | Composite::Weighted | Composite::Moments => None,
-            Composite::Layers(_) => Some(Self::Layers),
-            Composite::Sorted | Composite::Gaussians => Some(Self::Sorted),
-        }
-    }
 }
 
 /// What the triangles of a scene need, if there are any. Without splats nothing is joined.

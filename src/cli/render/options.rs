@@ -23,6 +23,17 @@ impl Arguments {
     }
 }
 
+impl From<LowPassName> for LowPass {
+    fn from(name: LowPassName) -> Self {
+        match name {
+            LowPassName::None => Self::None,
+            LowPassName::Max => Self::Max,
+            LowPassName::Ewa => Self::Ewa,
+            LowPassName::Gaussians => Self::Gaussians,
+        }
+    }
+}
+
 pub(super) fn options(arguments: &Arguments, format: Format) -> Result<RenderOptions> {
     let maps = Maps::of(&arguments.aov);
     if !maps.is_empty() && format == Format::Png {
@@ -66,12 +77,7 @@ pub(super) fn options(arguments: &Arguments, format: Format) -> Result<RenderOpt
         samples: arguments.samples.unwrap_or(SAMPLES),
         facing: facing(arguments),
         outline: arguments.outline,
-        low_pass: match arguments.lowpass {
-            None | Some(LowPassName::None) => LowPass::None,
-            Some(LowPassName::Max) => LowPass::Max,
-            Some(LowPassName::Ewa) => LowPass::Ewa,
-            Some(LowPassName::Gaussians) => LowPass::Gaussians,
-        },
+        low_pass: arguments.lowpass.map_or(LowPass::None, LowPass::from),
         accumulator: arguments.accumulator.unwrap_or_default(),
         organisation: arguments.organisation.unwrap_or_default(),
         raster: raster(arguments),

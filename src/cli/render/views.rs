@@ -167,7 +167,11 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
     if let (Some((first, unseen)), count) = empty.into_inner() {
         note(&format!("{} ({}, the first of {count} empty pictures)", unseen, first.display()));
     }
-    let views = pictures;
+    tell(arguments, pictures, writers, start)
+}
+
+/// Tells of all pictures, since the scene was there.
+fn tell(arguments: &Arguments, views: Vec<Picture>, writers: NonZeroUsize, start: Instant) -> Result<()> {
     views.iter().for_each(|view| note_overflows(&view.report));
     let reports = Reports {
         writers: writers.get(),

@@ -6,9 +6,10 @@ mod common;
 
 use std::path::Path;
 use std::process::Command;
+use std::sync::Arc;
 
 use epsplat::io::{self, Points, ply};
-use epsplat::scene::{Colors, Scene};
+use epsplat::scene::{Colors, Hierarchy, Scene};
 use epsplat::surfels::{build, hierarchy};
 
 fn epsplat(arguments: &[&str]) -> (i32, String, String) {
@@ -56,7 +57,7 @@ fn a_file_keeps_levels_of_detail() {
     let path = folder.path().join("levels.ply");
     for linear in [false, true] {
         let scene = lod(points(3000, linear));
-        ply::write_points(&path, &hierarchy::points(&scene), &()).unwrap();
+        ply::write_scene(&path, &scene, None, &()).unwrap();
         let read = io::read(&path, &()).unwrap();
         assert_eq!(read.positions.len(), 3000);
         let (again, _) = build(vec![read], &()).unwrap();
@@ -79,7 +80,7 @@ fn normals_without_a_side_stay_without_one() {
     let path = folder.path().join("levels.ply");
     let scene = lod(Points { normals: None, radii: None, ..points(800, false) });
     assert!(!scene.oriented);
-    ply::write_points(&path, &hierarchy::points(&scene), &()).unwrap();
+    ply::write_scene(&path, &scene, None, &()).unwrap();
     let (again, _) = build(vec![io::read(&path, &()).unwrap()], &()).unwrap();
     assert!(!again.oriented && again.hierarchy.is_some());
 }
@@ -89,38 +90,30 @@ fn normals_without_a_side_stay_without_one() {
 fn broken_trees_are_told() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("levels.ply");
-    let whole = hierarchy::points(&lod(points(500, false)));
-    let rejected = |change: &dyn Fn(&mut Points)| {
-        let mut broken = whole.clone();
+    let whole = lod(points(500, false));
+    let rejected = |change: &dyn Fn(&mut Hierarchy)| {
+        let mut broken = whole.hierarchy.as_deref().unwrap().clone();
         change(&mut broken);
-        ply::write_points(&path, &broken, &()).unwrap();
+        let broken = Scene { hierarchy: Some(Arc::new(broken)), ..whole.clone() };
+        ply::write_scene(&path, &broken, None, &()).unwrap();
         let (code, _, told) = epsplat(&["info", path.to_str().unwrap()]);
         assert_eq!(code, 1, "{told}");
         assert!(told.contains("levels.ply") && told.lines().count() == 1, "{told}");
         told
     };
-    let tree = |points: &mut Points| points.tree.take().unwrap();
-    let row = |points: &mut Points, index: usize, change: &dyn Fn(&mut io::TreeRow)| {
-        let mut own = tree(points);
-        change(&mut own.rows[index]);
-        points.tree = Some(own);
-    };
-    let inner = whole.tree.as_ref().unwrap().rows.iter().skip(1).position(|row| !row.leaf).unwrap() + 1;
-    assert!(rejected(&|points| row(points, inner, &|row| row.first = 0)).contains("children"));
-    assert!(rejected(&|points| row(points, inner, &|row| row.first = u32::MAX)).contains("children"));
-    assert!(rejected(&|points| row(points, 0, &|row| row.count = 200)).contains("too much"));
-    assert!(rejected(&|points| row(points, inner, &|row| row.leaf = true)).contains("node"));
-    let last = whole.tree.as_ref().unwrap().rows.len() - 1;
-    assert!(rejected(&|points| row(points, last, &|row| row.count += 1)).contains("points"));
-    assert!(rejected(&|points| row(points, last, &|row| row.count = 0)).contains("nothing"));
-    let told = rejected(&|points| {
-        let mut own = tree(points);
-        own.nodes.positions[3][0] = f64::INFINITY;
-        points.tree = Some(own);
-    });
+    let nodes = &whole.hierarchy.as_ref().unwrap().nodes;
+    let inner = nodes.iter().skip(1).position(|node| !node.leaf).unwrap() + 1;
+    assert!(rejected(&|tree| tree.nodes[inner].first = 0).contains("children"));
+    assert!(rejected(&|tree| tree.nodes[inner].first = u32::MAX).contains("children"));
+    assert!(rejected(&|tree| tree.nodes[0].count = 200).contains("too much"));
+    assert!(rejected(&|tree| tree.nodes[inner].leaf = true).contains("node"));
+    let last = nodes.len() - 1;
+    assert!(rejected(&|tree| tree.nodes[last].count += 1).contains("points"));
+    assert!(rejected(&|tree| tree.nodes[last].count = 0).contains("nothing"));
+    let told = rejected(&|tree| tree.nodes[3].surfel.center[0] = f32::INFINITY);
     assert!(told.contains("no numbers"), "{told}");
     // Cut off in what it says of all points, and in its nodes.
-    ply::write_points(&path, &whole, &()).unwrap();
+    ply::write_scene(&path, &whole, None, &()).unwrap();
     let bytes = std::fs::read(&path).unwrap();
     for (less, element) in [(40, "scene"), (400, "node")] {
         std::fs::write(&path, &bytes[..bytes.len() - less]).unwrap();

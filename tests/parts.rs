@@ -19,13 +19,13 @@ use epsplat::scene::{
     Whole,
 };
 use epsplat::surfels::part::{Taken, nothing};
-use epsplat::surfels::{self, hierarchy};
+use epsplat::surfels;
 use epsplat::{Error, Result};
 use glam::{DVec3, Vec3};
 
 fn written(scene: Scene, folder: &Path) -> PathBuf {
     let path = folder.join("levels.ply");
-    ply::write_points(&path, &hierarchy::points(&levels(scene)), &()).unwrap();
+    ply::write_scene(&path, &levels(scene), None, &()).unwrap();
     path
 }
 
@@ -298,16 +298,21 @@ fn damaged_files_are_told() {
 #[test]
 fn other_files_are_read_whole() {
     let folder = tempfile::tempdir().unwrap();
-    let open = |name: &str, points: &io::Points| {
-        let path = folder.path().join(name);
-        ply::write_points(&path, points, &()).unwrap();
-        Levels::open(Input::open(&path, None).unwrap()).unwrap().is_some()
-    };
-    let points = hierarchy::points(&levels(sphere(500, 1.7)));
-    assert!(open("levels.ply", &points));
-    assert!(!open("plain.ply", &io::Points { tree: None, whole: None, ..points.clone() }));
-    assert!(!open("older.ply", &io::Points { whole: None, ..points.clone() }));
-    assert!(!open("beside.ply", &io::Points { beside: Some("mesh.obj".into()), ..points }));
+    let path = folder.path().join("levels.ply");
+    let open = || Levels::open(Input::open(&path, None).unwrap()).unwrap().is_some();
+    let scene = levels(sphere(500, 1.7));
+    ply::write_scene(&path, &Scene { hierarchy: None, ..scene.clone() }, None, &()).unwrap();
+    assert!(!open());
+    ply::write_scene(&path, &scene, Some(Path::new("mesh.obj")), &()).unwrap();
+    assert!(!open());
+    ply::write_scene(&path, &scene, None, &()).unwrap();
+    assert!(open());
+    let mut bytes = std::fs::read(&path).unwrap();
+    let name = b"element scene";
+    let at = bytes.windows(name.len()).position(|words| words == name).unwrap();
+    bytes[at..at + name.len()].copy_from_slice(b"element other");
+    std::fs::write(&path, &bytes).unwrap();
+    assert!(!open());
     let obj = folder.path().join("points.obj");
     std::fs::write(&obj, "v 0 0 0\n").unwrap();
     assert!(Levels::open(Input::open(&obj, None).unwrap()).unwrap().is_none());

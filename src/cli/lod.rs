@@ -75,16 +75,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     let divided = seconds();
     let surfels = scene.surfels.len() as u64;
-    let mut points = match arguments.cut {
-        Some(length) => hierarchy::points(&Cut::by_length(&tree, length).scene(&scene, &tree, true)),
-        None => hierarchy::points(&scene),
-    };
-    drop(scene);
-    points.beside = beside;
-    ply::write_points(&arguments.output, &points, &bars)?;
+    let cut = arguments.cut.map(|length| Cut::by_length(&tree, length).scene(&scene, &tree, true));
+    let written = cut.as_ref().unwrap_or(&scene);
+    ply::write_scene(&arguments.output, written, beside.as_deref(), &bars)?;
     let report = Report {
         surfels,
-        cut: arguments.cut.map(|_| points.positions.len() as u64),
+        cut: cut.map(|cut| cut.surfels.len() as u64),
         nodes: tree.nodes.len() as u64,
         levels: tree.levels() as u64,
         seconds: [read, made, divided, seconds()],

@@ -1,10 +1,8 @@
 //! Levels of detail as a file has them.
 
 use super::Points;
-use crate::scene::color::srgb8;
 use crate::scene::hierarchy::{Fault, Hierarchy, Node};
-use crate::scene::{Colors, Surfel};
-use rayon::prelude::*;
+use crate::scene::Surfel;
 
 /// The largest number of a node, as for coordinates of points.
 const LARGEST: f32 = 1e18;
@@ -84,28 +82,5 @@ impl Tree {
             }
         };
         Some(what)
-    }
-
-    /// The nodes of a scene's levels of detail, in world coordinates.
-    pub fn of(hierarchy: &Hierarchy, origin: glam::DVec3, coded: bool) -> Self {
-        let nodes = &hierarchy.nodes;
-        let position = |(index, node): (usize, &Node)| {
-            let low = hierarchy.low.get(index).copied().unwrap_or_default();
-            let [center, low] = [node.surfel.center, low].map(|part| glam::DVec3::from_array(part.map(f64::from)));
-            (origin + (center + low)).to_array()
-        };
-        let points = Points {
-            positions: nodes.par_iter().enumerate().map(position).collect(),
-            axes: Some(nodes.iter().map(|node| [node.surfel.s, node.surfel.t]).collect()),
-            radii: Some(nodes.iter().map(|node| node.radius).collect()),
-            caps: Some(nodes.iter().map(|node| node.cap).collect()),
-            colors: Some(match coded {
-                true => Colors::Srgb8(nodes.par_iter().map(|node| srgb8(node.color)).collect()),
-                false => Colors::Linear(nodes.iter().map(|node| node.color).collect()),
-            }),
-            ..Points::default()
-        };
-        let row = |&Node { cone, first, count, leaf, .. }: &Node| TreeRow { cone, first, count, leaf };
-        Self { nodes: Box::new(points), rows: nodes.iter().map(row).collect() }
     }
 }

@@ -6,9 +6,9 @@
 use std::collections::HashMap;
 
 use glam::{DVec3, IVec3};
-use rayon::prelude::*;
 
 use super::Bounds;
+use super::body::Places;
 
 /// Two groups of points are one if they are nearer to each other than this part of the core's longest edge; farther than twice that,
 /// they are apart.
@@ -38,25 +38,20 @@ impl Cell {
     }
 }
 
-/// The box of those of `count` points in `body` that are not apart, and how many are: a group of at most [`FEW`] different points,
-/// and one in [`SHARE`] of all, that lies apart from `core` and from all others, and whose disks do not bridge that. `at` gives a
-/// point and its radius. It depends on the set of points alone.
-pub(super) fn without_apart(
-    (core, body): (&Bounds, &Bounds),
-    count: usize,
-    at: impl Fn(usize) -> (DVec3, f64) + Sync,
-) -> (Bounds, u64) {
+/// The box of those points in `body` that are not apart, and how many are: a group of at most [`FEW`] different points,
+/// and one in [`SHARE`] of all, that lies apart from `core` and from all others, and whose disks do not bridge that. It depends on the set of points alone.
+pub(super) fn without_apart((core, body): (&Bounds, &Bounds), places: &impl Places) -> (Bounds, u64) {
     let edge = APART * core.extent().max_element();
     let near = Bounds { min: core.min - 2.0 * edge, max: core.max + 2.0 * edge };
     let holds = |bounds: &Bounds, p: DVec3| p.cmpge(bounds.min).all() && p.cmple(bounds.max).all();
-    if (count as u64) < SHARE || holds(&near, body.min) && holds(&near, body.max) {
+    let count = places.count() as u64;
+    if count < SHARE || holds(&near, body.min) && holds(&near, body.max) {
         return (*body, 0);
     }
     // What is near the core is of it; the grid is of what is beyond.
     let grid = |p: DVec3| ((p - core.min) / edge).floor().as_ivec3();
     type Beyond = (Bounds, HashMap<IVec3, Cell>);
-    let add = |(mut inside, mut cells): Beyond, index: usize| {
-        let (p, radius) = at(index);
+    let add = |(mut inside, mut cells): Beyond, p: DVec3, radius: f64| {
         if holds(&near, p) {
             inside = inside.with_point(p);
         } else if holds(body, p) {
@@ -73,14 +68,13 @@ pub(super) fn without_apart(
         (a.0.union(b.0), cells)
     };
     let nothing = || (Bounds::EMPTY, HashMap::new());
-    let (mut bounds, mut cells) =
-        (0..count).into_par_iter().with_min_len(65_536).fold(nothing, add).reduce(nothing, join);
+    let (mut bounds, mut cells) = places.fold(nothing, add, join);
     let mut apart = 0;
     while let Some(&first) = cells.keys().next() {
         let group = taken(&mut cells, first);
         // A gap of less than a cell to the core's surroundings is none.
         let touches = group.bounds.min.cmple(near.max + edge).all() && group.bounds.max.cmpge(near.min - edge).all();
-        let few = group.count <= FEW.min(count as u64 / SHARE) || group.bounds.extent() == DVec3::ZERO;
+        let few = group.count <= FEW.min(count / SHARE) || group.bounds.extent() == DVec3::ZERO;
         if few && !touches && !group.large {
             apart += group.count;
         } else {

@@ -25,16 +25,57 @@ const FAR: f64 = 16.0;
 /// The narrowest scene, world units, whose half-axes and depths have products that an f32 holds to the last digit.
 pub(crate) const SMALLEST_SCENE: f64 = 1e-15;
 
+/// Positions with the radii of what is there, wherever these are kept.
+pub(crate) trait Places: Sync {
+    /// How many there are.
+    fn count(&self) -> usize;
+
+    /// Adds all to `nothing`, in parts that are joined, in any order.
+    fn fold<T: Send>(
+        &self,
+        nothing: impl Fn() -> T + Sync + Send,
+        add: impl Fn(T, DVec3, f64) -> T + Sync + Send,
+        join: impl Fn(T, T) -> T + Sync + Send,
+    ) -> T;
+}
+
+/// So many places in memory, by number.
+pub(crate) struct Listed<F>(pub usize, pub F);
+
+impl<F: Fn(usize) -> (DVec3, f64) + Sync> Places for Listed<F> {
+    fn count(&self) -> usize {
+        self.0
+    }
+
+    fn fold<T: Send>(
+        &self,
+        nothing: impl Fn() -> T + Sync + Send,
+        add: impl Fn(T, DVec3, f64) -> T + Sync + Send,
+        join: impl Fn(T, T) -> T + Sync + Send,
+    ) -> T {
+        let add = |all: T, index: usize| {
+            let (position, radius) = self.1(index);
+            add(all, position, radius)
+        };
+        (0..self.0).into_par_iter().with_min_len(1 << 14).fold(&nothing, add).reduce(&nothing, join)
+    }
+}
+
 /// The box of `count` positions without those that stray, and how many do. It depends on the set of positions alone, on no order:
 /// the core, which holds all but one in 64 beyond each side, is that of a sample chosen by the coordinates' own bits. Positions
 /// that are not finite are in no box.
 pub(crate) fn body(count: usize, position: impl Fn(usize) -> DVec3 + Sync) -> (Bounds, u64) {
-    body_around(core(count, &position), count, &position)
+    body_of(&Listed(count, |index| (position(index), 0.0)))
+}
+
+/// The same of places.
+pub(crate) fn body_of(places: &impl Places) -> (Bounds, u64) {
+    body_around(core(places), places)
 }
 
 /// The same, where the core is known.
-fn body_around(core: Option<Bounds>, count: usize, position: &(impl Fn(usize) -> DVec3 + Sync)) -> (Bounds, u64) {
-    let all = box_of(count, position, |_| true).0;
+fn body_around(core: Option<Bounds>, places: &impl Places) -> (Bounds, u64) {
+    let all = box_of(places, |_| true).0;
     let Some(core) = core else { return (all, 0) };
     let far = FAR * core.extent().max_element();
     let (low, high) = (core.min - far, core.max + far);
@@ -43,48 +84,45 @@ fn body_around(core: Option<Bounds>, count: usize, position: &(impl Fn(usize) ->
     if far < FAR * SMALLEST_SCENE || all.is_empty() || holds(all.min) && holds(all.max) {
         return (all, 0);
     }
-    box_of(count, position, holds)
+    box_of(places, holds)
 }
 
-/// The box of what the default view shows of `count` points, each with its radius, and how many are not in it: those that stray
+/// The box of what the default view shows of places, each with its radius, and how many are not in it: those that stray
 /// from the body, and those few that lie [apart](super::apart) from it.
-pub(crate) fn framed(count: usize, at: impl Fn(usize) -> (DVec3, f64) + Sync) -> (Bounds, u64) {
-    let (_, framed, left_out) = body_and_framed(count, at);
+pub(crate) fn framed(places: &impl Places) -> (Bounds, u64) {
+    let (_, framed, left_out) = body_and_framed(places);
     (framed, left_out)
 }
 
 /// The body, the box of what the default view shows, and how many are not in that.
-pub(crate) fn body_and_framed(count: usize, at: impl Fn(usize) -> (DVec3, f64) + Sync) -> (Bounds, Bounds, u64) {
-    let core = core(count, &|index| at(index).0);
-    let (body, strays) = body_around(core, count, &|index| at(index).0);
+pub(crate) fn body_and_framed(places: &impl Places) -> (Bounds, Bounds, u64) {
+    let core = core(places);
+    let (body, strays) = body_around(core, places);
     let Some(core) = core.filter(|core| core.extent().max_element() >= SMALLEST_SCENE && !body.is_empty()) else {
         return (body, body, strays);
     };
-    let (bounds, apart) = without_apart((&core, &body), count, at);
+    let (bounds, apart) = without_apart((&core, &body), places);
     (body, bounds, strays + apart)
 }
 
 /// The box of the finite positions that are wanted, and how many are not.
-fn box_of(
-    count: usize,
-    position: &(impl Fn(usize) -> DVec3 + Sync),
-    wanted: impl Fn(DVec3) -> bool + Sync,
-) -> (Bounds, u64) {
-    let add = |(bounds, others): (Bounds, u64), index: usize| {
-        let p = position(index);
+fn box_of(places: &impl Places, wanted: impl Fn(DVec3) -> bool + Sync + Send) -> (Bounds, u64) {
+    let add = |(bounds, others): (Bounds, u64), p: DVec3, _| {
         let unwanted = p.is_finite() && !wanted(p);
         (if unwanted { bounds } else { bounds.with_point(p) }, others + u64::from(unwanted))
     };
-    let join = |a: (Bounds, u64), b: (Bounds, u64)| (a.0.union(b.0), a.1 + b.1);
-    (0..count).into_par_iter().with_min_len(4096).fold(|| (Bounds::EMPTY, 0), add).reduce(|| (Bounds::EMPTY, 0), join)
+    places.fold(|| (Bounds::EMPTY, 0), add, |a, b| (a.0.union(b.0), a.1 + b.1))
 }
 
 /// The box between the quantiles of the sampled positions, axis by axis; none if there are too few.
-fn core(count: usize, position: &(impl Fn(usize) -> DVec3 + Sync)) -> Option<Bounds> {
-    let share = SAMPLED as f64 / count.max(1) as f64;
+fn core(places: &impl Places) -> Option<Bounds> {
+    let share = SAMPLED as f64 / places.count().max(1) as f64;
     let most = if share < 1.0 { (share * 2f64.powi(64)) as u64 } else { u64::MAX };
-    let chosen = |index| Some(position(index)).filter(|p| p.is_finite() && hash(*p) <= most);
-    let mut sample: Vec<DVec3> = (0..count).into_par_iter().with_min_len(4096).filter_map(chosen).collect();
+    let add = |mut chosen: Vec<DVec3>, p: DVec3, _| {
+        chosen.extend(Some(p).filter(|p| p.is_finite() && hash(*p) <= most));
+        chosen
+    };
+    let mut sample = places.fold(Vec::new, add, |one, other| [one, other].concat());
     // What a scanner writes for nothing may be there a million times; it is one position.
     let bits = |p: &DVec3| p.to_array().map(f64::to_bits);
     sample.sort_unstable_by_key(bits);

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::harmonics::Harmonics;
-pub use super::srgb::{SRGB8_TO_LINEAR, linear_to_srgb, srgb_to_linear};
+pub use super::srgb::{SRGB8_TO_LINEAR, linear_to_srgb, srgb_to_linear, srgb8_of};
 use super::texture::Textured;
 
 /// The colours of a scene or of one input, with straight alpha.
@@ -27,9 +27,7 @@ pub const DEFAULT_COLOR: [f32; 4] = [0.7, 0.7, 0.7, 1.0];
 /// The nearest 8-bit sRGB codes of a linear colour, alpha straight; what lies outside of [0, 1] is clamped.
 pub fn srgb8([r, g, b, a]: [f32; 4]) -> [u8; 4] {
     // A cast takes what is larger for 255.
-    let code = |value: f64| (value * 255.0).round() as u8;
-    let [r, g, b] = [r, g, b].map(|linear| code(linear_to_srgb(f64::from(linear))));
-    [r, g, b, code(f64::from(a))]
+    [srgb8_of(r), srgb8_of(g), srgb8_of(b), (f64::from(a) * 255.0).round() as u8]
 }
 
 impl Default for Colors {

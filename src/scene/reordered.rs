@@ -9,6 +9,11 @@ fn at<T: Copy + Send + Sync>(values: &[T], indices: &[u32]) -> Vec<T> {
     if values.is_empty() { Vec::new() } else { indices.par_iter().map(|&index| values[index as usize]).collect() }
 }
 
+/// Puts a list in another order.
+fn reorder<T: Copy + Send + Sync>(values: &mut Vec<T>, indices: &[u32]) {
+    *values = at(values, indices);
+}
+
 impl Scene {
     /// The surfels at these indices, in this order, as a scene like this one; without levels of detail, as it is in no tree's order.
     #[must_use]
@@ -36,6 +41,28 @@ impl Scene {
             part_of: self.part_of.clone(),
             ..*self
         }
+    }
+
+    /// The same, where it takes the place of this scene: lists are replaced one after the other.
+    #[must_use]
+    pub fn into_order(mut self, indices: &[u32]) -> Self {
+        let places = || indices.iter().map(|&index| index as usize).collect::<Vec<_>>();
+        reorder(&mut self.surfels, indices);
+        reorder(&mut self.low, indices);
+        reorder(&mut self.clips, indices);
+        reorder(&mut self.caps, indices);
+        reorder(&mut self.normals, indices);
+        reorder(&mut self.fades, indices);
+        match &mut self.colors {
+            Colors::Constant(_) => {}
+            Colors::Srgb8(codes) => reorder(codes, indices),
+            Colors::Linear(colors) => reorder(colors, indices),
+            Colors::Textured(textured) => *textured = textured.taken(&places()),
+            Colors::Harmonics(harmonics) => *harmonics = harmonics.taken(&places()),
+        }
+        self.provenance.reorder(indices);
+        self.hierarchy = None;
+        self
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{Cap, Clip, Colors, Fade, Hierarchy, Provenance, Surfel, Triangles, Whole};
+use super::{Cap, Clip, Colors, Fade, Hierarchy, Listed, Provenance, Surfel, Triangles, Whole};
 
 /// The world axis that points up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -174,7 +174,7 @@ impl Scene {
         if let Some(whole) = &self.part_of {
             return (whole.framed, 0);
         }
-        super::framed(self.places(), |index| self.place(index))
+        super::framed(&Listed(self.places(), |index| self.place(index)))
     }
 
     /// The box of the finite surfel centres and of the triangles' corners, world units relative to [`Scene::origin`]; disks reach past it by up to

@@ -17,9 +17,39 @@ pub fn linear_to_srgb(linear: f64) -> f64 {
 pub static SRGB8_TO_LINEAR: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|code| srgb_to_linear(code as f64 / 255.0) as f32));
 
+/// The nearest 8-bit sRGB code of linear light, 0 of what is no number.
+pub fn srgb8_of(linear: f32) -> u8 {
+    // At most 255 of them.
+    LEAST.partition_point(|least| *least <= linear) as u8
+}
+
+/// The least linear light of each code from 1 on, as [`linear_to_srgb`] says: the power that it takes is much slower than to look that up.
+static LEAST: LazyLock<[f32; 255]> = LazyLock::new(|| {
+    let code = |linear: f32| (linear_to_srgb(linear.into()) * 255.0).round() as usize;
+    std::array::from_fn(|index| {
+        // Numbers from 0 on are in the order of their bits.
+        let (mut below, mut least) = (0, 1f32.to_bits());
+        while least - below > 1 {
+            let middle = below.midpoint(least);
+            *if code(f32::from_bits(middle)) > index { &mut least } else { &mut below } = middle;
+        }
+        f32::from_bits(least)
+    })
+});
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn codes_that_are_looked_up_are_the_nearest() {
+        let plain = |linear: f32| (linear_to_srgb(linear.into()) * 255.0).round() as u8;
+        let at_ends = LEAST.iter().flat_map(|least| (-4i32..5).map(|step| least.to_bits().wrapping_add_signed(step)));
+        let spread = (0..1 << 16).map(|k| 0x3000_0000 + k * 0x1100);
+        for linear in at_ends.chain(spread).map(f32::from_bits).chain([-1.0, -0.0, 0.0, 1e-40, 7.0, f32::NAN, f32::INFINITY]) {
+            assert_eq!(srgb8_of(linear), plain(linear), "{linear}");
+        }
+    }
 
     #[test]
     fn transfer_functions_are_inverse_and_monotone() {

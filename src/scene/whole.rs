@@ -2,9 +2,8 @@
 
 use glam::DVec3;
 
-use super::body::body_and_framed;
 use super::hierarchy::{Hierarchy, Node};
-use super::{Bounds, Scene};
+use super::{Bounds, Listed, Scene, body_and_framed};
 use rayon::prelude::*;
 
 /// A scene with levels of detail as it is when all of it is there. A picture of a part of it is that of the whole to the bit, and some of what pictures
@@ -90,7 +89,7 @@ impl Whole {
     /// That of a scene that has all of its surfels and of their nodes; None of one without nodes.
     pub fn of(scene: &Scene) -> Option<Self> {
         let hierarchy = scene.hierarchy.as_deref()?;
-        let (body, framed, _) = body_and_framed(scene.places(), |index| scene.place(index));
+        let (body, framed, _) = body_and_framed(&Listed(scene.places(), |index| scene.place(index)));
         Some(Self {
             surfels: scene.surfels.len().try_into().ok()?,
             nodes: hierarchy.nodes.len().try_into().ok()?,

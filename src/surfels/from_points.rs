@@ -18,7 +18,7 @@ use super::sizes::{
 };
 use super::{Limits, Preparation, guess_up, origin_for, painting, unit, usable_axes};
 use crate::io::Points;
-use crate::scene::{Bounds, Clip, Surfel, body, framed};
+use crate::scene::{Bounds, Clip, Listed, Surfel, body, framed};
 use crate::{Error, Progress, Result};
 
 /// A disk that ends at an edge is larger by this factor, as neither cells nor planes are certain there: of 4.0 million rays at 60,000
@@ -147,7 +147,7 @@ pub fn from_points(inputs: Vec<Points>, options: &FromPoints, progress: &dyn Pro
         Points { unsided, normals, radii, axes, clips, caps, up, closed: false, tree: None, ..gathered.points };
     preparation.limited_by_neighbours = sizes.limited(distinct.of_point());
     let radius = |index: usize| points.radii.as_ref().map_or(0.0, |radii| f64::from(radii[index]));
-    preparation.strays = framed(count, |index| (DVec3::from_array(points.positions[index]), radius(index))).1;
+    preparation.strays = framed(&Listed(count, |index| (DVec3::from_array(points.positions[index]), radius(index)))).1;
     Ok(Surfels { points, preparation, parts, collinear: sizes.collinear })
 }
 

@@ -40,9 +40,11 @@ mod whole;
 mod write;
 mod write_gaussians;
 mod write_mesh;
+mod write_scene;
 
 pub use levels::Levels;
 pub(super) use read::companions;
 pub use read::{read, read_mesh};
 pub use write::{Color, ColorProperties, Properties, Vertex, check_extension, write, write_points};
 pub use write_mesh::write_mesh;
+pub use write_scene::write_scene;

@@ -1,10 +1,9 @@
 //! From surfels to PLY bytes.
 
-use super::vertex::{CAP_NAMES, CLIP_NAMES, NODE_NAMES, NUMBER_NAME, SLOPE_NAMES};
-use super::whole;
+use super::vertex::{CAP_NAMES, CLIP_NAMES, NUMBER_NAME, SLOPE_NAMES};
 use super::write_gaussians;
 use crate::io::atomic::{Output, write_whole};
-use crate::io::{Points, Tree, TreeRow, Up};
+use crate::io::{Points, Up};
 use crate::scene::color::{DEFAULT_COLOR, SRGB8_TO_LINEAR, srgb8};
 use crate::scene::{Cap, Clip, Colors};
 use crate::{Error, Progress, Result};
@@ -154,7 +153,7 @@ impl Properties {
     }
 
     /// The lines of an element's properties.
-    fn write_properties(self, out: &mut Output<'_>) -> io::Result<()> {
+    pub(super) fn write_properties(self, out: &mut Output<'_>) -> io::Result<()> {
         let mut scalars =
             |kind: &str, names: &[&str]| names.iter().try_for_each(|name| writeln!(out, "property {kind} {name}"));
         scalars(if self.double_coordinates { "double" } else { "float" }, &["x", "y", "z"])?;
@@ -263,7 +262,7 @@ pub fn write(
     })
 }
 
-/// Writes all that `points` hold, so that [`read`](super::read) gives them back; Gaussians as files of 2D Gaussian splatting have them, in f32.
+/// Writes all that `points` hold but levels of detail, so that [`read`](super::read) gives them back; Gaussians as files of 2D Gaussian splatting have them, in f32.
 ///
 /// With half-axes, normals that are missing are their product s x t, and radii that are missing their longer one.
 ///
@@ -276,51 +275,19 @@ pub fn write_points(path: &Path, points: &Points, progress: &dyn Progress) -> Re
     }
     let (properties, count) = (Properties::of(points), points.positions.len());
     let comments: Vec<String> = points.beside.iter().map(|mesh| format!("triangles {}", mesh.display())).collect();
-    let nodes = points.tree.as_ref().map(|tree| (tree, node_properties(tree)));
-    let whole = points.whole.as_ref().filter(|_| nodes.is_some());
     progress.begin("writing points", count as u64);
     let written = write_whole(path, |out| {
         properties.write_header(out, count as u64, &comments)?;
-        if let Some((tree, properties)) = nodes {
-            writeln!(out, "element node {}", tree.rows.len())?;
-            properties.write_properties(out)?;
-            let [cone, first, count, leaf] = NODE_NAMES;
-            write!(
-                out,
-                "property float {cone}\nproperty uint {first}\nproperty uint {count}\nproperty uchar {leaf}\n"
-            )?;
-        }
-        if whole.is_some() {
-            out.write_all(whole::lines().as_bytes())?;
-        }
         out.write_all(b"end_header\n")?;
         let of_point = |index: usize, rows: &mut Vec<u8>| properties.encode(&vertex(points, index), rows);
-        write_rows(out, count, of_point, progress)?;
-        if let Some((tree, properties)) = nodes {
-            write_rows(out, tree.rows.len(), |index, rows| encode_node(tree, properties, index, rows), &())?;
-        }
-        whole.map_or(Ok(()), |whole| out.write_all(&whole::bytes(whole)))
+        write_rows(out, count, of_point, progress)
     });
     progress.end();
     written
 }
 
-/// A node has no normal but its half-axes', and a radius that is its sphere's.
-fn node_properties(tree: &Tree) -> Properties {
-    Properties { normals: false, ..Properties::of(&tree.nodes) }
-}
-
-/// Appends the bytes of a node.
-fn encode_node(tree: &Tree, properties: Properties, index: usize, rows: &mut Vec<u8>) {
-    properties.encode(&vertex(&tree.nodes, index), rows);
-    let TreeRow { cone, first, count, leaf } = tree.rows[index];
-    rows.extend(cone.to_le_bytes());
-    rows.extend([first, count].map(u32::to_le_bytes).as_flattened());
-    rows.push(leaf.into());
-}
-
 /// Writes `count` rows, which `encode` appends the bytes of, some blocks at a time by all threads.
-fn write_rows(
+pub(super) fn write_rows(
     out: &mut Output<'_>,
     count: usize,
     encode: impl Fn(usize, &mut Vec<u8>) + Sync,
@@ -384,14 +351,14 @@ fn of<T: Copy>(all: &Option<Vec<T>>, index: usize) -> Option<T> {
 }
 
 /// The unit normal of a disk with these half-axes, zero where they span none.
-fn normal([s, t]: [[f32; 3]; 2]) -> [f32; 3] {
+pub(super) fn normal([s, t]: [[f32; 3]; 2]) -> [f32; 3] {
     // In f64 the product of f32 numbers neither overflows nor underflows.
     let [s, t] = [s, t].map(|axis| glam::DVec3::from_array(axis.map(f64::from)));
     s.cross(t).normalize_or_zero().as_vec3().to_array()
 }
 
 /// The length of the longer half-axis.
-fn longer(axes: [[f32; 3]; 2]) -> f32 {
+pub(super) fn longer(axes: [[f32; 3]; 2]) -> f32 {
     let [s, t] = axes.map(|axis| glam::DVec3::from_array(axis.map(f64::from)).length());
     s.max(t) as f32
 }

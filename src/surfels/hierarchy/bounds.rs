@@ -6,16 +6,17 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::Made;
+use super::below::{Below, Disk, Known};
 use super::curvature;
-use super::octree::{Octree, Set};
-use super::sums::{Scales, Sums, normal_of};
+use super::lattice::Lattice;
+use super::sums::{Sums, normal_of};
 use crate::scene::hierarchy::Node;
 use crate::scene::{Cap, Scene, Surfel};
 use crate::surfels::eigen::Symmetric3;
 use crate::surfels::sizes::shape;
 
 /// Surfels of a node whose bounds are made by all threads.
-const MANY: usize = 1 << 16;
+const MANY: u64 = 1 << 16;
 
 /// What half-axes and radii are longer by than was found, as they are rounded to f32.
 const ROUNDED_UP: f64 = 1.0 + 1.0 / (1u64 << 21) as f64;
@@ -121,8 +122,7 @@ fn farthest(at: DVec2, [u, v]: [DVec2; 2]) -> f64 {
 }
 
 /// A node whose bounds are looked for.
-struct Bounding<'a> {
-    scene: &'a Scene,
+struct Bounding {
     center: DVec3,
     normal: DVec3,
     shape: Shape,
@@ -130,14 +130,13 @@ struct Bounding<'a> {
     scale: f64,
 }
 
-impl Bounding<'_> {
+impl Bounding {
     /// What bounds one surfel, where a rim no farther than `known` is of no matter.
-    fn of(&self, index: usize, known: f64) -> Bound {
-        let surfel = &self.scene.surfels[index];
-        let offset = self.scene.center(index) - self.center;
+    fn of(&self, Disk { surfel, center, cap }: &Disk, known: f64) -> Bound {
+        let offset = center - self.center;
         let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
         let own = normal_of(surfel);
-        let height = self.scene.caps.get(index).map_or(0.0, Cap::highest);
+        let height = cap.highest();
         let across = self.leaning(own);
         let rim = [DVec2::ZERO, across].into_iter().fold(0.0, |rim: f64, across| {
             let shown = |vector: DVec3| self.shape.seen(vector) - across * vector.dot(self.normal);
@@ -151,7 +150,7 @@ impl Bounding<'_> {
         Bound {
             rim,
             radius: offset.length() + longest([s.dot(s), s.dot(t), t.dot(t)]) + height,
-            cosine: match tilt(self.scene, index) {
+            cosine: match tilt(surfel, cap) {
                 0.0 => own.dot(self.normal).clamp(-1.0, 1.0),
                 tilt => (own.dot(self.normal).clamp(-1.0, 1.0).acos() + tilt).min(PI).cos(),
             },
@@ -193,111 +192,106 @@ impl Bounding<'_> {
 }
 
 /// The largest angle between the normals of a surfel's cap and that of its plane, or more: 0 of a flat one.
-fn tilt(scene: &Scene, index: usize) -> f64 {
-    let Some(Cap(heights)) = scene.caps.get(index).filter(|cap| !cap.is_flat()) else { return 0.0 };
-    let [uu, uv, vv] = heights.map(|height| f64::from(height).abs());
-    let [s, t] = [scene.surfels[index].s, scene.surfels[index].t];
-    let length = |axis: [f32; 3]| DVec3::from_array(axis.map(f64::from)).length();
-    ((uu + uv) / length(s)).hypot((uv + vv) / length(t)).atan()
-}
-
-/// What is known of the nodes below one: all of these nodes, and what their f32 centres leave out.
-#[derive(Clone, Copy)]
-pub(super) struct Below<'a> {
-    pub tree: &'a Octree,
-    pub nodes: &'a [Made],
-}
-
-/// The node of a set of `scene`, with these sums on their lattice; what its f32 centre leaves out comes second.
-pub(super) fn node(scene: &Scene, set: &Set, sums: &Sums, below: Below<'_>, scale: &Scales) -> Made {
-    let color = sums.color(scale);
-    let range = set.range();
-    let (first, count) = (range.start as u32, range.len() as u32);
-    let (normal, sided) = sums.normal(scene.oriented);
-    let cone = |cosine: f64| if sided { (cosine - ROUNDED_OFF) as f32 } else { -1.0 };
-    if range.len() == 1 {
-        let surfel = scene.surfels[range.start];
-        let low = scene.low.get(range.start).copied().unwrap_or_default();
-        let height = scene.caps.get(range.start).map_or(0.0, Cap::highest);
-        let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
-        let radius = ((longest([s.dot(s), s.dot(t), t.dot(t)]) + height) * ROUNDED_UP) as f32;
-        return (
-            Node {
-                surfel,
-                cap: scene.caps.get(range.start).copied().unwrap_or_default(),
-                color,
-                radius,
-                cone: cone(tilt(scene, range.start).cos()),
-                first,
-                count,
-                leaf: true,
-            },
-            low,
-        );
+fn tilt(surfel: &Surfel, cap: &Cap) -> f64 {
+    if cap.is_flat() {
+        return 0.0;
     }
-    let lattice = &below.tree.lattices[set.lattice as usize];
-    let shape = Shape::of(sums.covariance(lattice, scale), normal);
+    let [uu, uv, vv] = cap.0.map(|height| f64::from(height).abs());
+    let length = |axis: [f32; 3]| DVec3::from_array(axis.map(f64::from)).length();
+    ((uu + uv) / length(surfel.s)).hypot((uv + vv) / length(surfel.t)).atan()
+}
+
+/// A cosine as a cone has it, where normals tell sides.
+fn cone(sided: bool, cosine: f64) -> f32 {
+    if sided { (cosine - ROUNDED_OFF) as f32 } else { -1.0 }
+}
+
+/// The node of one surfel of `scene`, with its sums; what its f32 centre leaves out comes second.
+pub(super) fn of_one(scene: &Scene, index: usize, sums: &Sums, known: &Known) -> Made {
+    let Disk { surfel, cap, .. } = Disk::of(scene, index);
+    let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
+    let node = Node {
+        surfel,
+        cap,
+        color: sums.color(&known.scales),
+        radius: ((longest([s.dot(s), s.dot(t), t.dot(t)]) + cap.highest()) * ROUNDED_UP) as f32,
+        cone: cone(sums.normal(known.oriented).1, tilt(&surfel, &cap).cos()),
+        first: index as u32,
+        count: 1,
+        leaf: true,
+    };
+    (node, scene.low.get(index).copied().unwrap_or_default())
+}
+
+/// The node of more surfels with these sums on `lattice`, which are below `of`; what its f32 centre leaves out comes second. What is right below it is not told yet.
+pub(super) fn node<B: Below>(of: B::Key, sums: &Sums, lattice: &Lattice, below: &B, known: &Known) -> Made {
+    let Known { origin, oriented, scales, .. } = known;
+    let (normal, sided) = sums.normal(*oriented);
+    let covariance = sums.covariance(lattice, scales);
+    let shape = Shape::of(covariance, normal);
     // As what is stored has it.
     let stored = shape.s.cross(shape.t).normalize();
     let plane = [shape.s.normalize(), shape.t.normalize(), stored];
     let mean = lattice.position(sums.moments.mean());
     let curves = sums.alignment((normal, sided)) >= curvature::LEAST_ALIGNMENT;
-    let heights = if curves { curvature::heights(scene, set, below, mean, plane) } else { curvature::FLAT };
+    let heights = if curves { curvature::heights(of, below, mean, plane) } else { curvature::FLAT };
     // A paraboloid with its top at the mean would lie off the surface by the mean height: that much to the other side it does not.
     let top = mean - stored * curvature::mean_height(heights, sums.covariance_of_centers(lattice), plane);
     // As a file in world coordinates has it, so that what is read back is the same.
-    let top = (scene.origin + top) - scene.origin;
-    let rounded = ((scene.origin + top.as_vec3().as_dvec3()) - scene.origin).as_vec3();
-    let low = if scene.low.is_empty() { DVec3::ZERO } else { top - rounded.as_dvec3() }.as_vec3();
+    let top = (origin + top) - origin;
+    let rounded = ((origin + top.as_vec3().as_dvec3()) - origin).as_vec3();
+    let low = if known.low { top - rounded.as_dvec3() } else { DVec3::ZERO }.as_vec3();
     let center = rounded.as_dvec3() + low.as_dvec3();
     let longer = shape.seen.map(DVec3::length);
-    let bounding = Bounding { scene, center, normal: stored, shape, scale: longer[0].hypot(longer[1]) };
-    let all = bound(&bounding, set, below, sided);
+    let bounding = Bounding { center, normal: stored, shape, scale: longer[0].hypot(longer[1]) };
+    let all = bound(&bounding, (of, sums.moments.count), below, sided);
     let factor = all.rim * ROUNDED_UP;
     let [s, t] = [shape.s, shape.t].map(|axis| (axis * factor).as_vec3().to_array());
-    let surfel = Surfel { center: rounded.to_array(), s, t };
     let lengths = [shape.s, shape.t].map(|axis| axis.length() * factor);
     let cap = curvature::cap(heights, lengths);
-    let radius = (all.radius.max(factor + cap.highest()) * ROUNDED_UP) as f32;
-    (Node { surfel, cap, color, radius, cone: cone(all.cosine), first, count, leaf: true }, low.to_array())
+    let node = Node {
+        surfel: Surfel { center: rounded.to_array(), s, t },
+        cap,
+        color: sums.color(scales),
+        radius: (all.radius.max(factor + cap.highest()) * ROUNDED_UP) as f32,
+        cone: cone(sided, all.cosine),
+        first: 0,
+        count: 0,
+        leaf: true,
+    };
+    (node, low.to_array())
 }
 
-/// What bounds all surfels of a set: those that could change it are looked at, and what is below a node that could not is passed over. What comes
+/// What bounds all `surfels` below a node: those that could change it are looked at, and what is below a node that could not is passed over. What comes
 /// out is what looking at all would, whatever is passed over.
-fn bound(of: &Bounding<'_>, set: &Set, below: Below<'_>, sided: bool) -> Bound {
-    if set.is_leaf() || set.range().len() <= MANY {
-        return bound_from(of, set, below, sided);
+fn bound<B: Below>(of: &Bounding, (key, surfels): (B::Key, u64), below: &B, sided: bool) -> Bound {
+    if below.is_leaf(key) || surfels <= MANY {
+        return bound_from(of, key, below, sided);
     }
     // By all threads, what is below one node each.
-    let children = || (set.first_child..set.first_child + set.children).into_par_iter();
-    let one = |child: u32| bound(of, &below.tree.sets[child as usize], below, sided);
-    children().map(one).reduce(|| Bound::NOTHING, Bound::both)
+    let mut children = Vec::new();
+    below.children(key, |child| children.push((child.key, child.surfels)));
+    let one = |child: (B::Key, u64)| bound(of, child, below, sided);
+    children.into_par_iter().map(one).reduce(|| Bound::NOTHING, Bound::both)
 }
 
 /// That of a set, by one thread.
-fn bound_from(of: &Bounding<'_>, set: &Set, below: Below<'_>, sided: bool) -> Bound {
+fn bound_from<B: Below>(of: &Bounding, key: B::Key, below: &B, sided: bool) -> Bound {
     let mut all = Bound::NOTHING;
-    let mut open: Vec<(Bound, u32)> = Vec::new();
-    let push = |set: &Set, open: &mut Vec<(Bound, u32)>| {
+    let mut open: Vec<(Bound, B::Key)> = Vec::new();
+    let push = |key: B::Key, open: &mut Vec<(Bound, B::Key)>| {
         let first = open.len();
-        for child in set.first_child..set.first_child + set.children {
-            let (node, low) = &below.nodes[child as usize];
-            open.push((of.of_node(node, *low), child));
-        }
+        below.children(key, |child| open.push((of.of_node(&child.made.0, child.made.1), child.key)));
         // What reaches farthest comes first.
         open[first..].sort_by(|a, b| a.0.rim.total_cmp(&b.0.rim));
     };
-    let look = |set: &Set, all: &mut Bound| set.range().for_each(|index| *all = all.both(of.of(index, all.rim)));
-    if set.is_leaf() {
-        look(set, &mut all);
-    }
-    push(set, &mut open);
+    let look = |key: B::Key, all: &mut Bound| below.disks(key, |disk| *all = all.both(of.of(&disk, all.rim)));
+    if below.is_leaf(key) { look(key, &mut all) } else { push(key, &mut open) }
     while let Some((most, child)) = open.pop() {
         let changes = most.rim > all.rim || most.radius > all.radius || (sided && most.cosine < all.cosine);
-        let set = &below.tree.sets[child as usize];
         match changes {
-            true if set.is_leaf() => look(set, &mut all),
-            true => push(set, &mut open),
+            true if below.is_leaf(child) => look(child, &mut all),
+            true => push(child, &mut open),
             false => {}
         }
     }
@@ -312,8 +306,7 @@ mod tests {
     #[test]
     fn angles_of_nodes_add_up() {
         let shape = Shape { s: DVec3::X, t: DVec3::Y, seen: [DVec3::X, DVec3::Y] };
-        let scene = Scene::default();
-        let bounding = Bounding { scene: &scene, center: DVec3::ZERO, normal: DVec3::Z, shape, scale: 1.0 };
+        let bounding = Bounding { center: DVec3::ZERO, normal: DVec3::Z, shape, scale: 1.0 };
         let of = |angle: f64, cone: f32| {
             let (sine, cosine) = angle.sin_cos();
             let surfel = Surfel { center: [0.0; 3], s: [cosine as f32, 0.0, -sine as f32], t: [0.0, 1.0, 0.0] };

@@ -6,10 +6,10 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::bounds::Below;
-use super::octree::Set;
+use super::below::Below;
 use super::sums::normal_of;
-use crate::scene::{Cap, Scene};
+use crate::scene::Cap;
+use crate::scene::hierarchy::FAN_OUT;
 use crate::surfels::eigen::Symmetric3;
 
 /// A normal that leans farther from the node's counts as one that leans so far: the cosine of 76 degrees.
@@ -28,18 +28,19 @@ pub(super) const FLAT: Heights = [0.0; 3];
 /// Heights over a plane, `(xx x² + 2 xy x y + yy y²) / 2` along its normal for x and y along two of its directions: xx, xy, yy, 1 / world unit.
 pub(super) type Heights = [f64; 3];
 
-/// Those of the node of a set of `scene` with the centre `center`, over the plane of these unit directions and of this normal.
-pub(super) fn heights(scene: &Scene, set: &Set, below: Below<'_>, center: DVec3, plane: [DVec3; 3]) -> Heights {
-    if set.is_leaf() {
-        let of = |index: usize| (scene.center(index) - center, normal_of(&scene.surfels[index]), 1.0);
-        return fitted(set.range().map(of), plane);
+/// Those of the node `of` with the centre `center`, over the plane of these unit directions and of this normal.
+pub(super) fn heights<B: Below>(of: B::Key, below: &B, center: DVec3, plane: [DVec3; 3]) -> Heights {
+    let mut right_below = Vec::with_capacity(FAN_OUT);
+    if below.is_leaf(of) {
+        below.disks(of, |disk| right_below.push((disk.center - center, normal_of(&disk.surfel), 1.0)));
+    } else {
+        below.children(of, |child| {
+            let (node, low) = child.made;
+            let [place, low] = [node.surfel.center, *low].map(|part| DVec3::from_array(part.map(f64::from)));
+            right_below.push((place + low - center, normal_of(&node.surfel), child.surfels as f64));
+        });
     }
-    let of = |child: u32| {
-        let (node, low) = &below.nodes[child as usize];
-        let [place, low] = [node.surfel.center, *low].map(|part| DVec3::from_array(part.map(f64::from)));
-        (place + low - center, normal_of(&node.surfel), below.tree.sets[child as usize].range().len() as f64)
-    };
-    fitted((set.first_child..set.first_child + set.children).map(of), plane)
+    fitted(right_below.into_iter(), plane)
 }
 
 /// Those of a node whose plane has these unit directions and this normal, of the normals and places of what is right below it.
@@ -82,8 +83,8 @@ mod tests {
 
     use super::super::build;
     use super::*;
-    use crate::scene::Surfel;
     use crate::scene::hierarchy::Node;
+    use crate::scene::{Scene, Surfel};
 
     /// Surfels of a height field, by its heights and slopes.
     fn field(height: impl Fn(f64, f64) -> (f64, DVec2), oriented: bool) -> Scene {

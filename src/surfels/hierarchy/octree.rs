@@ -65,20 +65,34 @@ impl Octree {
     /// Divides `count` points, fewer than 2^32, at `position`. The sets depend on the positions alone; `told` hears of each point that came to a leaf.
     pub fn grow(count: u32, position: impl Fn(u32) -> DVec3 + Sync, told: impl Fn(u64)) -> Self {
         let bounds = Bounds::of((0..count).into_par_iter().with_min_len(4096).map(&position));
-        let root = Lattice::over(&bounds);
+        Self::grow_below((Lattice::over(&bounds), 0), count, position, told)
+    }
+
+    /// The same of a set so many levels below the root, that has its points on this lattice.
+    pub fn grow_below(
+        (root, depth): (Lattice, usize),
+        count: u32,
+        position: impl Fn(u32) -> DVec3 + Sync,
+        told: impl Fn(u64),
+    ) -> Self {
         let element = |index: u32| Element { place: root.place(position(index)), index };
         let elements: Vec<Element> = (0..count).into_par_iter().with_min_len(4096).map(element).collect();
         let all = Set { first: 0, end: count, lattice: 0, first_child: 0, children: 0 };
         let mut tree = Self { elements, sets: vec![all], levels: vec![0, 1], lattices: vec![root] };
-        while tree.divide_level(&position, &told) {}
+        while tree.divide_level(depth, &position, &told) {}
         tree
     }
 
-    /// Divides the sets of the last level; whether there is another one.
-    fn divide_level(&mut self, position: &(impl Fn(u32) -> DVec3 + Sync), told: &impl Fn(u64)) -> bool {
+    /// Divides the sets of the last level, of a tree that starts at this depth; whether there is another one.
+    fn divide_level(
+        &mut self,
+        depth: usize,
+        position: &(impl Fn(u32) -> DVec3 + Sync),
+        told: &impl Fn(u64),
+    ) -> bool {
         let [.., begin, end] = self.levels[..] else { return false };
         // One level deeper there is none to divide them into.
-        let deepest = self.levels.len() - 2 == DEEPEST;
+        let deepest = depth + self.levels.len() - 2 == DEEPEST;
         let level = &self.sets[begin..end];
         let mut slices = Vec::with_capacity(level.len());
         let (mut rest, mut at) = (&mut self.elements[..], 0);

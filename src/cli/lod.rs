@@ -1,15 +1,16 @@
 //! `epsplat lod`: surfels with levels of detail.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
 use epsplat::Result;
-use epsplat::io::ply;
+use epsplat::io::{atomic, ply};
 use epsplat::scene::Cut;
 use epsplat::surfels::{self, hierarchy};
 use serde::Serialize;
 
+use super::parse::parse_memory;
 use super::progress::Bars;
 use super::reading::{LimitArguments, Reading, help_of, named};
 use super::{note, outputs, print, write_json};
@@ -20,7 +21,7 @@ use super::{note, outputs, print, write_json};
 /// covariance's shape that bounds the disks below it, with their mean colour and normal. The surfels are written in the order of the tree, so other programs see a cloud.
 #[derive(Args)]
 #[command(
-    after_help = "Examples:\n  epsplat lod scan.ply -o scan.lod.ply\n  epsplat render scan.lod.ply -o scan.png --lod 4px\n  epsplat lod scan.ply --cut 0.05 -o coarse.ply"
+    after_help = "Examples:\n  epsplat lod scan.ply -o scan.lod.ply\n  epsplat render scan.lod.ply -o scan.png --lod 4px\n  epsplat lod scan.ply --cut 0.05 -o coarse.ply\n  epsplat lod tiles/*.ply -o city.lod.ply --memory 4GiB"
 )]
 pub struct Arguments {
     #[arg(required = true, help = help_of("Surfels, point clouds or meshes"))]
@@ -35,6 +36,10 @@ pub struct Arguments {
     /// Write no tree, but a cut of it: nodes whose longest half-axis is shorter than this, world units, in place of the surfels below them
     #[arg(long, value_name = "LENGTH", value_parser = parse_length)]
     cut: Option<f64>,
+    /// The most memory to take, 4GiB: the points, of binary PLY files with normals and radii, or half-axes, are sorted in temporary files beside the output, of about three
+    /// times its size. The same file as without
+    #[arg(long, value_name = "SIZE", value_parser = parse_memory, conflicts_with_all = ["cut", "outliers"])]
+    memory: Option<u64>,
     /// What the tree is like as JSON, to a file or - for stdout
     #[arg(long, value_name = "FILE|-")]
     json: Option<PathBuf>,
@@ -49,46 +54,75 @@ struct Report {
     /// Surfels that were written in place of all, if a cut was.
     #[serde(skip_serializing_if = "Option::is_none")]
     cut: Option<u64>,
-    /// Seconds to read, to make surfels, to make the tree, and to write.
-    seconds: [f64; 4],
+    /// Trees that were made one after the other, if memory was bounded.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    subtrees: Option<u64>,
+    /// Seconds to read, to make surfels, to make the tree, and to write; together if memory was bounded.
+    seconds: Vec<f64>,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
     ply::check_extension(&arguments.output)?;
     outputs::check(&arguments.inputs, [&arguments.output].into_iter().chain(&arguments.json))?;
     let bars = Bars::new();
-    let mut started = Instant::now();
-    let mut seconds = || std::mem::replace(&mut started, Instant::now()).elapsed().as_secs_f64();
-    let inputs = arguments.reading.all(&arguments.inputs, &bars)?;
-    let beside = outputs::beside(&inputs, &arguments.output)?;
-    if inputs.iter().any(|points| points.texture.is_some()) {
-        note("warning: texture coordinates are left out, as levels of detail have none yet");
-    }
-    let read = seconds();
-    let (scene, preparation) = surfels::build_within(inputs, Vec::new(), &arguments.limits.limits(), &bars)
-        .map_err(|error| named(error, &arguments.inputs))?;
-    preparation.notes().iter().for_each(|line| note(line));
-    let made = seconds();
-    let (scene, tree) = match scene.hierarchy.clone() {
-        Some(known) => (scene, known),
-        None => hierarchy::build(scene, &bars)?,
-    };
-    let divided = seconds();
-    let surfels = scene.surfels.len() as u64;
-    let cut = arguments.cut.map(|length| Cut::by_length(&tree, length).scene(&scene, &tree, true));
-    let written = cut.as_ref().unwrap_or(&scene);
-    ply::write_scene(&arguments.output, written, beside.as_deref(), &bars)?;
-    let report = Report {
-        surfels,
-        cut: cut.map(|cut| cut.surfels.len() as u64),
-        nodes: tree.nodes.len() as u64,
-        levels: tree.levels() as u64,
-        seconds: [read, made, divided, seconds()],
+    let report = match arguments.memory {
+        Some(memory) => out_of_core(arguments, memory, &bars)?,
+        None => in_memory(arguments, &bars)?,
     };
     match &arguments.json {
         Some(path) => write_json(path, &report),
         None => print(&summary(&report)),
     }
+}
+
+fn in_memory(arguments: &Arguments, bars: &Bars) -> Result<Report> {
+    let mut started = Instant::now();
+    let mut seconds = || std::mem::replace(&mut started, Instant::now()).elapsed().as_secs_f64();
+    let inputs = arguments.reading.all(&arguments.inputs, bars)?;
+    let beside = outputs::beside(&inputs, &arguments.output)?;
+    if inputs.iter().any(|points| points.texture.is_some()) {
+        note("warning: texture coordinates are left out, as levels of detail have none yet");
+    }
+    let read = seconds();
+    let (scene, preparation) = surfels::build_within(inputs, Vec::new(), &arguments.limits.limits(), bars)
+        .map_err(|error| named(error, &arguments.inputs))?;
+    preparation.notes().iter().for_each(|line| note(line));
+    let made = seconds();
+    let (scene, tree) = match scene.hierarchy.clone() {
+        Some(known) => (scene, known),
+        None => hierarchy::build(scene, bars)?,
+    };
+    let divided = seconds();
+    let surfels = scene.surfels.len() as u64;
+    let cut = arguments.cut.map(|length| Cut::by_length(&tree, length).scene(&scene, &tree, true));
+    let written = cut.as_ref().unwrap_or(&scene);
+    ply::write_scene(&arguments.output, written, beside.as_deref(), bars)?;
+    Ok(Report {
+        surfels,
+        cut: cut.map(|cut| cut.surfels.len() as u64),
+        nodes: tree.nodes.len() as u64,
+        levels: tree.levels() as u64,
+        subtrees: None,
+        seconds: vec![read, made, divided, seconds()],
+    })
+}
+
+/// Of points that are read piece by piece.
+fn out_of_core(arguments: &Arguments, memory: u64, bars: &Bars) -> Result<Report> {
+    let started = Instant::now();
+    let files = arguments.reading.rows(&arguments.inputs)?;
+    let place = atomic::place_of(&arguments.output);
+    let folder = place.as_deref().and_then(Path::parent).map_or_else(std::env::temp_dir, Path::to_owned);
+    let made = hierarchy::out_of_core::write_levels(&files, memory, (&arguments.output, &folder), bars)?;
+    made.preparation.notes().iter().for_each(|line| note(line));
+    Ok(Report {
+        surfels: made.surfels,
+        nodes: made.nodes,
+        levels: made.levels,
+        cut: None,
+        subtrees: Some(made.subtrees),
+        seconds: vec![started.elapsed().as_secs_f64()],
+    })
 }
 
 /// A positive length, world units.
@@ -98,10 +132,14 @@ fn parse_length(text: &str) -> std::result::Result<f64, String> {
 }
 
 fn summary(report: &Report) -> String {
-    let [read, made, divided, written] = report.seconds;
     let cut = report.cut.map_or_else(String::new, |cut| format!(", a cut of {cut}"));
-    format!(
-        "{} surfels, {} nodes in {} levels{cut}: read in {read:.2} s, made in {made:.2} s, divided in {divided:.2} s, written in {written:.2} s\n",
-        report.surfels, report.nodes, report.levels
-    )
+    let times = match (&report.seconds[..], report.subtrees) {
+        ([read, made, divided, written], _) => {
+            format!("read in {read:.2} s, made in {made:.2} s, divided in {divided:.2} s, written in {written:.2} s")
+        }
+        (seconds, subtrees) => {
+            format!("{} trees after each other in {:.2} s", subtrees.unwrap_or(1), seconds.iter().sum::<f64>())
+        }
+    };
+    format!("{} surfels, {} nodes in {} levels{cut}: {times}\n", report.surfels, report.nodes, report.levels)
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use epsplat::io::las::Copc;
-use epsplat::io::ply::Levels;
+use epsplat::io::ply::{Levels, Rows};
 use epsplat::io::{self, ClassOpacities, Format, Input, Mesh, Points, ReadOptions};
 use epsplat::surfels::Limits;
 use epsplat::{Error, Progress, Result};
@@ -127,6 +127,21 @@ impl Reading {
     pub(super) fn levels(&self, path: &Path) -> Result<Option<Levels>> {
         let is_file = path.is_file() && path != Path::new("-");
         if is_file { Levels::open(Input::open(path, self.input.input_format)?) } else { Ok(None) }
+    }
+
+    /// The files, whose points are read piece by piece.
+    pub(super) fn rows(&self, paths: &[PathBuf]) -> Result<Vec<Rows>> {
+        let open = |path: &PathBuf| {
+            let is_file = path.is_file() && path != Path::new("-");
+            let rows = if is_file { Rows::open(Input::open(path, self.input.input_format)?)? } else { None };
+            rows.ok_or_else(|| {
+                Error::Usage(format!(
+                    "--memory takes binary PLY files of points with normals and radii, or half-axes, and {} is another one: make surfels of it first (epsplat surfels)",
+                    path.display()
+                ))
+            })
+        };
+        paths.iter().map(open).collect()
     }
 
     /// The points of some nodes of each of several files.

@@ -192,23 +192,8 @@ impl Scene {
         if let Some(whole) = &self.part_of {
             return whole.core;
         }
-        let step = self.surfels.len().div_ceil(CORE_SAMPLE).max(1);
-        let sampled = self.surfels.iter().step_by(step).map(|surfel| surfel.center);
-        let sampled: Vec<_> = sampled.filter(|center| center.iter().all(|x| x.is_finite())).collect();
-        if sampled.is_empty() {
-            return self.bounds();
-        }
-        let mut core = Bounds::EMPTY;
-        for axis in 0..3 {
-            let mut along: Vec<f32> = sampled.iter().map(|center| center[axis]).collect();
-            along.sort_unstable_by(f32::total_cmp);
-            let cut = along.len() / CORE_CUT;
-            let (low, high) = (f64::from(along[cut]), f64::from(along[along.len() - 1 - cut]));
-            // An even distribution reaches past both by as much.
-            let margin = (high - low) / (CORE_CUT - 2) as f64;
-            (core.min[axis], core.max[axis]) = (low - margin, high + margin);
-        }
-        if core.extent() == DVec3::ZERO { self.bounds() } else { core }
+        let step = core_step(self.surfels.len());
+        core_of(self.surfels.iter().step_by(step).map(|surfel| surfel.center)).unwrap_or_else(|| self.bounds())
     }
 
     /// Smallest and largest premultiplied linear colour `(r a, g a, b a, a)` of the scene, each component on its own,
@@ -273,6 +258,30 @@ impl Scene {
         let reach = |(index, surfel): (usize, &Surfel)| surfel.radius() + height(index);
         self.surfels.par_iter().enumerate().map(reach).reduce(|| 0.0, f32::max)
     }
+}
+
+/// How many surfels of `count` are passed over for each that [`Scene::core`] looks at, and that one.
+pub(crate) fn core_step(count: usize) -> usize {
+    count.div_ceil(CORE_SAMPLE).max(1)
+}
+
+/// The box of nearly all of the finite ones of some centres; None if it has no extent.
+pub(crate) fn core_of(centers: impl Iterator<Item = [f32; 3]>) -> Option<Bounds> {
+    let sampled: Vec<_> = centers.filter(|center| center.iter().all(|x| x.is_finite())).collect();
+    if sampled.is_empty() {
+        return None;
+    }
+    let mut core = Bounds::EMPTY;
+    for axis in 0..3 {
+        let mut along: Vec<f32> = sampled.iter().map(|center| center[axis]).collect();
+        along.sort_unstable_by(f32::total_cmp);
+        let cut = along.len() / CORE_CUT;
+        let (low, high) = (f64::from(along[cut]), f64::from(along[along.len() - 1 - cut]));
+        // An even distribution reaches past both by as much.
+        let margin = (high - low) / (CORE_CUT - 2) as f64;
+        (core.min[axis], core.max[axis]) = (low - margin, high + margin);
+    }
+    (core.extent() != DVec3::ZERO).then_some(core)
 }
 
 /// A centre whose rounding to f32 is less than this part of its disk's shorter half-axis is as good as any.

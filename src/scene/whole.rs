@@ -37,7 +37,7 @@ pub struct Whole {
 }
 
 /// What is known of the nodes of levels of detail.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LevelFacts {
     /// The longest half-axis with the height of its cap, world units.
     pub largest_radius: f32,
@@ -50,11 +50,26 @@ pub struct LevelFacts {
 impl LevelFacts {
     /// Those of `hierarchy`.
     pub fn of(hierarchy: &Hierarchy) -> Self {
-        let largest = |of: fn(&Node) -> f32| hierarchy.nodes.par_iter().map(of).reduce(|| 0.0, f32::max);
+        Self::of_nodes(hierarchy.nodes.par_iter())
+    }
+
+    /// Those of some nodes.
+    pub fn of_nodes<'a>(nodes: impl ParallelIterator<Item = &'a Node>) -> Self {
+        let own = |node: &Node| Self {
+            largest_radius: node.surfel.radius() + node.cap.highest() as f32,
+            largest_shorter: node.surfel.shorter(),
+            caps: !node.cap.is_flat(),
+        };
+        nodes.map(own).reduce(Self::default, Self::both)
+    }
+
+    /// Those of these nodes and of others.
+    #[must_use]
+    pub fn both(self, other: Self) -> Self {
         Self {
-            largest_radius: largest(|node| node.surfel.radius() + node.cap.highest() as f32),
-            largest_shorter: largest(|node| node.surfel.shorter()),
-            caps: hierarchy.nodes.par_iter().any(|node| !node.cap.is_flat()),
+            largest_radius: self.largest_radius.max(other.largest_radius),
+            largest_shorter: self.largest_shorter.max(other.largest_shorter),
+            caps: self.caps || other.caps,
         }
     }
 }

@@ -24,7 +24,7 @@ use crate::{Error, Progress, Result};
 
 /// The largest radius of a disk, in extents of the scene: from anywhere near the scene it is a plane without an end, and depths
 /// on it are as exact as others.
-const LARGEST_IN_EXTENTS: f64 = 1e6;
+pub(super) const LARGEST_IN_EXTENTS: f64 = 1e6;
 
 /// The largest absolute texture coordinate: f32 ones beyond have no digits after the point that a texture could use.
 pub(super) const LARGEST_PLACE: f32 = 1e4;
@@ -225,7 +225,7 @@ fn laid(center: Vec3, axes: [[f32; 3]; 2], normal: Vec3) -> Surfel {
 const LEAST_TURN: f32 = 1e-3;
 
 /// The unit normal of a surfel's plane.
-fn plane_of(surfel: &Surfel) -> Vec3 {
+pub(super) fn plane_of(surfel: &Surfel) -> Vec3 {
     unit(surfel.normal().to_array()).unwrap_or(Vec3::Z)
 }
 
@@ -300,7 +300,7 @@ impl Given<'_> {
         self.normal(i).is_none() && self.axes(i).is_none()
     }
 
-    fn lacks_radius(&self, i: usize) -> bool {
+    pub(super) fn lacks_radius(&self, i: usize) -> bool {
         self.radius(i).is_none() && self.axes(i).is_none()
     }
 }

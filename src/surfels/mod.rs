@@ -4,6 +4,7 @@ pub mod analytic;
 mod build;
 mod caps;
 mod colors;
+mod complete;
 mod coverage;
 mod creases;
 mod curvature;

@@ -6,15 +6,12 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use glam::DVec3;
 use rayon::prelude::*;
 
-use super::build::{Given, own_normal};
-use super::gather::gather;
-use crate::io::Points;
+use super::complete;
 use crate::io::ply::Levels;
 use crate::scene::hierarchy::{DEEPEST, FAN_OUT, Hierarchy, Node};
-use crate::scene::{Cap, Clip, Colors, Scene, Whole};
+use crate::scene::Scene;
 use crate::{Progress, Result};
 
 /// Nodes or points that are read at once: what is made of them on the way takes no more memory.
@@ -203,8 +200,10 @@ fn scene(levels: &mut Levels, numbers: &[Range<u32>], tree: Hierarchy, progress:
     scene.colors = levels.points(&[])?.colors.unwrap_or_default();
     for block in blocks(numbers) {
         let points = levels.points(&block)?;
-        progress.advance(points.positions.len() as u64);
-        add(&mut scene, points, &whole)
+        let count = points.positions.len();
+        progress.advance(count as u64);
+        complete::add(&mut scene, vec![points], whole.has)
+            .filter(|added| added.positions.len() == count)
             .ok_or_else(|| levels.malformed("a point of its levels of detail has no place or no half-axes"))?;
     }
     if !whole.holds(&scene) {
@@ -213,38 +212,10 @@ fn scene(levels: &mut Levels, numbers: &[Range<u32>], tree: Hierarchy, progress:
     Ok(Scene { part_of: Some(Box::new(whole)), ..scene })
 }
 
-/// Adds the surfels of some points; None if one of them is none.
-fn add(scene: &mut Scene, points: Points, whole: &Whole) -> Option<()> {
-    let count = points.positions.len();
-    let gathered = gather(vec![points]).ok().filter(|gathered| gathered.points.positions.len() == count)?;
-    let given = Given(&gathered);
-    if (0..count).into_par_iter().any(|i| given.lacks_normal(i)) {
-        return None;
-    }
-    let surfels = given.surfels(None, whole.origin);
-    let each = |has: bool| if has { 0..count } else { 0..0 };
-    let relative = |i: usize| DVec3::from_array(gathered.points.positions[i]) - whole.origin;
-    let rest = |i: usize| (relative(i) - DVec3::from_array(surfels[i].center.map(f64::from))).as_vec3().to_array();
-    let cap = |(i, cap): (usize, Cap)| cap.usable(surfels[i].radius().into());
-    let clips = gathered.points.clips.iter().flatten().copied().filter(|_| whole.has.clips);
-    scene.low.extend(each(whole.has.low).map(rest));
-    scene.clips.extend(clips.map(Clip::usable));
-    scene.caps.extend(given.caps().into_iter().enumerate().filter(|_| whole.has.caps).map(cap));
-    scene.normals.extend(each(whole.has.normals).map(|i| own_normal(&given, i, &surfels[i])));
-    match (&mut scene.colors, gathered.points.colors) {
-        (Colors::Srgb8(all), Some(Colors::Srgb8(own))) => all.extend(own),
-        (Colors::Linear(all), Some(Colors::Linear(own))) => all.extend(own),
-        // A file without colours.
-        _ => {}
-    }
-    scene.surfels.extend(surfels);
-    Some(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Surfel;
+    use crate::scene::{Cap, Surfel};
 
     /// Leaves whose points are those of others, however many they say they are.
     #[test]

@@ -50,11 +50,21 @@ pub(super) fn vertices<const BIG: bool>(
     length: u64,
     progress: &dyn Progress,
 ) -> Result<(Points, Vec<TreeRow>), Fault> {
-    let layout = Layout::of(vertex)?;
+    vertices_in::<BIG>(&mut reader, vertex, &Layout::of(vertex)?, length, progress)
+}
+
+/// The same of rows with a layout that is known.
+pub(super) fn vertices_in<const BIG: bool>(
+    mut reader: impl BufRead,
+    vertex: &Element,
+    layout: &Layout,
+    length: u64,
+    progress: &dyn Progress,
+) -> Result<(Points, Vec<TreeRow>), Fault> {
     let possible = length / layout.row_size.max(1) as u64;
-    let mut vertices = Vertices::with_capacity(&layout, vertex.count.min(possible))?;
+    let mut vertices = Vertices::with_capacity(layout, vertex.count.min(possible))?;
     let has_lists = vertex.properties.iter().any(|property| matches!(property.kind, Kind::List { .. }));
-    let block_rows = (BLOCK / layout.row_size).max(1);
+    let block_rows = (BLOCK / layout.row_size).clamp(1, usize::try_from(vertex.count).unwrap_or(usize::MAX).max(1));
     let mut block = vec![0; block_rows * layout.row_size];
     let mut columns = vec![Vec::with_capacity(block_rows); layout.columns.len()];
     while vertices.len() < vertex.count {

@@ -193,6 +193,12 @@ impl Layout {
         self.axes.is_some() && self.gaussian.is_none() && self.texture.is_none()
     }
 
+    /// Whether a row is a disk: neither a Gaussian nor a place in a texture.
+    pub(super) fn is_disk(&self) -> bool {
+        let round = self.normal.is_some() && self.radius.is_some();
+        (self.axes.is_some() || round) && self.gaussian.is_none() && self.texture.is_none()
+    }
+
     /// Whether colours stay the 8-bit codes they are in the file.
     fn is_srgb8(&self) -> bool {
         self.color.iter().flatten().chain(&self.alpha).all(|(_, coding)| *coding == Coding::Code8)

@@ -2,7 +2,7 @@
 
 use super::vertex::{CAP_NAMES, CLIP_NAMES, NUMBER_NAME, SLOPE_NAMES};
 use super::write_gaussians;
-use crate::io::atomic::{Output, write_whole};
+use crate::io::atomic::write_whole;
 use crate::io::{Points, Up};
 use crate::scene::color::{DEFAULT_COLOR, SRGB8_TO_LINEAR, srgb8};
 use crate::scene::{Cap, Clip, Colors};
@@ -136,7 +136,7 @@ impl Properties {
         }
     }
 
-    pub(super) fn write_header(self, out: &mut Output<'_>, count: u64, comments: &[String]) -> io::Result<()> {
+    pub(super) fn write_header(self, out: &mut impl Write, count: u64, comments: &[String]) -> io::Result<()> {
         write!(out, "ply\nformat binary_little_endian 1.0\ncomment epsplat {}\n", env!("CARGO_PKG_VERSION"))?;
         if let Some(up) = self.up {
             writeln!(out, "comment up {}", up.name())?;
@@ -153,7 +153,7 @@ impl Properties {
     }
 
     /// The lines of an element's properties.
-    pub(super) fn write_properties(self, out: &mut Output<'_>) -> io::Result<()> {
+    pub(super) fn write_properties(self, out: &mut impl Write) -> io::Result<()> {
         let mut scalars =
             |kind: &str, names: &[&str]| names.iter().try_for_each(|name| writeln!(out, "property {kind} {name}"));
         scalars(if self.double_coordinates { "double" } else { "float" }, &["x", "y", "z"])?;
@@ -288,7 +288,7 @@ pub fn write_points(path: &Path, points: &Points, progress: &dyn Progress) -> Re
 
 /// Writes `count` rows, which `encode` appends the bytes of, some blocks at a time by all threads.
 pub(super) fn write_rows(
-    out: &mut Output<'_>,
+    out: &mut impl Write,
     count: usize,
     encode: impl Fn(usize, &mut Vec<u8>) + Sync,
     progress: &dyn Progress,

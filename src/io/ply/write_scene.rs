@@ -6,6 +6,8 @@ use std::path::Path;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::kept_nodes::NodeAndLow;
+use super::rows::Rows;
 use super::vertex::NODE_NAMES;
 use super::whole;
 use super::write::{Color, ColorProperties, Properties, Vertex, longer, normal, write_rows};
@@ -47,6 +49,32 @@ pub fn write_scene(path: &Path, scene: &Scene, beside: Option<&Path>, progress: 
     });
     progress.end();
     written
+}
+
+/// Writes surfels that are kept in a file with these properties, and nodes of this kind, which come level by level, as [`write_scene`] would.
+///
+/// # Errors
+///
+/// [`Error::Write`](crate::Error::Write) where the system cannot write, or nodes cannot be read.
+pub(crate) fn write_kept(
+    path: &Path,
+    (properties, surfels): (Properties, &Rows),
+    (kind, whole): (Nodes, &Whole),
+    nodes: impl Iterator<Item = Result<Vec<NodeAndLow>>>,
+    progress: &dyn Progress,
+) -> Result<()> {
+    let of_nodes = Some((kind.properties(), whole.nodes.into()));
+    let head = Head { properties, count: surfels.count(), beside: None, nodes: of_nodes, whole: Some(whole) };
+    write_whole(path, |out| {
+        head.write(out)?;
+        surfels.copy(out)?;
+        for nodes in nodes {
+            let nodes = nodes.map_err(io::Error::other)?;
+            let row = |index: usize, rows: &mut Vec<u8>| kind.encode(&nodes[index].0, nodes[index].1, rows);
+            write_rows(out, nodes.len(), row, progress)?;
+        }
+        out.write_all(&whole::bytes(whole))
+    })
 }
 
 /// What comes before the rows.
@@ -106,7 +134,7 @@ impl Properties {
 }
 
 /// Whether an f32 would lose digits of a coordinate.
-pub(super) fn needs_double(position: [f64; 3]) -> bool {
+pub(crate) fn needs_double(position: [f64; 3]) -> bool {
     position.iter().any(|c| f64::from(*c as f32) != *c)
 }
 
@@ -131,7 +159,7 @@ pub(super) fn vertex(scene: &Scene, index: usize) -> Vertex {
 
 /// What nodes are written with.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Nodes {
+pub(crate) struct Nodes {
     origin: DVec3,
     /// Colours are codes of 8 bits, as those of surfels are.
     coded: bool,

@@ -11,6 +11,7 @@ mod lattice;
 mod moments;
 mod nodes;
 mod octree;
+pub mod out_of_core;
 mod sums;
 #[cfg(test)]
 mod tests;
@@ -23,7 +24,7 @@ use rayon::prelude::*;
 use self::below::Known;
 use self::octree::{Element, Octree, Set};
 use crate::scene::hierarchy::Node;
-use crate::scene::{Colors, Hierarchy, Scene, Surfel, by_content};
+use crate::scene::{Colors, Hierarchy, Scene, by_content};
 use crate::{Error, Progress, Result};
 
 /// The scene with levels of detail, which are told too, and its surfels in the order of the tree.
@@ -43,7 +44,7 @@ pub fn build(scene: Scene, progress: &dyn Progress) -> Result<(Scene, Arc<Hierar
             "levels of detail are of surfels with a colour each: Gaussians, and surfels that a texture paints, have none yet".into(),
         ));
     }
-    let scene = as_in_a_file(scene);
+    let scene = scene_as_in_a_file(scene);
     progress.begin("dividing points", count.into());
     let mut tree = Octree::grow(count, |index| scene.center(index as usize), |points| progress.advance(points));
     progress.end();
@@ -62,16 +63,24 @@ fn sorted(tree: &mut Octree, scene: Scene) -> Scene {
     scene.into_order(&order)
 }
 
-/// The scene with the centres that a file in world coordinates gives back.
-fn as_in_a_file(mut scene: Scene) -> Scene {
+/// A centre in f32, and what it leaves out.
+fn split(center: DVec3) -> [[f32; 3]; 2] {
+    let short = center.as_vec3();
+    [short, (center - short.as_dvec3()).as_vec3()].map(|part| part.to_array())
+}
+
+/// The centre that a file in world coordinates gives back.
+fn as_in_a_file(origin: DVec3, center: DVec3) -> DVec3 {
+    (origin + center) - origin
+}
+
+/// The scene with the centres that a file gives back.
+fn scene_as_in_a_file(mut scene: Scene) -> Scene {
     let origin = scene.origin;
-    let written = |index: usize| (origin + scene.center(index)) - origin;
-    let centers: Vec<DVec3> = (0..scene.surfels.len()).into_par_iter().map(written).collect();
-    scene.surfels.par_iter_mut().zip(&centers).for_each(|(surfel, center)| surfel.center = center.as_vec3().to_array());
-    let rest = |(low, (surfel, center)): (&mut [f32; 3], (&Surfel, &DVec3))| {
-        *low = (center - DVec3::from_array(surfel.center.map(f64::from))).as_vec3().to_array();
-    };
-    scene.low.par_iter_mut().zip(scene.surfels.par_iter().zip(&centers)).for_each(rest);
+    let places = (0..scene.surfels.len()).into_par_iter().map(|index| split(as_in_a_file(origin, scene.center(index))));
+    let places: Vec<[[f32; 3]; 2]> = places.collect();
+    scene.surfels.par_iter_mut().zip(&places).for_each(|(surfel, [short, _])| surfel.center = *short);
+    scene.low.par_iter_mut().zip(&places).for_each(|(low, [_, rest])| *low = *rest);
     scene
 }
 

@@ -9,7 +9,7 @@ use crate::scene::hierarchy::{DEEPEST, FAN_OUT};
 
 /// Steps across a set of more than [`FAN_OUT`] points below which they get a finer lattice of their own: then a mean has five digits within the set, whatever strays
 /// from the body of the scene.
-const FEWEST_STEPS: i64 = 1 << 16;
+pub(super) const FEWEST_STEPS: i64 = 1 << 16;
 
 /// Points of a set whose sums are made by all threads.
 const MANY: usize = 1 << 16;
@@ -151,11 +151,14 @@ fn divided(own: &mut [Element], deepest: bool, position: &(impl Fn(u32) -> DVec3
     }
     let sum = sum(own);
     let count = own.len() as i64;
-    let octant = |element: &Element| {
-        // Exact: a point is high if count q > Σ q, and equal ones are low, so that no set is divided into itself and nothing.
-        (0..3).fold(0, |octant, k| octant | usize::from(count * i64::from(element.place[k]) > sum[k]) << k)
-    };
+    let octant = |element: &Element| octant(element.place, count, sum);
     Divided { lattice, counts: Some(put_together(own, octant)) }
+}
+
+/// The octant of a point of a set with so many points and this sum of places, by bits. It is exact: a point is high if count q > Σ q, and equal ones are low, so
+/// that no set is divided into itself and nothing.
+pub(super) fn octant(place: [i32; 3], count: i64, sum: [i64; 3]) -> usize {
+    (0..3).fold(0, |octant, k| octant | usize::from(count * i64::from(place[k]) > sum[k]) << k)
 }
 
 /// The longest side of the box around a set, steps.

@@ -39,11 +39,14 @@ pub(super) struct Scales {
 
 impl Scales {
     pub fn of(scene: &Scene) -> Self {
-        let (low, high) = scene.color_range();
+        let longest = scene.surfels.par_iter().map(Surfel::radius).reduce(|| 0.0, f32::max);
+        Self::within(scene.color_range(), matches!(scene.colors, Colors::Srgb8(_)), longest)
+    }
+
+    /// Those of surfels with this [range of colours](Scene::color_range), which are codes of 8 bits if they are `coded`, and this longest half-axis.
+    pub fn within((low, high): ([f32; 4], [f32; 4]), coded: bool, longest: f32) -> Self {
         let [low, high] = [low, high].map(|color| color.map(f64::from));
-        let coded = matches!(scene.colors, Colors::Srgb8(_));
-        let longest = scene.surfels.par_iter().map(Surfel::radius).reduce(|| 0.0, f32::max).into();
-        Self { low, span: std::array::from_fn(|k| high[k] - low[k]), coded, longest }
+        Self { low, span: std::array::from_fn(|k| high[k] - low[k]), coded, longest: longest.into() }
     }
 
     fn units(&self, [r, g, b, a]: [f32; 4]) -> [i64; 4] {

@@ -1,0 +1,186 @@
+//! Rows of surfels that all have the same length, in a file, of which any threads read any: those of a binary PLY file, or of one that nobody sees.
+
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use super::binary;
+use super::faces::Faces;
+use super::header::{self, Comments, Element, Encoding, Kind};
+use super::vertex::{Layout, is_tree};
+use super::write::Properties;
+use super::write_scene::vertex;
+use crate::io::fault::Fault;
+use crate::io::{Format, Input, Points};
+use crate::scene::Scene;
+use crate::{Error, Result};
+
+/// Rows of one element of a file.
+pub struct Rows {
+    file: Mutex<File>,
+    /// What errors call the file.
+    path: PathBuf,
+    element: Element,
+    layout: Layout,
+    /// Bytes of the file before the first.
+    start: u64,
+    /// Bytes of each.
+    size: u64,
+    big: bool,
+    /// How they are written, if they are.
+    written: Option<Properties>,
+    comments: Comments,
+}
+
+impl Rows {
+    /// Those of the points of a binary PLY file; None of another file, and where points are not all that there is: of meshes, Gaussians, places in textures, files
+    /// with levels of detail, without normals or radii, and files that end early, which is told by who reads all of it.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Read`] where the system cannot read, [`Error::Malformed`] where the header is not PLY's.
+    pub fn open(input: Input) -> Result<Option<Self>> {
+        let Input { file, length, path, format } = input;
+        if format != Format::Ply {
+            return Ok(None);
+        }
+        let mut reader = BufReader::new(file);
+        let mut opened = || {
+            let header = header::read(&mut reader)?;
+            let start = reader.stream_position()?;
+            Ok((header, start))
+        };
+        let (header, start) = opened().map_err(|fault: Fault| fault.of(&path))?;
+        let other = header.elements.iter().skip(1).any(|element| is_tree(element) || Faces::are(element) && element.count > 0);
+        let Some(element) = header.elements.into_iter().next().filter(|first| first.name == "vertex" && !other) else {
+            return Ok(None);
+        };
+        let lists = element.properties.iter().any(|property| matches!(property.kind, Kind::List { .. }));
+        if header.encoding == Encoding::Ascii || header.comments.beside.is_some() || lists {
+            return Ok(None);
+        }
+        let layout = Layout::of(&element).map_err(|fault| fault.of(&path))?;
+        let size = layout.row_size as u64;
+        let whole = element.count.checked_mul(size).is_some_and(|bytes| bytes <= length.saturating_sub(start));
+        let big = header.encoding == Encoding::BigEndian;
+        let (file, comments) = (Mutex::new(reader.into_inner()), header.comments);
+        let sound = layout.is_disk() && whole;
+        Ok(sound.then_some(Self { file, path, element, layout, start, size, big, written: None, comments }))
+    }
+
+    /// No rows yet, with what `properties` name, in a file without a name in `folder`, which goes with this; errors call it `path`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Write`] where the system has no room for it.
+    pub fn temporary(folder: &Path, properties: Properties, path: &Path) -> Result<Self> {
+        let file = tempfile::tempfile_in(folder).map_err(|error| Error::write(path, error))?;
+        let mut text = Vec::new();
+        let header = properties.write_header(&mut text, 0, &[]).and_then(|()| text.write_all(b"end_header\n"));
+        header.map_err(|error| Error::write(path, error))?;
+        let element = header::read(&mut &text[..]).map_err(|fault| fault.of(path))?.elements.remove(0);
+        let layout = Layout::of(&element).map_err(|fault| fault.of(path))?;
+        let size = layout.row_size as u64;
+        let (file, path) = (Mutex::new(file), path.to_owned());
+        let written = Some(properties);
+        Ok(Self { file, path, element, layout, start: 0, size, big: false, written, comments: Comments::default() })
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> u64 {
+        self.element.count
+    }
+
+    /// Bytes of each.
+    pub fn size(&self) -> usize {
+        self.size as usize
+    }
+
+    /// The file's name.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What the file is found to be.
+    pub fn malformed(&self, what: impl Into<String>) -> Error {
+        Error::malformed(&self.path, what)
+    }
+
+    /// Numbers in pieces of `piece`.
+    pub fn pieces(&self, piece: u64) -> Vec<Range<u64>> {
+        let starts = (0..self.count()).step_by(piece.max(1) as usize);
+        starts.map(|start| start..self.count().min(start + piece)).collect()
+    }
+
+    /// The bytes of these rows.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Read`] where the system cannot read.
+    pub fn bytes(&self, numbers: Range<u64>) -> Result<Vec<u8>> {
+        let mut bytes = vec![0; ((numbers.end - numbers.start) * self.size) as usize];
+        let mut file = self.lock();
+        let read = file.seek(SeekFrom::Start(self.start + numbers.start * self.size));
+        read.and_then(|_| file.read_exact(&mut bytes)).map_err(|error| Error::read(&self.path, error))?;
+        Ok(bytes)
+    }
+
+    /// The points of the bytes of some rows.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Malformed`] if these are none.
+    pub fn points(&self, bytes: &[u8]) -> Result<Points> {
+        let (count, length) = (bytes.len() as u64 / self.size.max(1), bytes.len() as u64);
+        let element = Element { count, ..self.element.clone() };
+        let read = match self.big {
+            true => binary::vertices_in::<true>(bytes, &element, &self.layout, length, &()),
+            false => binary::vertices_in::<false>(bytes, &element, &self.layout, length, &()),
+        };
+        let (points, _) = read.map_err(|fault| fault.of(&self.path))?;
+        let Comments { up, closed, unsided, .. } = self.comments;
+        Ok(Points { up, closed, unsided, ..points })
+    }
+
+    /// The bytes of some surfels of `scene`, as rows that are written.
+    pub fn encoded(&self, scene: &Scene, surfels: Range<usize>) -> Vec<u8> {
+        let mut bytes = Vec::with_capacity(surfels.len() * self.size());
+        let properties = self.written.unwrap_or_default();
+        surfels.for_each(|index| properties.encode(&vertex(scene, index), &mut bytes));
+        bytes
+    }
+
+    /// Adds the bytes of rows after all others.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Write`] where the system cannot write.
+    pub fn append(&mut self, bytes: &[u8]) -> Result<()> {
+        let end = self.start + self.count() * self.size;
+        let mut file = self.lock();
+        let written = file.seek(SeekFrom::Start(end)).and_then(|_| file.write_all(bytes));
+        drop(file);
+        self.element.count += bytes.len() as u64 / self.size.max(1);
+        written.map_err(|error| Error::write(&self.path, error))
+    }
+
+    /// Writes all of them to `out`.
+    pub(super) fn copy(&self, out: &mut impl Write) -> io::Result<()> {
+        let mut file = self.lock();
+        file.seek(SeekFrom::Start(self.start))?;
+        io::copy(&mut (&mut *file).take(self.count() * self.size), out).map(drop)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, File> {
+        // Whoever reads or writes says where.
+        self.file.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The position of a row that is written with coordinates in f64.
+pub fn position(row: &[u8]) -> [f64; 3] {
+    let (words, _) = row.as_chunks::<8>();
+    [0, 1, 2].map(|k| words.get(k).map_or(f64::NAN, |word| f64::from_le_bytes(*word)))
+}

@@ -1,0 +1,186 @@
+//! The tree as far as it is made: subtrees whose surfels and nodes are kept in files, and the nodes above them.
+
+use std::ops::Range;
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use super::super::below::{Below, Child, Disk};
+use super::super::{Made, Octree};
+use super::sources::{Failed, PIECE};
+use super::survey::Survey;
+use crate::io::ply::{ColorProperties, KeptNodes, Nodes, Properties, Rows};
+use crate::scene::hierarchy::Node;
+use crate::scene::{Colors, LevelFacts, Scene};
+use crate::Result;
+use crate::scene::color::DEFAULT_COLOR;
+
+/// A node of the tree.
+#[derive(Clone, Copy)]
+pub(super) enum Key {
+    /// One above subtrees, by its number.
+    Above(u32),
+    /// One of the subtree whose first node has this number; its children, or surfels if it is a leaf, are so many of those that are kept.
+    Within { leaf: bool, first: u64, count: u32, subtree: u64 },
+}
+
+/// A node, and the number of surfels below it.
+pub(super) struct Branch {
+    pub key: Key,
+    pub made: Made,
+    pub surfels: u64,
+}
+
+/// Some nodes of the tree that hang together.
+pub(super) enum Part {
+    /// One above subtrees.
+    Above { depth: usize, children: Vec<Branch>, made: Made },
+    /// A subtree.
+    Subtree {
+        /// The level of its root in the tree.
+        depth: usize,
+        /// The number of its first node.
+        first: u64,
+        /// Where each of its levels starts after that, and the end.
+        levels: Vec<usize>,
+    },
+}
+
+/// What is kept.
+pub(super) struct Kept<'a> {
+    survey: &'a Survey,
+    /// Surfels in the order of the tree.
+    pub surfels: Rows,
+    pub nodes: KeptNodes,
+    /// Of nodes on one level, what is left of others comes first.
+    pub parts: Vec<Part>,
+    /// What nodes are written with.
+    pub kind: Nodes,
+    pub levels: LevelFacts,
+    /// What could not be read of these files.
+    failed: Failed,
+}
+
+impl<'a> Kept<'a> {
+    /// Nothing yet.
+    pub fn new(survey: &'a Survey, folder: &Path, path: &Path) -> Result<Self> {
+        let surfels = Rows::temporary(folder, properties(survey), path)?;
+        let nodes = KeptNodes::new(folder, path)?;
+        let kind = Nodes::none(survey.known.origin, matches!(survey.empty.colors, Colors::Srgb8(_)));
+        let levels = LevelFacts::default();
+        Ok(Self { survey, surfels, nodes, parts: Vec::new(), kind, levels, failed: Failed::default() })
+    }
+
+    /// Keeps a subtree, whose surfels are in its order.
+    pub fn subtree(&mut self, depth: usize, tree: &Octree, scene: &Scene, mut nodes: Vec<Made>) -> Result<Branch> {
+        let (surfels, first) = (self.surfels.count(), self.nodes.count());
+        let pieces: Vec<Range<usize>> = (0..scene.surfels.len())
+            .step_by(PIECE as usize)
+            .map(|start| start..scene.surfels.len().min(start + PIECE as usize))
+            .collect();
+        for pieces in pieces.chunks(rayon::current_num_threads()) {
+            let rows = &self.surfels;
+            let encoded: Vec<Vec<u8>> = pieces.par_iter().map(|piece| rows.encoded(scene, piece.clone())).collect();
+            encoded.iter().try_for_each(|bytes| self.surfels.append(bytes))?;
+        }
+        for (node, _) in nodes.iter_mut().filter(|(node, _)| node.leaf) {
+            // Fewer than 2^32 surfels are there in all.
+            node.first += surfels as u32;
+        }
+        self.nodes.append(&nodes)?;
+        self.told(&nodes);
+        self.parts.push(Part::Subtree { depth, first, levels: tree.levels.clone() });
+        let key = within(&nodes[0].0, first);
+        Ok(Branch { key, made: nodes[0], surfels: scene.surfels.len() as u64 })
+    }
+
+    /// Puts a node, which `make` is told how to look below of, above some branches.
+    pub fn above(&mut self, depth: usize, children: Vec<Branch>, make: impl FnOnce(&Self, Key) -> Made) -> Result<Branch> {
+        let number = self.parts.len();
+        let surfels = children.iter().map(|branch| branch.surfels).sum();
+        let nothing = children[0].made;
+        self.parts.push(Part::Above { depth, children, made: nothing });
+        let key = Key::Above(number as u32);
+        let made = make(self, key);
+        self.failed.check()?;
+        self.told(&[made]);
+        if let Part::Above { made: own, .. } = &mut self.parts[number] {
+            *own = made;
+        }
+        Ok(Branch { key, made, surfels })
+    }
+
+    /// Hears of nodes that are made.
+    fn told(&mut self, nodes: &[Made]) {
+        let none = Nodes::none(self.survey.known.origin, false);
+        let kind = nodes.par_iter().fold(|| none, |all, (node, low)| all.with(node, *low)).reduce(|| none, Nodes::both);
+        self.kind = self.kind.both(kind);
+        self.levels = self.levels.both(LevelFacts::of_nodes(nodes.par_iter().map(|(node, _)| node)));
+    }
+
+    /// Some of the surfels that are kept, as a part of the scene.
+    pub fn part(&self, numbers: Range<u64>) -> Result<Scene> {
+        let points = self.surfels.points(&self.surfels.bytes(numbers)?)?;
+        self.survey.part(points).ok_or_else(|| self.surfels.malformed("a surfel has no place or no half-axes"))
+    }
+}
+
+/// How a node of a subtree, whose first node has this number, is come to.
+fn within(node: &Node, subtree: u64) -> Key {
+    let first = if node.leaf { node.first.into() } else { subtree + u64::from(node.first) };
+    Key::Within { leaf: node.leaf, first, count: node.count, subtree }
+}
+
+/// What surfels are written with.
+pub(super) fn properties(survey: &Survey) -> Properties {
+    let Scene { oriented, closed, up, .. } = survey.empty;
+    Properties {
+        double_coordinates: survey.double,
+        normals: true,
+        radii: true,
+        axes: true,
+        clips: survey.has.clips,
+        caps: survey.has.caps,
+        colors: match survey.empty.colors {
+            Colors::Constant(DEFAULT_COLOR) => ColorProperties::Absent,
+            Colors::Srgb8(_) if survey.opaque => ColorProperties::Srgb8,
+            Colors::Srgb8(_) => ColorProperties::Srgb8Alpha,
+            _ => ColorProperties::Linear,
+        },
+        up: Some(up),
+        unsided: !oriented,
+        closed,
+        ..Properties::default()
+    }
+}
+
+impl Below for Kept<'_> {
+    type Key = Key;
+
+    fn is_leaf(&self, of: Key) -> bool {
+        matches!(of, Key::Within { leaf: true, .. })
+    }
+
+    fn children(&self, of: Key, mut see: impl FnMut(Child<'_, Key>)) {
+        match of {
+            Key::Above(number) => {
+                let Part::Above { children, .. } = &self.parts[number as usize] else { return };
+                for Branch { key, made, surfels } in children {
+                    see(Child { key: *key, made, surfels: *surfels });
+                }
+            }
+            Key::Within { first, count, subtree, .. } => {
+                let nodes = self.failed.noted(self.nodes.read(first..first + u64::from(count))).unwrap_or_default();
+                for made in &nodes {
+                    see(Child { key: within(&made.0, subtree), made, surfels: 0 });
+                }
+            }
+        }
+    }
+
+    fn disks(&self, of: Key, see: impl FnMut(Disk)) {
+        let Key::Within { first, count, .. } = of else { return };
+        let scene = self.failed.noted(self.part(first..first + u64::from(count))).unwrap_or_default();
+        (0..scene.surfels.len()).map(|index| Disk::of(&scene, index)).for_each(see);
+    }
+}

@@ -1,0 +1,201 @@
+//! Levels of detail of more points than memory has room for: the same file, to the bit, as of [`build`](super::build()) and [`write_scene`](crate::io::ply::write_scene).
+//!
+//! What all points say together is looked for first (`survey`); then they are copied into a file and divided at their means into files of fewer, until memory has room for
+//! those of a set (`runs`). Its subtree is made there, and kept in files (`kept`); nodes above subtrees are made of what is kept. At the end all is written level by level
+//! (`write`). A tree depends on the set of points alone, and so it is of no matter where it was made.
+
+mod kept;
+mod runs;
+mod sources;
+mod survey;
+mod write;
+
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use self::kept::{Branch, Kept};
+use self::runs::{Run, Runs};
+use self::sources::{PIECE, Sources};
+use self::survey::Survey;
+use super::lattice::Lattice;
+use super::moments::Moments;
+use super::octree::Octree;
+use super::sums::Sums;
+use super::{bounds, nodes, sorted};
+use crate::io::ply::Rows;
+use crate::scene::hierarchy::{DEEPEST, Node};
+use crate::scene::{Colors, Scene};
+use crate::surfels::Preparation;
+use crate::{Error, Progress, Result};
+
+/// Memory of the program and of what is read and written at once, bytes, and of each thread for pieces.
+const PROGRAM: u64 = 96 << 20;
+const OF_THREAD: u64 = 48 << 20;
+
+/// Memory of a surfel of a subtree beside what the scene has of it, bytes: its place, its part of the nodes and of their sums.
+const OF_SURFEL: u64 = 150;
+
+/// Points that memory must have room for.
+const FEWEST: u64 = 1 << 16;
+
+/// What came of it.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// Surfels.
+    pub surfels: u64,
+    /// Nodes of the tree.
+    pub nodes: u64,
+    /// Its levels.
+    pub levels: u64,
+    /// Subtrees that were made one after the other.
+    pub subtrees: u64,
+    /// What was done to the points.
+    pub preparation: Preparation,
+}
+
+/// Writes the surfels of all points of `files` with levels of detail at `path`, within about so many bytes of `memory`; what is kept meanwhile is in files without a name in
+/// `folder`, of about three times the size of what is written.
+///
+/// # Errors
+///
+/// [`Error::Usage`] for too little memory, or too many points or nodes, [`Error::Malformed`] for points without a normal or a radius, [`Error::EmptyScene`], and [`Error::Read`]
+/// and [`Error::Write`] of the system.
+pub fn write_levels(
+    files: &[Rows],
+    memory: u64,
+    (path, folder): (&Path, &Path),
+    progress: &dyn Progress,
+) -> Result<Report> {
+    let fixed = PROGRAM + OF_THREAD * rayon::current_num_threads() as u64;
+    let sources = Sources { files, progress };
+    let survey = Survey::of(&sources)?;
+    let of_surfel = survey.surfel_bytes() + OF_SURFEL;
+    let fits = memory.saturating_sub(fixed) / of_surfel;
+    if fits < FEWEST {
+        let least = (fixed + FEWEST * of_surfel) as f64 / 2f64.powi(20);
+        return Err(Error::Usage(format!(
+            "--memory is less than the {least:.0}MiB that levels of detail of these points take at least"
+        )));
+    }
+    let root = Lattice::over(&survey.bounds);
+    let runs = Runs { survey: &survey, folder, path, progress };
+    let run = runs.all(&sources, &root)?;
+    let kept = Kept::new(&survey, folder, path)?;
+    let mut divider = Divider { runs, kept, fits, lattices: vec![root] };
+    divider.branch(run, 0)?;
+    write::write(path, divider.kept, &survey, progress)
+}
+
+/// A branch, and what its parent's sums are made of.
+struct Summed {
+    branch: Branch,
+    sums: Sums,
+    /// On each of the lattices of the sets that it is in.
+    moments: Vec<Moments>,
+}
+
+/// What sets are divided with, from the root down.
+struct Divider<'a> {
+    runs: Runs<'a>,
+    kept: Kept<'a>,
+    /// Points that memory has room for.
+    fits: u64,
+    /// Those of the sets that the one which is looked at is in, each on the last.
+    lattices: Vec<Lattice>,
+}
+
+impl Divider<'_> {
+    /// The tree of a set, so many levels below the root.
+    fn branch(&mut self, mut run: Run, depth: usize) -> Result<Summed> {
+        if run.rows.count() <= self.fits {
+            return self.subtree(run, depth);
+        }
+        let known = self.lattices.len();
+        self.lattices.extend(self.runs.refined(&mut run)?);
+        let lattice = self.lattices[self.lattices.len() - 1];
+        let count = run.rows.count();
+        let below = if depth < DEEPEST { self.runs.divided(run, &lattice)? } else { Vec::new() };
+        if below.len() < 2 {
+            return Err(Error::Usage(format!(
+                "{count} points are at one place, and --memory has room for {}: give more",
+                self.fits
+            )));
+        }
+        let children = below.into_iter().map(|run| self.branch(run, depth + 1)).collect::<Result<Vec<_>>>()?;
+        let summed = self.above(children, (depth, &lattice));
+        self.lattices.truncate(known);
+        summed.map(|summed| Summed { moments: summed.moments[..known].to_vec(), ..summed })
+    }
+
+    /// The node above some branches, which has this lattice.
+    fn above(&mut self, children: Vec<Summed>, (depth, lattice): (usize, &Lattice)) -> Result<Summed> {
+        let mut moments = vec![Moments::default(); self.lattices.len()];
+        let mut sums = Sums::default();
+        for child in &children {
+            moments.iter_mut().zip(&child.moments).for_each(|(all, own)| all.add(own));
+            sums.add(&child.sums);
+        }
+        sums.moments = moments[moments.len() - 1];
+        let (known, count) = (self.runs.survey.known, children.len() as u32);
+        let children = children.into_iter().map(|child| child.branch).collect();
+        let branch = self.kept.above(depth, children, |kept, key| {
+            let (node, low) = bounds::node(key, &sums, lattice, kept, &known);
+            (Node { count, leaf: false, ..node }, low)
+        })?;
+        Ok(Summed { branch, sums, moments })
+    }
+
+    /// The tree of a set that memory has room for.
+    fn subtree(&mut self, run: Run, depth: usize) -> Result<Summed> {
+        let (survey, progress) = (self.runs.survey, self.runs.progress);
+        let count = run.rows.count() as u32;
+        let scene = self.loaded(run)?;
+        let inherited = self.lattices[self.lattices.len() - 1];
+        progress.begin("dividing points", count.into());
+        let center = |index: u32| scene.center(index as usize);
+        let mut tree = Octree::grow_below((inherited, depth), count, center, |points| progress.advance(points));
+        progress.end();
+        let scene = sorted(&mut tree, scene);
+        let (nodes, sums) = nodes::nodes(&tree, &scene, &survey.known, progress);
+        let on = |lattice: &Lattice| Moments::of((0..scene.surfels.len()).map(|k| lattice.place(scene.center(k))));
+        let mut moments: Vec<Moments> = Vec::with_capacity(self.lattices.len());
+        for (index, lattice) in self.lattices.iter().enumerate() {
+            let own = index + 1 == self.lattices.len() && tree.sets[0].lattice == 0;
+            moments.push(if own { sums.moments } else { on(lattice) });
+        }
+        let branch = self.kept.subtree(depth, &tree, &scene, nodes)?;
+        Ok(Summed { branch, sums, moments })
+    }
+
+    /// The surfels of a set, which is given up.
+    fn loaded(&self, run: Run) -> Result<Scene> {
+        let survey = self.runs.survey;
+        let mut scene = survey.empty.clone();
+        survey.reserve(&mut scene, run.rows.count() as usize);
+        let read = |piece| {
+            let points = run.rows.points(&run.rows.bytes(piece)?)?;
+            survey.part(points).ok_or_else(|| run.rows.malformed("a surfel has no place or no half-axes"))
+        };
+        for pieces in run.rows.pieces(PIECE).chunks(rayon::current_num_threads()) {
+            let parts: Vec<Scene> = pieces.par_iter().map(|piece| read(piece.clone())).collect::<Result<_>>()?;
+            parts.into_iter().for_each(|part| append(&mut scene, part));
+        }
+        Ok(scene)
+    }
+}
+
+/// Puts the surfels of a part behind those of another one.
+fn append(scene: &mut Scene, mut part: Scene) {
+    scene.surfels.append(&mut part.surfels);
+    scene.low.append(&mut part.low);
+    scene.clips.append(&mut part.clips);
+    scene.caps.append(&mut part.caps);
+    scene.normals.append(&mut part.normals);
+    match (&mut scene.colors, part.colors) {
+        (Colors::Srgb8(all), Colors::Srgb8(mut own)) => all.append(&mut own),
+        (Colors::Linear(all), Colors::Linear(mut own)) => all.append(&mut own),
+        // One for all.
+        _ => {}
+    }
+}

@@ -1,0 +1,115 @@
+//! The points of files that are read piece by piece, as often as they are wanted.
+
+use std::ops::Range;
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::io::Points;
+use crate::io::ply::Rows;
+use crate::scene::Places;
+use crate::surfels::gather::is_usable;
+use crate::{Error, Progress, Result};
+
+/// Rows of a piece.
+pub(super) const PIECE: u64 = 1 << 16;
+
+/// The files.
+pub(super) struct Sources<'a> {
+    pub files: &'a [Rows],
+    pub progress: &'a dyn Progress,
+}
+
+impl Sources<'_> {
+    /// How many points they have.
+    pub fn count(&self) -> u64 {
+        self.files.iter().map(Rows::count).sum()
+    }
+
+    /// What `of` makes of the points of each piece and of the file's name, joined in any order.
+    pub fn each<T: Send>(
+        &self,
+        nothing: impl Fn() -> T + Sync + Send,
+        of: impl Fn(Points, &Path) -> Result<T> + Sync + Send,
+        join: impl Fn(T, T) -> T + Sync + Send,
+    ) -> Result<T> {
+        let pieces: Vec<(&Rows, Range<u64>)> =
+            self.files.iter().flat_map(|file| file.pieces(PIECE).into_iter().map(move |piece| (file, piece))).collect();
+        let read = |(file, piece): (&Rows, Range<u64>)| {
+            let points = file.points(&file.bytes(piece)?)?;
+            let count = points.positions.len() as u64;
+            let made = of(points, file.path());
+            self.progress.advance(count);
+            made
+        };
+        pieces.into_par_iter().map(read).try_reduce(&nothing, |one, other| Ok(join(one, other)))
+    }
+}
+
+/// Places that are read from files each time that they are gone through.
+pub(super) struct Read<F> {
+    count: usize,
+    pieces: Vec<Range<u64>>,
+    of: F,
+    /// Why a piece could not be read.
+    failed: Failed,
+}
+
+impl<F: Fn(Range<u64>) -> Result<Vec<(DVec3, f64)>> + Sync> Read<F> {
+    /// So many, of which `of` reads pieces.
+    pub fn new(count: usize, pieces: Vec<Range<u64>>, of: F) -> Self {
+        Self { count, pieces, of, failed: Failed::default() }
+    }
+
+    /// What was made of all of them, if they could be read.
+    pub fn made<T>(self, of: impl FnOnce(&Self) -> T) -> Result<T> {
+        let made = of(&self);
+        self.failed.check().map(|()| made)
+    }
+}
+
+impl<F: Fn(Range<u64>) -> Result<Vec<(DVec3, f64)>> + Sync> Places for Read<F> {
+    fn count(&self) -> usize {
+        self.count
+    }
+
+    fn fold<T: Send>(
+        &self,
+        nothing: impl Fn() -> T + Sync + Send,
+        add: impl Fn(T, DVec3, f64) -> T + Sync + Send,
+        join: impl Fn(T, T) -> T + Sync + Send,
+    ) -> T {
+        let piece = |piece: &Range<u64>| {
+            let places = self.failed.noted((self.of)(piece.clone())).unwrap_or_default();
+            places.into_iter().fold(nothing(), |all, (position, radius)| add(all, position, radius))
+        };
+        self.pieces.par_iter().map(piece).reduce(&nothing, &join)
+    }
+}
+
+/// The first thing that went wrong where nothing could be said of it.
+#[derive(Default)]
+pub(super) struct Failed(Mutex<Option<Error>>);
+
+impl Failed {
+    /// What went well.
+    pub fn noted<T>(&self, outcome: Result<T>) -> Option<T> {
+        let note = |error| {
+            self.0.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+        };
+        outcome.map_err(note).ok()
+    }
+
+    /// Whether all went well.
+    pub fn check(&self) -> Result<()> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), Err)
+    }
+}
+
+/// The usable positions of some points.
+pub(super) fn usable(points: &Points) -> impl Iterator<Item = DVec3> {
+    // Adding +0 makes -0 the same coordinate as 0.
+    points.positions.iter().filter(|position| is_usable(position)).map(|p| DVec3::from_array(*p) + DVec3::ZERO)
+}

@@ -1,0 +1,366 @@
+//! What all points say together, which each part of them must be told.
+
+use glam::DVec3;
+
+use super::super::{as_in_a_file, split};
+use super::super::below::Known;
+use super::super::sums::Scales;
+use super::sources::{Read, Sources, usable};
+use crate::io::Points;
+use crate::scene::scene::shows;
+use crate::scene::whole::Has;
+use crate::scene::{Bounds, Cap, Clip, Colors, SMALLEST_SCENE, Scene, Surfel, Up, body_of};
+use crate::surfels::build::{LARGEST_IN_EXTENTS, plane_of};
+use crate::surfels::complete::{self, Added};
+use crate::surfels::{Preparation, guess_up, origin_for};
+use crate::{Error, Result};
+
+/// A scene without its surfels, and what is known of these.
+pub(super) struct Survey {
+    /// What parts of the scene start from.
+    pub empty: Scene,
+    /// What each part is joined with, so that it has what others have.
+    others: Points,
+    pub has: Has,
+    pub known: Known,
+    /// [`Scene::color_range`].
+    pub range: ([f32; 4], [f32; 4]),
+    /// [`Scene::largest_radius`].
+    pub largest_radius: f32,
+    /// [`Scene::largest_shorter`].
+    pub largest_shorter: f32,
+    /// All colours are opaque.
+    pub opaque: bool,
+    /// [`Scene::bounds`], with centres as a file gives them back.
+    pub bounds: Bounds,
+    /// An f32 would lose digits of a coordinate.
+    pub double: bool,
+    pub preparation: Preparation,
+}
+
+impl Survey {
+    /// That of the points of files.
+    pub fn of(sources: &Sources<'_>) -> Result<Self> {
+        let mut look = Look::new(sources)?;
+        let told = |what: &str| sources.progress.begin(what, sources.count());
+        told("looking at points");
+        let looks = sources.each(Looks::default, |points, path| look.at(points, path), Looks::both)?;
+        sources.progress.end();
+        let count = looks.preparation.surfels;
+        if count == 0 {
+            return Err(Error::EmptyScene("the inputs hold no point with three finite coordinates".into()));
+        }
+        if u32::try_from(count).is_err() {
+            return Err(Error::Usage(format!("a tree has at most 2^32 - 1 surfels, not {count}")));
+        }
+        told("looking for the body");
+        let body = body(sources, count)?;
+        sources.progress.end();
+        look.empty.origin = origin_for(&body);
+        look.empty.up = look.up.unwrap_or_else(|| guess_up(&body));
+        let extent = body.extent().max_element();
+        if extent < SMALLEST_SCENE || f64::from(looks.longest) > LARGEST_IN_EXTENTS * extent {
+            return Err(Error::Usage(
+                "disks of a million times the extent of the scene, and scenes of less than 1e-15 world units, are not taken with --memory: leave it out".into(),
+            ));
+        }
+        let has = Has { low: true, ..looks.has };
+        told("looking at digits");
+        let places = sources.each(<[Placed; 2]>::default, |points, _| Ok(look.placed(points, has)), |[a, b], [c, d]| {
+            [a.both(c), b.both(d)]
+        })?;
+        sources.progress.end();
+        Ok(look.finish(looks, places))
+    }
+
+    /// What the scene has of a surfel, bytes.
+    pub fn surfel_bytes(&self) -> u64 {
+        let Has { low, clips, caps, normals } = self.has;
+        let lists = [(low, 12), (clips, 24), (caps, 12), (normals, 12)];
+        let colors = match self.empty.colors {
+            Colors::Srgb8(_) => 4,
+            Colors::Linear(_) => 16,
+            _ => 0,
+        };
+        36 + colors + lists.iter().map(|(has, bytes)| if *has { *bytes } else { 0 }).sum::<u64>()
+    }
+
+    /// Makes room for so many surfels.
+    pub fn reserve(&self, scene: &mut Scene, count: usize) {
+        let Has { low, clips, caps, normals } = self.has;
+        let count_if = |has: bool| if has { count } else { 0 };
+        scene.surfels.reserve_exact(count);
+        scene.low.reserve_exact(count_if(low));
+        scene.clips.reserve_exact(count_if(clips));
+        scene.caps.reserve_exact(count_if(caps));
+        scene.normals.reserve_exact(count_if(normals));
+        match &mut scene.colors {
+            Colors::Srgb8(codes) => codes.reserve_exact(count),
+            Colors::Linear(colors) => colors.reserve_exact(count),
+            _ => {}
+        }
+    }
+
+    /// A part of the scene: the surfels of these points.
+    pub fn part(&self, points: Points) -> Option<Scene> {
+        let mut scene = self.empty.clone();
+        complete::add(&mut scene, vec![points, self.others.clone()], self.has)?;
+        Some(scene)
+    }
+}
+
+/// The box of all points but those that stray, world coordinates.
+fn body(sources: &Sources<'_>, count: u64) -> Result<Bounds> {
+    let mut pieces = Vec::new();
+    // The pieces of all files, one after the other.
+    let mut starts = Vec::new();
+    let mut start = 0;
+    for file in sources.files {
+        pieces.extend(file.pieces(super::sources::PIECE).into_iter().map(|piece| start + piece.start..start + piece.end));
+        starts.push(start);
+        start += file.count();
+    }
+    let read = |piece: std::ops::Range<u64>| {
+        let file = starts.partition_point(|start| *start <= piece.start) - 1;
+        let rows = &sources.files[file];
+        let points = rows.points(&rows.bytes(piece.start - starts[file]..piece.end - starts[file])?)?;
+        Ok(usable(&points).map(|position| (position, 0.0)).collect())
+    };
+    Read::new(count as usize, pieces, read).made(|places| body_of(places).0)
+}
+
+/// How points are looked at.
+struct Look {
+    empty: Scene,
+    others: Points,
+    up: Option<Up>,
+}
+
+/// What they say, wherever their origin is.
+#[derive(Clone)]
+struct Looks {
+    preparation: Preparation,
+    has: Has,
+    longest: f32,
+    radius: f32,
+    shorter: f32,
+    range: ([f32; 4], [f32; 4]),
+    /// One of the colours, if all are the same.
+    color: One,
+    opaque: bool,
+}
+
+/// Whether colours are one.
+#[derive(Clone, Copy, PartialEq)]
+enum One {
+    Nothing,
+    Color([f32; 4]),
+    Several,
+}
+
+impl One {
+    fn both(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::Nothing, one) | (one, Self::Nothing) => one,
+            (one, other) if one == other => one,
+            _ => Self::Several,
+        }
+    }
+
+    fn of(colors: &Colors, count: usize) -> Self {
+        if count == 0 {
+            return Self::Nothing;
+        }
+        let one = match colors {
+            Colors::Srgb8(codes) => codes.windows(2).all(|pair| pair[0] == pair[1]),
+            Colors::Linear(colors) => colors.windows(2).all(|pair| pair[0] == pair[1]),
+            _ => true,
+        };
+        if one { Self::Color(colors.linear(0)) } else { Self::Several }
+    }
+}
+
+impl Default for Looks {
+    fn default() -> Self {
+        Self {
+            preparation: Preparation::default(),
+            has: Has { low: false, clips: false, caps: false, normals: false },
+            longest: 0.0,
+            radius: 0.0,
+            shorter: 0.0,
+            range: ([f32::INFINITY; 4], [f32::NEG_INFINITY; 4]),
+            color: One::Nothing,
+            opaque: true,
+        }
+    }
+}
+
+impl Looks {
+    fn both(self, other: Self) -> Self {
+        let (a, b) = (&self.preparation, &other.preparation);
+        let each = |one: [f32; 4], other: [f32; 4], of: fn(f32, f32) -> f32| [0, 1, 2, 3].map(|k| of(one[k], other[k]));
+        Self {
+            preparation: Preparation {
+                points: a.points + b.points,
+                surfels: a.surfels + b.surfels,
+                dropped_non_finite: a.dropped_non_finite + b.dropped_non_finite,
+                replaced_colors: a.replaced_colors + b.replaced_colors,
+                clamped_alphas: a.clamped_alphas + b.clamped_alphas,
+                ..Preparation::default()
+            },
+            has: Has {
+                low: false,
+                clips: self.has.clips || other.has.clips,
+                caps: self.has.caps || other.has.caps,
+                normals: self.has.normals || other.has.normals,
+            },
+            longest: self.longest.max(other.longest),
+            radius: self.radius.max(other.radius),
+            shorter: self.shorter.max(other.shorter),
+            range: (each(self.range.0, other.range.0, f32::min), each(self.range.1, other.range.1, f32::max)),
+            color: self.color.both(other.color),
+            opaque: self.opaque && other.opaque,
+        }
+    }
+}
+
+/// Where centres are as a file gives them back, with trailing parts or without.
+#[derive(Clone, Copy)]
+struct Placed {
+    bounds: Bounds,
+    /// An f32 would lose digits of a coordinate.
+    double: bool,
+    /// What f32 centres leave out shows.
+    shows: bool,
+}
+
+impl Default for Placed {
+    fn default() -> Self {
+        Self { bounds: Bounds::EMPTY, double: false, shows: false }
+    }
+}
+
+impl Placed {
+    fn both(self, other: Self) -> Self {
+        Self {
+            bounds: self.bounds.union(other.bounds),
+            double: self.double || other.double,
+            shows: self.shows || other.shows,
+        }
+    }
+
+    fn with(self, origin: DVec3, center: DVec3, shows: bool) -> Self {
+        let double = crate::io::ply::needs_double((origin + center).to_array());
+        self.both(Self { bounds: Bounds::EMPTY.with_point(center), double, shows })
+    }
+}
+
+impl Look {
+    /// What all files have, by what none of their points has.
+    fn new(sources: &Sources<'_>) -> Result<Self> {
+        let mut all = Self { empty: Scene::default(), others: Points::default(), up: None };
+        let mut closed = true;
+        for file in sources.files {
+            let none = file.points(&[])?;
+            let others = &mut all.others;
+            others.colors = match (others.colors.take(), none.colors) {
+                (Some(Colors::Linear(_)), _) | (_, Some(Colors::Linear(_))) => Some(Colors::Linear(Vec::new())),
+                (one, other) => one.or(other),
+            };
+            others.clips = others.clips.take().or(none.clips);
+            others.caps = others.caps.take().or(none.caps);
+            others.normals = others.normals.take().or(none.normals);
+            others.unsided |= none.unsided;
+            closed &= none.closed || file.count() == 0;
+            all.up = match (all.up, none.up) {
+                (Some(Up::Z), _) | (_, Some(Up::Z)) => Some(Up::Z),
+                (said, says) => said.or(says),
+            };
+        }
+        all.empty.oriented = !all.others.unsided;
+        all.empty.closed = closed && all.empty.oriented;
+        all.empty.colors = all.others.colors.clone().unwrap_or_default();
+        Ok(all)
+    }
+
+    /// What points say.
+    fn at(&self, points: Points, path: &std::path::Path) -> Result<Looks> {
+        let all = Has { low: false, clips: true, caps: true, normals: true };
+        let mut scene = self.empty.clone();
+        let Some(Added { preparation, .. }) = complete::add(&mut scene, vec![points, self.others.clone()], all) else {
+            return Err(Error::malformed(
+                path,
+                "a point has no normal or no radius, and with --memory none are estimated: make surfels of it first (epsplat surfels)",
+            ));
+        };
+        let Scene { surfels, clips, caps, normals, colors, .. } = &scene;
+        let differs = |(normal, surfel): (&[f32; 3], &Surfel)| *normal != plane_of(surfel).to_array();
+        let opaque = match colors {
+            Colors::Srgb8(codes) => codes.iter().all(|code| code[3] == 255),
+            _ => true,
+        };
+        Ok(Looks {
+            preparation: Preparation { surfels: surfels.len() as u64, ..preparation },
+            has: Has {
+                low: false,
+                clips: !clips.iter().all(Clip::is_none),
+                caps: !caps.iter().all(Cap::is_flat),
+                normals: normals.iter().zip(surfels).any(differs),
+            },
+            longest: surfels.iter().map(Surfel::radius).fold(0.0, f32::max),
+            radius: scene.largest_radius(),
+            shorter: scene.largest_shorter(),
+            range: if surfels.is_empty() { Looks::default().range } else { scene.color_range() },
+            color: One::of(colors, surfels.len()),
+            opaque,
+        })
+    }
+
+    /// Where points are, without and with what f32 centres leave out.
+    fn placed(&self, points: Points, has: Has) -> [Placed; 2] {
+        let mut scene = self.empty.clone();
+        let added = complete::add(&mut scene, vec![points, self.others.clone()], has).unwrap_or_default();
+        let origin = scene.origin;
+        let mut all = <[Placed; 2]>::default();
+        for (index, (surfel, position)) in scene.surfels.iter().zip(&added.positions).enumerate() {
+            let short = DVec3::from_array(surfel.center.map(f64::from));
+            let left_out = (DVec3::from_array(*position) - origin) - short;
+            let shows = shows(surfel, left_out.abs().max_element());
+            let wide = |part: [f32; 3]| DVec3::from_array(part.map(f64::from));
+            let [alone, _] = split(as_in_a_file(origin, short)).map(wide);
+            let [near, rest] = split(as_in_a_file(origin, scene.center(index))).map(wide);
+            all[0] = all[0].with(origin, alone, shows);
+            all[1] = all[1].with(origin, near + rest, shows);
+        }
+        all
+    }
+
+    fn finish(self, looks: Looks, [without, with]: [Placed; 2]) -> Survey {
+        let Self { mut empty, mut others, up } = self;
+        let low = without.shows;
+        let placed = if low { with } else { without };
+        if let One::Color(color) = looks.color {
+            empty.colors = Colors::Constant(color);
+            others.colors = None;
+        }
+        empty.closed &= looks.preparation.dropped_non_finite == 0;
+        let scales = Scales::within(looks.range, matches!(empty.colors, Colors::Srgb8(_)), looks.longest);
+        let known = Known { origin: empty.origin, oriented: empty.oriented, low, scales };
+        let has = Has { low, ..looks.has };
+        others.clips = others.clips.filter(|_| has.clips);
+        others.caps = others.caps.filter(|_| has.caps);
+        Survey {
+            empty,
+            others,
+            has,
+            known,
+            range: looks.range,
+            largest_radius: looks.radius,
+            largest_shorter: looks.shorter,
+            opaque: looks.opaque,
+            bounds: placed.bounds,
+            double: placed.double,
+            preparation: Preparation { guessed_up: up.is_none(), ..looks.preparation },
+        }
+    }
+}

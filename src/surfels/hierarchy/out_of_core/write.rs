@@ -1,0 +1,108 @@
+//! The file, of what is kept: surfels as they lie, and nodes level by level.
+
+use std::ops::Range;
+use std::path::Path;
+
+use super::Report;
+use super::kept::{Kept, Part, properties};
+use super::sources::{PIECE, Read};
+use super::survey::Survey;
+use crate::io::ply::{NodeAndLow, write_kept};
+use crate::scene::scene::{core_of, core_step};
+use crate::scene::{Scene, Whole, body_and_framed};
+use crate::surfels::Preparation;
+use crate::{Error, Progress, Result};
+
+/// Writes all that is kept.
+pub(super) fn write(path: &Path, kept: Kept<'_>, survey: &Survey, progress: &dyn Progress) -> Result<Report> {
+    let above = kept.parts.iter().filter(|part| matches!(part, Part::Above { .. })).count();
+    let nodes = kept.nodes.count() + above as u64;
+    let (whole, strays) = whole(&kept, survey, nodes, progress)?;
+    let levels = kept.parts.iter().map(Part::end).max().unwrap_or(0);
+    let pieces: Vec<Piece<'_>> = (0..levels).flat_map(|level| kept.parts.iter().flat_map(move |part| part.pieces(level))).collect();
+    let mut next = 1;
+    let read = |piece: Piece<'_>| {
+        let mut read = match piece {
+            Piece::One(made) => vec![*made],
+            Piece::Kept(numbers) => kept.nodes.read(numbers)?,
+        };
+        for (node, _) in read.iter_mut().filter(|(node, _)| !node.leaf) {
+            // The children of the nodes of a level follow each other.
+            node.first = next;
+            next += node.count;
+        }
+        Ok(read)
+    };
+    progress.begin("writing levels of detail", nodes);
+    let written = write_kept(path, (properties(survey), &kept.surfels), (kept.kind, &whole), pieces.into_iter().map(read), progress);
+    progress.end();
+    written?;
+    let subtrees = kept.parts.len() as u64 - above as u64;
+    let preparation = Preparation { strays, ..survey.preparation.clone() };
+    Ok(Report { surfels: kept.surfels.count(), nodes, levels: levels as u64, subtrees, preparation })
+}
+
+/// Some nodes that follow each other.
+enum Piece<'a> {
+    One(&'a NodeAndLow),
+    Kept(Range<u64>),
+}
+
+impl Part {
+    /// The first level of the tree on which it has no nodes.
+    fn end(&self) -> usize {
+        match self {
+            Self::Above { depth, .. } => depth + 1,
+            Self::Subtree { depth, levels, .. } => depth + levels.len() - 1,
+        }
+    }
+
+    /// Its nodes on a level.
+    fn pieces(&self, level: usize) -> Vec<Piece<'_>> {
+        match self {
+            Self::Above { depth, made, .. } if *depth == level => vec![Piece::One(made)],
+            Self::Subtree { depth, first, levels } if level >= *depth => {
+                let own = |level: usize| levels.get(level - depth).map(|start| first + *start as u64);
+                let (Some(start), Some(end)) = (own(level), own(level + 1)) else { return Vec::new() };
+                let starts = (start..end).step_by(PIECE as usize);
+                starts.map(|start| Piece::Kept(start..end.min(start + PIECE))).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+}
+
+/// What a reader of a part must know, and how many points stray.
+fn whole(kept: &Kept<'_>, survey: &Survey, nodes: u64, progress: &dyn Progress) -> Result<(Whole, u64)> {
+    let count = kept.surfels.count();
+    let places = |piece: Range<u64>| {
+        let scene = kept.part(piece)?;
+        progress.advance(scene.surfels.len() as u64);
+        Ok((0..scene.surfels.len()).map(|k| (scene.center(k), f64::from(scene.surfels[k].radius()))).collect())
+    };
+    progress.begin("looking at surfels", 0);
+    let read: Read<_> = Read::new(count as usize, kept.surfels.pieces(PIECE), places);
+    let boxes = read.made(|places| body_and_framed(places));
+    progress.end();
+    let (body, framed, strays) = boxes?;
+    let sampled = (0..count).step_by(core_step(count as usize));
+    let center = |scene: Scene| scene.surfels.first().map_or([f32::NAN; 3], |surfel| surfel.center);
+    let sampled = sampled.map(|index| kept.part(index..index + 1).map(center)).collect::<Result<Vec<_>>>()?;
+    let whole = Whole {
+        // A survey has no more.
+        surfels: count as u32,
+        nodes: u32::try_from(nodes)
+            .map_err(|_| Error::Usage(format!("a tree has at most 2^32 - 1 nodes, not {nodes}")))?,
+        origin: survey.known.origin,
+        bounds: survey.bounds,
+        body,
+        core: core_of(sampled.into_iter()).unwrap_or(survey.bounds),
+        framed,
+        color: survey.range,
+        largest_radius: survey.largest_radius,
+        largest_shorter: survey.largest_shorter,
+        levels: kept.levels,
+        has: survey.has,
+    };
+    Ok((whole, strays))
+}

@@ -24,6 +24,9 @@ const ROUNDED_UP: f64 = 1.0 + 1.0 / (1u64 << 21) as f64;
 /// Cosine and sine of what the angle of a cone is larger by than was found, as cosines near 1 tell it badly: a thousandth of a radian.
 const ROUNDED_ANGLE: DVec2 = DVec2::new(1.0 - 5e-7, 1e-3);
 
+/// What is added to the tangent of a cone's angle for the same reason, and as a node's normal is rounded.
+const TURNED_MORE: f64 = 2e-3;
+
 /// What is rounded off a cosine.
 const ROUNDED_OFF: f64 = 1e-7;
 
@@ -182,9 +185,21 @@ impl Bounding {
         // A sum of angles past the half circle has a sine below 0, before what is rounded off is added or after; that of a whole cone is one.
         let beyond = node.cone <= -1.0 || angles.y < 0.0 || turned.y < 0.0;
         let slope = if !beyond && turned.y < STEEPEST * turned.x { turned.y / turned.x } else { STEEPEST };
-        let high = offset.dot(self.normal).abs() + radius;
+        let (at, height) = (self.shape.seen(offset), offset.dot(self.normal));
+        let high = height.abs() + radius;
+        let mut rim = at.length() + (radius + slope * high) * self.scale;
+        if !beyond && turned.x > 0.0 && node.cone > 0.0 {
+            // Where it is shown along its own normal, and how far from there what is shown along others is: leanings change by no more than this, for each radian that a normal
+            // turns by, and a tangent is longer than its angle.
+            let changes = (turned.x * turned.x).recip().min(1.0 + STEEPEST * STEEPEST);
+            let most = changes * ((f64::from(node.cone).powi(-2) - 1.0).max(0.0).sqrt() + TURNED_MORE);
+            let own = (angle.y / angle.x).min(STEEPEST);
+            let leaning = (at - self.leaning(normal_of(&node.surfel)) * height).length();
+            let leaning = leaning + (radius * (1.0 + own) + most * high) * self.scale;
+            rim = rim.min(leaning.max(at.length() + radius * self.scale));
+        }
         Bound {
-            rim: (self.shape.seen(offset).length() + (radius + slope * high) * self.scale) * ROUNDED_UP,
+            rim: rim * ROUNDED_UP,
             radius: (offset.length() + radius) * ROUNDED_UP,
             cosine: if beyond { -1.0 } else { turned.x },
         }
@@ -301,6 +316,62 @@ fn bound_from<B: Below>(of: &Bounding, key: B::Key, below: &B, sided: bool) -> B
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
+
+    /// What is told of a node is no less than of any disk below it, curved or not, on whichever side and however steep.
+    #[test]
+    fn nodes_bound_their_disks() {
+        let mut random = Random::stream(21, 0);
+        let (mut tight, mut looked) = (0, 0);
+        for _ in 0..4000 {
+            let mut number = || 2.0 * random.number() - 1.0;
+            let mut vector = || DVec3::new(number(), number(), number());
+            let normal = vector().normalize();
+            let s = normal.any_orthonormal_vector();
+            let t = normal.cross(s) * 0.3;
+            let seen = [s, t].map(|axis| axis / axis.length_squared());
+            let shape = Shape { s, t, seen };
+            let scale = seen[0].length().hypot(seen[1].length());
+            let bounding = Bounding { center: DVec3::ZERO, normal, shape, scale };
+            let lean = vector();
+            let (middle, own) = (vector() * 3.0, (normal + 1.5 * lean).normalize());
+            let spread = 0.5 * number().abs().powi(2);
+            let disks: Vec<Disk> = (0..6)
+                .map(|_| {
+                    let mut vector = || DVec3::new(number(), number(), number());
+                    let normal = (own + spread * vector()).normalize();
+                    let center = (middle + 0.2 * vector()).as_vec3();
+                    let s = normal.any_orthonormal_vector().as_vec3() * 0.1;
+                    let t = normal.as_vec3().cross(s) * 0.5;
+                    let cap = Cap([0.02 * number() as f32, 0.0, 0.0]);
+                    Disk { surfel: Surfel::ellipse(center, s, t), center: center.as_dvec3(), cap }
+                })
+                .collect();
+            let one = own.any_orthonormal_vector();
+            let surfel = Surfel::ellipse(middle.as_vec3(), one.as_vec3(), own.cross(one).as_vec3());
+            let middle = DVec3::from_array(surfel.center.map(f64::from));
+            let around = Bounding { center: middle, normal: normal_of(&surfel), ..bounding };
+            let all = disks.iter().map(|disk| around.of(disk, 0.0)).fold(Bound::NOTHING, Bound::both);
+            let node = Node {
+                surfel,
+                cap: Cap::FLAT,
+                color: [1.0; 4],
+                radius: (all.radius * ROUNDED_UP) as f32,
+                cone: cone(true, all.cosine),
+                first: 0,
+                count: 6,
+                leaf: true,
+            };
+            let told = bounding.of_node(&node, [0.0; 3]);
+            for disk in &disks {
+                let own = bounding.of(disk, 0.0);
+                assert!(own.rim <= told.rim && own.radius <= told.radius && own.cosine >= told.cosine);
+                tight += usize::from(own.rim > 0.5 * told.rim);
+                looked += 1;
+            }
+        }
+        assert!(tight > looked / 4, "{tight} of {looked}");
+    }
 
     /// The angles of a node's normals add up to a cosine, up to the half circle and past it.
     #[test]

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::super::below::{Below, Child, Disk};
 use super::super::{Made, Octree};
+use super::pages::Pages;
 use super::sources::{Failed, PIECE};
 use super::survey::Survey;
 use crate::io::ply::{ColorProperties, KeptNodes, Nodes, Properties, Rows};
@@ -57,6 +58,9 @@ pub(super) struct Kept<'a> {
     /// What nodes are written with.
     pub kind: Nodes,
     pub levels: LevelFacts,
+    /// Of surfels, and of nodes.
+    surfel_pages: Pages<Scene>,
+    node_pages: Pages<Vec<Made>>,
     /// What could not be read of these files.
     failed: Failed,
 }
@@ -68,7 +72,9 @@ impl<'a> Kept<'a> {
         let nodes = KeptNodes::new(folder, path)?;
         let kind = Nodes::none(survey.known.origin, matches!(survey.empty.colors, Colors::Srgb8(_)));
         let levels = LevelFacts::default();
-        Ok(Self { survey, surfels, nodes, parts: Vec::new(), kind, levels, failed: Failed::default() })
+        let (surfel_pages, node_pages) = (Pages::new(), Pages::new());
+        let (parts, failed) = (Vec::new(), Failed::default());
+        Ok(Self { survey, surfels, nodes, parts, kind, levels, surfel_pages, node_pages, failed })
     }
 
     /// Keeps a subtree, whose surfels are in its order.
@@ -170,17 +176,21 @@ impl Below for Kept<'_> {
                 }
             }
             Key::Within { first, count, subtree, .. } => {
-                let nodes = self.failed.noted(self.nodes.read(first..first + u64::from(count))).unwrap_or_default();
-                for made in &nodes {
-                    see(Child { key: within(&made.0, subtree), made, surfels: 0 });
-                }
+                let wanted = (first..first + u64::from(count), self.nodes.count());
+                let seen = self.node_pages.each(wanted, |rows| self.nodes.read(rows), |nodes, of| {
+                    for made in &nodes[of] {
+                        see(Child { key: within(&made.0, subtree), made, surfels: 0 });
+                    }
+                });
+                self.failed.noted(seen);
             }
         }
     }
 
-    fn disks(&self, of: Key, see: impl FnMut(Disk)) {
+    fn disks(&self, of: Key, mut see: impl FnMut(Disk)) {
         let Key::Within { first, count, .. } = of else { return };
-        let scene = self.failed.noted(self.part(first..first + u64::from(count))).unwrap_or_default();
-        (0..scene.surfels.len()).map(|index| Disk::of(&scene, index)).for_each(see);
+        let wanted = (first..first + u64::from(count), self.surfels.count());
+        let disks = |scene: &Scene, of: Range<usize>| of.for_each(|index| see(Disk::of(scene, index)));
+        self.failed.noted(self.surfel_pages.each(wanted, |rows| self.part(rows), disks));
     }
 }

@@ -5,6 +5,7 @@
 //! (`write`). A tree depends on the set of points alone, and so it is of no matter where it was made.
 
 mod kept;
+mod pages;
 mod runs;
 mod sources;
 mod survey;

@@ -18,8 +18,8 @@ use epsplat::scene::{
     Camera, Clip, Colors, Composite, Cull, Detail, DetailMeasure, Lens, LowPass, Map, Maps, Samples, Scene, Surfel, Up,
     Whole,
 };
-use epsplat::surfels::part::{Taken, nothing};
 use epsplat::surfels;
+use epsplat::surfels::part::{Taken, nothing};
 use epsplat::{Error, Result};
 use glam::{DVec3, Vec3};
 

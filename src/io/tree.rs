@@ -1,8 +1,8 @@
 //! Levels of detail as a file has them.
 
 use super::Points;
-use crate::scene::hierarchy::{Fault, Hierarchy, Node};
 use crate::scene::Surfel;
+use crate::scene::hierarchy::{Fault, Hierarchy, Node};
 
 /// The largest number of a node, as for coordinates of points.
 const LARGEST: f32 = 1e18;

@@ -69,13 +69,12 @@ pub(crate) fn body(count: usize, position: impl Fn(usize) -> DVec3 + Sync) -> (B
 }
 
 /// The same of places.
-pub(crate) fn body_of(places: &impl Places) -> (Bounds, u64) {
-    body_around(core(places), places)
+fn body_of(places: &impl Places) -> (Bounds, u64) {
+    body_within(core(places), box_of(places, |_| true).0, places)
 }
 
-/// The same, where the core is known.
-fn body_around(core: Option<Bounds>, places: &impl Places) -> (Bounds, u64) {
-    let all = box_of(places, |_| true).0;
+/// The same, where the core, and the box of all places, are known.
+pub(crate) fn body_within(core: Option<Bounds>, all: Bounds, places: &impl Places) -> (Bounds, u64) {
     let Some(core) = core else { return (all, 0) };
     let far = FAR * core.extent().max_element();
     let (low, high) = (core.min - far, core.max + far);
@@ -96,8 +95,12 @@ pub(crate) fn framed(places: &impl Places) -> (Bounds, u64) {
 
 /// The body, the box of what the default view shows, and how many are not in that.
 pub(crate) fn body_and_framed(places: &impl Places) -> (Bounds, Bounds, u64) {
-    let core = core(places);
-    let (body, strays) = body_around(core, places);
+    framed_within(core(places), box_of(places, |_| true).0, places)
+}
+
+/// The same, where the core, and the box of all places, are known.
+pub(crate) fn framed_within(core: Option<Bounds>, all: Bounds, places: &impl Places) -> (Bounds, Bounds, u64) {
+    let (body, strays) = body_within(core, all, places);
     let Some(core) = core.filter(|core| core.extent().max_element() >= SMALLEST_SCENE && !body.is_empty()) else {
         return (body, body, strays);
     };
@@ -116,28 +119,67 @@ fn box_of(places: &impl Places, wanted: impl Fn(DVec3) -> bool + Sync + Send) ->
 
 /// The box between the quantiles of the sampled positions, axis by axis; none if there are too few.
 fn core(places: &impl Places) -> Option<Bounds> {
-    let share = SAMPLED as f64 / places.count().max(1) as f64;
-    let most = if share < 1.0 { (share * 2f64.powi(64)) as u64 } else { u64::MAX };
-    let add = |mut chosen: Vec<DVec3>, p: DVec3, _| {
-        chosen.extend(Some(p).filter(|p| p.is_finite() && hash(*p) <= most));
-        chosen
+    let add = |mut sample: Sample, p: DVec3, _| {
+        sample.add(p);
+        sample
     };
-    let mut sample = places.fold(Vec::new, add, |one, other| [one, other].concat());
-    // What a scanner writes for nothing may be there a million times; it is one position.
-    let bits = |p: &DVec3| p.to_array().map(f64::to_bits);
-    sample.sort_unstable_by_key(bits);
-    sample.dedup_by_key(|p| bits(p));
-    if sample.len() < FEWEST {
-        return None;
+    places.fold(|| Sample::of(places.count()), add, Sample::both).core()
+}
+
+/// Positions that are looked at for the core: which of so many depends on the coordinates' own bits.
+#[derive(Clone)]
+pub(crate) struct Sample {
+    most: u64,
+    chosen: Vec<DVec3>,
+}
+
+impl Sample {
+    /// Of `count` positions, none yet.
+    pub fn of(count: usize) -> Self {
+        let share = SAMPLED as f64 / count.max(1) as f64;
+        let most = if share < 1.0 { (share * 2f64.powi(64)) as u64 } else { u64::MAX };
+        Self { most, chosen: Vec::new() }
     }
-    let cut = (sample.len() / CUT).max(1);
-    let mut core = Bounds::EMPTY;
-    for axis in 0..3 {
-        let mut along: Vec<f64> = sample.iter().map(|p| p[axis]).collect();
-        along.sort_unstable_by(f64::total_cmp);
-        (core.min[axis], core.max[axis]) = (along[cut], along[along.len() - 1 - cut]);
+
+    /// Looks at a position, if it is one of those.
+    pub fn add(&mut self, p: DVec3) {
+        if p.is_finite() && hash(p) <= self.most {
+            self.chosen.push(p);
+        }
     }
-    Some(core)
+
+    /// Those of two parts.
+    pub fn both(mut self, mut other: Self) -> Self {
+        self.chosen.append(&mut other.chosen);
+        // What a scanner writes for nothing may be there a million times; it is one position.
+        if self.chosen.len() > 4 * SAMPLED {
+            self.sort();
+        }
+        self
+    }
+
+    fn sort(&mut self) {
+        let bits = |p: &DVec3| p.to_array().map(f64::to_bits);
+        self.chosen.sort_unstable_by_key(bits);
+        self.chosen.dedup_by_key(|p| bits(p));
+    }
+
+    /// The box between their quantiles, axis by axis; none if there are too few.
+    pub fn core(mut self) -> Option<Bounds> {
+        self.sort();
+        let sample = self.chosen;
+        if sample.len() < FEWEST {
+            return None;
+        }
+        let cut = (sample.len() / CUT).max(1);
+        let mut core = Bounds::EMPTY;
+        for axis in 0..3 {
+            let mut along: Vec<f64> = sample.iter().map(|p| p[axis]).collect();
+            along.sort_unstable_by(f64::total_cmp);
+            (core.min[axis], core.max[axis]) = (along[cut], along[along.len() - 1 - cut]);
+        }
+        Some(core)
+    }
 }
 
 /// Spreads the bits of the coordinates over a word (the finaliser of SplitMix64 for each).

@@ -36,7 +36,9 @@ pub mod triangles;
 pub mod whole;
 
 pub use atlas::Atlas;
-pub(crate) use body::{Listed, Places, SMALLEST_SCENE, body, body_and_framed, body_of, framed};
+pub(crate) use body::{
+    Listed, Places, SMALLEST_SCENE, Sample, body, body_and_framed, body_within, framed, framed_within,
+};
 pub use camera::{Camera, Lens, Projection};
 pub use cap::Cap;
 pub use clip::Clip;

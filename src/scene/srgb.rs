@@ -46,7 +46,9 @@ mod tests {
         let plain = |linear: f32| (linear_to_srgb(linear.into()) * 255.0).round() as u8;
         let at_ends = LEAST.iter().flat_map(|least| (-4i32..5).map(|step| least.to_bits().wrapping_add_signed(step)));
         let spread = (0..1 << 16).map(|k| 0x3000_0000 + k * 0x1100);
-        for linear in at_ends.chain(spread).map(f32::from_bits).chain([-1.0, -0.0, 0.0, 1e-40, 7.0, f32::NAN, f32::INFINITY]) {
+        for linear in
+            at_ends.chain(spread).map(f32::from_bits).chain([-1.0, -0.0, 0.0, 1e-40, 7.0, f32::NAN, f32::INFINITY])
+        {
             assert_eq!(srgb8_of(linear), plain(linear), "{linear}");
         }
     }

@@ -10,8 +10,8 @@ use rayon::prelude::*;
 
 use super::complete;
 use crate::io::ply::Levels;
-use crate::scene::hierarchy::{DEEPEST, FAN_OUT, Hierarchy, Node};
 use crate::scene::Scene;
+use crate::scene::hierarchy::{DEEPEST, FAN_OUT, Hierarchy, Node};
 use crate::{Progress, Result};
 
 /// Nodes or points that are read at once: what is made of them on the way takes no more memory.

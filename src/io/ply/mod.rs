@@ -44,6 +44,7 @@ mod write_gaussians;
 mod write_mesh;
 mod write_scene;
 
+pub(crate) use kept_nodes::{KeptNodes, NodeAndLow};
 pub use levels::Levels;
 pub(super) use read::companions;
 pub use read::{read, read_mesh};
@@ -51,6 +52,5 @@ pub use rows::Rows;
 pub(crate) use rows::position;
 pub use write::{Color, ColorProperties, Properties, Vertex, check_extension, write, write_points};
 pub use write_mesh::write_mesh;
-pub(crate) use kept_nodes::{KeptNodes, NodeAndLow};
-pub(crate) use write_scene::{Nodes, needs_double, write_kept};
 pub use write_scene::write_scene;
+pub(crate) use write_scene::{Nodes, needs_double, write_kept};

@@ -53,7 +53,8 @@ impl Rows {
             Ok((header, start))
         };
         let (header, start) = opened().map_err(|fault: Fault| fault.of(&path))?;
-        let other = header.elements.iter().skip(1).any(|element| is_tree(element) || Faces::are(element) && element.count > 0);
+        let other =
+            header.elements.iter().skip(1).any(|element| is_tree(element) || Faces::are(element) && element.count > 0);
         let Some(element) = header.elements.into_iter().next().filter(|first| first.name == "vertex" && !other) else {
             return Ok(None);
         };

@@ -301,7 +301,11 @@ fn bound_from<B: Below>(of: &Bounding, key: B::Key, below: &B, sided: bool) -> B
         open[first..].sort_by(|a, b| a.0.rim.total_cmp(&b.0.rim));
     };
     let look = |key: B::Key, all: &mut Bound| below.disks(key, |disk| *all = all.both(of.of(&disk, all.rim)));
-    if below.is_leaf(key) { look(key, &mut all) } else { push(key, &mut open) }
+    if below.is_leaf(key) {
+        look(key, &mut all)
+    } else {
+        push(key, &mut open)
+    }
     while let Some((most, child)) = open.pop() {
         let changes = most.rim > all.rim || most.radius > all.radius || (sided && most.cosine < all.cosine);
         match changes {

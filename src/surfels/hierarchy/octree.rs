@@ -84,12 +84,7 @@ impl Octree {
     }
 
     /// Divides the sets of the last level, of a tree that starts at this depth; whether there is another one.
-    fn divide_level(
-        &mut self,
-        depth: usize,
-        position: &(impl Fn(u32) -> DVec3 + Sync),
-        told: &impl Fn(u64),
-    ) -> bool {
+    fn divide_level(&mut self, depth: usize, position: &(impl Fn(u32) -> DVec3 + Sync), told: &impl Fn(u64)) -> bool {
         let [.., begin, end] = self.levels[..] else { return false };
         // One level deeper there is none to divide them into.
         let deepest = depth + self.levels.len() - 2 == DEEPEST;

@@ -10,11 +10,12 @@ use super::super::{Made, Octree};
 use super::pages::Pages;
 use super::sources::{Failed, PIECE};
 use super::survey::Survey;
-use crate::io::ply::{ColorProperties, KeptNodes, Nodes, Properties, Rows};
-use crate::scene::hierarchy::Node;
-use crate::scene::{Colors, LevelFacts, Scene};
 use crate::Result;
+use crate::io::ply::{ColorProperties, KeptNodes, Nodes, Properties, Rows};
 use crate::scene::color::DEFAULT_COLOR;
+use crate::scene::hierarchy::Node;
+use crate::scene::scene::core_step;
+use crate::scene::{Colors, LevelFacts, Sample, Scene};
 
 /// A node of the tree.
 #[derive(Clone, Copy)]
@@ -58,6 +59,9 @@ pub(super) struct Kept<'a> {
     /// What nodes are written with.
     pub kind: Nodes,
     pub levels: LevelFacts,
+    /// Centres by which the body is told, and the core.
+    pub sample: Sample,
+    pub sampled: Vec<[f32; 3]>,
     /// Of surfels, and of nodes.
     surfel_pages: Pages<Scene>,
     node_pages: Pages<Vec<Made>>,
@@ -73,8 +77,9 @@ impl<'a> Kept<'a> {
         let kind = Nodes::none(survey.known.origin, matches!(survey.empty.colors, Colors::Srgb8(_)));
         let levels = LevelFacts::default();
         let (surfel_pages, node_pages) = (Pages::new(), Pages::new());
-        let (parts, failed) = (Vec::new(), Failed::default());
-        Ok(Self { survey, surfels, nodes, parts, kind, levels, surfel_pages, node_pages, failed })
+        let sample = Sample::of(survey.preparation.surfels as usize);
+        let (parts, sampled, failed) = (Vec::new(), Vec::new(), Failed::default());
+        Ok(Self { survey, surfels, nodes, parts, kind, levels, sample, sampled, surfel_pages, node_pages, failed })
     }
 
     /// Keeps a subtree, whose surfels are in its order.
@@ -93,6 +98,10 @@ impl<'a> Kept<'a> {
             // Fewer than 2^32 surfels are there in all.
             node.first += surfels as u32;
         }
+        (0..scene.surfels.len()).for_each(|index| self.sample.add(scene.center(index)));
+        let step = core_step(self.survey.preparation.surfels as usize);
+        let next = surfels.next_multiple_of(step as u64) - surfels;
+        self.sampled.extend(scene.surfels.iter().skip(next as usize).step_by(step).map(|surfel| surfel.center));
         self.nodes.append(&nodes)?;
         self.told(&nodes);
         self.parts.push(Part::Subtree { depth, first, levels: tree.levels.clone() });
@@ -101,7 +110,12 @@ impl<'a> Kept<'a> {
     }
 
     /// Puts a node, which `make` is told how to look below of, above some branches.
-    pub fn above(&mut self, depth: usize, children: Vec<Branch>, make: impl FnOnce(&Self, Key) -> Made) -> Result<Branch> {
+    pub fn above(
+        &mut self,
+        depth: usize,
+        children: Vec<Branch>,
+        make: impl FnOnce(&Self, Key) -> Made,
+    ) -> Result<Branch> {
         let number = self.parts.len();
         let surfels = children.iter().map(|branch| branch.surfels).sum();
         let nothing = children[0].made;
@@ -177,11 +191,15 @@ impl Below for Kept<'_> {
             }
             Key::Within { first, count, subtree, .. } => {
                 let wanted = (first..first + u64::from(count), self.nodes.count());
-                let seen = self.node_pages.each(wanted, |rows| self.nodes.read(rows), |nodes, of| {
-                    for made in &nodes[of] {
-                        see(Child { key: within(&made.0, subtree), made, surfels: 0 });
-                    }
-                });
+                let seen = self.node_pages.each(
+                    wanted,
+                    |rows| self.nodes.read(rows),
+                    |nodes, of| {
+                        for made in &nodes[of] {
+                            see(Child { key: within(&made.0, subtree), made, surfels: 0 });
+                        }
+                    },
+                );
                 self.failed.noted(seen);
             }
         }

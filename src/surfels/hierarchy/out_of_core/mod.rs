@@ -11,6 +11,7 @@ mod sources;
 mod survey;
 mod write;
 
+use std::ops::Range;
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -23,7 +24,7 @@ use super::lattice::Lattice;
 use super::moments::Moments;
 use super::octree::Octree;
 use super::sums::Sums;
-use super::{bounds, nodes, sorted};
+use super::{bounds, nodes, scene_as_in_a_file, sorted};
 use crate::io::ply::Rows;
 use crate::scene::hierarchy::{DEEPEST, Node};
 use crate::scene::{Colors, Scene};
@@ -81,10 +82,15 @@ pub fn write_levels(
     }
     let root = Lattice::over(&survey.bounds);
     let runs = Runs { survey: &survey, folder, path, progress };
-    let run = runs.all(&sources, &root)?;
     let kept = Kept::new(&survey, folder, path)?;
     let mut divider = Divider { runs, kept, fits, lattices: vec![root] };
-    divider.branch(run, 0)?;
+    if survey.preparation.surfels <= fits {
+        let scene = divider.loaded(survey.preparation.surfels, &sources.pieces())?;
+        divider.subtree(scene_as_in_a_file(scene), 0)?;
+    } else {
+        let run = divider.runs.all(&sources, &root)?;
+        divider.branch(run, 0)?;
+    }
     write::write(path, divider.kept, &survey, progress)
 }
 
@@ -110,7 +116,10 @@ impl Divider<'_> {
     /// The tree of a set, so many levels below the root.
     fn branch(&mut self, mut run: Run, depth: usize) -> Result<Summed> {
         if run.rows.count() <= self.fits {
-            return self.subtree(run, depth);
+            let pieces: Vec<_> = run.rows.pieces(PIECE).into_iter().map(|piece| (&run.rows, piece)).collect();
+            let scene = self.loaded(run.rows.count(), &pieces)?;
+            drop(run);
+            return self.subtree(scene, depth);
         }
         let known = self.lattices.len();
         self.lattices.extend(self.runs.refined(&mut run)?);
@@ -147,11 +156,10 @@ impl Divider<'_> {
         Ok(Summed { branch, sums, moments })
     }
 
-    /// The tree of a set that memory has room for.
-    fn subtree(&mut self, run: Run, depth: usize) -> Result<Summed> {
+    /// The tree of a set's surfels.
+    fn subtree(&mut self, scene: Scene, depth: usize) -> Result<Summed> {
         let (survey, progress) = (self.runs.survey, self.runs.progress);
-        let count = run.rows.count() as u32;
-        let scene = self.loaded(run)?;
+        let count = scene.surfels.len() as u32;
         let inherited = self.lattices[self.lattices.len() - 1];
         progress.begin("dividing points", count.into());
         let center = |index: u32| scene.center(index as usize);
@@ -169,20 +177,24 @@ impl Divider<'_> {
         Ok(Summed { branch, sums, moments })
     }
 
-    /// The surfels of a set, which is given up.
-    fn loaded(&self, run: Run) -> Result<Scene> {
+    /// So many surfels of some pieces of files.
+    fn loaded(&self, count: u64, pieces: &[(&Rows, Range<u64>)]) -> Result<Scene> {
         let survey = self.runs.survey;
         let mut scene = survey.empty.clone();
-        survey.reserve(&mut scene, run.rows.count() as usize);
-        let read = |piece| {
-            let points = run.rows.points(&run.rows.bytes(piece)?)?;
-            survey.part(points).ok_or_else(|| run.rows.malformed("a surfel has no place or no half-axes"))
+        survey.reserve(&mut scene, count as usize);
+        let read = |(rows, piece): &(&Rows, Range<u64>)| {
+            let points = rows.points(&rows.bytes(piece.clone())?)?;
+            self.runs.progress.advance(points.positions.len() as u64);
+            survey.part(points).ok_or_else(|| rows.malformed("it changed while it was read"))
         };
-        for pieces in run.rows.pieces(PIECE).chunks(rayon::current_num_threads()) {
-            let parts: Vec<Scene> = pieces.par_iter().map(|piece| read(piece.clone())).collect::<Result<_>>()?;
+        self.runs.progress.begin("reading points", count);
+        let loaded = pieces.chunks(rayon::current_num_threads()).try_for_each(|pieces| {
+            let parts: Vec<Scene> = pieces.par_iter().map(read).collect::<Result<_>>()?;
             parts.into_iter().for_each(|part| append(&mut scene, part));
-        }
-        Ok(scene)
+            Ok(())
+        });
+        self.runs.progress.end();
+        loaded.map(|()| scene)
     }
 }
 

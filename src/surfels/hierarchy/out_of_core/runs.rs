@@ -6,9 +6,9 @@ use std::sync::{Mutex, PoisonError};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::super::split;
 use super::super::lattice::Lattice;
 use super::super::octree::{FEWEST_STEPS, octant};
+use super::super::split;
 use super::sources::{PIECE, Sources};
 use super::survey::Survey;
 use crate::io::ply::{ColorProperties, Properties, Rows, position};
@@ -94,7 +94,10 @@ impl Runs<'_> {
         let copied = sources.each(
             || (),
             |points, _| {
-                let scene = self.survey.part(points).ok_or_else(|| Error::malformed(self.path, "an input changed while it was read"))?;
+                let scene = self
+                    .survey
+                    .part(points)
+                    .ok_or_else(|| Error::malformed(self.path, "an input changed while it was read"))?;
                 let mut run = run.lock().unwrap_or_else(PoisonError::into_inner);
                 let bytes = run.rows.encoded(&scene, 0..scene.surfels.len());
                 let size = run.rows.size();

@@ -28,6 +28,11 @@ impl Sources<'_> {
         self.files.iter().map(Rows::count).sum()
     }
 
+    /// Their pieces.
+    pub fn pieces(&self) -> Vec<(&Rows, Range<u64>)> {
+        self.files.iter().flat_map(|file| file.pieces(PIECE).into_iter().map(move |piece| (file, piece))).collect()
+    }
+
     /// What `of` makes of the points of each piece and of the file's name, joined in any order.
     pub fn each<T: Send>(
         &self,
@@ -35,8 +40,6 @@ impl Sources<'_> {
         of: impl Fn(Points, &Path) -> Result<T> + Sync + Send,
         join: impl Fn(T, T) -> T + Sync + Send,
     ) -> Result<T> {
-        let pieces: Vec<(&Rows, Range<u64>)> =
-            self.files.iter().flat_map(|file| file.pieces(PIECE).into_iter().map(move |piece| (file, piece))).collect();
         let read = |(file, piece): (&Rows, Range<u64>)| {
             let points = file.points(&file.bytes(piece)?)?;
             let count = points.positions.len() as u64;
@@ -44,22 +47,22 @@ impl Sources<'_> {
             self.progress.advance(count);
             made
         };
-        pieces.into_par_iter().map(read).try_reduce(&nothing, |one, other| Ok(join(one, other)))
+        self.pieces().into_par_iter().map(read).try_reduce(&nothing, |one, other| Ok(join(one, other)))
     }
 }
 
 /// Places that are read from files each time that they are gone through.
-pub(super) struct Read<F> {
+pub(super) struct Read<P, F> {
     count: usize,
-    pieces: Vec<Range<u64>>,
+    pieces: Vec<P>,
     of: F,
     /// Why a piece could not be read.
     failed: Failed,
 }
 
-impl<F: Fn(Range<u64>) -> Result<Vec<(DVec3, f64)>> + Sync> Read<F> {
+impl<P: Clone + Sync, F: Fn(P) -> Result<Vec<(DVec3, f64)>> + Sync> Read<P, F> {
     /// So many, of which `of` reads pieces.
-    pub fn new(count: usize, pieces: Vec<Range<u64>>, of: F) -> Self {
+    pub fn new(count: usize, pieces: Vec<P>, of: F) -> Self {
         Self { count, pieces, of, failed: Failed::default() }
     }
 
@@ -70,7 +73,7 @@ impl<F: Fn(Range<u64>) -> Result<Vec<(DVec3, f64)>> + Sync> Read<F> {
     }
 }
 
-impl<F: Fn(Range<u64>) -> Result<Vec<(DVec3, f64)>> + Sync> Places for Read<F> {
+impl<P: Clone + Sync, F: Fn(P) -> Result<Vec<(DVec3, f64)>> + Sync> Places for Read<P, F> {
     fn count(&self) -> usize {
         self.count
     }
@@ -81,7 +84,7 @@ impl<F: Fn(Range<u64>) -> Result<Vec<(DVec3, f64)>> + Sync> Places for Read<F> {
         add: impl Fn(T, DVec3, f64) -> T + Sync + Send,
         join: impl Fn(T, T) -> T + Sync + Send,
     ) -> T {
-        let piece = |piece: &Range<u64>| {
+        let piece = |piece: &P| {
             let places = self.failed.noted((self.of)(piece.clone())).unwrap_or_default();
             places.into_iter().fold(nothing(), |all, (position, radius)| add(all, position, radius))
         };

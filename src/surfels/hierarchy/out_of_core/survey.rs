@@ -1,15 +1,17 @@
 //! What all points say together, which each part of them must be told.
 
+use std::path::Path;
+
 use glam::DVec3;
 
-use super::super::{as_in_a_file, split};
 use super::super::below::Known;
 use super::super::sums::Scales;
+use super::super::{as_in_a_file, split};
 use super::sources::{Read, Sources, usable};
 use crate::io::Points;
 use crate::scene::scene::shows;
 use crate::scene::whole::Has;
-use crate::scene::{Bounds, Cap, Clip, Colors, SMALLEST_SCENE, Scene, Surfel, Up, body_of};
+use crate::scene::{Bounds, Cap, Clip, Colors, SMALLEST_SCENE, Sample, Scene, Surfel, Up, body_within};
 use crate::surfels::build::{LARGEST_IN_EXTENTS, plane_of};
 use crate::surfels::complete::{self, Added};
 use crate::surfels::{Preparation, guess_up, origin_for};
@@ -44,7 +46,8 @@ impl Survey {
         let mut look = Look::new(sources)?;
         let told = |what: &str| sources.progress.begin(what, sources.count());
         told("looking at points");
-        let looks = sources.each(Looks::default, |points, path| look.at(points, path), Looks::both)?;
+        let nothing = || Looks::of(sources.count());
+        let looks = sources.each(nothing, |points, path| look.at(points, path, nothing()), Looks::both)?;
         sources.progress.end();
         let count = looks.preparation.surfels;
         if count == 0 {
@@ -53,9 +56,14 @@ impl Survey {
         if u32::try_from(count).is_err() {
             return Err(Error::Usage(format!("a tree has at most 2^32 - 1 surfels, not {count}")));
         }
-        told("looking for the body");
-        let body = body(sources, count)?;
-        sources.progress.end();
+        // The sample is of all points that there are.
+        let sample =
+            if looks.preparation.dropped_non_finite == 0 { looks.sample.clone() } else { sampled(sources, count)? };
+        let places = Read::new(count as usize, sources.pieces(), |(file, piece)| {
+            let points = file.points(&file.bytes(piece)?)?;
+            Ok(usable(&points).map(|position| (position, 0.0)).collect())
+        });
+        let (body, _) = places.made(|places| body_within(sample.core(), looks.all, places))?;
         look.empty.origin = origin_for(&body);
         look.empty.up = look.up.unwrap_or_else(|| guess_up(&body));
         let extent = body.extent().max_element();
@@ -66,9 +74,11 @@ impl Survey {
         }
         let has = Has { low: true, ..looks.has };
         told("looking at digits");
-        let places = sources.each(<[Placed; 2]>::default, |points, _| Ok(look.placed(points, has)), |[a, b], [c, d]| {
-            [a.both(c), b.both(d)]
-        })?;
+        let places = sources.each(
+            <[Placed; 2]>::default,
+            |points, _| Ok(look.placed(points, has)),
+            |[a, b], [c, d]| [a.both(c), b.both(d)],
+        )?;
         sources.progress.end();
         Ok(look.finish(looks, places))
     }
@@ -109,24 +119,15 @@ impl Survey {
     }
 }
 
-/// The box of all points but those that stray, world coordinates.
-fn body(sources: &Sources<'_>, count: u64) -> Result<Bounds> {
-    let mut pieces = Vec::new();
-    // The pieces of all files, one after the other.
-    let mut starts = Vec::new();
-    let mut start = 0;
-    for file in sources.files {
-        pieces.extend(file.pieces(super::sources::PIECE).into_iter().map(|piece| start + piece.start..start + piece.end));
-        starts.push(start);
-        start += file.count();
-    }
-    let read = |piece: std::ops::Range<u64>| {
-        let file = starts.partition_point(|start| *start <= piece.start) - 1;
-        let rows = &sources.files[file];
-        let points = rows.points(&rows.bytes(piece.start - starts[file]..piece.end - starts[file])?)?;
-        Ok(usable(&points).map(|position| (position, 0.0)).collect())
+/// The sample of so many usable points.
+fn sampled(sources: &Sources<'_>, count: u64) -> Result<Sample> {
+    let nothing = || Sample::of(count as usize);
+    let sampled = |points: Points, _: &Path| {
+        let mut sample = nothing();
+        usable(&points).for_each(|position| sample.add(position));
+        Ok(sample)
     };
-    Read::new(count as usize, pieces, read).made(|places| body_of(places).0)
+    sources.each(nothing, sampled, Sample::both)
 }
 
 /// How points are looked at.
@@ -148,6 +149,9 @@ struct Looks {
     /// One of the colours, if all are the same.
     color: One,
     opaque: bool,
+    /// The box of their positions, world coordinates.
+    all: Bounds,
+    sample: Sample,
 }
 
 /// Whether colours are one.
@@ -180,8 +184,9 @@ impl One {
     }
 }
 
-impl Default for Looks {
-    fn default() -> Self {
+impl Looks {
+    /// Of so many points, none yet.
+    fn of(count: u64) -> Self {
         Self {
             preparation: Preparation::default(),
             has: Has { low: false, clips: false, caps: false, normals: false },
@@ -191,11 +196,11 @@ impl Default for Looks {
             range: ([f32::INFINITY; 4], [f32::NEG_INFINITY; 4]),
             color: One::Nothing,
             opaque: true,
+            all: Bounds::EMPTY,
+            sample: Sample::of(count as usize),
         }
     }
-}
 
-impl Looks {
     fn both(self, other: Self) -> Self {
         let (a, b) = (&self.preparation, &other.preparation);
         let each = |one: [f32; 4], other: [f32; 4], of: fn(f32, f32) -> f32| [0, 1, 2, 3].map(|k| of(one[k], other[k]));
@@ -220,6 +225,8 @@ impl Looks {
             range: (each(self.range.0, other.range.0, f32::min), each(self.range.1, other.range.1, f32::max)),
             color: self.color.both(other.color),
             opaque: self.opaque && other.opaque,
+            all: self.all.union(other.all),
+            sample: self.sample.both(other.sample),
         }
     }
 }
@@ -284,15 +291,21 @@ impl Look {
     }
 
     /// What points say.
-    fn at(&self, points: Points, path: &std::path::Path) -> Result<Looks> {
+    fn at(&self, points: Points, path: &Path, nothing: Looks) -> Result<Looks> {
         let all = Has { low: false, clips: true, caps: true, normals: true };
         let mut scene = self.empty.clone();
-        let Some(Added { preparation, .. }) = complete::add(&mut scene, vec![points, self.others.clone()], all) else {
+        let Some(Added { preparation, positions }) = complete::add(&mut scene, vec![points, self.others.clone()], all)
+        else {
             return Err(Error::malformed(
                 path,
                 "a point has no normal or no radius, and with --memory none are estimated: make surfels of it first (epsplat surfels)",
             ));
         };
+        let (mut all, mut sample) = (Bounds::EMPTY, nothing.sample);
+        for position in positions.into_iter().map(DVec3::from_array) {
+            all = all.with_point(position);
+            sample.add(position);
+        }
         let Scene { surfels, clips, caps, normals, colors, .. } = &scene;
         let differs = |(normal, surfel): (&[f32; 3], &Surfel)| *normal != plane_of(surfel).to_array();
         let opaque = match colors {
@@ -310,9 +323,11 @@ impl Look {
             longest: surfels.iter().map(Surfel::radius).fold(0.0, f32::max),
             radius: scene.largest_radius(),
             shorter: scene.largest_shorter(),
-            range: if surfels.is_empty() { Looks::default().range } else { scene.color_range() },
+            range: if surfels.is_empty() { nothing.range } else { scene.color_range() },
             color: One::of(colors, surfels.len()),
             opaque,
+            all,
+            sample,
         })
     }
 

@@ -8,8 +8,8 @@ use super::kept::{Kept, Part, properties};
 use super::sources::{PIECE, Read};
 use super::survey::Survey;
 use crate::io::ply::{NodeAndLow, write_kept};
-use crate::scene::scene::{core_of, core_step};
-use crate::scene::{Scene, Whole, body_and_framed};
+use crate::scene::scene::core_of;
+use crate::scene::{Whole, framed_within};
 use crate::surfels::Preparation;
 use crate::{Error, Progress, Result};
 
@@ -19,7 +19,8 @@ pub(super) fn write(path: &Path, kept: Kept<'_>, survey: &Survey, progress: &dyn
     let nodes = kept.nodes.count() + above as u64;
     let (whole, strays) = whole(&kept, survey, nodes, progress)?;
     let levels = kept.parts.iter().map(Part::end).max().unwrap_or(0);
-    let pieces: Vec<Piece<'_>> = (0..levels).flat_map(|level| kept.parts.iter().flat_map(move |part| part.pieces(level))).collect();
+    let pieces: Vec<Piece<'_>> =
+        (0..levels).flat_map(|level| kept.parts.iter().flat_map(move |part| part.pieces(level))).collect();
     let mut next = 1;
     let read = |piece: Piece<'_>| {
         let mut read = match piece {
@@ -34,7 +35,13 @@ pub(super) fn write(path: &Path, kept: Kept<'_>, survey: &Survey, progress: &dyn
         Ok(read)
     };
     progress.begin("writing levels of detail", nodes);
-    let written = write_kept(path, (properties(survey), &kept.surfels), (kept.kind, &whole), pieces.into_iter().map(read), progress);
+    let written = write_kept(
+        path,
+        (properties(survey), &kept.surfels),
+        (kept.kind, &whole),
+        pieces.into_iter().map(read),
+        progress,
+    );
     progress.end();
     written?;
     let subtrees = kept.parts.len() as u64 - above as u64;
@@ -81,13 +88,10 @@ fn whole(kept: &Kept<'_>, survey: &Survey, nodes: u64, progress: &dyn Progress) 
         Ok((0..scene.surfels.len()).map(|k| (scene.center(k), f64::from(scene.surfels[k].radius()))).collect())
     };
     progress.begin("looking at surfels", 0);
-    let read: Read<_> = Read::new(count as usize, kept.surfels.pieces(PIECE), places);
-    let boxes = read.made(|places| body_and_framed(places));
+    let read = Read::new(count as usize, kept.surfels.pieces(PIECE), places);
+    let boxes = read.made(|places| framed_within(kept.sample.clone().core(), survey.bounds, places));
     progress.end();
     let (body, framed, strays) = boxes?;
-    let sampled = (0..count).step_by(core_step(count as usize));
-    let center = |scene: Scene| scene.surfels.first().map_or([f32::NAN; 3], |surfel| surfel.center);
-    let sampled = sampled.map(|index| kept.part(index..index + 1).map(center)).collect::<Result<Vec<_>>>()?;
     let whole = Whole {
         // A survey has no more.
         surfels: count as u32,
@@ -96,7 +100,7 @@ fn whole(kept: &Kept<'_>, survey: &Survey, nodes: u64, progress: &dyn Progress) 
         origin: survey.known.origin,
         bounds: survey.bounds,
         body,
-        core: core_of(sampled.into_iter()).unwrap_or(survey.bounds),
+        core: core_of(kept.sampled.iter().copied()).unwrap_or(survey.bounds),
         framed,
         color: survey.range,
         largest_radius: survey.largest_radius,

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::parse::parse_memory;
 use super::progress::Bars;
-use super::reading::{LimitArguments, Reading, help_of, named};
+use super::reading::{LimitArguments, Reading, help_of_all, named};
 use super::{note, outputs, print, write_json};
 
 /// Write surfels with levels of detail as PLY: a tree whose nodes are surfels that stand for all below them.
@@ -24,8 +24,8 @@ use super::{note, outputs, print, write_json};
     after_help = "Examples:\n  epsplat lod scan.ply -o scan.lod.ply\n  epsplat render scan.lod.ply -o scan.png --lod 4px\n  epsplat lod scan.ply --cut 0.05 -o coarse.ply\n  epsplat lod tiles/*.ply -o city.lod.ply --memory 4GiB"
 )]
 pub struct Arguments {
-    #[arg(required = true, help = help_of("Surfels, point clouds or meshes"))]
-    inputs: Vec<PathBuf>,
+    #[arg(required = true, help = help_of_all("Surfels, point clouds or meshes"))]
+    pub(super) inputs: Vec<PathBuf>,
     #[command(flatten)]
     reading: Reading,
     /// The file: .ply

@@ -28,6 +28,8 @@ use clap::{Parser, Subcommand};
 use epsplat::{Error, Result};
 use serde::Serialize;
 
+use self::reading::with_folders;
+
 /// Render surfels and point clouds without a display, with compute kernels only.
 #[derive(Parser)]
 #[command(version, max_term_width = 110, after_help = EXIT_CODES)]
@@ -60,11 +62,11 @@ enum Command {
 pub fn run() -> ExitCode {
     signals::watch();
     let outcome = match Arguments::parse().command {
-        Command::Render(arguments) => render::run(&arguments),
+        Command::Render(mut arguments) => with_folders(&mut arguments.inputs).and_then(|()| render::run(&arguments)),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Coverage(arguments) => coverage::run(&arguments),
         Command::Generate(arguments) => generate::run(&arguments),
-        Command::Surfels(arguments) => surfels::run(&arguments),
+        Command::Surfels(mut arguments) => with_folders(&mut arguments.inputs).and_then(|()| surfels::run(&arguments)),
         Command::Sample(arguments) => sample::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Adapters(arguments) => adapters::run(&arguments),
@@ -73,7 +75,7 @@ pub fn run() -> ExitCode {
         Command::Card(arguments) => card::run(&arguments),
         Command::Simplify(arguments) => simplify::run(&arguments),
         Command::Hybrid(arguments) => hybrid::run(&arguments),
-        Command::Lod(arguments) => lod::run(&arguments),
+        Command::Lod(mut arguments) => with_folders(&mut arguments.inputs).and_then(|()| lod::run(&arguments)),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

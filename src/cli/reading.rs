@@ -63,10 +63,43 @@ fn formats() -> impl TypedValueParser<Value = Format> {
     PossibleValuesParser::new(names).try_map(|name| name.parse::<Format>())
 }
 
+/// Puts the files of a folder in its place, in the order of their names: those that are read by these names.
+///
+/// # Errors
+///
+/// [`Error::Read`] where the system cannot list them, [`Error::Usage`] where there is none.
+pub(super) fn with_folders(inputs: &mut Vec<PathBuf>) -> Result<()> {
+    let is_read = |path: &PathBuf| {
+        let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
+        path.is_file() && Format::READ.iter().any(|(name, _)| name.eq_ignore_ascii_case(extension))
+    };
+    for folder in std::mem::take(inputs) {
+        if !folder.is_dir() {
+            inputs.push(folder);
+            continue;
+        }
+        let listed = std::fs::read_dir(&folder).and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect());
+        let mut files: Vec<PathBuf> = listed.map_err(|error| Error::read(&folder, error))?;
+        files.retain(is_read);
+        files.sort();
+        if files.is_empty() {
+            let formats = Format::sentence();
+            return Err(Error::Usage(format!("the folder {} has no {formats} files", folder.display())));
+        }
+        inputs.append(&mut files);
+    }
+    Ok(())
+}
+
 /// The help of inputs that are `what`.
 pub(super) fn help_of(what: &str) -> String {
     let extensions: Vec<_> = Format::READ.iter().map(|(name, _)| format!(".{name}")).collect();
     format!("{what}: {}; - is standard input", extensions.join(", "))
+}
+
+/// The same of inputs that may be folders.
+pub(super) fn help_of_all(what: &str) -> String {
+    format!("{}; a folder stands for its files", help_of(what))
 }
 
 /// What is wrong with a scene, with the name of its file if there is one.

@@ -38,7 +38,7 @@ use super::parse::{
     parse_color, parse_intrinsics, parse_memory, parse_pixels, parse_scale, parse_size, parse_up, parse_vector,
 };
 use super::progress::Bars;
-use super::reading::{LimitArguments, Reading, help_of};
+use super::reading::{LimitArguments, Reading, help_of_all};
 use super::{note, outputs, write_json};
 
 /// Render point clouds and meshes to a PNG or EXR image.
@@ -60,8 +60,8 @@ use super::{note, outputs, write_json};
     epsplat render scan.laz -o views --cameras transforms.json"
 )]
 pub struct Arguments {
-    #[arg(required_unless_present = "triangles", help = help_of("Point clouds or meshes, which become surfels"))]
-    inputs: Vec<PathBuf>,
+    #[arg(required_unless_present = "triangles", help = help_of_all("Point clouds or meshes, which become surfels"))]
+    pub(super) inputs: Vec<PathBuf>,
     /// Meshes whose triangles are drawn as they are, beside the surfels, whose files come before, or alone: .obj or .ply
     #[arg(long, value_name = "MESH", num_args = 1.., help_heading = "Triangles")]
     triangles: Vec<PathBuf>,

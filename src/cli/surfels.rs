@@ -9,7 +9,7 @@ use epsplat::{Error, Result};
 
 use super::parse::parse_orientation;
 use super::progress::Bars;
-use super::reading::{LimitArguments, Reading, help_of, named};
+use super::reading::{LimitArguments, Reading, help_of_all, named};
 use super::{note, outputs};
 
 /// Make surfels of points: normals with a side, and disks or ellipses that cover the surface, kept as PLY.
@@ -19,8 +19,8 @@ use super::{note, outputs};
 #[command(after_help = "Examples:\n  epsplat surfels scan.laz -o scan.ply\n  \
     epsplat surfels left.ply right.ply -o room.ply --size ellipse --outliers 3 --orient 0,0,1.6 --orient 4.1,0,1.6")]
 pub struct Arguments {
-    #[arg(required = true, help = help_of("Point clouds, or meshes, of which the vertices are taken"))]
-    inputs: Vec<PathBuf>,
+    #[arg(required = true, help = help_of_all("Point clouds, or meshes, of which the vertices are taken"))]
+    pub(super) inputs: Vec<PathBuf>,
     #[command(flatten)]
     reading: Reading,
     /// The file: .ply

@@ -57,3 +57,18 @@ pub(super) fn add(scene: &mut Scene, inputs: Vec<Points>, has: Has) -> Option<Ad
     scene.surfels.extend(surfels);
     Some(Added { positions: points.positions, preparation })
 }
+
+/// Puts the surfels of a part behind those of another one.
+pub(super) fn append(scene: &mut Scene, mut part: Scene) {
+    scene.surfels.append(&mut part.surfels);
+    scene.low.append(&mut part.low);
+    scene.clips.append(&mut part.clips);
+    scene.caps.append(&mut part.caps);
+    scene.normals.append(&mut part.normals);
+    match (&mut scene.colors, part.colors) {
+        (Colors::Srgb8(all), Colors::Srgb8(mut own)) => all.append(&mut own),
+        (Colors::Linear(all), Colors::Linear(mut own)) => all.append(&mut own),
+        // One for all.
+        _ => {}
+    }
+}

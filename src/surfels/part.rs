@@ -9,6 +9,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::complete;
+use crate::io::Points;
 use crate::io::ply::Levels;
 use crate::scene::Scene;
 use crate::scene::hierarchy::{DEEPEST, FAN_OUT, Hierarchy, Node};
@@ -195,16 +196,18 @@ fn in_order(tree: &mut Hierarchy) -> Option<Vec<Range<u32>>> {
 /// The surfels of these numbers and the tree over them.
 fn scene(levels: &mut Levels, numbers: &[Range<u32>], tree: Hierarchy, progress: &dyn Progress) -> Result<Scene> {
     let whole = levels.whole;
-    let mut scene = Scene { hierarchy: Some(Arc::new(tree)), part_of: None, ..nothing(levels) };
-    // Colours as the file has them, if it has none of a surfel.
-    scene.colors = levels.points(&[])?.colors.unwrap_or_default();
-    for block in blocks(numbers) {
-        let points = levels.points(&block)?;
-        let count = points.positions.len();
-        progress.advance(count as u64);
+    let empty = Scene { part_of: None, colors: levels.no_colors(), ..nothing(levels) };
+    let mut scene = Scene { hierarchy: Some(Arc::new(tree)), ..empty.clone() };
+    let made = |points: Points| {
+        let (mut scene, count) = (empty.clone(), points.positions.len());
         complete::add(&mut scene, vec![points], whole.has)
             .filter(|added| added.positions.len() == count)
-            .ok_or_else(|| levels.malformed("a point of its levels of detail has no place or no half-axes"))?;
+            .ok_or("a point of its levels of detail has no place or no half-axes")?;
+        progress.advance(count as u64);
+        Ok(scene)
+    };
+    for block in blocks(numbers) {
+        levels.points(&block, made)?.into_iter().for_each(|part| complete::append(&mut scene, part));
     }
     if !whole.holds(&scene) {
         return Err(levels.malformed("its element 'scene' leaves out points or nodes that it has"));

@@ -7,7 +7,8 @@ use super::whole;
 use crate::Result;
 use crate::io::fault::Fault;
 use crate::io::{Format, Input, Points, Tree, TreeRow};
-use crate::scene::{Hierarchy, Up, Whole};
+use crate::scene::{Colors, Hierarchy, Up, Whole};
+use rayon::prelude::*;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::ops::Range;
@@ -15,6 +16,9 @@ use std::path::{Path, PathBuf};
 
 /// What is read ahead of what was asked for, bytes: rows that lie nearer than that are read together.
 const AHEAD: usize = 1 << 18;
+
+/// Rows that a thread decodes at once.
+const TOGETHER: usize = 1 << 14;
 
 /// Numbers of places and ranges are no larger.
 const LARGEST: f64 = 1e30;
@@ -82,35 +86,72 @@ impl Levels {
     ///
     /// [`Error::Read`](crate::Error::Read), or [`Error::Malformed`](crate::Error::Malformed) where a node has no place or extent, or the ranges are no nodes.
     pub fn nodes(&mut self, numbers: &[Range<u32>]) -> Result<Hierarchy> {
-        let (points, rows) = self.read(numbers, |levels| &levels.node)?;
-        let hierarchy = Tree { nodes: Box::new(points), rows }.hierarchy(self.whole.origin);
-        hierarchy.ok_or_else(|| self.malformed("a node of its levels of detail has no place, no extent or no colour"))
+        let origin = self.whole.origin;
+        let parts = self.read(
+            numbers,
+            |levels| &levels.node,
+            |points, rows| {
+                let nodes = Tree { nodes: Box::new(points), rows }.hierarchy(origin);
+                nodes.ok_or("a node of its levels of detail has no place, no extent or no colour")
+            },
+        )?;
+        let mut all = Hierarchy::default();
+        for mut part in parts {
+            all.nodes.append(&mut part.nodes);
+            all.low.append(&mut part.low);
+        }
+        Ok(all)
     }
 
-    /// The points of these ranges of numbers, which ascend.
+    /// What `of` makes of the points of these ranges of numbers, which ascend, in parts, or what is wrong with these.
     ///
     /// # Errors
     ///
-    /// As [`nodes`](Self::nodes).
-    pub fn points(&mut self, numbers: &[Range<u32>]) -> Result<Points> {
-        self.read(numbers, |levels| &levels.vertex).map(|(points, _)| points)
+    /// [`Error::Read`](crate::Error::Read), or [`Error::Malformed`](crate::Error::Malformed) where something is wrong, or the ranges are no points.
+    pub fn points<T: Send>(
+        &mut self,
+        numbers: &[Range<u32>],
+        of: impl Fn(Points) -> Result<T, &'static str> + Sync,
+    ) -> Result<Vec<T>> {
+        self.read(numbers, |levels| &levels.vertex, |points, _| of(points))
     }
 
-    fn read(&mut self, numbers: &[Range<u32>], of: impl Fn(&Self) -> &Rows) -> Result<(Points, Vec<TreeRow>)> {
-        let Rows { element, start, size } = of(self);
+    /// Colours as points have them, of none.
+    pub fn no_colors(&self) -> Colors {
+        let none = binary::vertices::<false>(&[][..], &Element { count: 0, ..self.vertex.element.clone() }, 0, &());
+        none.ok().and_then(|(points, _)| points.colors).unwrap_or_default()
+    }
+
+    /// What all threads make of rows that are read at once.
+    fn read<T: Send>(
+        &mut self,
+        numbers: &[Range<u32>],
+        rows: impl Fn(&Self) -> &Rows,
+        of: impl Fn(Points, Vec<TreeRow>) -> Result<T, &'static str> + Sync,
+    ) -> Result<Vec<T>> {
+        let Rows { element, start, size } = rows(self);
         let (start, size) = (*start, *size);
         let inside = numbers.iter().all(|range| range.start <= range.end && u64::from(range.end) <= element.count);
         if !inside {
             return Err(self.malformed("a node of its levels of detail names what does not exist"));
         }
-        let count = numbers.iter().map(|range| u64::from(range.end - range.start)).sum();
-        let element = Element { count, ..element.clone() };
+        let count: u64 = numbers.iter().map(|range| u64::from(range.end - range.start)).sum();
+        let element = element.clone();
         let pieces = numbers
             .iter()
             .map(|range| (start + u64::from(range.start) * size, u64::from(range.end - range.start) * size));
-        let pieces = Pieces::new(&mut self.file, pieces).map_err(|error| Fault::Io(error).of(&self.path))?;
-        let read = binary::vertices::<false>(BufReader::new(pieces), &element, count * size, &());
-        read.map_err(|fault| fault.of(&self.path))
+        let mut bytes = vec![0; (count * size) as usize];
+        let read = Pieces::new(&mut self.file, pieces).and_then(|mut pieces| pieces.read_exact(&mut bytes));
+        read.map_err(|error| Fault::Io(error).of(&self.path))?;
+        let layout = Layout::of(&element).map_err(|fault| fault.of(&self.path))?;
+        let made = |bytes: &[u8]| {
+            let length = bytes.len() as u64;
+            let element = Element { count: length / size, ..element.clone() };
+            let (points, rows) = binary::vertices_in::<false>(bytes, &element, &layout, length, &())?;
+            of(points, rows).map_err(|what| Fault::Malformed(what.into()))
+        };
+        let parts: Result<Vec<T>, Fault> = bytes.par_chunks(TOGETHER * size as usize).map(made).collect();
+        parts.map_err(|fault| fault.of(&self.path))
     }
 }
 

@@ -11,6 +11,9 @@ use crate::Progress;
 use crate::scene::hierarchy::Node;
 use crate::scene::{Cap, Scene, Surfel};
 
+/// Sets that are made at once, by all threads.
+const TOGETHER: usize = 1 << 16;
+
 /// A node that is not made yet.
 const NOTHING: Node = Node {
     surfel: Surfel { center: [0.0; 3], s: [0.0; 3], t: [0.0; 3] },
@@ -35,15 +38,20 @@ pub(super) fn nodes(tree: &Octree, scene: &Scene, known: &Known, progress: &dyn 
     let mut sums: Vec<Option<Box<Sums>>> = Vec::new();
     progress.begin("bounding nodes", tree.sets.len() as u64);
     for level in tree.levels.windows(2).rev() {
-        let numbers = || (level[0] as u32..level[1] as u32).into_par_iter();
         let below = |child: u32| sums[child as usize - level[1]].as_deref().copied();
-        let (own, leaves): (Vec<_>, Vec<_>) = numbers().map(|number| sets.summed(number, below)).unzip();
-        leaves.into_iter().flatten().for_each(|(number, made)| all[number as usize] = made);
-        let inner: Vec<Option<Made>> =
-            numbers().zip(&own).map(|(number, sums)| Some(sets.inner(number, sums.as_deref()?, &all))).collect();
-        all[level[0]..level[1]].iter_mut().zip(inner).for_each(|(into, made)| *into = made.unwrap_or(*into));
-        sums = own;
-        progress.advance((level[1] - level[0]) as u64);
+        let mut of_level = Vec::with_capacity(level[1] - level[0]);
+        for start in (level[0]..level[1]).step_by(TOGETHER) {
+            let range = start..level[1].min(start + TOGETHER);
+            let numbers = || (range.start as u32..range.end as u32).into_par_iter();
+            let (mut own, leaves): (Vec<_>, Vec<_>) = numbers().map(|number| sets.summed(number, below)).unzip();
+            leaves.into_iter().flatten().for_each(|(number, made)| all[number as usize] = made);
+            let inner: Vec<Option<Made>> =
+                numbers().zip(&own).map(|(number, sums)| Some(sets.inner(number, sums.as_deref()?, &all))).collect();
+            all[range.clone()].iter_mut().zip(inner).for_each(|(into, made)| *into = made.unwrap_or(*into));
+            of_level.append(&mut own);
+            progress.advance(range.len() as u64);
+        }
+        sums = of_level;
     }
     progress.end();
     let root = sums.first().and_then(|sums| sums.as_deref().copied()).unwrap_or_default();

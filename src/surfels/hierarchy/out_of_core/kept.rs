@@ -141,7 +141,7 @@ impl<'a> Kept<'a> {
     /// Some of the surfels that are kept, as a part of the scene.
     pub fn part(&self, numbers: Range<u64>) -> Result<Scene> {
         let points = self.surfels.points(&self.surfels.bytes(numbers)?)?;
-        self.survey.part(points).ok_or_else(|| self.surfels.malformed("a surfel has no place or no half-axes"))
+        self.survey.part_again(points).ok_or_else(|| self.surfels.malformed("a surfel has no place or no half-axes"))
     }
 }
 

@@ -9,6 +9,8 @@ mod pages;
 mod runs;
 mod sources;
 mod survey;
+#[cfg(test)]
+mod tests;
 mod write;
 
 use std::ops::Range;
@@ -25,10 +27,11 @@ use super::moments::Moments;
 use super::octree::Octree;
 use super::sums::Sums;
 use super::{bounds, nodes, scene_as_in_a_file, sorted};
+use crate::io::Points;
 use crate::io::ply::Rows;
+use crate::scene::Scene;
 use crate::scene::hierarchy::{DEEPEST, Node};
-use crate::scene::{Colors, Scene};
-use crate::surfels::Preparation;
+use crate::surfels::{Preparation, complete};
 use crate::{Error, Progress, Result};
 
 /// Memory of the program and of what is read and written at once, bytes, and of each thread for pieces.
@@ -80,19 +83,28 @@ pub fn write_levels(
             "--memory is less than the {least:.0}MiB that levels of detail of these points take at least"
         )));
     }
-    let root = Lattice::over(&survey.bounds);
     let runs = Runs { survey: &survey, folder, path, progress };
-    let kept = Kept::new(&survey, folder, path)?;
+    made(&sources, runs, fits)
+}
+
+/// The file, where memory has room for the tree of so many points at once.
+fn made(sources: &Sources<'_>, runs: Runs<'_>, fits: u64) -> Result<Report> {
+    let Runs { survey, folder, path, progress } = runs;
+    let root = Lattice::over(&survey.bounds);
+    let kept = Kept::new(survey, folder, path)?;
     let mut divider = Divider { runs, kept, fits, lattices: vec![root] };
     if survey.preparation.surfels <= fits {
-        let scene = divider.loaded(survey.preparation.surfels, &sources.pieces())?;
+        let scene = divider.loaded(survey.preparation.surfels, &sources.pieces(), Survey::part)?;
         divider.subtree(scene_as_in_a_file(scene), 0)?;
     } else {
-        let run = divider.runs.all(&sources, &root)?;
+        let run = divider.runs.all(sources, &root)?;
         divider.branch(run, 0)?;
     }
-    write::write(path, divider.kept, &survey, progress)
+    write::write(path, divider.kept, survey, progress)
 }
+
+/// How a part of a scene is made of points.
+type MadeOf = fn(&Survey, Points) -> Option<Scene>;
 
 /// A branch, and what its parent's sums are made of.
 struct Summed {
@@ -117,7 +129,7 @@ impl Divider<'_> {
     fn branch(&mut self, mut run: Run, depth: usize) -> Result<Summed> {
         if run.rows.count() <= self.fits {
             let pieces: Vec<_> = run.rows.pieces(PIECE).into_iter().map(|piece| (&run.rows, piece)).collect();
-            let scene = self.loaded(run.rows.count(), &pieces)?;
+            let scene = self.loaded(run.rows.count(), &pieces, Survey::part_again)?;
             drop(run);
             return self.subtree(scene, depth);
         }
@@ -177,38 +189,23 @@ impl Divider<'_> {
         Ok(Summed { branch, sums, moments })
     }
 
-    /// So many surfels of some pieces of files.
-    fn loaded(&self, count: u64, pieces: &[(&Rows, Range<u64>)]) -> Result<Scene> {
+    /// So many surfels of some pieces of files, as they are `made` of points.
+    fn loaded(&self, count: u64, pieces: &[(&Rows, Range<u64>)], made: MadeOf) -> Result<Scene> {
         let survey = self.runs.survey;
         let mut scene = survey.empty.clone();
         survey.reserve(&mut scene, count as usize);
         let read = |(rows, piece): &(&Rows, Range<u64>)| {
             let points = rows.points(&rows.bytes(piece.clone())?)?;
             self.runs.progress.advance(points.positions.len() as u64);
-            survey.part(points).ok_or_else(|| rows.malformed("it changed while it was read"))
+            made(survey, points).ok_or_else(|| rows.malformed("it changed while it was read"))
         };
         self.runs.progress.begin("reading points", count);
         let loaded = pieces.chunks(rayon::current_num_threads()).try_for_each(|pieces| {
             let parts: Vec<Scene> = pieces.par_iter().map(read).collect::<Result<_>>()?;
-            parts.into_iter().for_each(|part| append(&mut scene, part));
+            parts.into_iter().for_each(|part| complete::append(&mut scene, part));
             Ok(())
         });
         self.runs.progress.end();
         loaded.map(|()| scene)
-    }
-}
-
-/// Puts the surfels of a part behind those of another one.
-fn append(scene: &mut Scene, mut part: Scene) {
-    scene.surfels.append(&mut part.surfels);
-    scene.low.append(&mut part.low);
-    scene.clips.append(&mut part.clips);
-    scene.caps.append(&mut part.caps);
-    scene.normals.append(&mut part.normals);
-    match (&mut scene.colors, part.colors) {
-        (Colors::Srgb8(all), Colors::Srgb8(mut own)) => all.append(&mut own),
-        (Colors::Linear(all), Colors::Linear(mut own)) => all.append(&mut own),
-        // One for all.
-        _ => {}
     }
 }

@@ -14,7 +14,7 @@ use crate::scene::whole::Has;
 use crate::scene::{Bounds, Cap, Clip, Colors, SMALLEST_SCENE, Sample, Scene, Surfel, Up, body_within};
 use crate::surfels::build::{LARGEST_IN_EXTENTS, plane_of};
 use crate::surfels::complete::{self, Added};
-use crate::surfels::{Preparation, guess_up, origin_for};
+use crate::surfels::{Preparation, guess_up, origin_for, usable_axes};
 use crate::{Error, Result};
 
 /// A scene without its surfels, and what is known of these.
@@ -116,6 +116,13 @@ impl Survey {
         let mut scene = self.empty.clone();
         complete::add(&mut scene, vec![points, self.others.clone()], self.has)?;
         Some(scene)
+    }
+
+    /// The same of points that were written of a part: what it made of their normals stays, to the bit.
+    pub fn part_again(&self, mut points: Points) -> Option<Scene> {
+        let normals = if self.has.normals { points.normals.take() } else { None };
+        let part = self.part(points)?;
+        Some(Scene { normals: normals.unwrap_or_default(), ..part })
     }
 }
 
@@ -301,6 +308,9 @@ impl Look {
                 "a point has no normal or no radius, and with --memory none are estimated: make surfels of it first (epsplat surfels)",
             ));
         };
+        if !scene.surfels.iter().all(|surfel| usable_axes([surfel.s, surfel.t]).is_some()) {
+            return Err(Error::malformed(path, "a disk is smaller, larger or thinner than half-axes in a file can be"));
+        }
         let (mut all, mut sample) = (Bounds::EMPTY, nothing.sample);
         for position in positions.into_iter().map(DVec3::from_array) {
             all = all.with_point(position);

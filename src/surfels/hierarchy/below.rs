@@ -71,6 +71,8 @@ pub(super) trait Below: Sync {
 pub(super) struct InMemory<'a> {
     pub scene: &'a Scene,
     pub tree: &'a Octree,
+    /// Those from the first one on that is known.
+    pub first: usize,
     pub nodes: &'a [Made],
 }
 
@@ -91,7 +93,11 @@ impl Below for InMemory<'_> {
     fn children(&self, of: u32, mut see: impl FnMut(Child<'_, u32>)) {
         let set = self.set(of);
         for key in set.first_child..set.first_child + set.children {
-            see(Child { key, made: &self.nodes[key as usize], surfels: self.set(key).range().len() as u64 });
+            see(Child {
+                key,
+                made: &self.nodes[key as usize - self.first],
+                surfels: self.set(key).range().len() as u64,
+            });
         }
     }
 

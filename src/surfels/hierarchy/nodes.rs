@@ -11,9 +11,6 @@ use crate::Progress;
 use crate::scene::hierarchy::Node;
 use crate::scene::{Cap, Scene, Surfel};
 
-/// Sets that are made at once, by all threads.
-const TOGETHER: usize = 1 << 16;
-
 /// A node that is not made yet.
 const NOTHING: Node = Node {
     surfel: Surfel { center: [0.0; 3], s: [0.0; 3], t: [0.0; 3] },
@@ -38,28 +35,31 @@ pub(super) fn nodes(tree: &Octree, scene: &Scene, known: &Known, progress: &dyn 
     let mut sums: Vec<Option<Box<Sums>>> = Vec::new();
     progress.begin("bounding nodes", tree.sets.len() as u64);
     for level in tree.levels.windows(2).rev() {
+        let (here, lower) = all.split_at_mut(level[1]);
         let below = |child: u32| sums[child as usize - level[1]].as_deref().copied();
-        let mut of_level = Vec::with_capacity(level[1] - level[0]);
-        for start in (level[0]..level[1]).step_by(TOGETHER) {
-            let range = start..level[1].min(start + TOGETHER);
-            let numbers = || (range.start as u32..range.end as u32).into_par_iter();
-            let (mut own, leaves): (Vec<_>, Vec<_>) = numbers().map(|number| sets.summed(number, below)).unzip();
-            leaves.into_iter().flatten().for_each(|(number, made)| all[number as usize] = made);
-            let inner: Vec<Option<Made>> =
-                numbers().zip(&own).map(|(number, sums)| Some(sets.inner(number, sums.as_deref()?, &all))).collect();
-            all[range.clone()].iter_mut().zip(inner).for_each(|(into, made)| *into = made.unwrap_or(*into));
-            of_level.append(&mut own);
-            progress.advance(range.len() as u64);
+        // The children of the sets of a level follow each other.
+        let mut children: Vec<&mut [Made]> = Vec::with_capacity(level[1] - level[0]);
+        let mut rest = &mut *lower;
+        for set in &tree.sets[level[0]..level[1]] {
+            let (own, after) = rest.split_at_mut(set.children as usize);
+            children.push(own);
+            rest = after;
         }
-        sums = of_level;
+        let numbers = || (level[0] as u32..level[1] as u32).into_par_iter();
+        let summed = numbers().zip(children).map(|(number, children)| sets.summed(number, children, below));
+        sums = summed.collect();
+        let here = here[level[0]..].par_iter_mut().zip(numbers()).zip(&sums);
+        here.for_each(|((node, number), sums)| {
+            if let Some(sums) = sums {
+                *node = sets.inner(number, sums, (level[1], lower));
+            }
+        });
+        progress.advance((level[1] - level[0]) as u64);
     }
     progress.end();
     let root = sums.first().and_then(|sums| sums.as_deref().copied()).unwrap_or_default();
     (all, root)
 }
-
-/// The sums of a set that is divided, and the nodes of the leaves right below it.
-type Summed = (Option<Box<Sums>>, Vec<(u32, Made)>);
 
 /// What nodes are made of.
 struct Sets<'a> {
@@ -74,10 +74,10 @@ impl Sets<'_> {
         Sums::of(&self.tree.elements[set.range()], self.scene, set.first as usize, &self.known.scales)
     }
 
-    /// A set with the nodes of the levels below it.
-    fn made(&self, number: u32, sums: &Sums, nodes: &[Made]) -> Made {
+    /// The node of a set, where those from number `nodes.0` on are known.
+    fn made(&self, number: u32, sums: &Sums, (first, nodes): (usize, &[Made])) -> Made {
         let lattice = &self.tree.lattices[self.tree.sets[number as usize].lattice as usize];
-        let below = InMemory { scene: self.scene, tree: self.tree, nodes };
+        let below = InMemory { scene: self.scene, tree: self.tree, first, nodes };
         bounds::node(number, sums, lattice, &below, self.known)
     }
 
@@ -87,27 +87,27 @@ impl Sets<'_> {
         if set.range().len() == 1 {
             return bounds::of_one(self.scene, set.first as usize, sums, self.known);
         }
-        let (node, low) = self.made(number, sums, &[]);
+        let (node, low) = self.made(number, sums, (0, &[]));
         (Node { first: set.first, count: set.range().len() as u32, ..node }, low)
     }
 
-    /// The node of a set that is divided.
-    fn inner(&self, number: u32, sums: &Sums, nodes: &[Made]) -> Made {
+    /// The node of a set that is divided, where those from number `nodes.0` on are known.
+    fn inner(&self, number: u32, sums: &Sums, nodes: (usize, &[Made])) -> Made {
         let set = &self.tree.sets[number as usize];
         let (node, low) = self.made(number, sums, nodes);
         (Node { first: set.first_child, count: set.children, leaf: false, ..node }, low)
     }
 
-    /// The sums of a set's children together (EQ 4), of which those that are divided are known; none of a leaf, whose sums are made where its
-    /// parent's are. Of children on another lattice the moments are made anew on this one.
-    fn summed(&self, number: u32, below: impl Fn(u32) -> Option<Sums>) -> Summed {
+    /// The sums of a set's children together (EQ 4), of which those that are divided are known, and the nodes of the others; none of a leaf. Of children
+    /// on another lattice the moments are made anew on this one.
+    fn summed(&self, number: u32, nodes: &mut [Made], below: impl Fn(u32) -> Option<Sums>) -> Option<Box<Sums>> {
         let set = &self.tree.sets[number as usize];
-        let (mut all, mut leaves) = (Sums::default(), Vec::new());
-        for number in set.first_child..set.first_child + set.children {
+        let mut all = Sums::default();
+        for (number, node) in (set.first_child..).zip(nodes) {
             let child = &self.tree.sets[number as usize];
             let mut own = below(number).unwrap_or_else(|| {
                 let own = self.of_points(child);
-                leaves.push((number, self.leaf(number, &own)));
+                *node = self.leaf(number, &own);
                 own
             });
             if child.lattice != set.lattice {
@@ -116,6 +116,6 @@ impl Sets<'_> {
             }
             all.add(&own);
         }
-        ((!set.is_leaf()).then(|| Box::new(all)), leaves)
+        (!set.is_leaf()).then(|| Box::new(all))
     }
 }

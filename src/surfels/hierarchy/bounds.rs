@@ -134,8 +134,8 @@ struct Bounding {
 }
 
 impl Bounding {
-    /// What bounds one surfel, where a rim no farther than `known` is of no matter.
-    fn of(&self, Disk { surfel, center, cap }: &Disk, known: f64) -> Bound {
+    /// What bounds one surfel, where what is no more than `known` is of no matter.
+    fn of(&self, Disk { surfel, center, cap }: &Disk, known: &Bound) -> Bound {
         let offset = center - self.center;
         let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
         let own = normal_of(surfel);
@@ -146,13 +146,20 @@ impl Bounding {
             let [at, u, v] = [offset, s, t].map(shown);
             // A cap leans out as far as it is high.
             let lean = shown(own * height).length();
-            // That of a circle around the disk is found sooner.
-            let circle = at.length() + longest([u.dot(u), u.dot(v), v.dot(v)]);
-            if circle + lean > known.max(rim) { rim.max(circle.min(farthest(at, [u, v])) + lean) } else { rim }
+            let matters = |reach: f64| at.length() + reach + lean > known.rim.max(rim);
+            let products = [u.dot(u), u.dot(v), v.dot(v)];
+            // That of a circle around the disk is found sooner, and a larger one yet sooner.
+            if !matters((products[0] + products[2]).sqrt()) || !matters(longest(products)) {
+                return rim;
+            }
+            rim.max((at.length() + longest(products)).min(farthest(at, [u, v])) + lean)
         });
+        let products = [s.dot(s), s.dot(t), t.dot(t)];
+        let reach = |longest: f64| offset.length() + longest + height;
+        let matters = reach((products[0] + products[2]).sqrt()) > known.radius;
         Bound {
             rim,
-            radius: offset.length() + longest([s.dot(s), s.dot(t), t.dot(t)]) + height,
+            radius: if matters { reach(longest(products)) } else { 0.0 },
             cosine: match tilt(surfel, cap) {
                 0.0 => own.dot(self.normal).clamp(-1.0, 1.0),
                 tilt => (own.dot(self.normal).clamp(-1.0, 1.0).acos() + tilt).min(PI).cos(),
@@ -300,7 +307,16 @@ fn bound_from<B: Below>(of: &Bounding, key: B::Key, below: &B, sided: bool) -> B
         // What reaches farthest comes first.
         open[first..].sort_by(|a, b| a.0.rim.total_cmp(&b.0.rim));
     };
-    let look = |key: B::Key, all: &mut Bound| below.disks(key, |disk| *all = all.both(of.of(&disk, all.rim)));
+    // What lies farthest away comes first: then most of the others are of no matter.
+    let mut disks: Vec<(f64, Disk)> = Vec::new();
+    let mut look = |key: B::Key, all: &mut Bound| {
+        disks.clear();
+        below.disks(key, |disk| disks.push((of.shape.seen(disk.center - of.center).length_squared(), disk)));
+        if let Some(farthest) = (0..disks.len()).max_by(|a, b| disks[*a].0.total_cmp(&disks[*b].0)) {
+            disks.swap(0, farthest);
+        }
+        disks.iter().for_each(|(_, disk)| *all = all.both(of.of(disk, all)));
+    };
     if below.is_leaf(key) {
         look(key, &mut all)
     } else {
@@ -355,7 +371,7 @@ mod tests {
             let surfel = Surfel::ellipse(middle.as_vec3(), one.as_vec3(), own.cross(one).as_vec3());
             let middle = DVec3::from_array(surfel.center.map(f64::from));
             let around = Bounding { center: middle, normal: normal_of(&surfel), ..bounding };
-            let all = disks.iter().map(|disk| around.of(disk, 0.0)).fold(Bound::NOTHING, Bound::both);
+            let all = disks.iter().map(|disk| around.of(disk, &Bound::NOTHING)).fold(Bound::NOTHING, Bound::both);
             let node = Node {
                 surfel,
                 cap: Cap::FLAT,
@@ -368,7 +384,7 @@ mod tests {
             };
             let told = bounding.of_node(&node, [0.0; 3]);
             for disk in &disks {
-                let own = bounding.of(disk, 0.0);
+                let own = bounding.of(disk, &Bound::NOTHING);
                 assert!(own.rim <= told.rim && own.radius <= told.radius && own.cosine >= told.cosine);
                 tight += usize::from(own.rim > 0.5 * told.rim);
                 looked += 1;

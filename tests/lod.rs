@@ -271,3 +271,61 @@ fn memory_is_bounded() {
     let (code, _, told) = epsplat(&[&["render", &levels, "-o", &output, "--backend", "reference"], &away[..]].concat());
     assert!(code == 0 && told.contains("all lie behind the camera"), "{told}");
 }
+
+/// With a bound for memory points are sorted in files, and the file is the same; a folder of tiles is one tree; and what does not go with that is told.
+#[test]
+fn trees_are_made_within_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| path_in(&folder, name);
+    let [surfels, levels] = spheres(&folder, "200000");
+    let bounded = path("bounded.ply");
+    assert_eq!(epsplat(&["lod", &surfels, "-o", &levels]).0, 0);
+    // What so many threads take, and room for less than half of the points.
+    let threads = std::thread::available_parallelism().unwrap().get();
+    let memory = format!("{}MiB", 96 + 48 * threads + 15);
+    let (code, text, told) = epsplat(&["lod", &surfels, "-o", &bounded, "--memory", &memory, "--json", "-"]);
+    assert_eq!(code, 0, "{told}");
+    let report: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert!(report["surfels"] == 200_000 && report["subtrees"].as_u64().unwrap() >= 8, "{report}");
+    let same = || std::fs::read(&levels).unwrap() == std::fs::read(&bounded).unwrap();
+    assert!(same());
+    // Two tiles, and something else.
+    let tiles = folder.path().join("tiles");
+    std::fs::create_dir(&tiles).unwrap();
+    let whole = io::read(Path::new(&surfels), &()).unwrap();
+    let tile = |of: std::ops::Range<usize>| Points {
+        positions: whole.positions[of.clone()].to_vec(),
+        normals: whole.normals.as_ref().map(|all| all[of.clone()].to_vec()),
+        radii: whole.radii.as_ref().map(|all| all[of.clone()].to_vec()),
+        colors: match &whole.colors {
+            Some(Colors::Srgb8(codes)) => Some(Colors::Srgb8(codes[of].to_vec())),
+            _ => None,
+        },
+        ..whole.clone()
+    };
+    ply::write_points(&tiles.join("left.ply"), &tile(0..90_000), &()).unwrap();
+    ply::write_points(&tiles.join("right.PLY"), &tile(90_000..200_000), &()).unwrap();
+    std::fs::write(tiles.join("readme.txt"), "tiles").unwrap();
+    let tiles = tiles.to_str().unwrap();
+    for more in [&["--memory", &memory][..], &[]] {
+        std::fs::remove_file(&bounded).unwrap();
+        let (code, _, told) = epsplat(&[&["lod", tiles, "-o", &bounded], more].concat());
+        assert!(code == 0 && same(), "{told}");
+    }
+    let empty = path("empty");
+    std::fs::create_dir(&empty).unwrap();
+    let bare = path("bare.ply");
+    ply::write_points(Path::new(&bare), &Points { radii: None, ..tile(0..100) }, &()).unwrap();
+    let refused = path("refused.ply");
+    for (arguments, words) in [
+        (&[&surfels[..], "--memory", "9MiB"][..], "take at least"),
+        (&[&surfels, "--memory", "9"], "no size of memory"),
+        (&[&surfels, "--memory", "9GiB", "--cut", "0.1"], "--cut"),
+        (&[&bare, "--memory", "9GiB"], "epsplat surfels"),
+        (&[&levels, "--memory", "9GiB"], "epsplat surfels"),
+        (&[&empty], "has no PLY"),
+    ] {
+        let (code, _, told) = epsplat(&[&["lod", "-o", &refused], arguments].concat());
+        assert!(code == 2 && told.contains(words) && !Path::new(&refused).exists(), "{arguments:?}: {told}");
+    }
+}

@@ -45,12 +45,13 @@ impl<T> Pages<T> {
 
     fn page(&self, rows: Range<u64>, read: impl Fn(Range<u64>) -> Result<T>) -> Result<Arc<T>> {
         let slot = &self.slots[(rows.start / PAGE % SLOTS) as usize];
-        let mut slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, page)) = slot.as_ref().filter(|(known, _)| *known == rows) {
+        let lock = || slot.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, page)) = lock().as_ref().filter(|(known, _)| *known == rows) {
             return Ok(page.clone());
         }
+        // Nothing is locked while a thread reads, as what it waits for may be work that wants a page.
         let page = Arc::new(read(rows.clone())?);
-        *slot = Some((rows, page.clone()));
+        *lock() = Some((rows, page.clone()));
         Ok(page)
     }
 }

@@ -38,7 +38,7 @@ pub struct Arguments {
     cut: Option<f64>,
     /// The most memory to take, 4GiB: the points, of binary PLY files with normals and radii, or half-axes, are sorted in temporary files beside the output, of about three
     /// times its size. The same file as without
-    #[arg(long, value_name = "SIZE", value_parser = parse_memory, conflicts_with_all = ["cut", "outliers"])]
+    #[arg(long, value_name = "SIZE", value_parser = parse_memory, conflicts_with_all = ["cut", "outliers", "max_radius", "flat", "class_opacity"])]
     memory: Option<u64>,
     /// What the tree is like as JSON, to a file or - for stdout
     #[arg(long, value_name = "FILE|-")]
@@ -138,7 +138,9 @@ fn summary(report: &Report) -> String {
             format!("read in {read:.2} s, made in {made:.2} s, divided in {divided:.2} s, written in {written:.2} s")
         }
         (seconds, subtrees) => {
-            format!("{} trees after each other in {:.2} s", subtrees.unwrap_or(1), seconds.iter().sum::<f64>())
+            let trees = subtrees.filter(|trees| *trees > 1);
+            let trees = trees.map_or_else(String::new, |trees| format!("of {trees} subtrees, one after the other, "));
+            format!("{trees}in {:.2} s", seconds.iter().sum::<f64>())
         }
     };
     format!("{} surfels, {} nodes in {} levels{cut}: {times}\n", report.surfels, report.nodes, report.levels)

@@ -169,7 +169,7 @@ impl Reading {
             let rows = if is_file { Rows::open(Input::open(path, self.input.input_format)?)? } else { None };
             rows.ok_or_else(|| {
                 Error::Usage(format!(
-                    "--memory takes binary PLY files of points with normals and radii, or half-axes, and {} is another one: make surfels of it first (epsplat surfels)",
+                    "--memory takes binary PLY files of points with normals and radii, or half-axes, and without faces, textures or levels of detail, and {} is another one: make surfels of it first (epsplat surfels), or leave it out",
                     path.display()
                 ))
             })

@@ -31,6 +31,9 @@ pub struct Node {
     pub leaf: bool,
 }
 
+/// A node, and what its f32 centre leaves out, world units.
+pub(crate) type NodeAndLow = (Node, [f32; 3]);
+
 /// A point-octree over the surfels of a scene: each node's are divided at the mean of their centres (Pajarola 2003, section 3.2). The scene has
 /// them in the order of the tree: those below a node follow each other. It depends on the set of surfels alone.
 #[derive(Clone, Debug, Default, PartialEq)]

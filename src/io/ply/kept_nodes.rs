@@ -6,7 +6,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use crate::scene::hierarchy::Node;
+use crate::scene::hierarchy::{Node, NodeAndLow};
 use crate::scene::{Cap, Surfel};
 use crate::{Error, Result};
 
@@ -15,9 +15,6 @@ const WORDS: usize = 24;
 
 /// Bytes of a node.
 const BYTES: u64 = 4 * WORDS as u64;
-
-/// A node, and what its f32 centre leaves out.
-pub type NodeAndLow = (Node, [f32; 3]);
 
 /// Nodes, by their numbers.
 pub struct KeptNodes {
@@ -115,7 +112,16 @@ mod tests {
             let x = k as f32 + 0.5;
             let surfel = Surfel { center: [x, 1.0, 2.0], s: [3.0, x, 4.0], t: [5.0, 6.0, x] };
             let (cap, color) = (Cap([x, 0.25, -x]), [0.1, x, 0.3, 1.0]);
-            let node = Node { surfel, cap, color, radius: 7.0 * x, cone: -x, first: k, count: 3 * k, leaf: k % 2 == 0 };
+            let node = Node {
+                surfel,
+                cap,
+                color,
+                radius: 7.0 * x,
+                cone: -x,
+                first: k,
+                count: 3 * k,
+                leaf: k.is_multiple_of(2),
+            };
             (node, [x * 1e-9, 0.0, -x])
         };
         let folder = tempfile::tempdir().unwrap();

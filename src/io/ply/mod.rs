@@ -44,7 +44,7 @@ mod write_gaussians;
 mod write_mesh;
 mod write_scene;
 
-pub(crate) use kept_nodes::{KeptNodes, NodeAndLow};
+pub(crate) use kept_nodes::KeptNodes;
 pub use levels::Levels;
 pub(super) use read::companions;
 pub use read::{read, read_mesh};

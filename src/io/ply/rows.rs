@@ -1,12 +1,13 @@
 //! Rows of surfels that all have the same length, in a file, of which any threads read any: those of a binary PLY file, or of one that nobody sees.
 
 use std::fs::File;
-use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
+use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::binary;
+use super::contents::ends_early;
 use super::faces::Faces;
 use super::header::{self, Comments, Element, Encoding, Kind};
 use super::vertex::{Layout, is_tree};
@@ -15,12 +16,16 @@ use super::write_scene::vertex;
 use crate::io::fault::Fault;
 use crate::io::{Format, Input, Points};
 use crate::scene::Scene;
-use crate::{Error, Result};
+use crate::{Error, Progress, Result};
+
+/// Rows that are copied at once.
+const TOGETHER: u64 = 1 << 16;
 
 /// Rows of one element of a file.
 pub struct Rows {
-    file: Mutex<File>,
-    /// What errors call the file.
+    /// None of an input, which is opened where it is read: there may be more of them than a program may have open.
+    file: Option<Mutex<File>>,
+    /// What errors call the file, and an input's place.
     path: PathBuf,
     element: Element,
     layout: Layout,
@@ -36,11 +41,11 @@ pub struct Rows {
 
 impl Rows {
     /// Those of the points of a binary PLY file; None of another file, and where points are not all that there is: of meshes, Gaussians, places in textures, files
-    /// with levels of detail, without normals or radii, and files that end early, which is told by who reads all of it.
+    /// with levels of detail, without normals or radii.
     ///
     /// # Errors
     ///
-    /// [`Error::Read`] where the system cannot read, [`Error::Malformed`] where the header is not PLY's.
+    /// [`Error::Read`] where the system cannot read, [`Error::Malformed`] where the header is not PLY's, or promises more points than there are.
     pub fn open(input: Input) -> Result<Option<Self>> {
         let Input { file, length, path, format } = input;
         if format != Format::Ply {
@@ -66,9 +71,13 @@ impl Rows {
         let size = layout.row_size as u64;
         let whole = element.count.checked_mul(size).is_some_and(|bytes| bytes <= length.saturating_sub(start));
         let big = header.encoding == Encoding::BigEndian;
-        let (file, comments) = (Mutex::new(reader.into_inner()), header.comments);
-        let sound = layout.is_disk() && whole;
-        Ok(sound.then_some(Self { file, path, element, layout, start, size, big, written: None, comments }))
+        if !whole {
+            let rows = length.saturating_sub(start) / size.max(1);
+            return Err(ends_early(&element, rows).of(&path));
+        }
+        let comments = header.comments;
+        let sound = layout.is_disk() || element.count == 0;
+        Ok(sound.then_some(Self { file: None, path, element, layout, start, size, big, written: None, comments }))
     }
 
     /// No rows yet, with what `properties` name, in a file without a name in `folder`, which goes with this; errors call it `path`.
@@ -84,7 +93,7 @@ impl Rows {
         let element = header::read(&mut &text[..]).map_err(|fault| fault.of(path))?.elements.remove(0);
         let layout = Layout::of(&element).map_err(|fault| fault.of(path))?;
         let size = layout.row_size as u64;
-        let (file, path) = (Mutex::new(file), path.to_owned());
+        let (file, path) = (Some(Mutex::new(file)), path.to_owned());
         let written = Some(properties);
         Ok(Self { file, path, element, layout, start: 0, size, big: false, written, comments: Comments::default() })
     }
@@ -92,6 +101,11 @@ impl Rows {
     /// How many there are.
     pub fn count(&self) -> u64 {
         self.element.count
+    }
+
+    /// Whether the file says that its surfels cover a closed surface.
+    pub fn is_closed(&self) -> bool {
+        self.comments.closed
     }
 
     /// Bytes of each.
@@ -122,10 +136,13 @@ impl Rows {
     /// [`Error::Read`] where the system cannot read.
     pub fn bytes(&self, numbers: Range<u64>) -> Result<Vec<u8>> {
         let mut bytes = vec![0; ((numbers.end - numbers.start) * self.size) as usize];
-        let mut file = self.lock();
-        let read = file.seek(SeekFrom::Start(self.start + numbers.start * self.size));
-        read.and_then(|_| file.read_exact(&mut bytes)).map_err(|error| Error::read(&self.path, error))?;
-        Ok(bytes)
+        let start = self.start + numbers.start * self.size;
+        let mut read = |file: &mut File| file.seek(SeekFrom::Start(start)).and_then(|_| file.read_exact(&mut bytes));
+        let read = match &self.file {
+            Some(file) => read(&mut lock(file)),
+            None => File::open(&self.path).and_then(|mut file| read(&mut file)),
+        };
+        read.map(|()| bytes).map_err(|error| Error::read(&self.path, error))
     }
 
     /// The points of the bytes of some rows.
@@ -153,31 +170,35 @@ impl Rows {
         bytes
     }
 
-    /// Adds the bytes of rows after all others.
+    /// Adds the bytes of rows that are written after all others.
     ///
     /// # Errors
     ///
     /// [`Error::Write`] where the system cannot write.
     pub fn append(&mut self, bytes: &[u8]) -> Result<()> {
         let end = self.start + self.count() * self.size;
-        let mut file = self.lock();
-        let written = file.seek(SeekFrom::Start(end)).and_then(|_| file.write_all(bytes));
-        drop(file);
+        let written = self.file.as_ref().map_or(Ok(()), |file| {
+            let mut file = lock(file);
+            file.seek(SeekFrom::Start(end)).and_then(|_| file.write_all(bytes))
+        });
         self.element.count += bytes.len() as u64 / self.size.max(1);
         written.map_err(|error| Error::write(&self.path, error))
     }
 
-    /// Writes all of them to `out`.
-    pub(super) fn copy(&self, out: &mut impl Write) -> io::Result<()> {
-        let mut file = self.lock();
-        file.seek(SeekFrom::Start(self.start))?;
-        io::copy(&mut (&mut *file).take(self.count() * self.size), out).map(drop)
+    /// Writes all of them to `out`, and tells how many.
+    pub(super) fn copy(&self, out: &mut impl Write, progress: &dyn Progress) -> Result<()> {
+        for piece in self.pieces(TOGETHER) {
+            let count = piece.end - piece.start;
+            out.write_all(&self.bytes(piece)?).map_err(|error| Error::write(&self.path, error))?;
+            progress.advance(count);
+        }
+        Ok(())
     }
+}
 
-    fn lock(&self) -> MutexGuard<'_, File> {
-        // Whoever reads or writes says where.
-        self.file.lock().unwrap_or_else(PoisonError::into_inner)
-    }
+/// Whoever reads or writes says where.
+fn lock(file: &Mutex<File>) -> MutexGuard<'_, File> {
+    file.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// The position of a row that is written with coordinates in f64.

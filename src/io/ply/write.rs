@@ -286,27 +286,31 @@ pub fn write_points(path: &Path, points: &Points, progress: &dyn Progress) -> Re
     written
 }
 
-/// Writes `count` rows, which `encode` appends the bytes of, some blocks at a time by all threads.
+/// Writes `count` rows, which `encode` appends the bytes of: some blocks at a time by all threads, while those before are written.
 pub(super) fn write_rows(
-    out: &mut impl Write,
+    out: &mut (impl Write + Send),
     count: usize,
     encode: impl Fn(usize, &mut Vec<u8>) + Sync,
     progress: &dyn Progress,
 ) -> io::Result<()> {
     const BLOCK: usize = 1 << 14;
     let starts: Vec<usize> = (0..count).step_by(BLOCK).collect();
+    let mut blocks: Vec<Vec<u8>> = Vec::new();
     for starts in starts.chunks(2 * rayon::current_num_threads()) {
         let block = |start: &usize| {
             let mut rows = Vec::new();
             (*start..count.min(start + BLOCK)).for_each(|index| encode(index, &mut rows));
             rows
         };
-        let blocks: Vec<Vec<u8>> = starts.par_iter().map(block).collect();
-        blocks.iter().try_for_each(|rows| out.write_all(rows))?;
+        let encode = || starts.par_iter().map(block).collect::<Vec<Vec<u8>>>();
+        let write = || blocks.iter().try_for_each(|rows| out.write_all(rows));
+        let (written, encoded) = rayon::join(write, encode);
+        written?;
+        blocks = encoded;
         let end = starts.last().map_or(0, |start| count.min(start + BLOCK));
         progress.advance((end - starts[0]) as u64);
     }
-    Ok(())
+    blocks.iter().try_for_each(|rows| out.write_all(rows))
 }
 
 /// What is written of a point.

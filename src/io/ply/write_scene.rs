@@ -6,14 +6,13 @@ use std::path::Path;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::kept_nodes::NodeAndLow;
 use super::rows::Rows;
 use super::vertex::NODE_NAMES;
 use super::whole;
 use super::write::{Color, ColorProperties, Properties, Vertex, longer, normal, write_rows};
 use crate::io::atomic::{Output, write_whole};
 use crate::scene::color::{DEFAULT_COLOR, srgb8};
-use crate::scene::hierarchy::Node;
+use crate::scene::hierarchy::{Node, NodeAndLow};
 use crate::scene::{Colors, Hierarchy, Scene, Whole};
 use crate::{Progress, Result};
 
@@ -67,7 +66,7 @@ pub(crate) fn write_kept(
     let head = Head { properties, count: surfels.count(), beside: None, nodes: of_nodes, whole: Some(whole) };
     write_whole(path, |out| {
         head.write(out)?;
-        surfels.copy(out)?;
+        surfels.copy(out, progress).map_err(io::Error::other)?;
         for nodes in nodes {
             let nodes = nodes.map_err(io::Error::other)?;
             let row = |index: usize, rows: &mut Vec<u8>| kind.encode(&nodes[index].0, nodes[index].1, rows);

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use glam::{DVec2, DVec3};
+use glam::{DMat2, DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::Made;
@@ -20,6 +20,9 @@ const MANY: u64 = 1 << 16;
 
 /// What half-axes and radii are longer by than was found, as they are rounded to f32.
 const ROUNDED_UP: f64 = 1.0 + 1.0 / (1u64 << 21) as f64;
+
+/// What a quicker bound is longer by than one of the same in other roundings.
+const ROUNDED: f64 = 1.0 + 1e-14;
 
 /// Cosine and sine of what the angle of a cone is larger by than was found, as cosines near 1 tell it badly: a thousandth of a radian.
 const ROUNDED_ANGLE: DVec2 = DVec2::new(1.0 - 5e-7, 1e-3);
@@ -58,6 +61,34 @@ impl Shape {
     /// (u, v) of a vector.
     fn seen(&self, vector: DVec3) -> DVec2 {
         DVec2::from_array(self.seen.map(|axis| vector.dot(axis)))
+    }
+}
+
+/// How a node curves: its heights over the plane of two unit directions.
+#[derive(Clone, Copy)]
+struct Curve {
+    along: DVec3,
+    across: DVec3,
+    heights: DMat2,
+    /// The largest curvature.
+    most: f64,
+}
+
+impl Curve {
+    fn of([xx, xy, yy]: curvature::Heights, [along, across, _]: [DVec3; 3]) -> Self {
+        let heights = DMat2::from_cols_array(&[xx, xy, xy, yy]);
+        Self { along, across, heights, most: 0.5 * (xx + yy).abs() + length(0.5 * (xx - yy), xy) }
+    }
+
+    /// The vector along these directions.
+    fn in_plane(&self, vector: DVec3) -> DVec2 {
+        DVec2::new(vector.dot(self.along), vector.dot(self.across))
+    }
+
+    /// The height over the plane at a place, and what it gains for a unit along each direction.
+    fn at(&self, place: DVec2) -> (f64, DVec2) {
+        let slope = self.heights * place;
+        (0.5 * slope.dot(place), slope)
     }
 }
 
@@ -129,6 +160,7 @@ struct Bounding {
     center: DVec3,
     normal: DVec3,
     shape: Shape,
+    curve: Curve,
     /// How much longer a vector is in units of the half-axes, at most.
     scale: f64,
 }
@@ -141,22 +173,27 @@ impl Bounding {
         let own = normal_of(surfel);
         let height = cap.highest();
         let across = self.leaning(own);
+        let (over, slope) = self.curve.at(self.curve.in_plane(offset));
+        // A vector's dot product with this is what its end lies higher over the node's cap than its start, which bends by no more than that below it.
+        let higher = self.normal - slope.x * self.curve.along - slope.y * self.curve.across;
+        let bend = 0.5 * self.curve.most * s.length_squared().max(t.length_squared());
+        let places = [offset, s, t, own * height].map(|vector| self.shape.seen(vector));
+        let above = [offset.dot(self.normal) - over, s.dot(higher), t.dot(higher), height * own.dot(higher)];
         let rim = [DVec2::ZERO, across].into_iter().fold(0.0, |rim: f64, across| {
-            let shown = |vector: DVec3| self.shape.seen(vector) - across * vector.dot(self.normal);
-            let [at, u, v] = [offset, s, t].map(shown);
+            let [at, u, v, lean] = [0, 1, 2, 3].map(|k| places[k] - across * above[k]);
             // A cap leans out as far as it is high.
-            let lean = shown(own * height).length();
+            let lean = lean.length() + across.length() * bend;
             let matters = |reach: f64| at.length() + reach + lean > known.rim.max(rim);
             let products = [u.dot(u), u.dot(v), v.dot(v)];
             // That of a circle around the disk is found sooner, and a larger one yet sooner.
-            if !matters((products[0] + products[2]).sqrt()) || !matters(longest(products)) {
+            if !matters((products[0] + products[2]).sqrt() * ROUNDED) || !matters(longest(products)) {
                 return rim;
             }
             rim.max((at.length() + longest(products)).min(farthest(at, [u, v])) + lean)
         });
         let products = [s.dot(s), s.dot(t), t.dot(t)];
         let reach = |longest: f64| offset.length() + longest + height;
-        let matters = reach((products[0] + products[2]).sqrt()) > known.radius;
+        let matters = reach((products[0] + products[2]).sqrt() * ROUNDED) > known.radius;
         Bound {
             rim,
             radius: if matters { reach(longest(products)) } else { 0.0 },
@@ -167,7 +204,7 @@ impl Bounding {
         }
     }
 
-    /// How far beside a point, in units of the half-axes, it is shown along a normal, by what it lies over the node's plane.
+    /// How far beside a point, in units of the half-axes, it is shown along a normal, by what it lies over the node's cap.
     ///
     /// Along the node's normal alone, neighbours whose planes bend away from each other would part where they are seen askew: each ends where
     /// the other does, but above or below it. Shown along the disk's normal, which is the surface's, both reach the line in which they meet.
@@ -192,8 +229,13 @@ impl Bounding {
         // A sum of angles past the half circle has a sine below 0, before what is rounded off is added or after; that of a whole cone is one.
         let beyond = node.cone <= -1.0 || angles.y < 0.0 || turned.y < 0.0;
         let slope = if !beyond && turned.y < STEEPEST * turned.x { turned.y / turned.x } else { STEEPEST };
-        let (at, height) = (self.shape.seen(offset), offset.dot(self.normal));
-        let high = height.abs() + radius;
+        let at = self.shape.seen(offset);
+        let place = self.curve.in_plane(offset);
+        let (over, gain) = self.curve.at(place);
+        let above = offset.dot(self.normal) - over;
+        // How much the height over the cap changes within the ball around it.
+        let around = radius * (1.0 + gain.length()) + 2.0 * self.curve.most * radius * radius;
+        let high = above.abs() + around;
         let mut rim = at.length() + (radius + slope * high) * self.scale;
         if !beyond && turned.x > 0.0 && node.cone > 0.0 {
             // Where it is shown along its own normal, and how far from there what is shown along others is: leanings change by no more than this, for each radian that a normal
@@ -201,8 +243,8 @@ impl Bounding {
             let changes = (turned.x * turned.x).recip().min(1.0 + STEEPEST * STEEPEST);
             let most = changes * ((f64::from(node.cone).powi(-2) - 1.0).max(0.0).sqrt() + TURNED_MORE);
             let own = (angle.y / angle.x).min(STEEPEST);
-            let leaning = (at - self.leaning(normal_of(&node.surfel)) * height).length();
-            let leaning = leaning + (radius * (1.0 + own) + most * high) * self.scale;
+            let leaning = (at - self.leaning(normal_of(&node.surfel)) * above).length();
+            let leaning = leaning + (radius + own * around + most * high) * self.scale;
             rim = rim.min(leaning.max(at.length() + radius * self.scale));
         }
         Bound {
@@ -265,7 +307,8 @@ pub(super) fn node<B: Below>(of: B::Key, sums: &Sums, lattice: &Lattice, below: 
     let low = if known.low { top - rounded.as_dvec3() } else { DVec3::ZERO }.as_vec3();
     let center = rounded.as_dvec3() + low.as_dvec3();
     let longer = shape.seen.map(DVec3::length);
-    let bounding = Bounding { center, normal: stored, shape, scale: longer[0].hypot(longer[1]) };
+    let curve = Curve::of(heights, plane);
+    let bounding = Bounding { center, normal: stored, shape, curve, scale: longer[0].hypot(longer[1]) };
     let all = bound(&bounding, (of, sums.moments.count), below, sided);
     let factor = all.rim * ROUNDED_UP;
     let [s, t] = [shape.s, shape.t].map(|axis| (axis * factor).as_vec3().to_array());
@@ -345,6 +388,7 @@ mod tests {
         let (mut tight, mut looked) = (0, 0);
         for _ in 0..4000 {
             let mut number = || 2.0 * random.number() - 1.0;
+            let curved = [0.3, 0.1, -0.2].map(|height| height * number());
             let mut vector = || DVec3::new(number(), number(), number());
             let normal = vector().normalize();
             let s = normal.any_orthonormal_vector();
@@ -352,7 +396,8 @@ mod tests {
             let seen = [s, t].map(|axis| axis / axis.length_squared());
             let shape = Shape { s, t, seen };
             let scale = seen[0].length().hypot(seen[1].length());
-            let bounding = Bounding { center: DVec3::ZERO, normal, shape, scale };
+            let curve = Curve::of(curved, [s, normal.cross(s), normal]);
+            let bounding = Bounding { center: DVec3::ZERO, normal, shape, curve, scale };
             let lean = vector();
             let (middle, own) = (vector() * 3.0, (normal + 1.5 * lean).normalize());
             let spread = 0.5 * number().abs().powi(2);
@@ -397,7 +442,8 @@ mod tests {
     #[test]
     fn angles_of_nodes_add_up() {
         let shape = Shape { s: DVec3::X, t: DVec3::Y, seen: [DVec3::X, DVec3::Y] };
-        let bounding = Bounding { center: DVec3::ZERO, normal: DVec3::Z, shape, scale: 1.0 };
+        let curve = Curve::of([0.0; 3], [DVec3::X, DVec3::Y, DVec3::Z]);
+        let bounding = Bounding { center: DVec3::ZERO, normal: DVec3::Z, shape, curve, scale: 1.0 };
         let of = |angle: f64, cone: f32| {
             let (sine, cosine) = angle.sin_cos();
             let surfel = Surfel { center: [0.0; 3], s: [cosine as f32, 0.0, -sine as f32], t: [0.0, 1.0, 0.0] };

@@ -23,7 +23,7 @@ use rayon::prelude::*;
 
 use self::below::Known;
 use self::octree::{Element, Octree, Set};
-use crate::scene::hierarchy::Node;
+use crate::scene::hierarchy::NodeAndLow as Made;
 use crate::scene::{Colors, Hierarchy, Scene, by_content};
 use crate::{Error, Progress, Result};
 
@@ -101,6 +101,3 @@ fn in_order(tree: &mut Octree, scene: &Scene) {
         own.sort_unstable_by(|a, b| a.place.cmp(&b.place).then_with(|| content(a, b)));
     });
 }
-
-/// A node, and what its f32 centre leaves out.
-type Made = (Node, [f32; 3]);

@@ -123,7 +123,10 @@ fn nodes_hold_what_is_below_them() {
                 let up = own.dot(normal);
                 let across = (own - up * normal) / up;
                 let along = normal + across * (4.0 / across.length()).min(1.0);
-                for shown in [rim, rim.map(|point| point - along * point.dot(normal))] {
+                let [s, t] = [node.surfel.s, node.surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
+                let part = |point: DVec3, axis: DVec3| point.dot(axis) / axis.length_squared();
+                let above = |point: DVec3| point.dot(normal) - node.cap.height(part(point, s), part(point, t));
+                for shown in [rim, rim.map(|point| point - along * above(point))] {
                     assert!(shown.iter().all(|point| holds(&node.surfel, *point)), "{index}");
                     on_the_rim |= !shown.iter().all(|point| holds(&smaller, *point));
                 }
@@ -131,8 +134,8 @@ fn nodes_hold_what_is_below_them() {
             looked += usize::from(own.len() > 1);
             tight += usize::from(on_the_rim);
         }
-        // A rim is on each node's, shown along one or the other; where caps lean out, it is farther than it need be.
-        assert!(looked > 1000 && (curved || tight == looked), "{tight} of {looked}");
+        // A rim is on that of many nodes, shown along one or the other; where a cap bends below a disk, or disks are caps, it is farther than it need be.
+        assert!(looked > 1000 && (curved || 6 * tight > looked), "{tight} of {looked}");
         assert!(oriented == tree.nodes.iter().any(|node| node.cone > -1.0));
     }
 }

@@ -73,18 +73,24 @@ pub fn write_levels(
     progress: &dyn Progress,
 ) -> Result<Report> {
     let fixed = PROGRAM + OF_THREAD * rayon::current_num_threads() as u64;
+    let least = fixed + FEWEST * OF_SURFEL;
+    if memory < least {
+        return Err(too_little(least));
+    }
     let sources = Sources { files, progress };
     let survey = Survey::of(&sources)?;
     let of_surfel = survey.surfel_bytes() + OF_SURFEL;
     let fits = memory.saturating_sub(fixed) / of_surfel;
     if fits < FEWEST {
-        let least = (fixed + FEWEST * of_surfel) as f64 / 2f64.powi(20);
-        return Err(Error::Usage(format!(
-            "--memory is less than the {least:.0}MiB that levels of detail of these points take at least"
-        )));
+        return Err(too_little(fixed + FEWEST * of_surfel));
     }
     let runs = Runs { survey: &survey, folder, path, progress };
     made(&sources, runs, fits)
+}
+
+fn too_little(least: u64) -> Error {
+    let least = least.div_ceil(1 << 20);
+    Error::Usage(format!("--memory is less than the {least}MiB that levels of detail of these points take at least"))
 }
 
 /// The file, where memory has room for the tree of so many points at once.
@@ -140,7 +146,7 @@ impl Divider<'_> {
         let below = if depth < DEEPEST { self.runs.divided(run, &lattice)? } else { Vec::new() };
         if below.len() < 2 {
             return Err(Error::Usage(format!(
-                "{count} points are at one place, and --memory has room for {}: give more",
+                "{count} points are too near each other to be divided, and --memory has room for {}: give more",
                 self.fits
             )));
         }

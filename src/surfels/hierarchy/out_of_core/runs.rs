@@ -93,11 +93,9 @@ impl Runs<'_> {
         self.progress.begin("copying points", sources.count());
         let copied = sources.each(
             || (),
-            |points, _| {
-                let scene = self
-                    .survey
-                    .part(points)
-                    .ok_or_else(|| Error::malformed(self.path, "an input changed while it was read"))?;
+            |points, path| {
+                let scene =
+                    self.survey.part(points).ok_or_else(|| Error::malformed(path, "it changed while it was read"))?;
                 let mut run = run.lock().unwrap_or_else(PoisonError::into_inner);
                 let bytes = run.rows.encoded(&scene, 0..scene.surfels.len());
                 let size = run.rows.size();

@@ -1,6 +1,7 @@
 //! What all points say together, which each part of them must be told.
 
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
@@ -47,8 +48,9 @@ impl Survey {
         let told = |what: &str| sources.progress.begin(what, sources.count());
         told("looking at points");
         let nothing = || Looks::of(sources.count());
-        let looks = sources.each(nothing, |points, path| look.at(points, path, nothing()), Looks::both)?;
+        let looks = sources.each(nothing, |points, path| look.at(points, path, nothing()), Looks::both);
         sources.progress.end();
+        let looks = looks?;
         let count = looks.preparation.surfels;
         if count == 0 {
             return Err(Error::EmptyScene("the inputs hold no point with three finite coordinates".into()));
@@ -69,7 +71,7 @@ impl Survey {
         let extent = body.extent().max_element();
         if extent < SMALLEST_SCENE || f64::from(looks.longest) > LARGEST_IN_EXTENTS * extent {
             return Err(Error::Usage(
-                "disks of a million times the extent of the scene, and scenes of less than 1e-15 world units, are not taken with --memory: leave it out".into(),
+                "points that are all at one place, and disks of a million times the extent of all, are not taken with --memory: leave it out".into(),
             ));
         }
         let has = Has { low: true, ..looks.has };
@@ -78,9 +80,10 @@ impl Survey {
             <[Placed; 2]>::default,
             |points, _| Ok(look.placed(points, has)),
             |[a, b], [c, d]| [a.both(c), b.both(d)],
-        )?;
+        );
         sources.progress.end();
-        Ok(look.finish(looks, places))
+        look.empty.closed &= look.are_closed(sources, &looks);
+        Ok(look.finish(looks, places?))
     }
 
     /// What the scene has of a surfel, bytes.
@@ -159,6 +162,8 @@ struct Looks {
     /// The box of their positions, world coordinates.
     all: Bounds,
     sample: Sample,
+    /// Of each file, how many are usable, and how many are not.
+    of_files: BTreeMap<PathBuf, [u64; 2]>,
 }
 
 /// Whether colours are one.
@@ -205,10 +210,15 @@ impl Looks {
             opaque: true,
             all: Bounds::EMPTY,
             sample: Sample::of(count as usize),
+            of_files: BTreeMap::new(),
         }
     }
 
-    fn both(self, other: Self) -> Self {
+    fn both(mut self, mut other: Self) -> Self {
+        for (path, [usable, dropped]) in std::mem::take(&mut other.of_files) {
+            let of_file = self.of_files.entry(path).or_default();
+            *of_file = [of_file[0] + usable, of_file[1] + dropped];
+        }
         let (a, b) = (&self.preparation, &other.preparation);
         let each = |one: [f32; 4], other: [f32; 4], of: fn(f32, f32) -> f32| [0, 1, 2, 3].map(|k| of(one[k], other[k]));
         Self {
@@ -234,6 +244,7 @@ impl Looks {
             opaque: self.opaque && other.opaque,
             all: self.all.union(other.all),
             sample: self.sample.both(other.sample),
+            of_files: self.of_files,
         }
     }
 }
@@ -246,11 +257,13 @@ struct Placed {
     double: bool,
     /// What f32 centres leave out shows.
     shows: bool,
+    /// The largest error of a coordinate that shows though trailing parts are kept; 0 if none does.
+    error: f64,
 }
 
 impl Default for Placed {
     fn default() -> Self {
-        Self { bounds: Bounds::EMPTY, double: false, shows: false }
+        Self { bounds: Bounds::EMPTY, double: false, shows: false, error: 0.0 }
     }
 }
 
@@ -260,12 +273,13 @@ impl Placed {
             bounds: self.bounds.union(other.bounds),
             double: self.double || other.double,
             shows: self.shows || other.shows,
+            error: self.error.max(other.error),
         }
     }
 
-    fn with(self, origin: DVec3, center: DVec3, shows: bool) -> Self {
+    fn with(self, origin: DVec3, center: DVec3, (shows, error): (bool, f64)) -> Self {
         let double = crate::io::ply::needs_double((origin + center).to_array());
-        self.both(Self { bounds: Bounds::EMPTY.with_point(center), double, shows })
+        self.both(Self { bounds: Bounds::EMPTY.with_point(center), double, shows, error })
     }
 }
 
@@ -273,7 +287,6 @@ impl Look {
     /// What all files have, by what none of their points has.
     fn new(sources: &Sources<'_>) -> Result<Self> {
         let mut all = Self { empty: Scene::default(), others: Points::default(), up: None };
-        let mut closed = true;
         for file in sources.files {
             let none = file.points(&[])?;
             let others = &mut all.others;
@@ -285,14 +298,13 @@ impl Look {
             others.caps = others.caps.take().or(none.caps);
             others.normals = others.normals.take().or(none.normals);
             others.unsided |= none.unsided;
-            closed &= none.closed || file.count() == 0;
             all.up = match (all.up, none.up) {
                 (Some(Up::Z), _) | (_, Some(Up::Z)) => Some(Up::Z),
                 (said, says) => said.or(says),
             };
         }
         all.empty.oriented = !all.others.unsided;
-        all.empty.closed = closed && all.empty.oriented;
+        all.empty.closed = all.empty.oriented;
         all.empty.colors = all.others.colors.clone().unwrap_or_default();
         Ok(all)
     }
@@ -309,13 +321,17 @@ impl Look {
             ));
         };
         if !scene.surfels.iter().all(|surfel| usable_axes([surfel.s, surfel.t]).is_some()) {
-            return Err(Error::malformed(path, "a disk is smaller, larger or thinner than half-axes in a file can be"));
+            return Err(Error::malformed(
+                path,
+                "a disk is smaller, larger or thinner than half-axes in a file can be, which it must be with --memory",
+            ));
         }
         let (mut all, mut sample) = (Bounds::EMPTY, nothing.sample);
         for position in positions.into_iter().map(DVec3::from_array) {
             all = all.with_point(position);
             sample.add(position);
         }
+        let of_file = [scene.surfels.len() as u64, preparation.dropped_non_finite];
         let Scene { surfels, clips, caps, normals, colors, .. } = &scene;
         let differs = |(normal, surfel): (&[f32; 3], &Surfel)| *normal != plane_of(surfel).to_array();
         let opaque = match colors {
@@ -338,6 +354,7 @@ impl Look {
             opaque,
             all,
             sample,
+            of_files: BTreeMap::from([(path.to_owned(), of_file)]),
         })
     }
 
@@ -349,15 +366,25 @@ impl Look {
         let mut all = <[Placed; 2]>::default();
         for (index, (surfel, position)) in scene.surfels.iter().zip(&added.positions).enumerate() {
             let short = DVec3::from_array(surfel.center.map(f64::from));
-            let left_out = (DVec3::from_array(*position) - origin) - short;
-            let shows = shows(surfel, left_out.abs().max_element());
+            let relative = DVec3::from_array(*position) - origin;
+            let seen = |error: DVec3| Some(error.abs().max_element()).filter(|error| shows(surfel, *error));
+            let shows = seen(relative - short).is_some();
+            let error = seen(relative - scene.center(index)).unwrap_or(0.0);
             let wide = |part: [f32; 3]| DVec3::from_array(part.map(f64::from));
             let [alone, _] = split(as_in_a_file(origin, short)).map(wide);
             let [near, rest] = split(as_in_a_file(origin, scene.center(index))).map(wide);
-            all[0] = all[0].with(origin, alone, shows);
-            all[1] = all[1].with(origin, near + rest, shows);
+            all[0] = all[0].with(origin, alone, (shows, 0.0));
+            all[1] = all[1].with(origin, near + rest, (shows, error));
         }
         all
+    }
+
+    /// Whether surfels of all files cover closed surfaces: of those that have a usable one, and none that is not.
+    fn are_closed(&self, sources: &Sources<'_>, looks: &Looks) -> bool {
+        sources.files.iter().all(|file| match looks.of_files.get(file.path()) {
+            None | Some([0, _]) => true,
+            Some([_, dropped]) => file.is_closed() && *dropped == 0,
+        })
     }
 
     fn finish(self, looks: Looks, [without, with]: [Placed; 2]) -> Survey {
@@ -368,7 +395,6 @@ impl Look {
             empty.colors = Colors::Constant(color);
             others.colors = None;
         }
-        empty.closed &= looks.preparation.dropped_non_finite == 0;
         let scales = Scales::within(looks.range, matches!(empty.colors, Colors::Srgb8(_)), looks.longest);
         let known = Known { origin: empty.origin, oriented: empty.oriented, low, scales };
         let has = Has { low, ..looks.has };
@@ -385,7 +411,11 @@ impl Look {
             opaque: looks.opaque,
             bounds: placed.bounds,
             double: placed.double,
-            preparation: Preparation { guessed_up: up.is_none(), ..looks.preparation },
+            preparation: Preparation {
+                guessed_up: up.is_none(),
+                rounding: Some(placed.error).filter(|error| *error > 0.0),
+                ..looks.preparation
+            },
         }
     }
 }

@@ -89,6 +89,7 @@ fn scenes() -> Vec<(&'static str, Vec<Points>)> {
     let mut unusable = and(plain(), &bird);
     (unusable.positions[7][1], unusable.positions[90][0]) = (f64::NAN, 1e30);
     unusable.closed = true;
+    let none = Points { positions: vec![[f64::NAN; 3]; 3000], ..plain() };
     let one = Colors::Srgb8(vec![[9, 8, 7, 255]; 3000]);
     let mut clear = plain();
     if let Some(Colors::Srgb8(codes)) = &mut clear.colors {
@@ -110,6 +111,7 @@ fn scenes() -> Vec<(&'static str, Vec<Points>)> {
         ("several", vec![plain(), Points { up: Some(Up::Z), ..sphere(2000, [4.0, 0.0, 1.0], 0.5) }, stray.clone()]),
         ("with strays", vec![and(plain(), &stray)]),
         ("unusable", vec![unusable]),
+        ("closed beside none", vec![Points { closed: true, ..plain() }, none]),
         ("clusters", vec![clusters]),
         ("nested", vec![nested.reduce(|one, other| and(one, &other)).unwrap()]),
         ("with equal ones", vec![many]),
@@ -134,7 +136,9 @@ fn files_are_those_that_are_made_in_memory() {
             assert!(std::fs::read(&path).unwrap() == expected, "{name}, {fits}");
             assert_eq!((report.surfels, report.nodes), (scene.surfels.len() as u64, tree.nodes.len() as u64));
             assert_eq!(report.levels, tree.levels() as u64);
-            let told = |all: &Preparation| (all.points, all.dropped_non_finite, all.strays, all.replaced_colors);
+            let told = |all: &Preparation| {
+                (all.points, all.dropped_non_finite, all.strays, all.replaced_colors, all.rounding.map(f64::to_bits))
+            };
             assert_eq!(told(&report.preparation), told(&preparation), "{name}");
             subtrees.push(report.subtrees);
         }
@@ -161,7 +165,7 @@ fn what_cannot_be_made_is_told() {
     };
     let mut equal = sphere(500, [0.0; 3], 1.0);
     equal.positions[..300].fill([0.1, 0.2, 0.3]);
-    assert!(told(equal, 200).contains("300 points are at one place"));
+    assert!(told(equal, 200).contains("300 points are too near"));
     let mut lacking = sphere(500, [0.0; 3], 1.0);
     lacking.radii.as_mut().unwrap()[70] = 0.0;
     assert!(told(lacking.clone(), 200).contains("epsplat surfels"));
@@ -189,7 +193,8 @@ fn other_files_are_no_rows() {
     assert!(is_rows());
     let bytes = std::fs::read(&path).unwrap();
     std::fs::write(&path, &bytes[..bytes.len() - 1]).unwrap();
-    assert!(!is_rows());
+    let short = Rows::open(Input::open(&path, None).unwrap()).err().unwrap().to_string();
+    assert!(short.contains("promises 40 vertices, the file ends after 39"), "{short}");
     for other in [
         Points { radii: None, ..points.clone() },
         Points { normals: None, ..points.clone() },

@@ -7,7 +7,8 @@ use super::Report;
 use super::kept::{Kept, Part, properties};
 use super::sources::{PIECE, Read};
 use super::survey::Survey;
-use crate::io::ply::{NodeAndLow, write_kept};
+use crate::io::ply::write_kept;
+use crate::scene::hierarchy::NodeAndLow;
 use crate::scene::scene::core_of;
 use crate::scene::{Whole, framed_within};
 use crate::surfels::Preparation;
@@ -34,7 +35,7 @@ pub(super) fn write(path: &Path, kept: Kept<'_>, survey: &Survey, progress: &dyn
         }
         Ok(read)
     };
-    progress.begin("writing levels of detail", nodes);
+    progress.begin("writing points", kept.surfels.count() + nodes);
     let written = write_kept(
         path,
         (properties(survey), &kept.surfels),
@@ -87,7 +88,7 @@ fn whole(kept: &Kept<'_>, survey: &Survey, nodes: u64, progress: &dyn Progress) 
         progress.advance(scene.surfels.len() as u64);
         Ok((0..scene.surfels.len()).map(|k| (scene.center(k), f64::from(scene.surfels[k].radius()))).collect())
     };
-    progress.begin("looking at surfels", 0);
+    progress.begin("looking at surfels", count);
     let read = Read::new(count as usize, kept.surfels.pieces(PIECE), places);
     let boxes = read.made(|places| framed_within(kept.sample.clone().core(), survey.bounds, places));
     progress.end();

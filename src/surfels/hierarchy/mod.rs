@@ -1,7 +1,7 @@
 //! Levels of detail of a scene: a point-octree whose nodes are surfels (Pajarola 2003, section 3; [`Hierarchy`]).
 //!
 //! Sets of points are divided at their mean (`octree`); of what is below it each node has sums that are whole numbers (`sums`, `moments`), from which its
-//! centre, normal, colour and shape follow, and then the least ellipse of that shape that bounds all surfels below (`bounds`).
+//! centre, normal, colour and shape follow, and then the least ellipse of that shape that bounds all surfels below (`bounds`, `rims`).
 //! Everything is a sum of whole numbers, a minimum or a maximum, so a tree depends on the set of surfels alone, and not on their order or on the number of threads.
 
 mod below;
@@ -12,6 +12,7 @@ mod moments;
 mod nodes;
 mod octree;
 pub mod out_of_core;
+mod rims;
 mod sums;
 #[cfg(test)]
 mod tests;

@@ -1,0 +1,353 @@
+//! How far what is below a node reaches: a surfel, or a node by what is told of it, shown in the node's plane or on its cap.
+
+use std::f64::consts::PI;
+
+use glam::{DMat2, DVec2, DVec3};
+
+use super::below::Disk;
+use super::curvature;
+use super::sums::normal_of;
+use crate::scene::hierarchy::Node;
+use crate::scene::{Cap, Surfel};
+use crate::surfels::eigen::Symmetric3;
+use crate::surfels::sizes::shape;
+
+/// What half-axes and radii are longer by than was found, as they are rounded to f32.
+pub(super) const ROUNDED_UP: f64 = 1.0 + 1.0 / (1u64 << 21) as f64;
+
+/// What a quicker bound is longer by than one of the same in other roundings.
+const ROUNDED: f64 = 1.0 + 1e-14;
+
+/// Cosine and sine of what the angle of a cone is larger by than was found, as cosines near 1 tell it badly: a thousandth of a radian.
+const ROUNDED_ANGLE: DVec2 = DVec2::new(1.0 - 5e-7, 1e-3);
+
+/// What is added to the tangent of a cone's angle for the same reason, and as a node's normal is rounded.
+const TURNED_MORE: f64 = 2e-3;
+
+/// What is rounded off a cosine.
+const ROUNDED_OFF: f64 = 1e-7;
+
+/// A disk is shown along its own normal too, unless that leans farther from the node's: the tangent of 76 degrees.
+const STEEPEST: f64 = 4.0;
+
+/// A direction and a shape: vectors of the plane across a normal, of which the second is `slimness` as long as the first.
+#[derive(Clone, Copy)]
+pub(super) struct Shape {
+    pub s: DVec3,
+    pub t: DVec3,
+    /// What a vector's dot products with these are is its (u, v), in units of the half-axes.
+    pub seen: [DVec3; 2],
+}
+
+impl Shape {
+    /// Like the covariance in the plane (EQ 3, 5), with what f32 keeps of it. Of the centres alone, as in the paper, two disks side by side would
+    /// get an ellipse several times as long as both.
+    pub fn of(covariance: Symmetric3, normal: DVec3) -> Self {
+        let (e1, e2) = normal.any_orthonormal_pair();
+        let plane = [e1.dot(covariance.times(e1)), e1.dot(covariance.times(e2)), e2.dot(covariance.times(e2))];
+        let ([x, y], slimness) = shape(plane).unwrap_or(([1.0, 0.0], 1.0));
+        let s = e1 * x + e2 * y;
+        let rounded = |v: DVec3| v.as_vec3().as_dvec3();
+        let (s, t) = (rounded(s), rounded(normal.cross(s) * slimness));
+        Self { s, t, seen: [s, t].map(|axis| axis / axis.length_squared()) }
+    }
+
+    /// (u, v) of a vector.
+    pub fn seen(&self, vector: DVec3) -> DVec2 {
+        DVec2::from_array(self.seen.map(|axis| vector.dot(axis)))
+    }
+}
+
+/// How a node curves: its heights over the plane of two unit directions.
+#[derive(Clone, Copy)]
+pub(super) struct Curve {
+    along: DVec3,
+    across: DVec3,
+    heights: DMat2,
+    /// The largest curvature.
+    most: f64,
+}
+
+impl Curve {
+    pub fn of([xx, xy, yy]: curvature::Heights, [along, across, _]: [DVec3; 3]) -> Self {
+        let heights = DMat2::from_cols_array(&[xx, xy, xy, yy]);
+        Self { along, across, heights, most: 0.5 * (xx + yy).abs() + length(0.5 * (xx - yy), xy) }
+    }
+
+    /// The vector along these directions.
+    fn in_plane(&self, vector: DVec3) -> DVec2 {
+        DVec2::new(vector.dot(self.along), vector.dot(self.across))
+    }
+
+    /// The height over the plane at a place, and what it gains for a unit along each direction.
+    fn at(&self, place: DVec2) -> (f64, DVec2) {
+        let slope = self.heights * place;
+        (0.5 * slope.dot(place), slope)
+    }
+}
+
+/// What bounds surfels so far.
+#[derive(Clone, Copy)]
+pub(super) struct Bound {
+    /// The largest |(u, v)| of a disk, shown in the node's plane along the node's normal and along its own.
+    pub rim: f64,
+    /// The largest distance from the centre.
+    pub radius: f64,
+    /// The smallest cosine.
+    pub cosine: f64,
+}
+
+impl Bound {
+    pub const NOTHING: Self = Self { rim: 0.0, radius: 0.0, cosine: 1.0 };
+
+    pub fn both(self, other: Self) -> Self {
+        Self {
+            rim: self.rim.max(other.rim),
+            radius: self.radius.max(other.radius),
+            cosine: self.cosine.min(other.cosine),
+        }
+    }
+}
+
+/// That of a vector whose squares neither overflow nor vanish.
+fn length(x: f64, y: f64) -> f64 {
+    (x * x + y * y).sqrt()
+}
+
+/// The longer half-axis of the ellipse with the half-axes s and t, of whose products these are: the larger singular value of [s t].
+pub(super) fn longest([ss, st, tt]: [f64; 3]) -> f64 {
+    (0.5 * (ss + tt + length(ss - tt, 2.0 * st))).sqrt()
+}
+
+/// The largest distance from 0 of a point of the ellipse around `at` with these half-axes, or hardly more.
+///
+/// It is the maximum of `|a + M w|²` over the unit circle, and by duality the least of `λ + Σ b_i² / (λ - λ_i) + |a|²` over λ > λ_1, where λ_i are the
+/// eigenvalues of `MᵀM`, greatest first, and b is `Mᵀa` along its eigenvectors: each λ gives a bound, and where the derivative is 0 the least.
+fn farthest(at: DVec2, [u, v]: [DVec2; 2]) -> f64 {
+    let (uu, uv, vv) = (u.dot(u), u.dot(v), v.dot(v));
+    let (mean, half) = (0.5 * (uu + vv), length(0.5 * (uu - vv), uv));
+    let [first, second] = [mean + half, mean - half];
+    // The longer of the eigenvector's two forms does not cancel; of a circle each direction is one.
+    let (one, other) = (DVec2::new(first - vv, uv), DVec2::new(uv, first - uu));
+    let longer = if one.length_squared() > other.length_squared() { one } else { other };
+    let axis = longer.try_normalize().unwrap_or(DVec2::X);
+    let b = DVec2::new(u.dot(at), v.dot(at));
+    let b = DVec2::new(b.dot(axis), b.perp_dot(axis));
+    let (b1, b2) = (b.x * b.x, b.y * b.y);
+    // From past where the derivative is 0.
+    let least = first + b.x.abs();
+    let mut lambda = first + b.length();
+    for _ in 0..2 {
+        let [p, q] = [lambda - first, lambda - second];
+        let [square, cube] = [b1 / (p * p) + b2 / (q * q), b1 / (p * p * p) + b2 / (q * q * q)];
+        let step = (square.sqrt() - 1.0) * square / cube;
+        lambda = if step.is_finite() { (lambda + step).max(least) } else { lambda };
+    }
+    let part = |b: f64, rest: f64| if b > 0.0 { b / rest } else { 0.0 };
+    let squared = lambda + part(b1, lambda - first) + part(b2, lambda - second) + at.length_squared();
+    // Where roundings leave no distance it is that of a circle around the ellipse.
+    if squared.is_finite() { squared.sqrt() } else { at.length() + first.sqrt() }
+}
+
+/// A node whose bounds are looked for.
+pub(super) struct Bounding {
+    pub center: DVec3,
+    pub normal: DVec3,
+    pub shape: Shape,
+    pub curve: Curve,
+    /// How much longer a vector is in units of the half-axes, at most.
+    pub scale: f64,
+}
+
+impl Bounding {
+    /// What bounds one surfel, where what is no more than `known` is of no matter.
+    pub fn of(&self, Disk { surfel, center, cap }: &Disk, known: &Bound) -> Bound {
+        let offset = center - self.center;
+        let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
+        let own = normal_of(surfel);
+        let height = cap.highest();
+        let across = self.leaning(own);
+        let (over, slope) = self.curve.at(self.curve.in_plane(offset));
+        // A vector's dot product with this is what its end lies higher over the node's cap than its start, which bends by no more than that below it.
+        let higher = self.normal - slope.x * self.curve.along - slope.y * self.curve.across;
+        let bend = 0.5 * self.curve.most * s.length_squared().max(t.length_squared());
+        let places = [offset, s, t, own * height].map(|vector| self.shape.seen(vector));
+        let above = [offset.dot(self.normal) - over, s.dot(higher), t.dot(higher), height * own.dot(higher)];
+        let rim = [DVec2::ZERO, across].into_iter().fold(0.0, |rim: f64, across| {
+            let [at, u, v, lean] = [0, 1, 2, 3].map(|k| places[k] - across * above[k]);
+            // A cap leans out as far as it is high.
+            let lean = lean.length() + across.length() * bend;
+            let matters = |reach: f64| at.length() + reach + lean > known.rim.max(rim);
+            let products = [u.dot(u), u.dot(v), v.dot(v)];
+            // That of a circle around the disk is found sooner, and a larger one yet sooner.
+            if !matters((products[0] + products[2]).sqrt() * ROUNDED) || !matters(longest(products)) {
+                return rim;
+            }
+            rim.max((at.length() + longest(products)).min(farthest(at, [u, v])) + lean)
+        });
+        let products = [s.dot(s), s.dot(t), t.dot(t)];
+        let reach = |longest: f64| offset.length() + longest + height;
+        let matters = reach((products[0] + products[2]).sqrt() * ROUNDED) > known.radius;
+        Bound {
+            rim,
+            radius: if matters { reach(longest(products)) } else { 0.0 },
+            cosine: match tilt(surfel, cap) {
+                0.0 => own.dot(self.normal).clamp(-1.0, 1.0),
+                tilt => (own.dot(self.normal).clamp(-1.0, 1.0).acos() + tilt).min(PI).cos(),
+            },
+        }
+    }
+
+    /// How far beside a point, in units of the half-axes, it is shown along a normal, by what it lies over the node's cap.
+    ///
+    /// Along the node's normal alone, neighbours whose planes bend away from each other would part where they are seen askew: each ends where
+    /// the other does, but above or below it. Shown along the disk's normal, which is the surface's, both reach the line in which they meet.
+    fn leaning(&self, own: DVec3) -> DVec2 {
+        let up = own.dot(self.normal);
+        let beside = (own - up * self.normal) * up.signum();
+        let most = STEEPEST / beside.length();
+        let slope = if up.abs() * most > 1.0 { up.abs().recip() } else { most };
+        if slope.is_finite() { self.shape.seen(beside * slope) } else { DVec2::ZERO }
+    }
+
+    /// What bounds all below a node, or more.
+    pub fn of_node(&self, node: &Node, low: [f32; 3]) -> Bound {
+        let [center, low] = [node.surfel.center, low].map(|part| DVec3::from_array(part.map(f64::from)));
+        let offset = center + low - self.center;
+        let radius = f64::from(node.radius) * ROUNDED_UP;
+        // Cosine and sine of the angle between the normals, of that and the cone's, and of these and what is rounded off.
+        let turned = |by: DVec2, cosine: f64| by.rotate(DVec2::new(cosine, (1.0 - cosine * cosine).max(0.0).sqrt()));
+        let angle = turned(DVec2::X, normal_of(&node.surfel).dot(self.normal).clamp(-1.0, 1.0));
+        let angles = turned(angle, f64::from(node.cone).clamp(-1.0, 1.0));
+        let turned = ROUNDED_ANGLE.rotate(angles);
+        // A sum of angles past the half circle has a sine below 0, before what is rounded off is added or after; that of a whole cone is one.
+        let beyond = node.cone <= -1.0 || angles.y < 0.0 || turned.y < 0.0;
+        let slope = if !beyond && turned.y < STEEPEST * turned.x { turned.y / turned.x } else { STEEPEST };
+        let at = self.shape.seen(offset);
+        let place = self.curve.in_plane(offset);
+        let (over, gain) = self.curve.at(place);
+        let above = offset.dot(self.normal) - over;
+        // How much the height over the cap changes within the ball around it.
+        let around = radius * (1.0 + gain.length()) + 2.0 * self.curve.most * radius * radius;
+        let high = above.abs() + around;
+        let mut rim = at.length() + (radius + slope * high) * self.scale;
+        if !beyond && turned.x > 0.0 && node.cone > 0.0 {
+            // Where it is shown along its own normal, and how far from there what is shown along others is: leanings change by no more than this, for each radian that a normal
+            // turns by, and a tangent is longer than its angle.
+            let changes = (turned.x * turned.x).recip().min(1.0 + STEEPEST * STEEPEST);
+            let most = changes * ((f64::from(node.cone).powi(-2) - 1.0).max(0.0).sqrt() + TURNED_MORE);
+            let own = (angle.y / angle.x).min(STEEPEST);
+            let leaning = (at - self.leaning(normal_of(&node.surfel)) * above).length();
+            let leaning = leaning + (radius + own * around + most * high) * self.scale;
+            rim = rim.min(leaning.max(at.length() + radius * self.scale));
+        }
+        Bound {
+            rim: rim * ROUNDED_UP,
+            radius: (offset.length() + radius) * ROUNDED_UP,
+            cosine: if beyond { -1.0 } else { turned.x },
+        }
+    }
+}
+
+/// The largest angle between the normals of a surfel's cap and that of its plane, or more: 0 of a flat one.
+pub(super) fn tilt(surfel: &Surfel, cap: &Cap) -> f64 {
+    if cap.is_flat() {
+        return 0.0;
+    }
+    let [uu, uv, vv] = cap.0.map(|height| f64::from(height).abs());
+    let length = |axis: [f32; 3]| DVec3::from_array(axis.map(f64::from)).length();
+    ((uu + uv) / length(surfel.s)).hypot((uv + vv) / length(surfel.t)).atan()
+}
+
+/// A cosine as a cone has it, where normals tell sides.
+pub(super) fn cone(sided: bool, cosine: f64) -> f32 {
+    if sided { (cosine - ROUNDED_OFF) as f32 } else { -1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    /// What is told of a node is no less than of any disk below it, curved or not, on whichever side and however steep.
+    #[test]
+    fn nodes_bound_their_disks() {
+        let mut random = Random::stream(21, 0);
+        let (mut tight, mut looked) = (0, 0);
+        for _ in 0..4000 {
+            let mut number = || 2.0 * random.number() - 1.0;
+            let curved = [0.3, 0.1, -0.2].map(|height| height * number());
+            let mut vector = || DVec3::new(number(), number(), number());
+            let normal = vector().normalize();
+            let s = normal.any_orthonormal_vector();
+            let t = normal.cross(s) * 0.3;
+            let seen = [s, t].map(|axis| axis / axis.length_squared());
+            let shape = Shape { s, t, seen };
+            let scale = seen[0].length().hypot(seen[1].length());
+            let curve = Curve::of(curved, [s, normal.cross(s), normal]);
+            let bounding = Bounding { center: DVec3::ZERO, normal, shape, curve, scale };
+            let lean = vector();
+            let (middle, own) = (vector() * 3.0, (normal + 1.5 * lean).normalize());
+            let spread = 0.5 * number().abs().powi(2);
+            let disks: Vec<Disk> = (0..6)
+                .map(|_| {
+                    let mut vector = || DVec3::new(number(), number(), number());
+                    let normal = (own + spread * vector()).normalize();
+                    let center = (middle + 0.2 * vector()).as_vec3();
+                    let s = normal.any_orthonormal_vector().as_vec3() * 0.1;
+                    let t = normal.as_vec3().cross(s) * 0.5;
+                    let cap = Cap([0.02 * number() as f32, 0.0, 0.0]);
+                    Disk { surfel: Surfel::ellipse(center, s, t), center: center.as_dvec3(), cap }
+                })
+                .collect();
+            let one = own.any_orthonormal_vector();
+            let surfel = Surfel::ellipse(middle.as_vec3(), one.as_vec3(), own.cross(one).as_vec3());
+            let middle = DVec3::from_array(surfel.center.map(f64::from));
+            let around = Bounding { center: middle, normal: normal_of(&surfel), ..bounding };
+            let all = disks.iter().map(|disk| around.of(disk, &Bound::NOTHING)).fold(Bound::NOTHING, Bound::both);
+            let node = Node {
+                surfel,
+                cap: Cap::FLAT,
+                color: [1.0; 4],
+                radius: (all.radius * ROUNDED_UP) as f32,
+                cone: cone(true, all.cosine),
+                first: 0,
+                count: 6,
+                leaf: true,
+            };
+            let told = bounding.of_node(&node, [0.0; 3]);
+            for disk in &disks {
+                let own = bounding.of(disk, &Bound::NOTHING);
+                assert!(own.rim <= told.rim && own.radius <= told.radius && own.cosine >= told.cosine);
+                tight += usize::from(own.rim > 0.5 * told.rim);
+                looked += 1;
+            }
+        }
+        assert!(tight > looked / 4, "{tight} of {looked}");
+    }
+
+    /// The angles of a node's normals add up to a cosine, up to the half circle and past it.
+    #[test]
+    fn angles_of_nodes_add_up() {
+        let shape = Shape { s: DVec3::X, t: DVec3::Y, seen: [DVec3::X, DVec3::Y] };
+        let curve = Curve::of([0.0; 3], [DVec3::X, DVec3::Y, DVec3::Z]);
+        let bounding = Bounding { center: DVec3::ZERO, normal: DVec3::Z, shape, curve, scale: 1.0 };
+        let of = |angle: f64, cone: f32| {
+            let (sine, cosine) = angle.sin_cos();
+            let surfel = Surfel { center: [0.0; 3], s: [cosine as f32, 0.0, -sine as f32], t: [0.0, 1.0, 0.0] };
+            let (cap, color) = (Cap::FLAT, [1.0; 4]);
+            bounding.of_node(&Node { surfel, cap, color, radius: 1.0, cone, first: 0, count: 1, leaf: true }, [0.0; 3])
+        };
+        for angle in (0..=32).map(|k| f64::from(k) * PI / 32.0) {
+            for cone in (0..=32).map(|k| f64::from(k) * PI / 32.0) {
+                let bound = of(angle, cone.cos() as f32);
+                let expected = (angle + cone + 1e-3).min(PI);
+                assert!((bound.cosine - expected.cos()).abs() < 1e-6, "{angle} {cone}: {}", bound.cosine);
+                let slope = if expected < STEEPEST.atan() { expected.tan() } else { STEEPEST };
+                assert!((bound.rim / (1.0 + slope) - 1.0).abs() < 1e-4, "{angle} {cone}: {}", bound.rim);
+            }
+            // A whole cone has every normal, whatever its own is.
+            assert_eq!(of(angle, -1.0).cosine, -1.0);
+        }
+    }
+}

@@ -36,8 +36,8 @@ pub struct Arguments {
     /// Write no tree, but a cut of it: nodes whose longest half-axis is shorter than this, world units, in place of the surfels below them
     #[arg(long, value_name = "LENGTH", value_parser = parse_length)]
     cut: Option<f64>,
-    /// The most memory to take, 4GiB: the points, of binary PLY files with normals and radii, or half-axes, are sorted in temporary files beside the output, of about three
-    /// times its size. The same file as without
+    /// The most memory to take, 4GiB: the points, of binary PLY files with normals and radii, or half-axes, are sorted in temporary files beside the output, of up to twice
+    /// its size. The same file as without
     #[arg(long, value_name = "SIZE", value_parser = parse_memory, conflicts_with_all = ["cut", "outliers", "max_radius", "flat", "class_opacity"])]
     memory: Option<u64>,
     /// What the tree is like as JSON, to a file or - for stdout

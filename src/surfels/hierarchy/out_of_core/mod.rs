@@ -60,7 +60,7 @@ pub struct Report {
 }
 
 /// Writes the surfels of all points of `files` with levels of detail at `path`, within about so many bytes of `memory`; what is kept meanwhile is in files without a name in
-/// `folder`, of about three times the size of what is written.
+/// `folder`, of up to twice the size of what is written.
 ///
 /// # Errors
 ///

@@ -29,8 +29,8 @@ const LARGEST: f64 = 1e30;
 pub struct Levels {
     file: BufReader<File>,
     path: PathBuf,
-    vertex: Rows,
-    node: Rows,
+    vertex: Stretch,
+    node: Stretch,
     /// What it says of all points together.
     pub whole: Whole,
     /// Which way it says is up.
@@ -42,7 +42,7 @@ pub struct Levels {
 }
 
 /// Where the rows of an element lie.
-struct Rows {
+struct Stretch {
     element: Element,
     /// Bytes from the file's start.
     start: u64,
@@ -126,10 +126,10 @@ impl Levels {
     fn read<T: Send>(
         &mut self,
         numbers: &[Range<u32>],
-        rows: impl Fn(&Self) -> &Rows,
+        stretch: impl Fn(&Self) -> &Stretch,
         of: impl Fn(Points, Vec<TreeRow>) -> Result<T, &'static str> + Sync,
     ) -> Result<Vec<T>> {
-        let Rows { element, start, size } = rows(self);
+        let Stretch { element, start, size } = stretch(self);
         let (start, size) = (*start, *size);
         let inside = numbers.iter().all(|range| range.start <= range.end && u64::from(range.end) <= element.count);
         if !inside {
@@ -180,7 +180,7 @@ fn opened(file: File, length: u64, path: &Path) -> Result<Option<Levels>, Fault>
             _ if whole::is_whole(&element) => &mut scene,
             _ => &mut None,
         };
-        into.get_or_insert(Rows { element, start, size });
+        into.get_or_insert(Stretch { element, start, size });
         start = end;
     }
     let (Some(vertex), Some(node), Some(scene)) = (vertex, node, scene) else { return Ok(None) };

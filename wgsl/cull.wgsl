@@ -3,7 +3,7 @@
 // its fragments could be nearest or within epsilon of the nearest, so no image depends on it. The splats of the others are
 // stored one batch after the other, in slots: those that are left out take no room.
 // Host side and twin: src/passes/cull.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x4a70849808b8e6ae
+// All loops end, by 1 of src/gpu/loops.rs: 0x2d45421bb5698868
 
 // A batch's bounding ball: centre and radius, world units relative to the scene's origin.
 @group(0) @binding(23) var<storage, read> balls: array<vec4<f32>>;
@@ -28,8 +28,8 @@ fn slot_of(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32) -> u32 {
     return (drawn[1] - workgroups.y + workgroup.y) * BATCH + workgroup.x * WORKGROUP + local;
 }
 
-// The surfel whose splat belongs there; past the last for some in the slots of the last batch.
-fn surfel_for(slot: u32) -> u32 {
+// The place in its page of the surfel whose splat belongs there; past the last for some in the slots of the last batch.
+fn place_for(slot: u32) -> u32 {
     return drawn[LIST_START + slot / BATCH] * BATCH + slot % BATCH;
 }
 
@@ -37,9 +37,9 @@ fn surfel_for(slot: u32) -> u32 {
 // words, and those have the number of the batch, of which a page has fewer than 2^16.
 const SPARE: vec2<u32> = vec2<u32>(9u);
 
-fn anchor_words(splat: Splat, surfel: u32) -> vec2<u32> {
+fn anchor_words(splat: Splat, place: u32) -> vec2<u32> {
     let anchor = bitcast<vec2<u32>>(vec2<i32>(splat.anchor_x, splat.anchor_y));
-    let batch = surfel / BATCH;
+    let batch = place / BATCH;
     return ((anchor << SPARE) >> SPARE) | (vec2<u32>(batch, batch >> SPARE.x) << (32u - SPARE));
 }
 
@@ -50,7 +50,7 @@ fn anchor_of(words: vec2<u32>) -> vec2<i32> {
 // The surfel of the splat that is stored in a slot.
 fn surfel_in(record: SplatRecord, slot: u32) -> u32 {
     let spare = each_word(record[0]).xy >> (32u - SPARE);
-    return (spare.x | spare.y << SPARE.x) * BATCH + slot % BATCH;
+    return surfel_of((spare.x | spare.y << SPARE.x) * BATCH + slot % BATCH);
 }
 
 fn ball_of_batch(batch: u32) -> Ball {

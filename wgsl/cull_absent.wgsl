@@ -4,11 +4,11 @@ fn slot_of(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32) -> u32 {
     return linear_index(workgroup, workgroups, local);
 }
 
-fn surfel_for(slot: u32) -> u32 {
+fn place_for(slot: u32) -> u32 {
     return slot;
 }
 
-fn anchor_words(splat: Splat, surfel: u32) -> vec2<u32> {
+fn anchor_words(splat: Splat, place: u32) -> vec2<u32> {
     return bitcast<vec2<u32>>(vec2<i32>(splat.anchor_x, splat.anchor_y));
 }
 
@@ -17,5 +17,5 @@ fn anchor_of(words: vec2<u32>) -> vec2<i32> {
 }
 
 fn surfel_in(record: SplatRecord, slot: u32) -> u32 {
-    return slot;
+    return surfel_of(slot);
 }

@@ -2,9 +2,6 @@
 // A fragment weighs as many parts as these are; depths have no weights, and each sample shows that of one cut.
 // Same interface as fade_absent.wgsl.
 
-// Which word of a surfel's attributes.
-override FADE_WORD: u32;
-
 // How many cuts.
 const FADE_STEPS: f32 = 64.0;
 
@@ -14,8 +11,9 @@ struct Fade {
     end: u32,
 }
 
-fn fade_of(index: u32) -> Fade {
-    let word = attribute_word(index, FADE_WORD);
+// That of a surfel at a place of its page.
+fn fade_of(index: u32, place: u32) -> Fade {
+    let word = fade_word(index, place);
     return Fade(word & 0xffu, word >> 8u);
 }
 

@@ -4,7 +4,7 @@ struct Fade {
     nothing: u32,
 }
 
-fn fade_of(index: u32) -> Fade {
+fn fade_of(index: u32, place: u32) -> Fade {
     return Fade(0u);
 }
 

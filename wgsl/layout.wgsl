@@ -94,12 +94,13 @@ struct Splat {
 
 // A page of surfels.
 struct Page {
-    // Surfels of the pages before it.
+    // Surfels of the pages before it; of a cut, of those of its branch.
     first: u32,
-    // Of a cut: runs of surfels that are dealt out over the page, the stride by which they are, and the one that undoes that.
+    // Those that it has room for.
+    surfels: u32,
+    // Of a cut: runs of surfels that are dealt out over the page, and the stride by which they are.
     runs: u32,
     stride: u32,
-    back: u32,
 }
 
 // A node of a tree, or one that has a part of a leaf's surfels.

@@ -1,5 +1,5 @@
 // Nothing that shows. Same interface as low_part.wgsl.
 
-fn low_part(record: u32) -> vec3<f32> {
+fn low_part(index: u32) -> vec3<f32> {
     return vec3<f32>(0.0);
 }

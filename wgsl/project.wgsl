@@ -1,7 +1,7 @@
 // Stage 1: every surfel becomes a splat, once. One invocation a surfel; the rare ones that take longer (thin splats, disks
 // that reach the near depth, large splats) are listed and done together, so that the others of a subgroup need not wait.
 // Twin: src/passes/project.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xc7f299e9518f66eb
+// All loops end, by 1 of src/gpu/loops.rs: 0x36cb894939cc0f08
 
 @group(0) @binding(3) var<storage, read_write> splats: array<SplatRecord>;
 // Word 0 counts the large splats, word 1 all that are out of view; three words from QUEUE_GRID on are a grid with a workgroup
@@ -53,7 +53,8 @@ const RARE: u32 = 2u;
 
 // Of a rare surfel the splat is written only if `every` kind is asked for.
 fn project_into(slot: u32, every: bool) -> u32 {
-    let index = surfel_for(slot);
+    let place = place_for(slot);
+    let index = surfel_of(place);
     let surfel = surfel_at(index);
     let center = rotate(relative_center(index, surfel));
     let axes = half_axes(surfel, center[2].high);
@@ -69,7 +70,7 @@ fn project_into(slot: u32, every: bool) -> u32 {
     let margin = 0.01 + 1e-5 * (abs(h.low) + abs(h.high));
     let first = max(ceil(h.low - margin - 0.5), vec2<f32>(0.0));
     let last = min(floor(h.high + margin - 0.5), size - 1.0);
-    let exists = index < surfels_held() && is_filled(index);
+    let exists = place < places_held() && is_filled(place);
     let faces = !(CULL_BACK && is_back(h, cap));
     let visible = exists && faces && all(first <= last);
 
@@ -86,21 +87,21 @@ fn project_into(slot: u32, every: bool) -> u32 {
         splat.c = array<f32, 3>(h.c.x, h.c.y, h.c.z);
         splat.clip = clip_of(index, h.turn);
         splat.cap = cap;
-        splat.fade = fade_of(index);
+        splat.fade = fade_of(index, place);
         splat.a_low = array<f32, 3>(h.a_low.x, h.a_low.y, h.a_low.z);
     }
     if (visible && is_large(splat)) {
         // Places depend on the schedule, but nothing later depends on places.
         atomicStore(&queue[QUEUE_START + atomicAdd(&queue[0], 1u)], slot);
     }
-    splats[slot] = splat_record(splat, index, filter_);
+    splats[slot] = splat_record(splat, place, filter_);
     return select(OUT_OF_VIEW, IN_VIEW, visible || !exists);
 }
 
 // Most splats are in view, so those that are not are counted.
 fn count_unseen(local: u32, slot: u32, unseen: bool) {
     if (unseen) {
-        atomicAdd(&group_unseen, copies_of(surfel_for(slot)));
+        atomicAdd(&group_unseen, copies_of(surfel_of(place_for(slot))));
     }
     workgroupBarrier();
     if (local == 0u) {

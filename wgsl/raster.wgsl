@@ -102,7 +102,7 @@ fn shape(@builtin(vertex_index) vertex: u32) -> ShapeCorner {
 @vertex
 fn shape_with_attributes(@builtin(vertex_index) vertex: u32) -> ShapeCorner {
     var corner = shape_corner(vertex);
-    let attributes = attributes_of(corner.index, splat_of(projected[corner.index]));
+    let attributes = attributes_of(surfel_of(corner.index), splat_of(projected[corner.index]));
     corner.color = attributes.color;
     corner.normal = attributes.normal;
     corner.radius = attributes.radius;

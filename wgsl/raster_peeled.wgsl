@@ -14,6 +14,6 @@ fn is_peeled(fragment: Fragment, radius: f32, pixel: vec2<u32>) -> bool {
 @vertex
 fn shape_to_peel(@builtin(vertex_index) vertex: u32) -> ShapeCorner {
     var corner = shape_corner(vertex);
-    corner.radius = radius_of(corner.index);
+    corner.radius = radius_of(surfel_of(corner.index));
     return corner;
 }

@@ -3,9 +3,9 @@
 
 alias SplatRecord = array<Words, 4u + FILTER_ROWS + CLIP_ROWS + CAP_ROWS + FADE_ROWS>;
 
-fn splat_record(splat: Splat, surfel: u32, filter_: Filter) -> SplatRecord {
+fn splat_record(splat: Splat, place: u32, filter_: Filter) -> SplatRecord {
     var record: SplatRecord;
-    record[0] = words(vec4<u32>(anchor_words(splat, surfel), splat.bounds_first, splat.bounds_last));
+    record[0] = words(vec4<u32>(anchor_words(splat, place), splat.bounds_first, splat.bounds_last));
     record[1] = words(bitcast<vec4<u32>>(vec4<f32>(splat.a[0], splat.a[1], splat.a[2], splat.b[0])));
     record[2] = words(bitcast<vec4<u32>>(vec4<f32>(splat.b[1], splat.b[2], splat.c[0], splat.c[1])));
     record[3] = words(bitcast<vec4<u32>>(vec4<f32>(splat.c[2], splat.a_low[0], splat.a_low[1], splat.a_low[2])));

@@ -1,50 +1,36 @@
 // Stage 0 of scenes with levels of detail: the cut that is drawn in place of all surfels (Pajarola 2003, section 5.1, step 1), branch by
 // branch of the tree, and in each level by level from its roots down. The nodes of a level that are come to are a stretch of `frontier`: they
 // are judged, what they leave is counted by workgroups, and from these counts follows where each puts what it leaves. So the order of the cut, too,
-// depends on tree and camera alone. Then what was chosen is copied to where pages of surfels are drawn from.
+// depends on tree and camera alone. Pages of surfels are drawn from where what was chosen lies.
 // Of cuts that fade into each other (select_fades.wgsl) all are made at once.
 // Host side and twin: src/passes/select.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xd16ca4c19a18d206
+// All loops end, by 1 of src/gpu/loops.rs: 0x4fe3defb55b6e93c
 
 @group(0) @binding(72) var<uniform> branch: Branch;
 @group(0) @binding(73) var<storage, read> tree_nodes: array<TreeNode>;
-// Its surfels, and those of its nodes.
-@group(0) @binding(74) var<storage, read> tree_surfels: array<Surfel>;
-// Numbers of nodes that are come to, level after level, and what becomes of each. This and `chosen` have a second half where cuts fade (select_fades.wgsl).
+// Numbers of nodes that are come to, level after level, and what becomes of each with what those of its workgroup before it leave. Numbers have a second half where cuts fade (select_fades.wgsl).
 @group(0) @binding(75) var<storage, read_write> frontier: array<u32>;
-@group(0) @binding(76) var<storage, read_write> fates: array<u32>;
+@group(0) @binding(76) var<storage, read_write> fates: array<vec2<u32>>;
 // Of each workgroup: how many surfels its nodes leave, and how many children; then where these start.
 @group(0) @binding(77) var<storage, read_write> group_counts: array<vec2<u32>>;
-// The surfels of this branch that are drawn, nodes' among them, by their places in tree_surfels.
+// How many surfels of this branch are drawn, its nodes' among them, and then which.
 @group(0) @binding(78) var<storage, read_write> chosen: array<u32>;
 // By how many cuts the roots of branches are come to.
 @group(0) @binding(79) var<storage, read_write> reached: array<u32>;
 // The words below.
 @group(0) @binding(80) var<storage, read_write> selection: array<u32>;
 @group(0) @binding(81) var<storage, read> selected: array<u32>;
-// Where the cut is drawn from: a page of it.
-@group(0) @binding(82) var<storage, read_write> gathered_surfels: array<Surfel>;
-@group(0) @binding(84) var<storage, read_write> gathered_attributes: array<u32>;
+// `chosen` of the branch that a page is of, where it is drawn.
+@group(0) @binding(74) var<storage, read> cut: array<u32>;
 
-// Words of the attributes of a surfel or node of the tree.
-override TREE_WORDS: u32;
-
-// Surfels of the cut in all branches so far, in those before this one, and in this one.
-const CUT: u32 = 0u;
-const CUT_BEFORE: u32 = 1u;
-const CUT_HERE: u32 = 2u;
 // The stretch of the frontier that is the level in work, and the next one.
-const LEVEL: u32 = 3u;
-const LEVEL_END: u32 = 4u;
-const NEXT: u32 = 5u;
-const NEXT_END: u32 = 6u;
-// Grids with an invocation for each node of the level that is judged, of that which is spread, and for each surfel of this branch's cut in a page.
-const JUDGE_GRID: u32 = 7u;
-const SPREAD_GRID: u32 = 10u;
-const GATHER_GRID: u32 = 13u;
-// The surfels of this branch's cut that lie in a page, among them.
-const GATHERED: u32 = 16u;
-const GATHERED_END: u32 = 17u;
+const LEVEL: u32 = 0u;
+const LEVEL_END: u32 = 1u;
+const NEXT: u32 = 2u;
+const NEXT_END: u32 = 3u;
+// Grids with an invocation for each node of the level that is judged, and of that which is spread.
+const JUDGE_GRID: u32 = 4u;
+const SPREAD_GRID: u32 = 7u;
 
 // Surfels of a run: whole batches.
 const RUN: u32 = 512u;
@@ -58,7 +44,9 @@ const OTHER_BRANCH: u32 = 2u;
 const PART_OF_LEAF: u32 = 3u;
 
 // What becomes of a node: in how many cuts, the first of those that come to it, it is divided; or nothing.
-const UNSEEN: u32 = 0xffffffffu;
+const UNSEEN: u32 = 0x7fu;
+// Its bits beside a number of surfels that a workgroup leaves: of each node itself and at most 4096 below it.
+const FATE_BITS: u32 = 7u;
 
 // A node's size is that of a disk as long as its image, not that of its image.
 override MEASURES_EXTENT: bool;
@@ -72,24 +60,38 @@ const SINE_SLACK: f32 = 1e-5;
 var<workgroup> counted: array<vec2<u32>, WORKGROUP>;
 var<workgroup> eights: array<vec2<u32>, 8>;
 
-// Where the surfel of a place in the page lies, by its stride, and the other way round. Neighbours in a cut are neighbours in the image, and
-// what is in work at the same time should not be: atomics would wait for each other (src/passes/order.rs).
-fn dealt(place: u32, stride: u32) -> u32 {
+// Which of those that are chosen has a place of the page. Neighbours in a cut are neighbours in the image, and what is in work at the same time
+// should not be: atomics would wait for each other (src/passes/order.rs).
+fn drawn_at(place: u32) -> u32 {
     let run = place / RUN;
-    // No product is past 2^32: a page has fewer than 2^16 runs. What is left of the last run stays.
-    let turn = select(run, (run * stride) % max(page.runs, 1u), run < page.runs);
-    return turn * RUN + place % RUN;
+    // A page has fewer than 2^16 runs, so no product is past 2^32, and the quotient in f32 errs by less than 2^16 * 6 * 2^-24 < 1: the
+    // remainder is right, or one whole too small or too large. Processors divide integers one by one.
+    let runs = max(page.runs, 1u);
+    let product = run * page.stride;
+    let rest = bitcast<i32>(product - u32(f32(product) / f32(runs)) * runs);
+    let turn = bitcast<u32>(rest + select(0, i32(runs), rest < 0) - select(0, i32(runs), rest >= i32(runs)));
+    // What is left of the last run stays.
+    return page.first + select(run, turn, run < page.runs) * RUN + place % RUN;
+}
+
+fn places_held() -> u32 {
+    return page.surfels;
+}
+
+// The surfel, or the node's, at a place of the page; any where the cut has ended.
+fn surfel_of(place: u32) -> u32 {
+    return cut[1u + CHOSEN_WORDS * drawn_at(place)];
 }
 
 // How many of a batch are of the cut.
 fn batch_size(batch: u32) -> u32 {
-    let first = min(page.first + dealt(batch * BATCH, page.back), selected[CUT]);
-    return min(min(BATCH, selected[CUT] - first), surfels_held() - batch * BATCH);
+    let first = min(drawn_at(batch * BATCH), cut[0]);
+    return min(min(BATCH, cut[0] - first), places_held() - batch * BATCH);
 }
 
-// Whether the slot of a surfel in its page has one of the cut.
-fn is_filled(index: u32) -> bool {
-    return page.first + dealt(index, page.back) < selected[CUT];
+// Whether a place has a surfel of the cut.
+fn is_filled(place: u32) -> bool {
+    return drawn_at(place) < cut[0];
 }
 
 // Which word of a surfel's attributes.
@@ -172,24 +174,23 @@ fn left_by(node: TreeNode, fate: u32, reached_in: u32) -> vec2<u32> {
     );
 }
 
-// The sum of the counts of the invocations before this one: of whole eights, and in its own. Few barriers, as each is dear on processors.
+// The sum of the counts of the invocations before this one: in its own eight, and of those before. Few barriers, as each is dear on processors.
 fn sum_before(counts: vec2<u32>, local: u32) -> vec2<u32> {
     counted[local] = counts;
     workgroupBarrier();
     if (local < 8u) {
         var sum = vec2<u32>(0u);
-        for (var k = 0u; k < 8u; k++) {
-            sum += counted[8u * local + k];
+        for (var k = 8u * local; k < 8u * local + 8u; k++) {
+            let own = counted[k];
+            counted[k] = sum;
+            sum += own;
         }
         eights[local] = sum;
     }
     workgroupBarrier();
-    var before = vec2<u32>(0u);
+    var before = counted[local];
     for (var k = 0u; k < local / 8u; k++) {
         before += eights[k];
-    }
-    for (var k = local & 56u; k < local; k++) {
-        before += counted[k];
     }
     return before;
 }
@@ -216,8 +217,7 @@ fn select_roots() {
             end++;
         }
     }
-    selection[CUT_BEFORE] = selection[CUT];
-    selection[CUT_HERE] = 0u;
+    chosen[0] = 0u;
     selection[NEXT] = 0u;
     selection[NEXT_END] = end;
     set_grid(JUDGE_GRID, end);
@@ -233,19 +233,22 @@ fn select_judge(
     hold_view();
     let place = selected[NEXT] + linear_index(workgroup, workgroups, local);
     var counts = vec2<u32>(0u);
+    var fate = UNSEEN;
     if (place < selected[NEXT_END]) {
         let index = frontier[place];
         let node = tree_nodes[index];
         let record = branch.surfels + index;
         let cuts = cuts_that_reach(place);
-        var fate = fate_of(node, tree_surfels[record], low_part(record));
+        fate = fate_of(node, surfel_at(record), low_part(record));
         if (fate != UNSEEN) {
             fate = min(fate, cuts);
         }
-        fates[place] = fate;
         counts = left_by(node, fate, cuts);
     }
     let before = sum_before(counts, local);
+    if (place < selected[NEXT_END]) {
+        fates[place] = vec2<u32>(fate | before.x << FATE_BITS, before.y);
+    }
     if (local == WORKGROUP - 1u) {
         group_counts[workgroup.y * workgroups.x + workgroup.x] = before + counts;
     }
@@ -256,7 +259,7 @@ fn select_judge(
 fn select_sum(@builtin(local_invocation_index) local: u32) {
     let first = selection[NEXT];
     let end = selection[NEXT_END];
-    let here = selection[CUT_HERE];
+    let here = chosen[0];
     let groups = groups_of(end - first);
     let each = (groups + WORKGROUP - 1u) / WORKGROUP;
     let stop = min((local + 1u) * each, groups);
@@ -278,8 +281,7 @@ fn select_sum(@builtin(local_invocation_index) local: u32) {
         selection[LEVEL_END] = end;
         selection[NEXT] = end;
         selection[NEXT_END] = end + all.y;
-        selection[CUT_HERE] = here + all.x;
-        selection[CUT] = selection[CUT_BEFORE] + here + all.x;
+        chosen[0] = here + all.x;
         set_grid(SPREAD_GRID, end - first);
         set_grid(JUDGE_GRID, all.y);
     }
@@ -293,26 +295,23 @@ fn select_spread(
     @builtin(local_invocation_index) local: u32,
 ) {
     let place = selected[LEVEL] + linear_index(workgroup, workgroups, local);
-    let exists = place < selected[LEVEL_END];
-    var index = 0u;
-    var fate = UNSEEN;
-    var cuts = 0u;
-    if (exists) {
-        index = frontier[place];
-        fate = fates[place];
-        cuts = cuts_that_reach(place);
+    if (place >= selected[LEVEL_END]) {
+        return;
     }
-    let node = tree_nodes[index];
-    let counts = left_by(node, fate, cuts);
-    let before = sum_before(counts, local);
+    let kept = fates[place];
+    let fate = kept.x & UNSEEN;
     if (fate == UNSEEN) {
         return;
     }
+    let index = frontier[place];
+    let cuts = cuts_that_reach(place);
+    let node = tree_nodes[index];
+    let counts = left_by(node, fate, cuts);
+    let before = vec2<u32>(kept.x >> FATE_BITS, kept.y);
     let start = group_counts[workgroup.y * workgroups.x + workgroup.x] + before;
     var at = start.x;
     if (fate < cuts) {
-        chosen[at] = branch.surfels + index;
-        choose_fade(at, fate, cuts);
+        choose(at, branch.surfels + index, fate, cuts);
         at++;
     }
     if (kind_of(node) == OTHER_BRANCH) {
@@ -320,40 +319,10 @@ fn select_spread(
     }
     let surfels = start.x + counts.x - at;
     for (var k = 0u; k < surfels; k++) {
-        chosen[at + k] = node.first + k;
-        choose_fade(at + k, 0u, fate);
+        choose(at + k, node.first + k, 0u, fate);
     }
     for (var k = 0u; k < counts.y; k++) {
         frontier[start.y + k] = node.first + k;
         set_cuts_that_reach(start.y + k, fate);
     }
-}
-
-// What of this branch's cut lies in a page.
-@compute @workgroup_size(1)
-fn select_page() {
-    let start = selection[CUT_BEFORE];
-    let end = start + selection[CUT_HERE];
-    let first = clamp(page.first, start, end);
-    let stop = clamp(page.first + arrayLength(&gathered_surfels), first, end);
-    selection[GATHERED] = first - start;
-    selection[GATHERED_END] = stop - start;
-    set_grid(GATHER_GRID, stop - first);
-}
-
-// One invocation a surfel of it.
-@compute @workgroup_size(WORKGROUP)
-fn select_gather(
-    @builtin(workgroup_id) workgroup: vec3<u32>,
-    @builtin(num_workgroups) workgroups: vec3<u32>,
-    @builtin(local_invocation_index) local: u32,
-) {
-    let place = selected[GATHERED] + linear_index(workgroup, workgroups, local);
-    if (place >= selected[GATHERED_END]) {
-        return;
-    }
-    let to = dealt(selected[CUT_BEFORE] + place - page.first, page.stride);
-    gathered_surfels[to] = tree_surfels[chosen[place]];
-    gather_attributes(chosen[place], to);
-    gather_fade(place, to);
 }

@@ -1,6 +1,14 @@
 // All surfels are drawn. Same interface as select.wgsl.
 
-fn is_filled(index: u32) -> bool {
+fn places_held() -> u32 {
+    return surfels_held();
+}
+
+fn surfel_of(place: u32) -> u32 {
+    return place;
+}
+
+fn is_filled(place: u32) -> bool {
     return true;
 }
 

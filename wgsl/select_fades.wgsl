@@ -1,7 +1,10 @@
 // Cuts that fade into each other (src/scene/fade.rs): what is come to is in the first so many of them, which the second half of the frontier says,
-// and what is chosen in those of its fade, which the second half of that list says. Same interface as select_fades_absent.wgsl.
+// and what is chosen in those of its fade, which follows its number. Same interface as select_fades_absent.wgsl.
 
 const ALL_CUTS: u32 = 64u;
+
+// Words of what is chosen.
+const CHOSEN_WORDS: u32 = 2u;
 
 fn cuts_that_reach(place: u32) -> u32 {
     return frontier[arrayLength(&frontier) / 2u + place];
@@ -17,10 +20,11 @@ fn cuts_that_divide(size: f32) -> u32 {
     return u32(clamp(floor(steps * (2.0 * (size / held.levels.x) - 1.0) + 1.0), 0.0, steps));
 }
 
-fn choose_fade(place: u32, first: u32, end: u32) {
-    chosen[arrayLength(&chosen) / 2u + place] = first | (end << 8u);
+fn choose(at: u32, surfel: u32, first: u32, end: u32) {
+    chosen[1u + CHOSEN_WORDS * at] = surfel;
+    chosen[2u + CHOSEN_WORDS * at] = first | (end << 8u);
 }
 
-fn gather_fade(place: u32, to: u32) {
-    gathered_attributes[to * ATTRIBUTE_WORDS + FADE_WORD] = chosen[arrayLength(&chosen) / 2u + place];
+fn fade_word(index: u32, place: u32) -> u32 {
+    return cut[2u + CHOSEN_WORDS * drawn_at(place)];
 }

@@ -2,6 +2,8 @@
 
 const ALL_CUTS: u32 = 1u;
 
+const CHOSEN_WORDS: u32 = 1u;
+
 fn cuts_that_reach(place: u32) -> u32 {
     return ALL_CUTS;
 }
@@ -12,6 +14,6 @@ fn cuts_that_divide(size: f32) -> u32 {
     return select(ALL_CUTS, 0u, size < held.levels.x);
 }
 
-fn choose_fade(place: u32, first: u32, end: u32) {}
-
-fn gather_fade(place: u32, to: u32) {}
+fn choose(at: u32, surfel: u32, first: u32, end: u32) {
+    chosen[1u + at] = surfel;
+}

@@ -55,19 +55,17 @@ pub const TILE: u32 = 16;
 /// Surfels of a batch: consecutive in memory, and left out together (`wgsl/cull.wgsl`).
 pub const BATCH: u32 = 64;
 
+/// Surfels of a batch of a cut that one invocation reads to bound it (`wgsl/select_balls.wgsl`).
+pub const BALL_PART: u32 = 8;
+
 /// Surfels of a run, which are dealt out together: whole batches. Of 64, 512 and 4096 the middle gave the shortest frames on a software adapter.
 pub const RUN: u32 = 512;
 
-/// Words of the state of a cut (`wgsl/select.wgsl`): where the grids of nodes that are judged, of nodes that are spread and of surfels that are
-/// copied start.
-pub const JUDGE_GRID: u32 = 7;
+/// Words of the state of a cut (`wgsl/select.wgsl`): where the grids of nodes that are judged and of nodes that are spread start, of which the latter
+/// is last.
+pub const JUDGE_GRID: u32 = 4;
 /// See [`JUDGE_GRID`].
-pub const SPREAD_GRID: u32 = 10;
-/// See [`JUDGE_GRID`].
-pub const GATHER_GRID: u32 = 13;
-
-/// The last word of that state.
-pub const GATHERED_END: u32 = 17;
+pub const SPREAD_GRID: u32 = 7;
 
 /// The lowest bit of [`TreeNode::below`] that says of what kind a node is.
 pub const KIND_SHIFT: u32 = 30;
@@ -172,9 +170,9 @@ pub struct Splat {
 #[allow(missing_docs)]
 pub struct Page {
     pub first: u32,
+    pub surfels: u32,
     pub runs: u32,
     pub stride: u32,
-    pub back: u32,
 }
 
 /// A node of a tree; see the WGSL.

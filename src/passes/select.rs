@@ -8,8 +8,8 @@
 //! from its size and from those of the nodes above it. So what a view shows changes by a part of so many when a node comes to its next size, and what
 //! is larger than the size asked for is drawn by none.
 //!
-//! On a device the tree lies in [`branches`](super::branches), which are gone through one after the other, and what was chosen of each is copied to the
-//! pages that surfels are drawn from: nothing that follows knows of trees.
+//! On a device the tree lies in [`branches`](super::branches), which are gone through one after the other. What was chosen of each is drawn from where it
+//! lies, page by page: nothing that follows knows of trees.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -17,9 +17,9 @@ use glam::{DVec2, DVec3};
 
 use super::cull;
 use super::lowpass::Design;
+use crate::plan::RenderOptions;
 use crate::plan::pass::Pass;
-use crate::plan::steps::{Kernel, Over, Run};
-use crate::plan::{RenderOptions, SurfelLayout};
+use crate::plan::steps::{Kernel, Over, Run, Stage};
 use crate::scene::cut::Fate;
 use crate::scene::detail::finest;
 use crate::scene::fade::STEPS;
@@ -30,19 +30,18 @@ use crate::scene::{Camera, Cut, Detail, DetailMeasure, Hierarchy, Projection};
 pub const PASS: Pass = Pass {
     name: "select",
     files: |needs| {
-        let gather = if SurfelLayout::of_tree(needs) > 0 { "gather.wgsl" } else { "gather_absent.wgsl" };
         let low = if needs.doubled { "low_part.wgsl" } else { "low_part_absent.wgsl" };
         let fades = if needs.fades { "select_fades.wgsl" } else { "select_fades_absent.wgsl" };
         match (needs.levels, needs.cull) {
-            (true, true) => vec!["select.wgsl", fades, gather, low, "select_balls.wgsl"],
-            (true, false) => vec!["select.wgsl", fades, gather, low],
+            (true, true) => vec!["select.wgsl", fades, low, "select_balls.wgsl"],
+            (true, false) => vec!["select.wgsl", fades, low],
             (false, _) => vec!["select_absent.wgsl"],
         }
     },
     kernels: |needs| match needs.levels {
         true => {
-            let balls = needs.cull.then_some(BALLS.kernel);
-            let all = [SELECT_ROOTS, SELECT_JUDGE, SELECT_SUM, SELECT_SPREAD, SELECT_PAGE, SELECT_GATHER];
+            let balls = needs.cull.then_some(SELECT_BALLS);
+            let all = [SELECT_ROOTS, SELECT_JUDGE, SELECT_SUM, SELECT_SPREAD];
             all.into_iter().chain(balls).collect()
         }
         false => Vec::new(),
@@ -50,10 +49,7 @@ pub const PASS: Pass = Pass {
     constants: |making| match making.needs.levels {
         true => {
             let extent = making.options.detail_measure == DetailMeasure::Extent;
-            vec![
-                ("MEASURES_EXTENT", u32::from(extent).into()),
-                ("TREE_WORDS", SurfelLayout::of_tree(making.needs).into()),
-            ]
+            vec![("MEASURES_EXTENT", u32::from(extent).into())]
         }
         false => Vec::new(),
     },
@@ -63,8 +59,7 @@ const SELECT_ROOTS: Kernel = Kernel::of("select_roots", [1, 1, 1]);
 const SELECT_JUDGE: Kernel = Kernel::new("select_judge");
 const SELECT_SUM: Kernel = Kernel::new("select_sum");
 const SELECT_SPREAD: Kernel = Kernel::new("select_spread");
-const SELECT_PAGE: Kernel = Kernel::of("select_page", [1, 1, 1]);
-const SELECT_GATHER: Kernel = Kernel::new("select_gather");
+const SELECT_BALLS: Kernel = Kernel::new("select_balls");
 
 /// The dispatches that choose what of a branch with so many levels is drawn.
 pub fn choose(levels: u32) -> Vec<Run> {
@@ -78,12 +73,10 @@ pub fn choose(levels: u32) -> Vec<Run> {
     runs
 }
 
-/// The dispatches that copy what was chosen of a branch to a page.
-pub const GATHER: [Run; 2] =
-    [Run { kernel: SELECT_PAGE, over: Over::Once }, Run { kernel: SELECT_GATHER, over: Over::Chosen }];
-
-/// The dispatches that bound the batches of what was copied, which are then culled.
-pub const BALLS: Run = Run { kernel: Kernel::new("select_balls"), over: Over::BatchGroups };
+/// Bounds the batches of what was chosen, which are then culled.
+pub fn bound() -> Stage {
+    Stage::new("select", 0, vec![Run { kernel: SELECT_BALLS, over: Over::BatchParts }])
+}
 
 /// Which cut is wanted.
 #[derive(Clone, Copy, Debug)]

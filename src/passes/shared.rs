@@ -7,7 +7,7 @@ pub const PASS: Pass = Pass {
     name: "shared",
     files: |needs| {
         let pick = |needed, file, absent| if needed { file } else { absent };
-        vec![
+        let mut files = vec![
             "layout.wgsl",
             pick(needs.long_words, "words_long.wgsl", "words.wgsl"),
             "records.wgsl",
@@ -19,7 +19,10 @@ pub const PASS: Pass = Pass {
             pick(needs.doubled, "center_doubled.wgsl", "center.wgsl"),
             pick(needs.copies, "copies.wgsl", "copies_absent.wgsl"),
             pick(needs.fades, "fade.wgsl", "fade_absent.wgsl"),
-        ]
+        ];
+        // Those of a cut come with it.
+        files.extend((needs.fades && !needs.levels).then_some("fade_own.wgsl"));
+        files
     },
     kernels: |_| Vec::new(),
     constants: |making| {

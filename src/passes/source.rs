@@ -58,7 +58,7 @@ pub trait Page {
     /// The surfels of a range.
     fn surfels(&self, range: Range<usize>) -> Vec<Surfel>;
 
-    /// The attributes of a range, as records of [`SurfelLayout::words`], of a branch's of [`SurfelLayout::of_tree`].
+    /// The attributes of a range, as records of [`SurfelLayout::words`].
     fn attributes(&self, range: Range<usize>) -> Vec<u32>;
 
     /// The bounding ball of each batch: centre and radius, world units relative to the origin.
@@ -126,7 +126,6 @@ impl Source for Scene {
             nodes: None,
             needs: *needs,
             layout: SurfelLayout::of(needs),
-            words: SurfelLayout::of(needs).words,
             indices: indices.into(),
             copies: copies.clone(),
         };
@@ -162,7 +161,6 @@ impl Source for Scene {
             nodes: self.levels(),
             needs: *needs,
             layout: SurfelLayout::of(needs),
-            words: SurfelLayout::of_tree(needs),
             indices: branch.surfels.clone().chain(nodes).collect(),
             copies: None,
         }))
@@ -183,8 +181,6 @@ struct ScenePage<'a> {
     nodes: Option<&'a Hierarchy>,
     needs: SceneNeeds,
     layout: SurfelLayout,
-    /// Of a record.
-    words: u32,
     indices: Box<[u32]>,
     /// Of every surfel of the scene; 0 of those that another stands for.
     copies: Option<Arc<[u32]>>,
@@ -266,7 +262,7 @@ impl ScenePage<'_> {
         if let (true, Some(cap)) = (self.needs.curved, self.scene.caps.get(index)) {
             write(&cap.0, &mut into[self.layout.cap as usize..]);
         }
-        // In a tree fades are no surfels', but a view's.
+        // In a tree fades are no surfels', but a cut's.
         if let Some(fade) = into.get_mut(self.layout.fade as usize) {
             *fade = self.scene.fades.get(index).copied().unwrap_or(Fade::WHOLE).word();
         }
@@ -283,7 +279,7 @@ impl Page for ScenePage<'_> {
     }
 
     fn attributes(&self, range: Range<usize>) -> Vec<u32> {
-        let words = self.words as usize;
+        let words = self.layout.words as usize;
         let mut values = vec![0; range.len() * words];
         let records = values.par_chunks_exact_mut(words.max(1)).zip(&self.indices[range]);
         records.for_each(|(into, index)| self.write_attributes(*index as usize, into));

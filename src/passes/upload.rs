@@ -33,8 +33,8 @@ pub struct BranchBuffers {
     pub buffers: Named,
     /// How many levels it has.
     pub levels: u32,
-    /// How many surfels and nodes, and how many of them are nodes.
-    pub records: [u64; 2],
+    /// How many nodes.
+    pub nodes: u64,
     /// How many roots.
     pub roots: u64,
 }
@@ -72,7 +72,7 @@ pub fn upload(
 
 /// The branches of the levels of detail that `source` has.
 fn branches(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds, progress: &dyn Progress) -> Result<Vec<BranchBuffers>> {
-    let words = SurfelLayout::of_tree(needs) as usize;
+    let words = SurfelLayout::of(needs).words as usize;
     let most = gpu.adapter.page_len(size_of::<Surfel>().max(4 * words));
     let tree = source.levels().ok_or_else(|| gpu.error("a scene has no levels of detail"))?;
     let tree = branches::branches(tree, most);
@@ -81,13 +81,15 @@ fn branches(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds, progress: &dyn P
         let Branch { surfels, nodes, roots, first_root, whole, levels, .. } = branch;
         let (surfels, records) = (surfels.len() as u32, surfels.len() + nodes.len());
         let own = layout::Branch { surfels, roots, first_root, whole: whole.into() };
+        // Of each that is chosen its number, and in how many cuts it is; before them how many there are.
+        let chosen = records as u64 * if needs.fades { 2 } else { 1 } + 1;
         let mut buffers = vec![
+            ("chosen", Buffer::storage(gpu, "surfels of a cut", chosen)?),
             ("branch", Buffer::uniform(gpu, "branch", &own)?.words()),
             ("tree_nodes", filled(gpu, "nodes", bytemuck::cast_slice(&nodes))?),
         ];
-        let names = ["tree_surfels", "tree_attributes"];
-        buffers.extend(names.into_iter().zip(records_of(gpu, (&*page, records), words, progress)?));
-        Ok(BranchBuffers { buffers, levels, records: [records as u64, nodes.len() as u64], roots: roots.into() })
+        buffers.extend(RECORDS.into_iter().zip(records_of(gpu, (&*page, records), words, progress)?));
+        Ok(BranchBuffers { buffers, levels, nodes: nodes.len() as u64, roots: roots.into() })
     };
     tree.into_iter().map(of).collect()
 }
@@ -96,13 +98,16 @@ fn page(gpu: &Gpu, of: &dyn source::Page, needs: &SceneNeeds, progress: &dyn Pro
     let numbers = of.numbers().into_owned();
     let words = SurfelLayout::of(needs).words as usize;
     let records = records_of(gpu, (of, numbers.len()), words, progress)?;
-    let mut buffers: Named = ["surfels", "attributes"].into_iter().zip(records).collect();
+    let mut buffers: Named = RECORDS.into_iter().zip(records).collect();
     let batches = of.balls();
     let balls = Buffer::storage(gpu, "batches", batches.len() as u64)?;
     balls.write(gpu, batches.len(), |range| batches[range].into(), &())?;
     buffers.push(("balls", balls.words()));
     Ok(Page { buffers, numbers, stand_for: of.stand_for() })
 }
+
+/// The names of what records are in.
+const RECORDS: [&str; 2] = ["surfels", "attributes"];
 
 /// The surfels of a page that has so many, and their attributes, of `words` each, if they have some.
 fn records_of(

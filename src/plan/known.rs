@@ -21,8 +21,10 @@ pub enum Listed {
 pub struct Known {
     /// Tiles that a splat touches on average in this view, by a sample.
     pub touched_tiles: f64,
-    /// Surfels of a cut that there is room for, of a scene with levels of detail.
-    pub cut: Option<u64>,
+    /// Surfels of a cut that there is room for, branch by branch, of a scene with levels of detail.
+    pub cut: Option<Vec<u64>>,
+    /// The cut of this view is chosen.
+    pub chosen: bool,
     /// The slots of splats were counted for an earlier view, which has left some spare.
     pub slots: bool,
     /// Whether the last frame had large splats.
@@ -52,14 +54,14 @@ impl Known {
 
     /// Forgets what holds for one view.
     pub fn forget_view(&mut self) {
-        self.overflows = 0;
+        (self.overflows, self.chosen) = (0, false);
         (self.cuts, self.times_cut) = (None, 0);
     }
 
     /// Forgets what buffers have room for.
     pub fn forget_buffers(&mut self) {
         self.forget_image();
-        self.slots = false;
+        (self.slots, self.chosen) = (false, false);
     }
 
     /// Forgets what holds for one size of image.

@@ -68,8 +68,8 @@ pub struct Plan {
     pub mesh: MeshFacts,
     /// Pages that the surfels fill, where each is drawn by itself.
     pub pages: usize,
-    /// Surfels of a cut that pages have room for, once that is known; of a scene of which one is drawn.
-    pub cut: Option<u64>,
+    /// Surfels of a cut that pages have room for, branch by branch, once that is known; of a scene of which one is drawn.
+    pub cut: Option<Vec<u64>>,
     /// Those of each individual, where they are kept apart.
     pub individuals: Vec<Range<usize>>,
     /// No list is longer than this, if some are gone through in rounds.
@@ -102,10 +102,10 @@ fn most_together((facts, drawn): (&Facts, u64), needs: &SceneNeeds) -> u64 {
     largest.filter(|_| needs.separate).unwrap_or(drawn)
 }
 
-/// The pages that individuals of so many surfels fill, each its own.
-fn pages_of(individuals: &[u64], most: u64) -> Vec<Range<usize>> {
+/// The pages that so many surfels each fill, which are kept apart.
+fn pages_of(apart: &[u64], most: u64) -> Vec<Range<usize>> {
     let mut end = 0;
-    let pages = individuals.iter().map(|surfels| {
+    let pages = apart.iter().map(|surfels| {
         let first = end;
         end += surfels.div_ceil(most) as usize;
         first..end
@@ -153,9 +153,12 @@ impl Plan {
         check::on_adapter(adapter, &needs, camera)?;
         let pixel = PixelLayout::of(&needs);
         let page = page_surfels(adapter, &needs);
-        let cut = known.cut.filter(|_| needs.levels);
-        let drawn = if needs.levels { cut.unwrap_or(0) } else { facts.surfels };
-        let gather = (1..=page).contains(&most_together((facts, drawn), &needs)) && gathers(&needs, options, known);
+        let cut = known.cut.clone().filter(|_| needs.levels);
+        // Branches have pages of their own.
+        let apart = if needs.levels { cut.clone().unwrap_or_default() } else { vec![facts.surfels] };
+        let (drawn, pages) = (apart.iter().sum(), pages_of(&apart, page).last().map_or(0, |last| last.end));
+        let in_one = (pages == 1 || needs.separate) && (1..=page).contains(&most_together((facts, drawn), &needs));
+        let gather = in_one && gathers(&needs, options, known);
         let cull = page >= BATCH.into() && culls(drawn, &needs, camera, options);
         let individuals = if needs.separate { pages_of(&facts.individuals, page) } else { Vec::new() };
         let veils = needs.lists == Some(Lists::Sorted) && known.veiled;
@@ -188,7 +191,7 @@ impl Plan {
             width: camera.width,
             bands,
             mesh: facts.mesh,
-            pages: individuals.last().map_or(drawn.div_ceil(page) as usize, |last| last.end),
+            pages: individuals.last().map_or(pages, |last| last.end),
             cut,
             individuals,
             longest_list: known.longest_list,

@@ -51,14 +51,12 @@ pub enum Over {
     Slots(Part),
     /// An invocation for each batch of a page.
     Batches,
-    /// A workgroup for each batch of a page.
-    BatchGroups,
+    /// An invocation for each [`BALL_PART`](crate::gpu::layout::BALL_PART) surfels of a batch of a page.
+    BatchParts,
     /// An invocation for each node of a level of a branch that is come to, as the device counted them.
     Judged,
     /// The same, after the next level's are known.
     Spread,
-    /// An invocation for each surfel of the cut that a branch has in a page.
-    Chosen,
     /// Workgroups for the splats that take long to project, as the device counted them.
     Rare,
     /// A workgroup for each large splat.
@@ -219,11 +217,8 @@ pub enum Look {
 /// A step of a frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// The cut of a tree, branch by branch.
-    Select {
-        /// It is copied to the pages that it is drawn from; else it is counted.
-        gathers: bool,
-    },
+    /// The cut of a tree, branch by branch, if an earlier try has not chosen it.
+    Select,
     /// Kernels.
     Stage(Stage),
     /// Makes room by what is there.

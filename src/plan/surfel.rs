@@ -22,7 +22,7 @@ pub struct SurfelLayout {
     pub normal: u32,
     /// Its place in a tree.
     pub number: u32,
-    /// How much of it there is: the last word, which trees do without.
+    /// How much of it there is: the last word, which surfels of a tree do without.
     pub fade: u32,
 }
 
@@ -43,12 +43,7 @@ impl SurfelLayout {
         let normal = cap + if needs.curved { 3 } else { 0 };
         let number = normal + if needs.own_normals { 3 } else { 0 };
         let fade = number + u32::from(needs.numbers_surfels());
-        Self { words: fade + u32::from(needs.fades), copies, low, clip, cap, normal, number, fade }
-    }
-
-    /// Words of the records of a tree whose cuts are drawn with `needs`.
-    pub fn of_tree(needs: &SceneNeeds) -> u32 {
-        Self::of(needs).fade
+        Self { words: fade + u32::from(needs.fades && !needs.levels), copies, low, clip, cap, normal, number, fade }
     }
 }
 

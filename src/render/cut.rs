@@ -1,79 +1,71 @@
-//! The cut of a scene with levels of detail, on a device: branch by branch, and then page by page.
+//! The cut of a scene with levels of detail, on a device: branch by branch.
 
 use super::run::{Run, over};
 use crate::error::Result;
-use crate::gpu::buffers::counts;
+use crate::gpu::buffers::{Buffer, counts};
 use crate::passes::select;
 
 /// Room that may be left unused before it is given back: what a view asks for changes from one to the next.
 const SPARE: u64 = 1 << 16;
 
 impl Run<'_> {
-    /// Chooses what is drawn of each branch, and copies it to the pages if it is `gathered`.
-    pub(super) fn select(&mut self, gathered: bool) -> Result<()> {
+    /// Chooses what is drawn of each branch.
+    pub(super) fn select(&mut self) -> Result<()> {
+        if self.known.chosen {
+            return Ok(());
+        }
         let (gpu, plan, store, kernels) = (self.gpu, self.plan, &*self.store, self.kernels);
         for (number, branch) in store.branches.iter().enumerate() {
             let clears = |encoder: &mut wgpu::CommandEncoder| {
-                let of_all = ["selection", "reached"].into_iter().filter(|_| number == 0);
-                of_all
-                    .filter_map(|name| store.buffer(name))
-                    .for_each(|buffer| encoder.clear_buffer(&buffer.raw, 0, None));
+                let of_all = store.buffer("reached").filter(|_| number == 0);
+                of_all.into_iter().for_each(|buffer| encoder.clear_buffer(&buffer.raw, 0, None));
             };
             self.timing.pass(gpu, "select", clears, |pass| {
-                let chosen = select::choose(branch.levels).into_iter().map(|run| (run, 0));
-                let pages = 0..if gathered { store.pages.len() } else { 0 };
-                let copied = pages.flat_map(|page| select::GATHER.map(|run| (run, page)));
-                for (run, page) in chosen.chain(copied) {
+                for run in select::choose(branch.levels) {
                     let program = kernels.of(gpu, &run.kernel)?;
-                    let grid = over(gpu, plan, store, (0, page), run.over)?;
-                    let binding = |name: &str| store.binding_of_branch(name, number, page);
+                    let grid = over(gpu, plan, store, (0, 0), run.over)?;
+                    let binding = |name: &str| store.binding_of_branch(name, number);
                     program.dispatch(gpu, pass, run.kernel.name, &binding, grid)?;
                 }
                 Ok(())
             })?;
         }
-        if !(gathered && plan.needs.cull) {
-            return Ok(());
-        }
-        let program = kernels.of(gpu, &select::BALLS.kernel)?;
-        self.timing.pass(
-            gpu,
-            "select",
-            |_| {},
-            |pass| {
-                (0..store.pages.len()).try_for_each(|page| {
-                    let grid = over(gpu, plan, store, (0, page), select::BALLS.over)?;
-                    let binding = |name: &str| store.binding(name, page, 0);
-                    program.dispatch(gpu, pass, select::BALLS.kernel.name, &binding, grid)
-                })
-            },
-        )
+        self.known.chosen = true;
+        Ok(())
     }
 
     /// Learns how large the cut is.
     pub(super) fn look_for_cut(&mut self) -> Result<()> {
         self.timing.flush(self.gpu)?;
-        let Some(selection) = self.store.buffer("selection") else { return Ok(()) };
-        let [cut, _] = counts(self.gpu, &[selection])?.first().copied().unwrap_or_default();
-        self.make_room(cut.into());
+        let chosen: Vec<&Buffer<u32>> = self.store.chosen().collect();
+        let cuts: Vec<u64> = counts(self.gpu, &chosen)?.into_iter().map(|[cut, _]| cut.into()).collect();
+        self.make_room(&cuts);
         Ok(())
     }
 
-    /// Whether pages with `room` for so many surfels have room for a cut; if not, or if it is far too much, the next try has as much as it takes.
-    pub(super) fn fits_cut(&mut self, room: u64, cut: u64) -> bool {
-        if cut > room || room > 4 * with_room(cut) + SPARE {
-            self.make_room(cut);
+    /// Whether pages with `rooms` for so many surfels of each branch have room for its cut; if not, or if it is far too much, the next try has as much as
+    /// it takes.
+    pub(super) fn fits_cut(&mut self, rooms: &[u64], cuts: &[u64]) -> bool {
+        let fits = rooms.iter().zip(cuts).all(|(room, cut)| cut <= room);
+        let enough: u64 = cuts.iter().copied().map(with_room).sum();
+        if !fits || rooms.iter().sum::<u64>() > 4 * enough + SPARE {
+            self.make_room(cuts);
         }
-        cut <= room
+        fits
     }
 
     /// From the next try on; its pages are new ones.
-    fn make_room(&mut self, cut: u64) {
-        (self.known.cut, self.known.slots) = (Some(with_room(cut)), false);
+    fn make_room(&mut self, cuts: &[u64]) {
+        let mut rooms: Vec<u64> = cuts.iter().copied().map(with_room).collect();
+        // Where nothing is drawn, a page.
+        if let (true, Some(first)) = (rooms.iter().all(|room| *room == 0), rooms.first_mut()) {
+            *first = 1;
+        }
+        (self.known.cut, self.known.slots) = (Some(rooms), false);
     }
 }
 
-/// An eighth more than this view takes, for the next one; and where nothing is drawn, a page.
+/// An eighth more than this view takes, for the next one.
 fn with_room(cut: u64) -> u64 {
-    (cut + cut / 8).max(1)
+    cut + cut / 8
 }

@@ -4,16 +4,17 @@ use super::store::{Named, kept};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
-use crate::gpu::layout::{self, BATCH, GATHERED_END, LIST_START, QUEUE_START, WORKGROUP};
+use crate::gpu::layout::{self, BATCH, LIST_START, QUEUE_START, SPREAD_GRID, WORKGROUP};
 use crate::passes::order;
 use crate::passes::upload::{self, BranchBuffers};
-use crate::plan::{SceneNeeds, SurfelLayout, splat_words};
-use crate::scene::Surfel;
+use crate::plan::{SceneNeeds, splat_words};
 
 /// One page: its surfels, and slots for splats of all of them, in their order, or, where batches are left out, of as many batches as
 /// there are to be drawn, one after the other ([`cull`](crate::passes::cull)).
 pub struct Page {
     pub(super) buffers: Named,
+    /// The number of the branch that has the surfels, if they are those of a cut.
+    pub(super) branch: Option<usize>,
     /// Surfels in it.
     pub surfels: u64,
     /// Surfels that they stand for together.
@@ -27,31 +28,25 @@ pub struct Page {
 impl Page {
     pub(super) fn new(gpu: &Gpu, uploaded: upload::Page, first: u32, needs: &SceneNeeds) -> Result<Self> {
         let upload::Page { buffers, numbers, stand_for } = uploaded;
-        let own = layout::Page { first, runs: 0, stride: 0, back: 0 };
-        Self::with(gpu, Named::from_iter(buffers), (numbers.len() as u64, stand_for), (own, needs))
+        let own = layout::Page { first, surfels: numbers.len() as u32, runs: 0, stride: 0 };
+        Self::with(gpu, Named::from_iter(buffers), (None, stand_for), (own, needs))
     }
 
-    /// One with room for so many surfels of a cut, from the one with the number `first` on.
-    pub(super) fn of_cut(gpu: &Gpu, surfels: u64, first: u32, needs: &SceneNeeds) -> Result<Self> {
-        let mut buffers = Named::new();
-        buffers.insert("surfels", Buffer::<Surfel>::storage(gpu, "surfels of a cut", surfels)?.words());
-        let words = u64::from(SurfelLayout::of(needs).words);
-        if words > 0 {
-            buffers.insert("attributes", Buffer::storage(gpu, "attributes of a cut", surfels * words)?);
-        }
-        // Of how many of them there are the state of the cut tells.
+    /// One with room for so many surfels of the cut of a branch, from the one with the number `first` on: how many of them there are, that cut tells.
+    pub(super) fn of_cut(gpu: &Gpu, surfels: u64, (branch, first): (usize, u64), needs: &SceneNeeds) -> Result<Self> {
         let balls = Buffer::<[f32; 4]>::storage(gpu, "balls of a cut", surfels.div_ceil(BATCH.into()))?;
-        buffers.insert("balls", balls.words());
-        Self::with(gpu, buffers, (surfels, 0), (order::dealt(surfels, first), needs))
+        let buffers = Named::from([("balls", balls.words())]);
+        Self::with(gpu, buffers, (Some(branch), 0), (order::dealt(surfels, first as u32), needs))
     }
 
     /// One with these buffers, and room for nothing yet of what is made of them.
     fn with(
         gpu: &Gpu,
         mut buffers: Named,
-        (surfels, stand_for): (u64, u64),
+        (branch, stand_for): (Option<usize>, u64),
         (own, needs): (layout::Page, &SceneNeeds),
     ) -> Result<Self> {
+        let surfels = u64::from(own.surfels);
         buffers.insert("page", Buffer::uniform(gpu, "page", &own)?.words());
         let batches = surfels.div_ceil(BATCH.into());
         let drawn = Buffer::indirect(gpu, "batches that are drawn", batches + u64::from(LIST_START))?;
@@ -64,7 +59,7 @@ impl Page {
         for (name, what) in [("queue", "queue of large splats"), ("rare", "list of rare splats")] {
             buffers.insert(name, Buffer::indirect(gpu, what, QUEUE_START.into())?);
         }
-        Ok(Self { buffers, surfels, stand_for, splat_words: splat_words(needs), slots: 0 })
+        Ok(Self { buffers, branch, surfels, stand_for, splat_words: splat_words(needs), slots: 0 })
     }
 
     /// Batches of surfels.
@@ -106,18 +101,16 @@ pub struct Branch {
 
 /// What all branches share while a cut is made, one after the other.
 pub(super) fn of_selection(gpu: &Gpu, branches: &[BranchBuffers], needs: &SceneNeeds) -> Result<Named> {
-    let most = |k: usize| branches.iter().map(|branch| branch.records[k]).max().unwrap_or(0);
-    let [records, nodes] = [most(0), most(1)];
+    let nodes = branches.iter().map(|branch| branch.nodes).max().unwrap_or(0);
     let roots = branches.iter().map(|branch| branch.roots).sum();
     let groups = nodes.div_ceil(WORKGROUP.into());
-    // In the second ones, how much there is of what is in the first.
+    // In the second one, by how many cuts what is in the first is come to.
     let halves = if needs.fades { 2 } else { 1 };
     Ok(Named::from([
-        ("selection", Buffer::indirect(gpu, "state of a cut", u64::from(GATHERED_END) + 1)?),
+        ("selection", Buffer::indirect(gpu, "state of a cut", u64::from(SPREAD_GRID) + 3)?),
         ("frontier", Buffer::storage(gpu, "nodes that a cut comes to", halves * nodes)?),
-        ("fates", Buffer::storage(gpu, "what becomes of nodes", nodes)?),
+        ("fates", Buffer::<[u32; 2]>::storage(gpu, "what becomes of nodes", nodes)?.words()),
         ("group_counts", Buffer::<[u32; 2]>::storage(gpu, "counts of a cut", groups)?.words()),
-        ("chosen", Buffer::storage(gpu, "surfels of a cut", halves * records)?),
         ("reached", Buffer::storage(gpu, "branches that a cut comes to", roots)?),
     ]))
 }

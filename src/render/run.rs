@@ -8,8 +8,8 @@ use crate::gpu::Gpu;
 use crate::gpu::buffers::{Buffer, counts};
 use crate::gpu::kernel::{Grid, grid};
 use crate::gpu::layout::{
-    BATCH, COVERED_GRID, COVERED_GRID_OF_EIGHTS, GATHER_GRID, JUDGE_GRID, LIST_FAR, QUEUE_GRID, QUEUE_LISTING,
-    SPREAD_GRID, TILE_WIDTH, WORKGROUP,
+    BALL_PART, BATCH, COVERED_GRID, COVERED_GRID_OF_EIGHTS, JUDGE_GRID, LIST_FAR, QUEUE_GRID, QUEUE_LISTING,
+    SPREAD_GRID, TILE_WIDTH,
 };
 use crate::gpu::timing::Timing;
 use crate::passes::tiles::{self, LONGEST, list_name};
@@ -91,7 +91,7 @@ impl<'a> Run<'a> {
                     self.read_back(*band, frame)?;
                     progress.advance(self.plan.bands[*band].rows.into());
                 }
-                Step::Select { gathers } => self.select(*gathers)?,
+                Step::Select => self.select()?,
                 Step::Look(Look::Cut) => {
                     self.look_for_cut()?;
                     return Ok(false);
@@ -146,9 +146,9 @@ impl<'a> Run<'a> {
         let small = self.plan.needs.gather.then(|| wanted("small_lists")).flatten();
         let counts_wraps = self.plan.sum_words > 0 && self.plan.needs.accumulator.row().head_words() > 0;
         let sums = counts_wraps.then(|| wanted("sums")).flatten();
-        let selection = self.plan.cut.and_then(|_| wanted("selection"));
+        let chosen = self.store.chosen().filter(|_| self.plan.cut.is_some());
         let of_pages = self.store.pages.iter().flat_map(|page| [page.buffer("queue"), page.buffer("drawn")]);
-        let all: Vec<&Buffer<u32>> = of_pages.chain([large, small, sums, selection]).flatten().collect();
+        let all: Vec<&Buffer<u32>> = of_pages.chain([large, small, sums]).flatten().chain(chosen).collect();
         let mut counted = counts(self.gpu, &all)?.into_iter();
         let mut next = || counted.next().unwrap_or_default();
         let (mut most_large, mut slots, mut unseen_in_all) = (0, true, 0);
@@ -165,11 +165,13 @@ impl<'a> Run<'a> {
             lists &= entries <= self.store.entries(of) && longest <= LONGEST;
         }
         let [overflows, _] = sums.map_or([0; 2], |_| next());
-        let [cut, _] = selection.map_or([0; 2], |_| next()).map(u64::from);
-        let fits = self.plan.cut.is_none_or(|room| self.fits_cut(room, cut));
-        if self.plan.cut.is_some() {
+        let mut fits = true;
+        if let Some(rooms) = &self.plan.cut {
+            let cuts: Vec<u64> = rooms.iter().map(|_| next()[0].into()).collect();
+            let cut: u64 = cuts.iter().sum();
             self.tally.drawn += cut.saturating_sub(unseen_in_all);
             self.tally.cut = Some(cut);
+            fits = self.fits_cut(rooms, &cuts);
         }
         // Of a view all bands are asked.
         let before = band > 0 && self.plan.projects_each_band && self.known.large == Some(true);
@@ -324,7 +326,6 @@ pub(super) fn over<'a>(
         }
         Over::Judged => return counted(store.buffer("selection"), JUDGE_GRID.into()),
         Over::Spread => return counted(store.buffer("selection"), SPREAD_GRID.into()),
-        Over::Chosen => return counted(store.buffer("selection"), GATHER_GRID.into()),
         Over::Rare => return counted(of_page.and_then(|page| page.buffer("rare")), QUEUE_GRID.into()),
         Over::Large => return counted(queue(), QUEUE_GRID.into()),
         Over::LargeTriangles => return counted(store.buffer("large_triangles"), QUEUE_GRID.into()),
@@ -336,7 +337,7 @@ pub(super) fn over<'a>(
         Over::Once => return Ok(Grid::Of((1, 1))),
         Over::Slots(_) => of_page.map_or(0, |page| page.slots),
         Over::Batches => of_page.map_or(0, |page| page.batches()),
-        Over::BatchGroups => of_page.map_or(0, |page| page.batches() * u64::from(WORKGROUP)),
+        Over::BatchParts => of_page.map_or(0, |page| page.batches() * u64::from(BATCH / BALL_PART)),
         Over::Occlusion => plan.bands[band].tiles,
         Over::Vertices => plan.mesh.vertices,
         Over::Triangles => plan.mesh.triangles,

@@ -22,11 +22,10 @@ use crate::plan::{
 use crate::scene::Samples;
 
 /// Names in WGSL of buffers that have another one where kernels write them.
-const ALIASES: [(&str, &str); 21] = [
+const ALIASES: [(&str, &str); 20] = [
     ("made_balls", "balls"),
     ("selected", "selection"),
-    ("gathered_surfels", "surfels"),
-    ("gathered_attributes", "attributes"),
+    ("cut", "chosen"),
     ("projected", "splats"),
     ("queued", "queue"),
     ("listed", "rare"),
@@ -46,8 +45,9 @@ const ALIASES: [(&str, &str); 21] = [
     ("tiles_of_triangles", "triangle_tiles"),
 ];
 
-/// Names of buffers that each page has.
-const PAGED: [&str; 9] = ["attributes", "balls", "drawn", "page", "queue", "rare", "rest", "splats", "surfels"];
+/// Names of buffers that each page has, or its branch.
+const PAGED: [&str; 10] =
+    ["attributes", "balls", "chosen", "drawn", "page", "queue", "rare", "rest", "splats", "surfels"];
 
 /// The name under which a buffer is kept.
 pub(super) fn kept(name: &str) -> &str {
@@ -107,8 +107,8 @@ pub struct Store {
     pub pages: Vec<Page>,
     /// The branches of its levels of detail, if a cut is drawn.
     pub branches: Vec<Branch>,
-    /// Surfels of a cut that pages are made for.
-    room: u64,
+    /// Surfels of a cut that pages are made for, branch by branch.
+    rooms: Vec<u64>,
     /// What it was uploaded for.
     uploaded: Uploading,
     shared: Named,
@@ -151,7 +151,7 @@ impl Store {
             uploaded: Uploading::of(needs),
             pages,
             branches,
-            room: 0,
+            rooms: Vec::new(),
             shared,
             made: None,
             frame: Named::new(),
@@ -201,14 +201,16 @@ impl Store {
             (self.made, self.targets, self.readback) = (None, None, None);
             self.frame.clear();
         }
-        if let Some(room) = plan.cut.filter(|room| *room != self.room) {
+        if let Some(rooms) = plan.cut.as_ref().filter(|rooms| **rooms != self.rooms) {
             // The old ones make room first.
-            (self.pages, self.room) = (Vec::new(), 0);
+            (self.pages, self.rooms) = (Vec::new(), Vec::new());
             let most = page_surfels(&gpu.adapter, &plan.needs);
-            for first in (0..room).step_by(most as usize) {
-                self.pages.push(Page::of_cut(gpu, most.min(room - first), first as u32, &plan.needs)?);
+            for (branch, room) in rooms.iter().enumerate() {
+                for first in (0..*room).step_by(most as usize) {
+                    self.pages.push(Page::of_cut(gpu, most.min(room - first), (branch, first), &plan.needs)?);
+                }
             }
-            self.room = room;
+            self.rooms.clone_from(rooms);
         }
         if !plan.needs.cull {
             self.pages.iter_mut().try_for_each(|page| page.grow(gpu, page.surfels))?;
@@ -349,10 +351,15 @@ impl Store {
         PAGED.contains(&kept(name))
     }
 
-    /// What a variable of a kernel that makes a cut is bound to, for a branch and a page.
-    pub fn binding_of_branch(&self, name: &str, branch: usize, page: usize) -> Option<wgpu::BindingResource<'_>> {
-        let own = self.branches.get(branch).and_then(|branch| branch.buffers.get(kept(name)));
-        own.map(Buffer::bound).or_else(|| self.binding(name, page, 0))
+    /// What is chosen of each branch, if a cut is drawn.
+    pub fn chosen(&self) -> impl Iterator<Item = &Buffer<u32>> {
+        self.branches.iter().filter_map(|branch| branch.buffers.get("chosen"))
+    }
+
+    /// What a variable of a kernel that makes a cut is bound to, for a branch.
+    pub fn binding_of_branch(&self, name: &str, branch: usize) -> Option<wgpu::BindingResource<'_>> {
+        let own = self.branches.get(branch)?.buffers.get(kept(name));
+        own.or_else(|| self.buffer(name)).map(Buffer::bound)
     }
 
     /// What a variable of a kernel is bound to, for a page and a band.
@@ -361,7 +368,8 @@ impl Store {
             return self.bands.get(band).map(Buffer::bound);
         }
         let paged = || self.pages.get(page)?.buffer(name);
-        let buffer = paged().or_else(|| self.buffer(name)).map(Buffer::bound);
+        let of_branch = || self.branches.get(self.pages.get(page)?.branch?)?.buffers.get(kept(name));
+        let buffer = paged().or_else(of_branch).or_else(|| self.buffer(name)).map(Buffer::bound);
         buffer.or_else(|| self.targets.as_ref()?.binding(name))
     }
 

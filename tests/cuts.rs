@@ -4,11 +4,15 @@
 
 mod common;
 
-use common::bits;
+use bytemuck::Zeroable;
 use common::levels::{cut, frame, levels, tree};
 use common::scenes::{shuffled, sphere, sphere_camera};
+use common::{Random, bits};
 use epsplat::frame::Frame;
+use epsplat::gpu::layout::View;
+use epsplat::gpu::sources::FILES;
 use epsplat::gpu::{Gpu, Sources};
+use epsplat::inspect::evaluate;
 use epsplat::plan::RenderOptions;
 use epsplat::render::{Backend, Renderer, render};
 use epsplat::scene::{
@@ -288,7 +292,7 @@ fn broken_kernels_are_noticed() {
     let scene = levels(sphere(6000, 1.7));
     let camera = sphere_camera(50, Projection::Pinhole);
     // Of which the first is culled by batches, and the second has several branches and pages.
-    let ways = [RenderOptions { cull: Cull::None, ..at(60.0) }, RenderOptions { cull: Cull::Back, ..at(60.0) }];
+    let ways = [RenderOptions { cull: Cull::None, ..at(60.0) }, RenderOptions { cull: Cull::Back, ..at(1e-6) }];
     let whole = [Backend::gpu(gpu), Backend::gpu(small())];
     let right = [0, 1].map(|way| {
         let (shown, report) = render(&scene, &camera, &ways[way], &whole[way], &()).unwrap();
@@ -301,19 +305,11 @@ fn broken_kernels_are_noticed() {
         ("select.wgsl", "return before;", "return before + counts;"),
         ("select.wgsl", "vec2<u32>(here, end);", "vec2<u32>(0u, end);"),
         ("select.wgsl", "reached[node.first] = fate;", "reached[node.first] = 0u;"),
-        (
-            "select.wgsl",
-            "page.first + dealt(index, page.back) < selected[CUT]",
-            "page.first + dealt(index, page.back) + 99u < selected[CUT]",
-        ),
-        (
-            "select.wgsl",
-            "let stop = clamp(page.first + arrayLength(&gathered_surfels), first, end);",
-            "let stop = end - 1u;",
-        ),
-        ("select.wgsl", "let to = dealt(selected[CUT_BEFORE] + place - page.first, page.stride);", "let to = place;"),
+        ("select.wgsl", "return drawn_at(place) < attributes", "return drawn_at(place) + 99u < attributes"),
+        ("select.wgsl", "return page.first + select(run", "return select(run"),
+        ("select.wgsl", "return page.surfels;", "return page.surfels - 1u;"),
+        ("select.wgsl", "let before = vec2<u32>(kept.x >> FATE_BITS, kept.y);", "let before = vec2<u32>(0u);"),
         ("select_balls.wgsl", "* (1.0 + BALL_SLACK);", "* 0.1;"),
-        ("gather.wgsl", "tree_attributes[from_ * TREE_WORDS + word]", "tree_attributes[word]"),
     ] {
         let sources = Sources::default().replace(file, from, to).unwrap();
         let noticed =
@@ -322,5 +318,66 @@ fn broken_kernels_are_noticed() {
                 render(&scene, &camera, way, &backend, &()).is_ok_and(|(shown, _)| bits(&shown) != *right)
             });
         assert!(noticed, "{file}: {to}");
+    }
+}
+
+/// What `drawn_at` of a text of select.wgsl says of each (runs, stride, place, first).
+fn dealt(gpu: &Gpu, text: &str, inputs: &[[u32; 4]]) -> Vec<u32> {
+    const KERNEL: &str = "
+        const RUN: u32 = 512u;
+        var<private> own: Page;
+        @group(0) @binding(20) var<storage, read> inputs: array<vec4<u32>>;
+        @group(0) @binding(21) var<storage, read_write> outputs: array<u32>;
+
+        @compute @workgroup_size(WORKGROUP)
+        fn evaluate(
+            @builtin(workgroup_id) workgroup: vec3<u32>,
+            @builtin(num_workgroups) workgroups: vec3<u32>,
+            @builtin(local_invocation_index) local: u32,
+        ) {
+            let index = linear_index(workgroup, workgroups, local);
+            if (index < arrayLength(&inputs)) {
+                let given = inputs[index];
+                own = Page(given.w, 0u, given.x, given.y, 0u);
+                outputs[index] = drawn_at(given.z);
+            }
+        }
+    ";
+    let of = |name: &str| FILES.iter().find(|(file, _)| *file == name).unwrap().1;
+    let start = text.find("fn drawn_at").unwrap();
+    let function = text[start..].split_inclusive("\n}\n").next().unwrap().replace("page.", "own.");
+    let lacking = "struct Clip { nothing: u32 } struct Cap { nothing: u32 } struct Fade { nothing: u32 }";
+    let text = [of("layout.wgsl"), lacking, &function, KERNEL].join("\n");
+    evaluate(gpu, &text, &View::zeroed(), inputs, inputs.len() as u64).unwrap()
+}
+
+/// Remainders are found by f32 and corrected: they are those of integers, up to the most runs that a page has.
+#[test]
+fn places_are_dealt_out_exactly() {
+    let Some(gpu) = common::gpu() else { return };
+    let mut random = Random(5);
+    let inputs: Vec<[u32; 4]> = (0..200_000u32)
+        .map(|k| {
+            let mut below = |most: u64| (random.bits() % most.max(1)) as u32;
+            let runs = if k % 3 == 0 { 65_535 - below(9) } else { below(1 << (1 + k % 16)) };
+            let stride = if k % 2 == 0 { below(runs.into()) } else { (f64::from(runs) * 0.618_033_988_75) as u32 };
+            // Those of the rest among them.
+            [runs, stride, 512 * below(u64::from(runs) + 1) + below(512), below(1000)]
+        })
+        .collect();
+    let text = FILES.iter().find(|(file, _)| *file == "select.wgsl").unwrap().1;
+    let expected = |[runs, stride, place, first]: [u32; 4]| {
+        let run = u64::from(place / 512);
+        let whole = run < u64::from(runs);
+        let turn = if whole { run * u64::from(stride) % u64::from(runs) } else { run };
+        first + turn as u32 * 512 + place % 512
+    };
+    let wrong = |text: &str| {
+        let all = dealt(&gpu, text, &inputs);
+        all.iter().zip(&inputs).filter(|(found, input)| **found != expected(**input)).count()
+    };
+    assert_eq!(wrong(text), 0);
+    for correction in ["select(0, i32(runs), rest < 0)", "select(0, i32(runs), rest >= i32(runs))"] {
+        assert!(text.contains(correction) && wrong(&text.replace(correction, "0")) > 0, "{correction}");
     }
 }

@@ -202,9 +202,9 @@ fn broken_fades_are_noticed() {
         ("visibility.wgsl", "fragment.hit && takes_sample(splat.fade, x, y)", "fragment.hit"),
         ("select.wgsl", "fate = min(fate, cuts);", ""),
         ("select.wgsl", "reached[node.first] = fate;", "reached[node.first] = ALL_CUTS;"),
-        ("select.wgsl", "choose_fade(at + k, 0u, fate);", "choose_fade(at + k, 0u, ALL_CUTS);"),
-        ("select.wgsl", "choose_fade(at, fate, cuts);", "choose_fade(at, 0u, cuts);"),
-        ("select.wgsl", "gather_fade(place, to);", "gather_fade(place + 1u, to);"),
+        ("select.wgsl", "choose(at + k, node.first + k, 0u, fate);", "choose(at + k, node.first + k, 0u, ALL_CUTS);"),
+        ("select.wgsl", "index, fate, cuts);", "index, 0u, cuts);"),
+        ("select_fades.wgsl", "* drawn_at(place)];", "* drawn_at(place + 1u)];"),
         ("select_fades.wgsl", "floor(steps *", "floor(0.9 * steps *"),
     ] {
         let sources = Sources::default().replace(file, from, to).unwrap();

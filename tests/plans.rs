@@ -52,7 +52,7 @@ fn line(stage: &Stage) -> String {
 fn lines(plan: &Plan) -> Vec<String> {
     let step = |step: &Step| match step {
         Step::Stage(stage) => line(stage),
-        Step::Select { gathers } => format!("select{}", if *gathers { ", gather" } else { "" }),
+        Step::Select => "select".to_owned(),
         Step::Look(Look::Cut) => "look for a cut".to_owned(),
         Step::Look(Look::Slots(part)) => format!("look for slots of {part:?}"),
         Step::Look(Look::Fragments(band)) => format!("look for fragments of {band}"),

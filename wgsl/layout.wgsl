@@ -101,6 +101,8 @@ struct Page {
     // Of a cut: runs of surfels that are dealt out over the page, and the stride by which they are.
     runs: u32,
     stride: u32,
+    // And where in the attributes of its branch what is chosen starts.
+    chosen: u32,
 }
 
 // A node of a tree, or one that has a part of a leaf's surfels.
@@ -124,6 +126,8 @@ struct Branch {
     first_root: u32,
     // 1 if its root is that of the tree.
     whole: u32,
+    // Where behind its attributes what is chosen starts.
+    chosen: u32,
 }
 
 const AWAY: u32 = 0x80000000u;

@@ -4,7 +4,7 @@
 // depends on tree and camera alone. Pages of surfels are drawn from where what was chosen lies.
 // Of cuts that fade into each other (select_fades.wgsl) all are made at once.
 // Host side and twin: src/passes/select.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x4fe3defb55b6e93c
+// All loops end, by 1 of src/gpu/loops.rs: 0xf9be819559b9c1cb
 
 @group(0) @binding(72) var<uniform> branch: Branch;
 @group(0) @binding(73) var<storage, read> tree_nodes: array<TreeNode>;
@@ -13,15 +13,14 @@
 @group(0) @binding(76) var<storage, read_write> fates: array<vec2<u32>>;
 // Of each workgroup: how many surfels its nodes leave, and how many children; then where these start.
 @group(0) @binding(77) var<storage, read_write> group_counts: array<vec2<u32>>;
-// How many surfels of this branch are drawn, its nodes' among them, and then which.
+// The attributes of this branch, and from branch.chosen on how many of its surfels are drawn, its nodes' among them, and then which: no kernel
+// that draws them needs another buffer, of which core WebGPU has eight.
 @group(0) @binding(78) var<storage, read_write> chosen: array<u32>;
 // By how many cuts the roots of branches are come to.
 @group(0) @binding(79) var<storage, read_write> reached: array<u32>;
 // The words below.
 @group(0) @binding(80) var<storage, read_write> selection: array<u32>;
 @group(0) @binding(81) var<storage, read> selected: array<u32>;
-// `chosen` of the branch that a page is of, where it is drawn.
-@group(0) @binding(74) var<storage, read> cut: array<u32>;
 
 // The stretch of the frontier that is the level in work, and the next one.
 const LEVEL: u32 = 0u;
@@ -80,18 +79,19 @@ fn places_held() -> u32 {
 
 // The surfel, or the node's, at a place of the page; any where the cut has ended.
 fn surfel_of(place: u32) -> u32 {
-    return cut[1u + CHOSEN_WORDS * drawn_at(place)];
+    return attributes[page.chosen + 1u + CHOSEN_WORDS * drawn_at(place)];
 }
 
 // How many of a batch are of the cut.
 fn batch_size(batch: u32) -> u32 {
-    let first = min(drawn_at(batch * BATCH), cut[0]);
-    return min(min(BATCH, cut[0] - first), places_held() - batch * BATCH);
+    let cut = attributes[page.chosen];
+    let first = min(drawn_at(batch * BATCH), cut);
+    return min(min(BATCH, cut - first), places_held() - batch * BATCH);
 }
 
 // Whether a place has a surfel of the cut.
 fn is_filled(place: u32) -> bool {
-    return drawn_at(place) < cut[0];
+    return drawn_at(place) < attributes[page.chosen];
 }
 
 // Which word of a surfel's attributes.
@@ -217,7 +217,7 @@ fn select_roots() {
             end++;
         }
     }
-    chosen[0] = 0u;
+    chosen[branch.chosen] = 0u;
     selection[NEXT] = 0u;
     selection[NEXT_END] = end;
     set_grid(JUDGE_GRID, end);
@@ -259,7 +259,7 @@ fn select_judge(
 fn select_sum(@builtin(local_invocation_index) local: u32) {
     let first = selection[NEXT];
     let end = selection[NEXT_END];
-    let here = chosen[0];
+    let here = chosen[branch.chosen];
     let groups = groups_of(end - first);
     let each = (groups + WORKGROUP - 1u) / WORKGROUP;
     let stop = min((local + 1u) * each, groups);
@@ -281,7 +281,7 @@ fn select_sum(@builtin(local_invocation_index) local: u32) {
         selection[LEVEL_END] = end;
         selection[NEXT] = end;
         selection[NEXT_END] = end + all.y;
-        chosen[0] = here + all.x;
+        chosen[branch.chosen] = here + all.x;
         set_grid(SPREAD_GRID, end - first);
         set_grid(JUDGE_GRID, all.y);
     }

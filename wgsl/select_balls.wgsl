@@ -1,6 +1,6 @@
 // Stage 0 of cuts of which hidden batches are left out (cull.wgsl): the ball of each batch of what was chosen (select.wgsl). Twin: ball in
 // src/passes/cull.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xf8c6ba271143cd65
+// All loops end, by 1 of src/gpu/loops.rs: 0x52ecbba18d550e06
 
 @group(0) @binding(85) var<storage, read_write> made_balls: array<vec4<f32>>;
 
@@ -11,9 +11,8 @@ const BALL_SLACK: f32 = 1e-5;
 const BALL_PART: u32 = 8u;
 const READERS: u32 = BATCH / BALL_PART;
 
-// Of what each invocation has read: the box of the centres, and the largest distance of a rim.
-var<workgroup> box_low: array<vec3<f32>, WORKGROUP>;
-var<workgroup> box_high: array<vec3<f32>, WORKGROUP>;
+// Of what each invocation reads: the centre of a surfel, and the largest distance of a rim.
+var<workgroup> sampled: array<vec3<f32>, WORKGROUP>;
 var<workgroup> farthest: array<f32, WORKGROUP>;
 
 // The longer half-axis of the ellipse whose half-axes need not be perpendicular, device units.
@@ -40,19 +39,14 @@ fn select_balls(
     // Of a batch with room left its last surfel stands for what is not there.
     let last = min(batch * BATCH + max(size, 1u) - 1u, places_held() - 1u);
     let first = batch * BATCH + reader;
-    var low = vector(surfel_at(surfel_of(min(first, last))).center);
-    var high = low;
-    for (var k = 1u; k < BALL_PART; k++) {
-        let center = vector(surfel_at(surfel_of(min(first + k * READERS, last))).center);
-        low = min(low, center);
-        high = max(high, center);
-    }
-    box_low[local] = low;
-    box_high[local] = high;
+    // Those of one surfel of each reader, from all over the batch, tell its middle well enough.
+    sampled[local] = vector(surfel_at(surfel_of(min(first + reader * READERS, last))).center);
     workgroupBarrier();
+    var low = sampled[local];
+    var high = low;
     for (var k = local - reader; k < local - reader + READERS; k++) {
-        low = min(low, box_low[k]);
-        high = max(high, box_high[k]);
+        low = min(low, sampled[k]);
+        high = max(high, sampled[k]);
     }
     let middle = low + (high - low) * 0.5;
     var radius = 0.0;

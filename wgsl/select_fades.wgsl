@@ -21,10 +21,11 @@ fn cuts_that_divide(size: f32) -> u32 {
 }
 
 fn choose(at: u32, surfel: u32, first: u32, end: u32) {
-    chosen[1u + CHOSEN_WORDS * at] = surfel;
-    chosen[2u + CHOSEN_WORDS * at] = first | (end << 8u);
+    let word = branch.chosen + 1u + CHOSEN_WORDS * at;
+    chosen[word] = surfel;
+    chosen[word + 1u] = first | (end << 8u);
 }
 
 fn fade_word(index: u32, place: u32) -> u32 {
-    return cut[2u + CHOSEN_WORDS * drawn_at(place)];
+    return attributes[page.chosen + 2u + CHOSEN_WORDS * drawn_at(place)];
 }

@@ -15,5 +15,5 @@ fn cuts_that_divide(size: f32) -> u32 {
 }
 
 fn choose(at: u32, surfel: u32, first: u32, end: u32) {
-    chosen[1u + at] = surfel;
+    chosen[branch.chosen + 1u + at] = surfel;
 }

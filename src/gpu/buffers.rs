@@ -214,10 +214,16 @@ impl Readback {
 
 /// The first two words of each of `buffers`, which have as many, by one trip to the device.
 pub(crate) fn counts(gpu: &Gpu, buffers: &[&Buffer<u32>]) -> Result<Vec<[u32; 2]>> {
+    let starts: Vec<_> = buffers.iter().map(|buffer| (*buffer, 0)).collect();
+    counts_at(gpu, &starts)
+}
+
+/// The two words that start with the one of a number of each of `buffers`.
+pub(crate) fn counts_at(gpu: &Gpu, buffers: &[(&Buffer<u32>, u64)]) -> Result<Vec<[u32; 2]>> {
     let all = Buffer::<[u32; 2]>::readable(gpu, "counts", buffers.len() as u64)?;
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    for (place, buffer) in (0..).zip(buffers) {
-        encoder.copy_buffer_to_buffer(&buffer.raw, 0, &all.raw, 8 * place, 8);
+    for (place, (buffer, word)) in (0..).zip(buffers) {
+        encoder.copy_buffer_to_buffer(&buffer.raw, 4 * word, &all.raw, 8 * place, 8);
     }
     gpu.queue.submit([encoder.finish()]);
     all.read(gpu, buffers.len() as u64)

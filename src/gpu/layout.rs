@@ -173,6 +173,7 @@ pub struct Page {
     pub surfels: u32,
     pub runs: u32,
     pub stride: u32,
+    pub chosen: u32,
 }
 
 /// A node of a tree; see the WGSL.
@@ -195,6 +196,7 @@ pub struct Branch {
     pub roots: u32,
     pub first_root: u32,
     pub whole: u32,
+    pub chosen: u32,
 }
 
 /// What a low-pass needs of a splat; see `wgsl/filter.wgsl`.

@@ -72,10 +72,11 @@ fn content(scene: &Scene, index: usize) -> ([[u32; 3]; 8], [u32; 4], Option<u32>
     )
 }
 
-/// How the surfels of a cut that a page has room for are dealt out over it (`wgsl/select.wgsl`), those of pages before it being `first`.
-pub(crate) fn dealt(surfels: u64, first: u32) -> Page {
+/// How the surfels of a cut that a page has room for are dealt out over it (`wgsl/select.wgsl`): of what is `chosen`, which starts there, those from the
+/// `first` on.
+pub(crate) fn dealt(surfels: u64, (chosen, first): (u32, u32)) -> Page {
     let runs = surfels / RUN as u64;
-    Page { first, surfels: surfels as u32, runs: runs as u32, stride: dealing(runs as usize) as u32 }
+    Page { first, surfels: surfels as u32, runs: runs as u32, stride: dealing(runs as usize) as u32, chosen }
 }
 
 /// A step near the golden ratio of `runs` that comes to each of them once.
@@ -121,7 +122,7 @@ mod tests {
             assert!(indices.iter().copied().eq(0..count as u32), "{count}");
         }
         for runs in [0, 1, 2, 3, 7, 4096] {
-            let Page { stride, surfels, .. } = dealt(runs * RUN as u64 + 5, 0);
+            let Page { stride, surfels, .. } = dealt(runs * RUN as u64 + 5, (0, 0));
             let mut turns: Vec<u64> = (0..runs).map(|run| run * u64::from(stride) % runs).collect();
             turns.sort_unstable();
             assert!(turns.into_iter().eq(0..runs) && u64::from(surfels) == runs * RUN as u64 + 5, "{runs}");

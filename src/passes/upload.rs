@@ -35,6 +35,8 @@ pub struct BranchBuffers {
     pub levels: u32,
     /// How many nodes.
     pub nodes: u64,
+    /// Where in the attributes what is chosen starts, words.
+    pub chosen: u32,
     /// How many roots.
     pub roots: u64,
 }
@@ -73,23 +75,28 @@ pub fn upload(
 /// The branches of the levels of detail that `source` has.
 fn branches(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds, progress: &dyn Progress) -> Result<Vec<BranchBuffers>> {
     let words = SurfelLayout::of(needs).words as usize;
-    let most = gpu.adapter.page_len(size_of::<Surfel>().max(4 * words));
+    // Of each that is chosen its number, and in how many cuts it is; before them how many there are.
+    let of_chosen = if needs.fades { 2 } else { 1 };
+    let most = gpu.adapter.page_len(size_of::<Surfel>().max(4 * (words + of_chosen))) - 1;
     let tree = source.levels().ok_or_else(|| gpu.error("a scene has no levels of detail"))?;
     let tree = branches::branches(tree, most);
     let of = |branch: Branch| {
         let page = source.branch(needs, &branch).ok_or_else(|| gpu.error("a scene has no levels of detail"))?;
         let Branch { surfels, nodes, roots, first_root, whole, levels, .. } = branch;
         let (surfels, records) = (surfels.len() as u32, surfels.len() + nodes.len());
-        let own = layout::Branch { surfels, roots, first_root, whole: whole.into() };
-        // Of each that is chosen its number, and in how many cuts it is; before them how many there are.
-        let chosen = records as u64 * if needs.fades { 2 } else { 1 } + 1;
+        let chosen = (records * words) as u32;
+        let own = layout::Branch { surfels, roots, first_root, whole: whole.into(), chosen };
         let mut buffers = vec![
-            ("chosen", Buffer::storage(gpu, "surfels of a cut", chosen)?),
             ("branch", Buffer::uniform(gpu, "branch", &own)?.words()),
             ("tree_nodes", filled(gpu, "nodes", bytemuck::cast_slice(&nodes))?),
         ];
-        buffers.extend(RECORDS.into_iter().zip(records_of(gpu, (&*page, records), words, progress)?));
-        Ok(BranchBuffers { buffers, levels, nodes: nodes.len() as u64, roots: roots.into() })
+        buffers.extend(RECORDS.into_iter().zip(records_of(
+            gpu,
+            (&*page, records),
+            (words, 1 + of_chosen * records),
+            progress,
+        )?));
+        Ok(BranchBuffers { buffers, levels, nodes: nodes.len() as u64, chosen, roots: roots.into() })
     };
     tree.into_iter().map(of).collect()
 }
@@ -97,7 +104,7 @@ fn branches(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds, progress: &dyn P
 fn page(gpu: &Gpu, of: &dyn source::Page, needs: &SceneNeeds, progress: &dyn Progress) -> Result<Page> {
     let numbers = of.numbers().into_owned();
     let words = SurfelLayout::of(needs).words as usize;
-    let records = records_of(gpu, (of, numbers.len()), words, progress)?;
+    let records = records_of(gpu, (of, numbers.len()), (words, 0), progress)?;
     let mut buffers: Named = RECORDS.into_iter().zip(records).collect();
     let batches = of.balls();
     let balls = Buffer::storage(gpu, "batches", batches.len() as u64)?;
@@ -109,18 +116,18 @@ fn page(gpu: &Gpu, of: &dyn source::Page, needs: &SceneNeeds, progress: &dyn Pro
 /// The names of what records are in.
 const RECORDS: [&str; 2] = ["surfels", "attributes"];
 
-/// The surfels of a page that has so many, and their attributes, of `words` each, if they have some.
+/// The surfels of a page that has so many, and their attributes, of `words` each, with room for so many words `behind` them; if there are some.
 fn records_of(
     gpu: &Gpu,
     (of, count): (&dyn source::Page, usize),
-    words: usize,
+    (words, behind): (usize, usize),
     progress: &dyn Progress,
 ) -> Result<Vec<Buffer<u32>>> {
     let surfels = Buffer::storage(gpu, "surfels", count as u64)?;
     surfels.write(gpu, count, |range| of.surfels(range).into(), progress)?;
     let mut buffers = vec![surfels.words()];
-    if words > 0 {
-        let attributes = Buffer::storage(gpu, "attributes", (count * words) as u64)?;
+    if words + behind > 0 {
+        let attributes = Buffer::storage(gpu, "attributes", (count * words + behind) as u64)?;
         // Of whole records, in which a range of words may start and end anywhere.
         let values = |range: Range<usize>| {
             let mut values = of.attributes(range.start / words..range.end.div_ceil(words));

@@ -2,7 +2,7 @@
 
 use super::run::{Run, over};
 use crate::error::Result;
-use crate::gpu::buffers::{Buffer, counts};
+use crate::gpu::buffers::counts_at;
 use crate::passes::select;
 
 /// Room that may be left unused before it is given back: what a view asks for changes from one to the next.
@@ -37,8 +37,8 @@ impl Run<'_> {
     /// Learns how large the cut is.
     pub(super) fn look_for_cut(&mut self) -> Result<()> {
         self.timing.flush(self.gpu)?;
-        let chosen: Vec<&Buffer<u32>> = self.store.chosen().collect();
-        let cuts: Vec<u64> = counts(self.gpu, &chosen)?.into_iter().map(|[cut, _]| cut.into()).collect();
+        let chosen: Vec<_> = self.store.chosen().collect();
+        let cuts: Vec<u64> = counts_at(self.gpu, &chosen)?.into_iter().map(|[cut, _]| cut.into()).collect();
         self.make_room(&cuts);
         Ok(())
     }

@@ -53,7 +53,7 @@ impl Kept {
     ) -> Result<(Frame, Report)> {
         let (image, camera) = (camera, &camera.sampled(self.options.samples)?);
         self.look_at(gpu, camera);
-        let mut total_ms = 0.0;
+        let (mut total_ms, mut all_passes) = (0.0, BTreeMap::new());
         let mut number = 0;
         while number < MOST_TRIES + self.known.times_cut {
             let first = number == 0;
@@ -73,16 +73,16 @@ impl Kept {
             let all = run.steps(&sequence::steps(&plan), &mut frame, progress)?;
             let spent = start.elapsed();
             total_ms += spent.as_secs_f64() * 1e3;
-            if !all {
-                continue;
+            let tally = if all { Some(run.tally()?) } else { None };
+            let clock = if run.timing.on_device() { "timestamps" } else { "wall" };
+            let order = &run.store.order;
+            for (pass, ms) in run.timing.finish(gpu)? {
+                *all_passes.entry(pass).or_insert(0.0) += ms;
             }
-            let tally = run.tally()?;
-            if tally.complete {
-                finish(&mut frame, &plan.needs, &source.provenance(), &run.store.order);
+            if let Some(tally) = tally.filter(|tally| tally.complete) {
+                finish(&mut frame, &plan.needs, &source.provenance(), order);
                 bar.end();
-                let clock = if run.timing.on_device() { "timestamps" } else { "wall" };
-                let passes = run.timing.finish(gpu)?;
-                let report = self.report(gpu, &plan, image, (tally, clock, passes, total_ms));
+                let report = self.report(gpu, &plan, image, (tally, clock, all_passes, total_ms));
                 return Ok((frame, report));
             }
         }

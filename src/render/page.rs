@@ -13,7 +13,7 @@ use crate::plan::{SceneNeeds, splat_words};
 /// there are to be drawn, one after the other ([`cull`](crate::passes::cull)).
 pub struct Page {
     pub(super) buffers: Named,
-    /// The number of the branch that has the surfels, if they are those of a cut.
+    /// The number of the branch that has the surfels and their attributes, if they are those of a cut.
     pub(super) branch: Option<usize>,
     /// Surfels in it.
     pub surfels: u64,
@@ -28,15 +28,20 @@ pub struct Page {
 impl Page {
     pub(super) fn new(gpu: &Gpu, uploaded: upload::Page, first: u32, needs: &SceneNeeds) -> Result<Self> {
         let upload::Page { buffers, numbers, stand_for } = uploaded;
-        let own = layout::Page { first, surfels: numbers.len() as u32, runs: 0, stride: 0 };
+        let own = layout::Page { first, surfels: numbers.len() as u32, runs: 0, stride: 0, chosen: 0 };
         Self::with(gpu, Named::from_iter(buffers), (None, stand_for), (own, needs))
     }
 
     /// One with room for so many surfels of the cut of a branch, from the one with the number `first` on: how many of them there are, that cut tells.
-    pub(super) fn of_cut(gpu: &Gpu, surfels: u64, (branch, first): (usize, u64), needs: &SceneNeeds) -> Result<Self> {
+    pub(super) fn of_cut(
+        gpu: &Gpu,
+        surfels: u64,
+        (number, branch, first): (usize, &Branch, u64),
+        needs: &SceneNeeds,
+    ) -> Result<Self> {
         let balls = Buffer::<[f32; 4]>::storage(gpu, "balls of a cut", surfels.div_ceil(BATCH.into()))?;
         let buffers = Named::from([("balls", balls.words())]);
-        Self::with(gpu, buffers, (Some(branch), 0), (order::dealt(surfels, first as u32), needs))
+        Self::with(gpu, buffers, (Some(number), 0), (order::dealt(surfels, (branch.chosen, first as u32)), needs))
     }
 
     /// One with these buffers, and room for nothing yet of what is made of them.
@@ -97,6 +102,8 @@ pub struct Branch {
     pub(super) buffers: Named,
     /// How many levels it has.
     pub levels: u32,
+    /// Where in its attributes what is chosen starts, words.
+    pub(super) chosen: u32,
 }
 
 /// What all branches share while a cut is made, one after the other.

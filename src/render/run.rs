@@ -5,7 +5,7 @@ use super::store::Store;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::Gpu;
-use crate::gpu::buffers::{Buffer, counts};
+use crate::gpu::buffers::{Buffer, counts_at};
 use crate::gpu::kernel::{Grid, grid};
 use crate::gpu::layout::{
     BALL_PART, BATCH, COVERED_GRID, COVERED_GRID_OF_EIGHTS, JUDGE_GRID, LIST_FAR, QUEUE_GRID, QUEUE_LISTING,
@@ -148,8 +148,9 @@ impl<'a> Run<'a> {
         let sums = counts_wraps.then(|| wanted("sums")).flatten();
         let chosen = self.store.chosen().filter(|_| self.plan.cut.is_some());
         let of_pages = self.store.pages.iter().flat_map(|page| [page.buffer("queue"), page.buffer("drawn")]);
-        let all: Vec<&Buffer<u32>> = of_pages.chain([large, small, sums]).flatten().chain(chosen).collect();
-        let mut counted = counts(self.gpu, &all)?.into_iter();
+        let starts = of_pages.chain([large, small, sums]).flatten().map(|buffer| (buffer, 0));
+        let all: Vec<_> = starts.chain(chosen).collect();
+        let mut counted = counts_at(self.gpu, &all)?.into_iter();
         let mut next = || counted.next().unwrap_or_default();
         let (mut most_large, mut slots, mut unseen_in_all) = (0, true, 0);
         for page in &self.store.pages {

@@ -25,7 +25,7 @@ use crate::scene::Samples;
 const ALIASES: [(&str, &str); 20] = [
     ("made_balls", "balls"),
     ("selected", "selection"),
-    ("cut", "chosen"),
+    ("chosen", "attributes"),
     ("projected", "splats"),
     ("queued", "queue"),
     ("listed", "rare"),
@@ -46,8 +46,7 @@ const ALIASES: [(&str, &str); 20] = [
 ];
 
 /// Names of buffers that each page has, or its branch.
-const PAGED: [&str; 10] =
-    ["attributes", "balls", "chosen", "drawn", "page", "queue", "rare", "rest", "splats", "surfels"];
+const PAGED: [&str; 9] = ["attributes", "balls", "drawn", "page", "queue", "rare", "rest", "splats", "surfels"];
 
 /// The name under which a buffer is kept.
 pub(super) fn kept(name: &str) -> &str {
@@ -142,10 +141,11 @@ impl Store {
         if needs.levels {
             shared.extend(of_selection(gpu, &uploaded.branches, needs)?);
         }
-        let branches = uploaded
-            .branches
-            .into_iter()
-            .map(|branch| Branch { levels: branch.levels, buffers: Named::from_iter(branch.buffers) });
+        let branches = uploaded.branches.into_iter().map(|branch| Branch {
+            levels: branch.levels,
+            chosen: branch.chosen,
+            buffers: Named::from_iter(branch.buffers),
+        });
         let branches = branches.collect();
         Ok(Self {
             uploaded: Uploading::of(needs),
@@ -205,9 +205,9 @@ impl Store {
             // The old ones make room first.
             (self.pages, self.rooms) = (Vec::new(), Vec::new());
             let most = page_surfels(&gpu.adapter, &plan.needs);
-            for (branch, room) in rooms.iter().enumerate() {
+            for (number, (branch, room)) in self.branches.iter().zip(rooms).enumerate() {
                 for first in (0..*room).step_by(most as usize) {
-                    self.pages.push(Page::of_cut(gpu, most.min(room - first), (branch, first), &plan.needs)?);
+                    self.pages.push(Page::of_cut(gpu, most.min(room - first), (number, branch, first), &plan.needs)?);
                 }
             }
             self.rooms.clone_from(rooms);
@@ -351,9 +351,9 @@ impl Store {
         PAGED.contains(&kept(name))
     }
 
-    /// What is chosen of each branch, if a cut is drawn.
-    pub fn chosen(&self) -> impl Iterator<Item = &Buffer<u32>> {
-        self.branches.iter().filter_map(|branch| branch.buffers.get("chosen"))
+    /// Where of each branch the number of what is chosen lies, if a cut is drawn.
+    pub fn chosen(&self) -> impl Iterator<Item = (&Buffer<u32>, u64)> {
+        self.branches.iter().filter_map(|branch| Some((branch.buffers.get("attributes")?, branch.chosen.into())))
     }
 
     /// What a variable of a kernel that makes a cut is bound to, for a branch.

@@ -290,7 +290,9 @@ fn cut(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
         |needs: &&SceneNeeds| matches!(needs.color, ColorNeed::Constant | ColorNeed::Srgb8 | ColorNeed::Linear);
     let of = |(step, needs): (usize, &SceneNeeds)| {
         let fades = step % 2 == 0 && needs.sums_by_compute() && needs.oit.is_none();
-        SceneNeeds { levels: true, fades, node_caps: needs.curved && step % 4 < 3, ..*needs }
+        // Fades may be given, too.
+        let levels = !fades || step % 16 > 0;
+        SceneNeeds { levels, fades, node_caps: levels && needs.curved && step % 4 < 3, ..*needs }
     };
     let disks = all.iter().filter(of_disks).filter(with_colors).filter(|needs| !needs.copies);
     disks.step_by(3).enumerate().map(of).collect()

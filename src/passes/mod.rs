@@ -192,16 +192,25 @@ fn passes(needs: &SceneNeeds) -> impl Iterator<Item = &'static Pass> {
     PASSES.into_iter().chain(own_maps(needs).map(|own| &own.pass))
 }
 
-/// The modules that a render with `needs` is made of: the first, and that of the tiles, if there are any.
+/// The modules that a render with `needs` is made of: the first, that of the tiles, and that which chooses a cut, if there are any.
 pub fn modules(needs: &SceneNeeds) -> Vec<Module> {
-    let with = |own: &Pass| PASSES.iter().flat_map(|pass| (pass.files)(needs)).chain((own.files)(needs));
+    let tiles = || Module { files: files_with(&tiles::PASS, needs).collect(), kernels: (tiles::PASS.kernels)(needs) };
+    // The same one before it is known how much is drawn.
+    let cut = || Module { files: first_files(&needs.before_cut()), kernels: select::CHOOSING.into() };
+    let kernels = passes(needs).flat_map(|pass| (pass.kernels)(needs)).collect();
+    let first = Module { files: first_files(needs), kernels };
+    std::iter::once(first).chain(needs.tiles.then(tiles)).chain(needs.levels.then(cut)).collect()
+}
+
+/// Files that every module has, and those of one more pass.
+fn files_with(own: &Pass, needs: &SceneNeeds) -> impl Iterator<Item = &'static str> {
+    PASSES.iter().flat_map(|pass| (pass.files)(needs)).chain((own.files)(needs))
+}
+
+/// Those of the first module.
+fn first_files(needs: &SceneNeeds) -> Vec<&'static str> {
     let of_maps = own_maps(needs).flat_map(|own| (own.pass.files)(needs));
-    let first = Module {
-        files: with(&accumulate::SUMS).chain(of_maps).collect(),
-        kernels: passes(needs).flat_map(|pass| (pass.kernels)(needs)).collect(),
-    };
-    let tiles = || Module { files: with(&tiles::PASS).collect(), kernels: (tiles::PASS.kernels)(needs) };
-    std::iter::once(first).chain(needs.tiles.then(tiles)).collect()
+    files_with(&accumulate::SUMS, needs).chain(of_maps).collect()
 }
 
 /// The overridable constants of a render, by name.

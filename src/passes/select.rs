@@ -39,12 +39,8 @@ pub const PASS: Pass = Pass {
         }
     },
     kernels: |needs| match needs.levels {
-        true => {
-            let balls = needs.cull.then_some(SELECT_BALLS);
-            let all = [SELECT_ROOTS, SELECT_JUDGE, SELECT_SUM, SELECT_SPREAD];
-            all.into_iter().chain(balls).collect()
-        }
-        false => Vec::new(),
+        true if needs.cull => vec![SELECT_BALLS],
+        _ => Vec::new(),
     },
     constants: |making| match making.needs.levels {
         true => {
@@ -60,6 +56,9 @@ const SELECT_JUDGE: Kernel = Kernel::new("select_judge");
 const SELECT_SUM: Kernel = Kernel::new("select_sum");
 const SELECT_SPREAD: Kernel = Kernel::new("select_spread");
 const SELECT_BALLS: Kernel = Kernel::new("select_balls");
+
+/// The kernels that choose what is drawn: what follows depends on how much that is, so they are compiled before all others.
+pub const CHOOSING: [Kernel; 4] = [SELECT_ROOTS, SELECT_JUDGE, SELECT_SUM, SELECT_SPREAD];
 
 /// The dispatches that choose what of a branch with so many levels is drawn.
 pub fn choose(levels: u32) -> Vec<Run> {

@@ -314,6 +314,11 @@ impl SceneNeeds {
         self.tiles && !(self.color == ColorNeed::Textured && self.mesh.is_some())
     }
 
+    /// These, but for what follows from how much is drawn.
+    pub fn before_cut(&self) -> Self {
+        Self { cull: false, gather: false, veils: false, long_lists: false, ..*self }
+    }
+
     /// Surfels of a cut are told apart by their places in the tree, as what is sorted goes by them at one depth.
     pub fn numbers_surfels(&self) -> bool {
         self.levels && self.lists == Some(Lists::Sorted)

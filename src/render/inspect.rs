@@ -73,7 +73,7 @@ pub fn stages(scene: &Scene, camera: &Camera, options: &RenderOptions, gpu: &Gpu
             gpu.adapter.name
         )));
     }
-    let kernels = Kernels::new(gpu, sources, &plan, options, facts.surfels)?;
+    let kernels = Kernels::new(sources, &plan, options, facts.surfels);
     let uploaded = upload(gpu, scene, &plan.needs, (&facts, true), &())?;
     let order: Vec<u32> = uploaded.pages.iter().flat_map(|page| page.numbers.clone()).collect();
     let mut store = Store::new(gpu, uploaded, &plan.needs)?;

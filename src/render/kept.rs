@@ -114,9 +114,10 @@ impl Kept {
         progress: &dyn Progress,
     ) -> Result<()> {
         let surfels = self.facts.surfels;
-        if !self.kernels.as_ref().is_some_and(|kernels| kernels.serve(plan, &self.options, surfels)) {
-            self.kernels = Some(Kernels::new(gpu, sources, plan, &self.options, surfels)?);
-        }
+        let kernels = self.kernels.take().filter(|kernels| kernels.serve(plan, &self.options, surfels));
+        let kernels = kernels.unwrap_or_else(|| Kernels::new(sources, plan, &self.options, surfels));
+        kernels.compile(gpu, plan)?;
+        self.kernels = Some(kernels);
         if self.store.as_ref().is_some_and(|store| !store.serves(&plan.needs)) {
             // The old ones make room first.
             self.store = None;

@@ -1,4 +1,5 @@
-//! The compiled kernels of a frame: a module for all passes, and one for the tiles, which is compiled when something is drawn by them.
+//! The compiled kernels of a frame: a module for all passes, one for the tiles, which is compiled when something is drawn by them, and one that
+//! chooses a cut.
 
 use std::cell::OnceCell;
 use std::sync::Arc;
@@ -6,6 +7,7 @@ use std::sync::Arc;
 use crate::error::Result;
 use crate::gpu::program::Program;
 use crate::gpu::{Gpu, Sources};
+use crate::passes::select::CHOOSING;
 use crate::passes::{constants, modules, raster};
 use crate::plan::pass::{Making, Module};
 use crate::plan::steps::Kernel;
@@ -21,14 +23,23 @@ pub struct Kernels {
 }
 
 impl Kernels {
-    /// Those of `plan`, of which the passes' are compiled.
-    pub fn new(gpu: &Gpu, sources: &Sources, plan: &Plan, options: &RenderOptions, surfels: u64) -> Result<Self> {
+    /// Those of `plan`, of which none is compiled yet.
+    pub fn new(sources: &Sources, plan: &Plan, options: &RenderOptions, surfels: u64) -> Self {
         let constants = constants(&Making { needs: &plan.needs, options, surfels });
         let modules = modules(&plan.needs).into_iter().map(|module| (module, OnceCell::new())).collect();
         let made = (plan.needs, bits(&constants));
-        let kernels = Self { made, sources: sources.clone(), constants, modules };
-        kernels.first(gpu)?;
-        Ok(kernels)
+        Self { made, sources: sources.clone(), constants, modules }
+    }
+
+    /// Compiles those that `plan` is known to dispatch: as long as a cut is looked for, no others than choose it.
+    pub fn compile(&self, gpu: &Gpu, plan: &Plan) -> Result<()> {
+        if plan.needs.levels {
+            self.of(gpu, &CHOOSING[0])?;
+        }
+        if !plan.looks_for_cut() {
+            self.first(gpu)?;
+        }
+        Ok(())
     }
 
     /// Whether they serve `plan` too.

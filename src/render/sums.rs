@@ -148,7 +148,7 @@ pub fn sums(
     let mut store = Store::new(gpu, upload(gpu, source, &plan.needs, (&facts, true), &())?, &plan.needs)?;
     for _ in 0..MOST_TRIES {
         let plan = Plan::of(&facts, &gpu.adapter, camera, options, &known)?;
-        let kernels = Kernels::new(gpu, sources, &plan, options, facts.surfels)?;
+        let kernels = Kernels::new(sources, &plan, options, facts.surfels);
         store.fit(gpu, &plan, &known)?;
         let view = View::new(&facts, camera, options);
         store.set_view(gpu, &view);
@@ -197,7 +197,7 @@ pub fn resolve(
     if !whole || of(sums) != of(&expected) {
         return Err(Error::Usage("the sums are of another scene, view or choice of options".into()));
     }
-    let kernels = Kernels::new(gpu, sources, &plan, options, facts.surfels)?;
+    let kernels = Kernels::new(sources, &plan, options, facts.surfels);
     let scene_wide = Uploaded { pages: Vec::new(), branches: Vec::new(), shared: shared(gpu, source, &plan.needs)? };
     let mut store = Store::new(gpu, scene_wide, &plan.needs)?;
     store.fit(gpu, &plan, &known)?;

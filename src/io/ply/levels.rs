@@ -10,12 +10,15 @@ use crate::io::{Format, Input, Points, Tree, TreeRow};
 use crate::scene::{Colors, Hierarchy, Up, Whole};
 use rayon::prelude::*;
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// What is read ahead of what was asked for, bytes: rows that lie nearer than that are read together.
-const AHEAD: usize = 1 << 18;
+/// Rows that lie nearer to each other, bytes, are read together with what is between them.
+const GAP: u64 = 1 << 14;
+
+/// What is read at once, bytes, where it is more than one piece.
+const SPAN: u64 = 1 << 20;
 
 /// Rows that a thread decodes at once.
 const TOGETHER: usize = 1 << 14;
@@ -27,7 +30,7 @@ const LARGEST: f64 = 1e30;
 ///
 /// When it is opened, where everything lies is checked against its length. Nodes and points are checked as they are read.
 pub struct Levels {
-    file: BufReader<File>,
+    file: File,
     path: PathBuf,
     vertex: Stretch,
     node: Stretch,
@@ -141,8 +144,7 @@ impl Levels {
             .iter()
             .map(|range| (start + u64::from(range.start) * size, u64::from(range.end - range.start) * size));
         let mut bytes = vec![0; (count * size) as usize];
-        let read = Pieces::new(&mut self.file, pieces).and_then(|mut pieces| pieces.read_exact(&mut bytes));
-        read.map_err(|error| Fault::Io(error).of(&self.path))?;
+        read_pieces(&mut self.file, pieces, &mut bytes).map_err(|error| Fault::Io(error).of(&self.path))?;
         let layout = Layout::of(&element).map_err(|fault| fault.of(&self.path))?;
         let made = |bytes: &[u8]| {
             let length = bytes.len() as u64;
@@ -156,7 +158,7 @@ impl Levels {
 }
 
 fn opened(file: File, length: u64, path: &Path) -> Result<Option<Levels>, Fault> {
-    let mut file = BufReader::with_capacity(AHEAD, file);
+    let mut file = BufReader::new(file);
     let header = header::read(&mut file)?;
     let comments = &header.comments;
     if header.encoding != Encoding::LittleEndian || comments.beside.is_some() {
@@ -200,41 +202,39 @@ fn opened(file: File, length: u64, path: &Path) -> Result<Option<Levels>, Fault>
         return Ok(None);
     }
     let (up, closed, unsided) = (comments.up, comments.closed, comments.unsided);
+    let file = file.into_inner();
     Ok(Some(Levels { file, path: path.to_owned(), vertex, node, whole, up, closed, unsided }))
 }
 
-/// Pieces of a file one after the other.
-struct Pieces<'a, I> {
-    file: &'a mut BufReader<File>,
-    /// Where each starts, and its bytes.
-    pieces: I,
-    /// Bytes from the file's start.
-    at: u64,
-    /// Bytes of this one.
-    left: u64,
-}
-
-impl<'a, I: Iterator<Item = (u64, u64)>> Pieces<'a, I> {
-    fn new(file: &'a mut BufReader<File>, pieces: I) -> io::Result<Self> {
-        let at = file.stream_position()?;
-        Ok(Self { file, pieces, at, left: 0 })
-    }
-}
-
-impl<I: Iterator<Item = (u64, u64)>> Read for Pieces<'_, I> {
-    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-        while self.left == 0 {
-            let Some((start, bytes)) = self.pieces.next() else { return Ok(0) };
-            // What is in the buffer stays there.
-            self.file.seek_relative(start as i64 - self.at as i64)?;
-            (self.at, self.left) = (start, bytes);
+/// Reads pieces of a file, each of which starts where it says and has so many bytes, one after the other `into` as many.
+fn read_pieces(file: &mut File, pieces: impl Iterator<Item = (u64, u64)>, mut into: &mut [u8]) -> io::Result<()> {
+    let mut together: Vec<(u64, u64)> = Vec::new();
+    let mut span = Vec::new();
+    let mut read = |together: &mut Vec<(u64, u64)>| {
+        let (Some(&(start, _)), Some(&(last, bytes))) = (together.first(), together.last()) else { return Ok(()) };
+        file.seek(SeekFrom::Start(start))?;
+        if let [_] = together[..] {
+            // Most of what is read lies in few pieces, which need no copy.
+            file.read_exact(into.split_off_mut(..bytes as usize).unwrap_or_default())?;
+        } else {
+            span.resize((last + bytes - start) as usize, 0);
+            file.read_exact(&mut span)?;
+            for (piece, bytes) in together.iter() {
+                let from = (piece - start) as usize;
+                let piece = &span[from..from + *bytes as usize];
+                into.split_off_mut(..piece.len()).unwrap_or_default().copy_from_slice(piece);
+            }
         }
-        let most = into.len().min(usize::try_from(self.left).unwrap_or(usize::MAX));
-        let available = self.file.fill_buf()?;
-        let count = most.min(available.len());
-        into[..count].copy_from_slice(&available[..count]);
-        self.file.consume(count);
-        (self.at, self.left) = (self.at + count as u64, self.left - count as u64);
-        Ok(count)
+        together.clear();
+        Ok(())
+    };
+    for (start, bytes) in pieces {
+        let near = |&(last, length): &(u64, u64)| (last + length..last + length + GAP).contains(&start);
+        let whole = |all: &[(u64, u64)]| all.first().is_some_and(|(first, _)| start + bytes - first > SPAN);
+        if !together.last().is_some_and(near) || whole(&together) {
+            read(&mut together)?;
+        }
+        together.push((start, bytes));
     }
+    read(&mut together)
 }

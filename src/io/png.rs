@@ -8,7 +8,8 @@ use super::atomic::write_whole;
 use super::{Texture, image};
 use crate::error::Result;
 use crate::frame::Frame;
-use crate::scene::color::{linear_to_srgb, srgb_to_linear};
+use crate::scene::color::{srgb_to_linear, srgb8};
+use rayon::prelude::*;
 
 /// Writes the colour; values are clamped to [0, 1].
 pub fn write(path: &Path, frame: &Frame) -> Result<()> {
@@ -29,12 +30,7 @@ pub fn write_texture(path: &Path, texture: &Texture) -> Result<()> {
 
 /// Linear colours as sRGB codes, four bytes each.
 pub(crate) fn srgb_bytes(color: &[[f32; 4]]) -> Vec<u8> {
-    let byte = |v: f64| (v * 255.0).round() as u8;
-    let codes = |&[r, g, b, a]: &[f32; 4]| {
-        let [r, g, b] = [r, g, b].map(|c| byte(linear_to_srgb(c.into())));
-        [r, g, b, byte(f64::from(a).clamp(0.0, 1.0))]
-    };
-    color.iter().flat_map(codes).collect()
+    color.par_iter().copied().map(srgb8).collect::<Vec<_>>().into_flattened()
 }
 
 /// Encodes four bytes a pixel.

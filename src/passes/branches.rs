@@ -7,6 +7,8 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use crate::gpu::layout::{INNER, KIND_SHIFT, LEAF, OTHER_BRANCH, PART_OF_LEAF, TreeNode};
 use crate::scene::hierarchy::{Hierarchy, Node};
 
@@ -65,12 +67,11 @@ fn parts(number: u32, node: &Node) -> impl Iterator<Item = Item> + use<> {
 
 /// The branches of a tree, each of at most `most` surfels and nodes together, if that is a few thousand or more.
 pub fn branches(tree: &Hierarchy, most: u64) -> Vec<Branch> {
-    let sizes = sizes(tree);
-    let all = sizes.first().map_or(0..0, |_| 0..surfels_below(tree));
-    if sizes.first().is_none_or(|size| *size <= most) {
-        return vec![Branch { whole: true, ..laid_out(tree, vec![Item::Node(0)], all, |_| None) }];
+    let (rows, surfels) = rows_of(tree);
+    if rows <= most {
+        return vec![Branch { whole: true, ..laid_out(tree, vec![Item::Node(0)], 0..surfels, |_| None) }];
     }
-    let subtrees = subtrees(tree, &sizes, most);
+    let subtrees = subtrees(tree, &sizes(tree), most);
     let mut roots: HashMap<u32, Elsewhere> = HashMap::new();
     for (root, (item, ..)) in (0..).zip(&subtrees) {
         let (node, in_parts) = match *item {
@@ -96,9 +97,14 @@ pub fn branches(tree: &Hierarchy, most: u64) -> Vec<Branch> {
     all
 }
 
-/// Surfels below the root.
-fn surfels_below(tree: &Hierarchy) -> u32 {
-    tree.nodes.iter().filter(|node| node.leaf).map(|node| node.count).sum()
+/// Rows and surfels of a tree.
+fn rows_of(tree: &Hierarchy) -> (u64, u32) {
+    let of = |(number, node): (usize, &Node)| {
+        let surfels = if node.leaf { node.count } else { 0 };
+        (1 + u64::from(surfels) + parts(number as u32, node).count() as u64, surfels)
+    };
+    let sum = |(a, b): (u64, u32), (c, d): (u64, u32)| (a + c, b + d);
+    tree.nodes.par_iter().enumerate().with_min_len(4096).map(of).reduce(|| (0, 0), sum)
 }
 
 /// How many surfels and rows are below each node, itself with them.
@@ -159,6 +165,11 @@ fn laid_out(
 ) -> Branch {
     let roots = items.len() as u32;
     let (mut nodes, mut numbers) = (Vec::new(), Vec::new());
+    if roots == 1 {
+        items.reserve(tree.nodes.len());
+        nodes.reserve(tree.nodes.len());
+        numbers.reserve(tree.nodes.len());
+    }
     let (mut levels, mut level_end) = (0, 0);
     while nodes.len() < items.len() {
         if nodes.len() == level_end {

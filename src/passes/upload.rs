@@ -107,7 +107,7 @@ fn page(gpu: &Gpu, of: &dyn source::Page, needs: &SceneNeeds, progress: &dyn Pro
     let records = records_of(gpu, (of, numbers.len()), (words, 0), progress)?;
     let mut buffers: Named = RECORDS.into_iter().zip(records).collect();
     let batches = of.balls();
-    let balls = Buffer::storage(gpu, "batches", batches.len() as u64)?;
+    let balls = Buffer::writable(gpu, "batches", batches.len() as u64)?;
     balls.write(gpu, batches.len(), |range| batches[range].into(), &())?;
     buffers.push(("balls", balls.words()));
     Ok(Page { buffers, numbers, stand_for: of.stand_for() })
@@ -123,11 +123,11 @@ fn records_of(
     (words, behind): (usize, usize),
     progress: &dyn Progress,
 ) -> Result<Vec<Buffer<u32>>> {
-    let surfels = Buffer::storage(gpu, "surfels", count as u64)?;
+    let surfels = Buffer::writable(gpu, "surfels", count as u64)?;
     surfels.write(gpu, count, |range| of.surfels(range).into(), progress)?;
     let mut buffers = vec![surfels.words()];
     if words + behind > 0 {
-        let attributes = Buffer::storage(gpu, "attributes", (count * words + behind) as u64)?;
+        let attributes = Buffer::writable(gpu, "attributes", (count * words + behind) as u64)?;
         // Of whole records, in which a range of words may start and end anywhere.
         let values = |range: Range<usize>| {
             let mut values = of.attributes(range.start / words..range.end.div_ceil(words));
@@ -182,7 +182,7 @@ fn of_triangles(gpu: &Gpu, triangles: &Triangles, mesh: &MeshNeeds, textures: u3
 
 /// A buffer that is `what`, of `words`.
 fn filled(gpu: &Gpu, what: &str, words: &[u32]) -> Result<Buffer<u32>> {
-    let buffer = Buffer::storage(gpu, what, words.len() as u64)?;
+    let buffer = Buffer::writable(gpu, what, words.len() as u64)?;
     buffer.write(gpu, words.len(), |range| words[range].into(), &())?;
     Ok(buffer)
 }

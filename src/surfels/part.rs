@@ -6,8 +6,6 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
 use super::complete;
 use crate::io::Points;
 use crate::io::ply::Levels;
@@ -74,6 +72,10 @@ fn grown(
     fits: impl Fn(&Taken) -> Result<()>,
     progress: &dyn Progress,
 ) -> Result<(Hierarchy, Taken)> {
+    let judged = |nodes: Hierarchy| {
+        let divided: Vec<bool> = (0..nodes.nodes.len() as u32).map(|index| may_be_divided(&nodes, index)).collect();
+        (nodes, divided)
+    };
     let (mut tree, mut taken) = (Hierarchy::default(), Taken { nodes: 0, surfels: 0, bytes: 0 });
     // Those of a level, by their numbers in the file, which ascend.
     let mut numbers: Vec<Range<u32>> = std::iter::once(0..1).collect();
@@ -82,13 +84,12 @@ fn grown(
         let place = tree.nodes.len() + numbers.iter().map(Range::len).sum::<usize>();
         let mut below = Below { numbers: Vec::new(), reached: last.end, place: place as u32, surfels: 0 };
         for block in blocks(&numbers) {
-            let nodes = levels.nodes(&block)?;
-            let judged = (0..nodes.nodes.len() as u32).into_par_iter().with_min_len(256);
-            let divided: Vec<bool> = judged.map(|index| may_be_divided(&nodes, index)).collect();
-            progress.advance(divided.len() as u64);
-            taken.nodes += divided.len() as u64;
-            let added = below.append(&mut tree, nodes, &divided);
-            added.ok_or_else(|| levels.malformed("its levels of detail (element node) are no tree"))?;
+            for (nodes, divided) in levels.nodes(&block, judged)? {
+                progress.advance(divided.len() as u64);
+                taken.nodes += divided.len() as u64;
+                let added = below.append(&mut tree, nodes, &divided);
+                added.ok_or_else(|| levels.malformed("its levels of detail (element node) are no tree"))?;
+            }
             fits(&Taken { surfels: taken.surfels + below.surfels, ..taken })?;
         }
         taken.surfels += below.surfels;

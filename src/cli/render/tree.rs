@@ -3,6 +3,7 @@
 use epsplat::io::ply::Levels;
 use epsplat::plan::RenderOptions;
 use epsplat::render::taken;
+use epsplat::scene::hierarchy::Node;
 use epsplat::scene::{Camera, Scene, Surfel};
 use epsplat::surfels::part::{Taken, nothing};
 use epsplat::surfels::{Limits, Preparation};
@@ -48,9 +49,9 @@ impl Tree {
             return Ok(None);
         };
         let coarsest = 0..levels.whole.nodes.min(OVERVIEW);
-        let nodes = levels.nodes(std::slice::from_ref(&coarsest))?;
+        let nodes: Vec<Node> = levels.nodes(std::slice::from_ref(&coarsest), |part| part.nodes)?.concat();
         // Those that stand for what is not here.
-        let lowest = nodes.nodes.iter().filter(|node| node.leaf || node.first as usize >= nodes.nodes.len());
+        let lowest = nodes.iter().filter(|node| node.leaf || node.first as usize >= nodes.len());
         // Nodes reach past what is below them, and few of them farther than a margin of the view.
         let surfels = lowest.map(|node| Surfel { s: [0.0; 3], t: [0.0; 3], ..node.surfel }).collect();
         let overview = Scene { surfels, ..nothing(&levels) };

@@ -21,7 +21,7 @@ const GAP: u64 = 1 << 14;
 const SPAN: u64 = 1 << 20;
 
 /// Rows that a thread decodes at once.
-const TOGETHER: usize = 1 << 14;
+const TOGETHER: usize = 1 << 12;
 
 /// Numbers of places and ranges are no larger.
 const LARGEST: f64 = 1e30;
@@ -34,6 +34,8 @@ pub struct Levels {
     path: PathBuf,
     vertex: Stretch,
     node: Stretch,
+    /// Rows as they were read last: room for the next ones.
+    bytes: Vec<u8>,
     /// What it says of all points together.
     pub whole: Whole,
     /// Which way it says is up.
@@ -83,27 +85,18 @@ impl Levels {
         Fault::Malformed(what.into()).of(&self.path)
     }
 
-    /// The nodes of these ranges of numbers, which ascend.
+    /// What `of` makes of the nodes of these ranges of numbers, which ascend, in parts.
     ///
     /// # Errors
     ///
     /// [`Error::Read`](crate::Error::Read), or [`Error::Malformed`](crate::Error::Malformed) where a node has no place or extent, or the ranges are no nodes.
-    pub fn nodes(&mut self, numbers: &[Range<u32>]) -> Result<Hierarchy> {
+    pub fn nodes<T: Send>(&mut self, numbers: &[Range<u32>], of: impl Fn(Hierarchy) -> T + Sync) -> Result<Vec<T>> {
         let origin = self.whole.origin;
-        let parts = self.read(
-            numbers,
-            |levels| &levels.node,
-            |points, rows| {
-                let nodes = Tree { nodes: Box::new(points), rows }.hierarchy(origin);
-                nodes.ok_or("a node of its levels of detail has no place, no extent or no colour")
-            },
-        )?;
-        let mut all = Hierarchy::default();
-        for mut part in parts {
-            all.nodes.append(&mut part.nodes);
-            all.low.append(&mut part.low);
-        }
-        Ok(all)
+        let made = |points: Points, rows: Vec<TreeRow>| {
+            let nodes = Tree { nodes: Box::new(points), rows }.hierarchy(origin);
+            nodes.map(&of).ok_or("a node of its levels of detail has no place, no extent or no colour")
+        };
+        self.read(numbers, |levels| &levels.node, made)
     }
 
     /// What `of` makes of the points of these ranges of numbers, which ascend, in parts, or what is wrong with these.
@@ -143,7 +136,8 @@ impl Levels {
         let pieces = numbers
             .iter()
             .map(|range| (start + u64::from(range.start) * size, u64::from(range.end - range.start) * size));
-        let mut bytes = vec![0; (count * size) as usize];
+        let mut bytes = std::mem::take(&mut self.bytes);
+        bytes.resize((count * size) as usize, 0);
         read_pieces(&mut self.file, pieces, &mut bytes).map_err(|error| Fault::Io(error).of(&self.path))?;
         let layout = Layout::of(&element).map_err(|fault| fault.of(&self.path))?;
         let made = |bytes: &[u8]| {
@@ -153,6 +147,7 @@ impl Levels {
             of(points, rows).map_err(|what| Fault::Malformed(what.into()))
         };
         let parts: Result<Vec<T>, Fault> = bytes.par_chunks(TOGETHER * size as usize).map(made).collect();
+        self.bytes = bytes;
         parts.map_err(|fault| fault.of(&self.path))
     }
 }
@@ -203,7 +198,7 @@ fn opened(file: File, length: u64, path: &Path) -> Result<Option<Levels>, Fault>
     }
     let (up, closed, unsided) = (comments.up, comments.closed, comments.unsided);
     let file = file.into_inner();
-    Ok(Some(Levels { file, path: path.to_owned(), vertex, node, whole, up, closed, unsided }))
+    Ok(Some(Levels { file, path: path.to_owned(), vertex, node, bytes: Vec::new(), whole, up, closed, unsided }))
 }
 
 /// Reads pieces of a file, each of which starts where it says and has so many bytes, one after the other `into` as many.

@@ -15,10 +15,10 @@ use crate::{Progress, Result};
 ///
 /// [`Error::Read`](crate::Error::Read) and [`Error::Malformed`](crate::Error::Malformed) of the file, and whatever `fits` says of how much is taken so far.
 pub fn taken(
-    levels: &mut Levels,
+    levels: &Levels,
     camera: &Camera,
     options: &RenderOptions,
-    fits: impl Fn(&Taken) -> Result<()>,
+    fits: impl Fn(&Taken) -> Result<()> + Sync,
     progress: &dyn Progress,
 ) -> Result<(Scene, Taken)> {
     let (facts, origin) = (Facts::of(&part::nothing(levels)), levels.whole.origin);

@@ -14,7 +14,7 @@ use crate::scene::hierarchy::{DEEPEST, FAN_OUT, Hierarchy, Node};
 use crate::{Progress, Result};
 
 /// Nodes or points that are read at once: what is made of them on the way takes no more memory.
-const BLOCK: u32 = 1 << 18;
+const BLOCK: u32 = 1 << 16;
 
 /// How much of a file a part is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,9 +48,9 @@ pub fn nothing(levels: &Levels) -> Scene {
 ///
 /// [`Error::Read`](crate::Error::Read) and [`Error::Malformed`](crate::Error::Malformed) of the file, and whatever `fits` says of how much is taken so far.
 pub fn part(
-    levels: &mut Levels,
+    levels: &Levels,
     may_be_divided: impl Fn(&Hierarchy, u32) -> bool + Sync,
-    fits: impl Fn(&Taken) -> Result<()>,
+    fits: impl Fn(&Taken) -> Result<()> + Sync,
     progress: &dyn Progress,
 ) -> Result<(Scene, Taken)> {
     progress.begin("reading levels of detail", 0);
@@ -67,9 +67,9 @@ pub fn part(
 
 /// The nodes of a part, of which leaves name surfels of the file, and how much it is.
 fn grown(
-    levels: &mut Levels,
+    levels: &Levels,
     may_be_divided: impl Fn(&Hierarchy, u32) -> bool + Sync,
-    fits: impl Fn(&Taken) -> Result<()>,
+    fits: impl Fn(&Taken) -> Result<()> + Sync,
     progress: &dyn Progress,
 ) -> Result<(Hierarchy, Taken)> {
     let judged = |nodes: Hierarchy| {
@@ -83,15 +83,16 @@ fn grown(
         let Some(last) = numbers.last() else { break };
         let place = tree.nodes.len() + numbers.iter().map(Range::len).sum::<usize>();
         let mut below = Below { numbers: Vec::new(), reached: last.end, place: place as u32, surfels: 0 };
-        for block in blocks(&numbers) {
-            for (nodes, divided) in levels.nodes(&block, judged)? {
+        let append = |parts: Vec<(Hierarchy, Vec<bool>)>| {
+            for (nodes, divided) in parts {
                 progress.advance(divided.len() as u64);
                 taken.nodes += divided.len() as u64;
                 let added = below.append(&mut tree, nodes, &divided);
                 added.ok_or_else(|| levels.malformed("its levels of detail (element node) are no tree"))?;
             }
-            fits(&Taken { surfels: taken.surfels + below.surfels, ..taken })?;
-        }
+            fits(&Taken { surfels: taken.surfels + below.surfels, ..taken })
+        };
+        in_blocks(levels, &numbers, judged, append)?;
         taken.surfels += below.surfels;
         numbers = below.numbers;
     }
@@ -100,6 +101,30 @@ fn grown(
     }
     taken.bytes = levels.bytes(taken.surfels, taken.nodes);
     Ok((tree, taken))
+}
+
+/// Hands what `made` makes of the nodes of these numbers to `append`, block by block: while one is decoded the one before it is appended, and the next
+/// one is read.
+fn in_blocks<T: Send>(
+    levels: &Levels,
+    numbers: &[Range<u32>],
+    made: impl Fn(Hierarchy) -> T + Sync,
+    mut append: impl FnMut(Vec<T>) -> Result<()> + Send,
+) -> Result<()> {
+    let blocks = blocks(numbers);
+    let mut next = blocks.iter();
+    let mut read_next = |rows: &mut Vec<u8>| next.next().map_or(Ok(()), |block| levels.read_nodes(block, rows));
+    let (mut rows, mut next_rows, mut decoded) = (Vec::new(), Vec::new(), Vec::new());
+    read_next(&mut rows)?;
+    for _ in &blocks {
+        let before = std::mem::take(&mut decoded);
+        let others = || append(before).and_then(|()| read_next(&mut next_rows));
+        let (these, others) = rayon::join(|| levels.nodes(&rows, &made), others);
+        others?;
+        decoded = these?;
+        std::mem::swap(&mut rows, &mut next_rows);
+    }
+    append(decoded)
 }
 
 /// What is below a level.
@@ -195,7 +220,7 @@ fn in_order(tree: &mut Hierarchy) -> Option<Vec<Range<u32>>> {
 }
 
 /// The surfels of these numbers and the tree over them.
-fn scene(levels: &mut Levels, numbers: &[Range<u32>], tree: Hierarchy, progress: &dyn Progress) -> Result<Scene> {
+fn scene(levels: &Levels, numbers: &[Range<u32>], tree: Hierarchy, progress: &dyn Progress) -> Result<Scene> {
     let whole = levels.whole;
     let empty = Scene { part_of: None, colors: levels.no_colors(), ..nothing(levels) };
     let mut scene = Scene { hierarchy: Some(Arc::new(tree)), ..empty.clone() };

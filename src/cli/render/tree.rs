@@ -45,11 +45,13 @@ impl Tree {
                     .into(),
             ));
         }
-        let Some(mut levels) = levels.filter(|levels| bounded || levels.whole.surfels >= FEWEST) else {
+        let Some(levels) = levels.filter(|levels| bounded || levels.whole.surfels >= FEWEST) else {
             return Ok(None);
         };
         let coarsest = 0..levels.whole.nodes.min(OVERVIEW);
-        let nodes: Vec<Node> = levels.nodes(std::slice::from_ref(&coarsest), |part| part.nodes)?.concat();
+        let mut rows = Vec::new();
+        levels.read_nodes(std::slice::from_ref(&coarsest), &mut rows)?;
+        let nodes: Vec<Node> = levels.nodes(&rows, |part| part.nodes)?.concat();
         // Those that stand for what is not here.
         let lowest = nodes.iter().filter(|node| node.leaf || node.first as usize >= nodes.len());
         // Nodes reach past what is below them, and few of them farther than a margin of the view.
@@ -67,7 +69,7 @@ impl Tree {
         progress: &dyn Progress,
     ) -> Result<Part> {
         let fits = |taken: &Taken| memory.as_ref().map_or(Ok(()), |memory| memory.fits(taken));
-        let (scene, read) = taken(&mut self.levels, camera, options, fits, progress)?;
+        let (scene, read) = taken(&self.levels, camera, options, fits, progress)?;
         let (nodes, surfels) = (self.levels.whole.nodes.into(), self.levels.whole.surfels.into());
         let preparation = Preparation { points: surfels, surfels, ..Preparation::default() };
         let read = Read {

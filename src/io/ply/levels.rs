@@ -34,8 +34,6 @@ pub struct Levels {
     path: PathBuf,
     vertex: Stretch,
     node: Stretch,
-    /// Rows as they were read last: room for the next ones.
-    bytes: Vec<u8>,
     /// What it says of all points together.
     pub whole: Whole,
     /// Which way it says is up.
@@ -85,18 +83,27 @@ impl Levels {
         Fault::Malformed(what.into()).of(&self.path)
     }
 
-    /// What `of` makes of the nodes of these ranges of numbers, which ascend, in parts.
+    /// Reads the rows of the nodes of these ranges of numbers, which ascend, in place of those that are there.
     ///
     /// # Errors
     ///
-    /// [`Error::Read`](crate::Error::Read), or [`Error::Malformed`](crate::Error::Malformed) where a node has no place or extent, or the ranges are no nodes.
-    pub fn nodes<T: Send>(&mut self, numbers: &[Range<u32>], of: impl Fn(Hierarchy) -> T + Sync) -> Result<Vec<T>> {
+    /// [`Error::Read`](crate::Error::Read), or [`Error::Malformed`](crate::Error::Malformed) where the ranges are no nodes.
+    pub fn read_nodes(&self, numbers: &[Range<u32>], rows: &mut Vec<u8>) -> Result<()> {
+        self.read(numbers, &self.node, rows)
+    }
+
+    /// What `of` makes of the nodes of rows, in parts.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Malformed`](crate::Error::Malformed) where a node has no place or extent.
+    pub fn nodes<T: Send>(&self, rows: &[u8], of: impl Fn(Hierarchy) -> T + Sync) -> Result<Vec<T>> {
         let origin = self.whole.origin;
         let made = |points: Points, rows: Vec<TreeRow>| {
             let nodes = Tree { nodes: Box::new(points), rows }.hierarchy(origin);
             nodes.map(&of).ok_or("a node of its levels of detail has no place, no extent or no colour")
         };
-        self.read(numbers, |levels| &levels.node, made)
+        self.made(rows, &self.node, made)
     }
 
     /// What `of` makes of the points of these ranges of numbers, which ascend, in parts, or what is wrong with these.
@@ -105,11 +112,13 @@ impl Levels {
     ///
     /// [`Error::Read`](crate::Error::Read), or [`Error::Malformed`](crate::Error::Malformed) where something is wrong, or the ranges are no points.
     pub fn points<T: Send>(
-        &mut self,
+        &self,
         numbers: &[Range<u32>],
         of: impl Fn(Points) -> Result<T, &'static str> + Sync,
     ) -> Result<Vec<T>> {
-        self.read(numbers, |levels| &levels.vertex, |points, _| of(points))
+        let mut rows = Vec::new();
+        self.read(numbers, &self.vertex, &mut rows)?;
+        self.made(&rows, &self.vertex, |points, _| of(points))
     }
 
     /// Colours as points have them, of none.
@@ -118,36 +127,34 @@ impl Levels {
         none.ok().and_then(|(points, _)| points.colors).unwrap_or_default()
     }
 
-    /// What all threads make of rows that are read at once.
-    fn read<T: Send>(
-        &mut self,
-        numbers: &[Range<u32>],
-        stretch: impl Fn(&Self) -> &Stretch,
-        of: impl Fn(Points, Vec<TreeRow>) -> Result<T, &'static str> + Sync,
-    ) -> Result<Vec<T>> {
-        let Stretch { element, start, size } = stretch(self);
-        let (start, size) = (*start, *size);
+    /// Reads the rows of these numbers.
+    fn read(&self, numbers: &[Range<u32>], stretch: &Stretch, rows: &mut Vec<u8>) -> Result<()> {
+        let Stretch { element, start, size } = stretch;
         let inside = numbers.iter().all(|range| range.start <= range.end && u64::from(range.end) <= element.count);
         if !inside {
             return Err(self.malformed("a node of its levels of detail names what does not exist"));
         }
-        let count: u64 = numbers.iter().map(|range| u64::from(range.end - range.start)).sum();
-        let element = element.clone();
-        let pieces = numbers
-            .iter()
-            .map(|range| (start + u64::from(range.start) * size, u64::from(range.end - range.start) * size));
-        let mut bytes = std::mem::take(&mut self.bytes);
-        bytes.resize((count * size) as usize, 0);
-        read_pieces(&mut self.file, pieces, &mut bytes).map_err(|error| Fault::Io(error).of(&self.path))?;
-        let layout = Layout::of(&element).map_err(|fault| fault.of(&self.path))?;
+        let bytes = |range: &Range<u32>| u64::from(range.end - range.start) * size;
+        let pieces = numbers.iter().map(|range| (start + u64::from(range.start) * size, bytes(range)));
+        rows.resize(numbers.iter().map(bytes).sum::<u64>() as usize, 0);
+        read_pieces(&self.file, pieces, rows).map_err(|error| Fault::Io(error).of(&self.path))
+    }
+
+    /// What all threads make of rows.
+    fn made<T: Send>(
+        &self,
+        rows: &[u8],
+        Stretch { element, size, .. }: &Stretch,
+        of: impl Fn(Points, Vec<TreeRow>) -> Result<T, &'static str> + Sync,
+    ) -> Result<Vec<T>> {
+        let layout = Layout::of(element).map_err(|fault| fault.of(&self.path))?;
         let made = |bytes: &[u8]| {
             let length = bytes.len() as u64;
             let element = Element { count: length / size, ..element.clone() };
             let (points, rows) = binary::vertices_in::<false>(bytes, &element, &layout, length, &())?;
             of(points, rows).map_err(|what| Fault::Malformed(what.into()))
         };
-        let parts: Result<Vec<T>, Fault> = bytes.par_chunks(TOGETHER * size as usize).map(made).collect();
-        self.bytes = bytes;
+        let parts: Result<Vec<T>, Fault> = rows.par_chunks(TOGETHER * *size as usize).map(made).collect();
         parts.map_err(|fault| fault.of(&self.path))
     }
 }
@@ -198,11 +205,11 @@ fn opened(file: File, length: u64, path: &Path) -> Result<Option<Levels>, Fault>
     }
     let (up, closed, unsided) = (comments.up, comments.closed, comments.unsided);
     let file = file.into_inner();
-    Ok(Some(Levels { file, path: path.to_owned(), vertex, node, bytes: Vec::new(), whole, up, closed, unsided }))
+    Ok(Some(Levels { file, path: path.to_owned(), vertex, node, whole, up, closed, unsided }))
 }
 
 /// Reads pieces of a file, each of which starts where it says and has so many bytes, one after the other `into` as many.
-fn read_pieces(file: &mut File, pieces: impl Iterator<Item = (u64, u64)>, mut into: &mut [u8]) -> io::Result<()> {
+fn read_pieces(mut file: &File, pieces: impl Iterator<Item = (u64, u64)>, mut into: &mut [u8]) -> io::Result<()> {
     let mut together: Vec<(u64, u64)> = Vec::new();
     let mut span = Vec::new();
     let mut read = |together: &mut Vec<(u64, u64)>| {

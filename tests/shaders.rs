@@ -82,9 +82,9 @@ fn every_combination_is_valid_with_its_accumulators_features_and_no_others() {
         };
         let drawn = drawn.iter().chain(of_mesh).copied();
         let own: BTreeSet<&str> = kernels.iter().map(|kernel| kernel.name).chain(drawn).collect();
-        // Of a render by tiles each module has entry points that only the other needs; weights by depth need no visibility pass.
+        // Of a render by tiles or of a cut each module has entry points that only the other needs; weights by depth need no visibility pass.
         let shared = entries.difference(&own).count();
-        let leaves = made.of_tiles() || needs.gather || needs.oit == Some(Oit::Weighted);
+        let leaves = made.of_tiles() || needs.levels || needs.gather || needs.oit == Some(Oit::Weighted);
         assert!(own.is_subset(&entries) && (shared == 0) != leaves, "{entries:?}");
         for (_, variable) in module.global_variables.iter().filter(|(_, v)| v.binding.is_some()) {
             let buffer = matches!(variable.space, AddressSpace::Uniform | AddressSpace::Storage { .. });

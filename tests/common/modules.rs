@@ -7,6 +7,7 @@ use epsplat::gpu::Sources;
 use epsplat::gpu::kernel::reflect;
 use epsplat::gpu::program::Bindings;
 use epsplat::passes::modules;
+use epsplat::passes::select::CHOOSING;
 use epsplat::plan::SceneNeeds;
 use epsplat::plan::pass::Module;
 use epsplat::plan::steps::Kernel;
@@ -61,6 +62,8 @@ static ALL: LazyLock<All> = LazyLock::new(|| {
                 texts.push(sources.join(&files));
                 texts.len() - 1
             });
+            // What chooses a cut is made before that is known.
+            let needs = if kernels == CHOOSING { needs.before_cut() } else { needs };
             made.push(Made { needs, files, kernels, text });
         }
     }

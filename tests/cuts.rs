@@ -13,10 +13,11 @@ use epsplat::gpu::layout::View;
 use epsplat::gpu::sources::FILES;
 use epsplat::gpu::{Gpu, Sources};
 use epsplat::inspect::evaluate;
-use epsplat::plan::RenderOptions;
+use epsplat::plan::{Raster, RasterDepth, RenderOptions};
 use epsplat::render::{Backend, Renderer, render};
 use epsplat::scene::{
-    Camera, Clip, Colors, Composite, Cull, Detail, DetailMeasure, Lens, Map, Maps, Projection, Samples, Scene, Up,
+    Camera, Clip, Colors, Composite, Cull, Detail, DetailMeasure, Epsilon, Lens, Map, Maps, Projection, Samples, Scene,
+    Up,
 };
 use glam::DVec3;
 
@@ -165,6 +166,15 @@ fn cuts_are_composited_and_rasterised() {
     let disks = RenderOptions { raster: None, detail_caps: false, ..raster.clone() };
     let reference = frame(&scene, &camera, &disks, &Backend::Reference);
     assert!(differ(&frame(&scene, &camera, &raster, &own), &reference) < 5);
+    // By its own depths, moved by the radius of each surfel, it draws the twin's cut as it draws that alone.
+    let moved = Raster { depth: RasterDepth::Offset, ..Raster::default() };
+    let moved = RenderOptions { raster: Some(moved), epsilon: Epsilon::Radius(1.0), ..at(100.0) };
+    let (twins, flat) = cut(&scene, &camera, &moved);
+    let alone = frame(&twins, &camera, &flat, &own);
+    let by_slots = Sources::default().replace("raster_offset.wgsl", "surfel_of(index)", "index").unwrap();
+    let by_slots = Backend::Gpu { gpu: Box::new(common::gpu().unwrap()), sources: by_slots };
+    let [right, wrong] = [&own, &by_slots].map(|backend| differ(&frame(&scene, &camera, &moved, backend), &alone));
+    assert!(right < 5 && wrong > 10, "{right} {wrong}");
 }
 
 /// Pixels whose colours are not nearly the same.
@@ -338,7 +348,7 @@ fn dealt(gpu: &Gpu, text: &str, inputs: &[[u32; 4]]) -> Vec<u32> {
             let index = linear_index(workgroup, workgroups, local);
             if (index < arrayLength(&inputs)) {
                 let given = inputs[index];
-                own = Page(given.w, 0u, given.x, given.y, 0u);
+                own = Page(given.w, 0u, given.x, given.y, 0u, 0u, 0u, 0u);
                 outputs[index] = drawn_at(given.z);
             }
         }

@@ -38,7 +38,7 @@ fn whole(path: &Path) -> Scene {
 }
 
 fn part(path: &Path, camera: &Camera, options: &RenderOptions) -> Result<(Scene, Taken)> {
-    taken(&mut opened(path), camera, options, |_| Ok(()), &())
+    taken(&opened(path), camera, options, |_| Ok(()), &())
 }
 
 /// Spheres in what a file may have: far from the origin, in one colour, in codes, in light, with lines, with normals, with trailing parts.
@@ -217,7 +217,7 @@ fn a_part_may_not_fit() {
     let (_, taken) = part(&path, &camera, &options).unwrap();
     let limited = |most: u64| {
         let fits = |taken: &Taken| if taken.nodes <= most { Ok(()) } else { Err(Error::Usage("too much".into())) };
-        epsplat::render::taken(&mut opened(&path), &camera, &options, fits, &()).map(|(_, taken)| taken)
+        epsplat::render::taken(&opened(&path), &camera, &options, fits, &()).map(|(_, taken)| taken)
     };
     assert_eq!(limited(taken.nodes).unwrap(), taken);
     assert!(matches!(limited(taken.nodes - 1), Err(Error::Usage(_))));
@@ -243,7 +243,7 @@ fn damaged_files_are_told() {
         let other = folder.path().join("damaged.ply");
         std::fs::write(&other, bytes).unwrap();
         let opened = Levels::open(Input::open(&other, None).unwrap());
-        opened.and_then(|levels| taken(&mut levels.unwrap(), &camera, &options, |_| Ok(()), &()))
+        opened.and_then(|levels| taken(&levels.unwrap(), &camera, &options, |_| Ok(()), &()))
     };
     let told = |at: usize, with: &[u8], what: &str| match damaged(at, with) {
         Err(Error::Malformed { what: said, .. }) => assert!(said.contains(what), "{said}"),

@@ -103,6 +103,9 @@ struct Page {
     stride: u32,
     // And where in the attributes of its branch what is chosen starts.
     chosen: u32,
+    padding_0: u32,
+    padding_1: u32,
+    padding_2: u32,
 }
 
 // A node of a tree, or one that has a part of a leaf's surfels.
@@ -128,6 +131,9 @@ struct Branch {
     whole: u32,
     // Where behind its attributes what is chosen starts.
     chosen: u32,
+    padding_0: u32,
+    padding_1: u32,
+    padding_2: u32,
 }
 
 const AWAY: u32 = 0x80000000u;

@@ -12,7 +12,7 @@ fn corner_depth(splat: Splat, image: vec2<f32>, index: u32) -> f32 {
     if (!MOVED) {
         return depth_order(z);
     }
-    return depth_order(farthest_shown(z, radius_of(index), image));
+    return depth_order(farthest_shown(z, radius_of(surfel_of(index)), image));
 }
 
 @fragment

@@ -1,5 +1,5 @@
-// Stage 0 of cuts of which hidden batches are left out (cull.wgsl): the ball of each batch of what was chosen (select.wgsl). Twin: ball in
-// src/passes/cull.rs.
+// Stage 0 of cuts of which hidden batches are left out (cull.wgsl): the ball of each batch of what was chosen (select.wgsl). As ball in
+// src/passes/cull.rs, but for the middle.
 // All loops end, by 1 of src/gpu/loops.rs: 0x52ecbba18d550e06
 
 @group(0) @binding(85) var<storage, read_write> made_balls: array<vec4<f32>>;

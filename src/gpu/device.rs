@@ -14,7 +14,7 @@ const OPTIONAL_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
     .union(wgpu::Features::SUBGROUP)
     .union(wgpu::Features::FLOAT32_BLENDABLE);
 
-/// Of an adapter whose memory is the host's the host reads buffers where they lie; a card's would then have them in slow memory.
+/// Of an adapter whose memory is the host's the host reads and writes buffers where they lie; a card's would then have them in slow memory.
 const SOFTWARE_FEATURES: wgpu::Features = wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
 
 /// What to do about a missing adapter.

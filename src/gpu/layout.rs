@@ -67,6 +67,9 @@ pub const JUDGE_GRID: u32 = 4;
 /// See [`JUDGE_GRID`].
 pub const SPREAD_GRID: u32 = 7;
 
+/// The bits that say what becomes of a node (`wgsl/select.wgsl`).
+pub const FATE_BITS: u32 = 7;
+
 /// The lowest bit of [`TreeNode::below`] that says of what kind a node is.
 pub const KIND_SHIFT: u32 = 30;
 
@@ -174,6 +177,9 @@ pub struct Page {
     pub runs: u32,
     pub stride: u32,
     pub chosen: u32,
+    pub padding_0: u32,
+    pub padding_1: u32,
+    pub padding_2: u32,
 }
 
 /// A node of a tree; see the WGSL.
@@ -197,6 +203,9 @@ pub struct Branch {
     pub first_root: u32,
     pub whole: u32,
     pub chosen: u32,
+    pub padding_0: u32,
+    pub padding_1: u32,
+    pub padding_2: u32,
 }
 
 /// What a low-pass needs of a splat; see `wgsl/filter.wgsl`.

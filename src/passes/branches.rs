@@ -9,11 +9,14 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::gpu::layout::{INNER, KIND_SHIFT, LEAF, OTHER_BRANCH, PART_OF_LEAF, TreeNode};
+use crate::gpu::layout::{FATE_BITS, INNER, KIND_SHIFT, LEAF, OTHER_BRANCH, PART_OF_LEAF, TreeNode, WORKGROUP};
 use crate::scene::hierarchy::{Hierarchy, Node};
 
 /// The most surfels that one invocation copies the numbers of.
 const MOST_OF_LEAF: u32 = 4096;
+
+// What a workgroup's nodes leave fits beside what becomes of one (`wgsl/select.wgsl`).
+const _: () = assert!(WORKGROUP * (1 + MOST_OF_LEAF) < 1 << (32 - FATE_BITS));
 
 /// Neighbouring subtrees.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,7 +72,9 @@ fn parts(number: u32, node: &Node) -> impl Iterator<Item = Item> + use<> {
 pub fn branches(tree: &Hierarchy, most: u64) -> Vec<Branch> {
     let (rows, surfels) = rows_of(tree);
     if rows <= most {
-        return vec![Branch { whole: true, ..laid_out(tree, vec![Item::Node(0)], 0..surfels, |_| None) }];
+        let mut items = Vec::with_capacity(tree.nodes.len());
+        items.push(Item::Node(0));
+        return vec![Branch { whole: true, ..laid_out(tree, items, 0..surfels, |_| None) }];
     }
     let subtrees = subtrees(tree, &sizes(tree), most);
     let mut roots: HashMap<u32, Elsewhere> = HashMap::new();
@@ -164,12 +169,7 @@ fn laid_out(
     elsewhere: impl Fn(u32) -> Option<Elsewhere>,
 ) -> Branch {
     let roots = items.len() as u32;
-    let (mut nodes, mut numbers) = (Vec::new(), Vec::new());
-    if roots == 1 {
-        items.reserve(tree.nodes.len());
-        nodes.reserve(tree.nodes.len());
-        numbers.reserve(tree.nodes.len());
-    }
+    let (mut nodes, mut numbers) = (Vec::with_capacity(items.capacity()), Vec::with_capacity(items.capacity()));
     let (mut levels, mut level_end) = (0, 0);
     while nodes.len() < items.len() {
         if nodes.len() == level_end {

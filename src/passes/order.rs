@@ -6,6 +6,7 @@
 //! notice of order; of fragments at one depth what is sorted and the map of indices take the first, which depends on what surfels are alone. (Schuetz et al. 2021, "Rendering Point Clouds with Compute Shaders and Vertex
 //! Order Optimization".)
 
+use bytemuck::Zeroable;
 use rayon::prelude::*;
 
 use crate::gpu::layout::{BATCH, Page};
@@ -76,7 +77,8 @@ fn content(scene: &Scene, index: usize) -> ([[u32; 3]; 8], [u32; 4], Option<u32>
 /// `first` on.
 pub(crate) fn dealt(surfels: u64, (chosen, first): (u32, u32)) -> Page {
     let runs = surfels / RUN as u64;
-    Page { first, surfels: surfels as u32, runs: runs as u32, stride: dealing(runs as usize) as u32, chosen }
+    let stride = dealing(runs as usize) as u32;
+    Page { first, surfels: surfels as u32, runs: runs as u32, stride, chosen, ..Zeroable::zeroed() }
 }
 
 /// A step near the golden ratio of `runs` that comes to each of them once.

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use bytemuck::Zeroable;
+
 use super::branches::{self, Branch};
 use super::source::{self, Source};
 use crate::error::Result;
@@ -77,7 +79,7 @@ fn branches(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds, progress: &dyn P
     let words = SurfelLayout::of(needs).words as usize;
     // Of each that is chosen its number, and in how many cuts it is; before them how many there are.
     let of_chosen = if needs.fades { 2 } else { 1 };
-    let most = gpu.adapter.page_len(size_of::<Surfel>().max(4 * (words + of_chosen))) - 1;
+    let most = gpu.adapter.page_len(size_of::<Surfel>().max(4 * (words + of_chosen))).saturating_sub(1);
     let tree = source.levels().ok_or_else(|| gpu.error("a scene has no levels of detail"))?;
     let tree = branches::branches(tree, most);
     let of = |branch: Branch| {
@@ -85,7 +87,8 @@ fn branches(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds, progress: &dyn P
         let Branch { surfels, nodes, roots, first_root, whole, levels, .. } = branch;
         let (surfels, records) = (surfels.len() as u32, surfels.len() + nodes.len());
         let chosen = (records * words) as u32;
-        let own = layout::Branch { surfels, roots, first_root, whole: whole.into(), chosen };
+        let whole = whole.into();
+        let own = layout::Branch { surfels, roots, first_root, whole, chosen, ..Zeroable::zeroed() };
         let mut buffers = vec![
             ("branch", Buffer::uniform(gpu, "branch", &own)?.words()),
             ("tree_nodes", filled(gpu, "nodes", bytemuck::cast_slice(&nodes))?),

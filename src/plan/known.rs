@@ -61,7 +61,7 @@ impl Known {
     /// Forgets what buffers have room for.
     pub fn forget_buffers(&mut self) {
         self.forget_image();
-        (self.slots, self.chosen) = (false, false);
+        (self.slots, self.chosen, self.cut) = (false, false, None);
     }
 
     /// Forgets what holds for one size of image.

@@ -38,25 +38,28 @@ impl Run<'_> {
     pub(super) fn look_for_cut(&mut self) -> Result<()> {
         self.timing.flush(self.gpu)?;
         let chosen: Vec<_> = self.store.chosen().collect();
-        let cuts: Vec<u64> = counts_at(self.gpu, &chosen)?.into_iter().map(|[cut, _]| cut.into()).collect();
-        self.make_room(&cuts);
+        let rooms = counts_at(self.gpu, &chosen)?.into_iter().map(|[cut, _]| with_room(cut.into()));
+        self.make_room(rooms.collect());
         Ok(())
     }
 
     /// Whether pages with `rooms` for so many surfels of each branch have room for its cut; if not, or if it is far too much, the next try has as much as
     /// it takes.
     pub(super) fn fits_cut(&mut self, rooms: &[u64], cuts: &[u64]) -> bool {
+        let enough: Vec<u64> = cuts.iter().copied().map(with_room).collect();
         let fits = rooms.iter().zip(cuts).all(|(room, cut)| cut <= room);
-        let enough: u64 = cuts.iter().copied().map(with_room).sum();
-        if !fits || rooms.iter().sum::<u64>() > 4 * enough + SPARE {
-            self.make_room(cuts);
+        if !fits {
+            // What has room keeps it, so that views of many branches do not make room again and again.
+            let larger = rooms.iter().zip(cuts).zip(enough);
+            self.make_room(larger.map(|((room, cut), enough)| if cut > room { enough } else { *room }).collect());
+        } else if rooms.iter().sum::<u64>() > 4 * enough.iter().sum::<u64>() + SPARE {
+            self.make_room(enough);
         }
         fits
     }
 
     /// From the next try on; its pages are new ones.
-    fn make_room(&mut self, cuts: &[u64]) {
-        let mut rooms: Vec<u64> = cuts.iter().copied().map(with_room).collect();
+    fn make_room(&mut self, mut rooms: Vec<u64>) {
         // Where nothing is drawn, a page.
         if let (true, Some(first)) = (rooms.iter().all(|room| *room == 0), rooms.first_mut()) {
             *first = 1;

@@ -73,7 +73,7 @@ impl Kept {
             let all = run.steps(&sequence::steps(&plan), &mut frame, progress)?;
             let spent = start.elapsed();
             total_ms += spent.as_secs_f64() * 1e3;
-            let tally = if all { Some(run.tally()?) } else { None };
+            let tally = all.then(|| run.tally()).transpose()?;
             let clock = if run.timing.on_device() { "timestamps" } else { "wall" };
             let order = &run.store.order;
             for (pass, ms) in run.timing.finish(gpu)? {

@@ -1,5 +1,7 @@
 //! What of the buffers there is for each page of surfels, and for each branch of a tree.
 
+use bytemuck::Zeroable;
+
 use super::store::{Named, kept};
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -28,7 +30,7 @@ pub struct Page {
 impl Page {
     pub(super) fn new(gpu: &Gpu, uploaded: upload::Page, first: u32, needs: &SceneNeeds) -> Result<Self> {
         let upload::Page { buffers, numbers, stand_for } = uploaded;
-        let own = layout::Page { first, surfels: numbers.len() as u32, runs: 0, stride: 0, chosen: 0 };
+        let own = layout::Page { first, surfels: numbers.len() as u32, ..Zeroable::zeroed() };
         Self::with(gpu, Named::from_iter(buffers), (None, stand_for), (own, needs))
     }
 

@@ -34,7 +34,7 @@ pub struct Report {
     pub width: u32,
     /// Image height.
     pub height: u32,
-    /// Milliseconds by pass, `NAME_ms`.
+    /// Milliseconds by pass, `NAME_ms`, of all tries together.
     pub passes: BTreeMap<String, f64>,
     /// Where the passes' times come from: `timestamps` or `wall`.
     pub clock: &'static str,

@@ -346,7 +346,7 @@ impl Store {
         self.frame.get(name).or_else(|| self.shared.get(name))
     }
 
-    /// Whether each page has a buffer of its own of this name.
+    /// Whether each page has a buffer of its own of this name, or its branch has.
     pub fn is_paged(name: &str) -> bool {
         PAGED.contains(&kept(name))
     }

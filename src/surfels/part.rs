@@ -13,7 +13,8 @@ use crate::scene::Scene;
 use crate::scene::hierarchy::{DEEPEST, FAN_OUT, Hierarchy, Node};
 use crate::{Progress, Result};
 
-/// Nodes or points that are read at once: what is made of them on the way takes no more memory.
+/// Nodes or points that are read at once: what is made of them on the way takes no more memory, but of nodes three times as much, as one block is read
+/// and another one appended meanwhile.
 const BLOCK: u32 = 1 << 16;
 
 /// How much of a file a part is.

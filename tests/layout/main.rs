@@ -13,9 +13,9 @@ use common::modules;
 use epsplat::gpu::Sources;
 use epsplat::gpu::kernel::reflect;
 use epsplat::gpu::layout::{
-    AWAY, BATCH, BLOCK_SIDE, COVERED_GRID, COVERED_GRID_OF_EIGHTS, COVERED_LIST, INNER, JUDGE_GRID, KIND_SHIFT, LEAF,
-    LIST_ENDS, LIST_FAR, LIST_START, MOST_GROUPS, OCCLUSION_TILE, ONE, OTHER_BRANCH, QUEUE_GRID, QUEUE_LISTING,
-    QUEUE_START, RUN, SPREAD_GRID, TILE, TILE_WIDTH, WORKGROUP,
+    AWAY, BALL_PART, BATCH, BLOCK_SIDE, COVERED_GRID, COVERED_GRID_OF_EIGHTS, COVERED_LIST, FATE_BITS, INNER,
+    JUDGE_GRID, KIND_SHIFT, LEAF, LIST_ENDS, LIST_FAR, LIST_START, MOST_GROUPS, OCCLUSION_TILE, ONE, OTHER_BRANCH,
+    QUEUE_GRID, QUEUE_LISTING, QUEUE_START, RUN, SPREAD_GRID, TILE, TILE_WIDTH, WORKGROUP,
 };
 use epsplat::gpu::sources::FILES;
 use epsplat::passes;
@@ -152,6 +152,7 @@ fn constants_agree() {
         let of_batches = [("LIST_START", LIST_START), ("LIST_FAR", LIST_FAR)];
         let of_cuts = [
             ("RUN", RUN),
+            ("FATE_BITS", FATE_BITS),
             ("JUDGE_GRID", JUDGE_GRID),
             ("SPREAD_GRID", SPREAD_GRID),
             ("KIND_SHIFT", KIND_SHIFT),
@@ -159,7 +160,13 @@ fn constants_agree() {
             ("LEAF", LEAF),
             ("OTHER_BRANCH", OTHER_BRANCH),
         ];
-        for (exists, constants) in [(tiles, &of_tiles[..]), (needs.cull, &of_batches), (needs.levels, &of_cuts)] {
+        let of_balls = [("BALL_PART", BALL_PART)];
+        for (exists, constants) in [
+            (tiles, &of_tiles[..]),
+            (needs.cull, &of_batches),
+            (needs.levels, &of_cuts),
+            (needs.cull && needs.levels, &of_balls),
+        ] {
             for &(name, value) in constants {
                 assert_eq!(constant(name), exists.then_some(f64::from(value)), "{name}");
             }

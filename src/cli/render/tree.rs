@@ -62,7 +62,7 @@ impl Tree {
 
     /// What the picture of `camera` with `options` takes, within `memory` if there is a bound.
     pub fn scene(
-        &mut self,
+        &self,
         memory: Option<Memory>,
         camera: &Camera,
         options: &RenderOptions,

@@ -13,6 +13,7 @@ use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 /// Rows that lie nearer to each other, bytes, are read together with what is between them.
 const GAP: u64 = 1 << 14;
@@ -30,7 +31,8 @@ const LARGEST: f64 = 1e30;
 ///
 /// When it is opened, where everything lies is checked against its length. Nodes and points are checked as they are read.
 pub struct Levels {
-    file: File,
+    /// Who reads from it moves to where it reads.
+    file: Mutex<File>,
     path: PathBuf,
     vertex: Stretch,
     node: Stretch,
@@ -137,7 +139,8 @@ impl Levels {
         let bytes = |range: &Range<u32>| u64::from(range.end - range.start) * size;
         let pieces = numbers.iter().map(|range| (start + u64::from(range.start) * size, bytes(range)));
         rows.resize(numbers.iter().map(bytes).sum::<u64>() as usize, 0);
-        read_pieces(&self.file, pieces, rows).map_err(|error| Fault::Io(error).of(&self.path))
+        read_pieces(&mut self.file.lock().unwrap_or_else(PoisonError::into_inner), pieces, rows)
+            .map_err(|error| Fault::Io(error).of(&self.path))
     }
 
     /// What all threads make of rows.
@@ -204,12 +207,12 @@ fn opened(file: File, length: u64, path: &Path) -> Result<Option<Levels>, Fault>
         return Ok(None);
     }
     let (up, closed, unsided) = (comments.up, comments.closed, comments.unsided);
-    let file = file.into_inner();
+    let file = Mutex::new(file.into_inner());
     Ok(Some(Levels { file, path: path.to_owned(), vertex, node, whole, up, closed, unsided }))
 }
 
 /// Reads pieces of a file, each of which starts where it says and has so many bytes, one after the other `into` as many.
-fn read_pieces(mut file: &File, pieces: impl Iterator<Item = (u64, u64)>, mut into: &mut [u8]) -> io::Result<()> {
+fn read_pieces(file: &mut File, pieces: impl Iterator<Item = (u64, u64)>, mut into: &mut [u8]) -> io::Result<()> {
     let mut together: Vec<(u64, u64)> = Vec::new();
     let mut span = Vec::new();
     let mut read = |together: &mut Vec<(u64, u64)>| {
@@ -217,14 +220,13 @@ fn read_pieces(mut file: &File, pieces: impl Iterator<Item = (u64, u64)>, mut in
         file.seek(SeekFrom::Start(start))?;
         if let [_] = together[..] {
             // Most of what is read lies in few pieces, which need no copy.
-            file.read_exact(into.split_off_mut(..bytes as usize).unwrap_or_default())?;
+            file.read_exact(next_of(&mut into, bytes)?)?;
         } else {
             span.resize((last + bytes - start) as usize, 0);
             file.read_exact(&mut span)?;
             for (piece, bytes) in together.iter() {
                 let from = (piece - start) as usize;
-                let piece = &span[from..from + *bytes as usize];
-                into.split_off_mut(..piece.len()).unwrap_or_default().copy_from_slice(piece);
+                next_of(&mut into, *bytes)?.copy_from_slice(&span[from..from + *bytes as usize]);
             }
         }
         together.clear();
@@ -239,4 +241,45 @@ fn read_pieces(mut file: &File, pieces: impl Iterator<Item = (u64, u64)>, mut in
         together.push((start, bytes));
     }
     read(&mut together)
+}
+
+/// The next so many bytes of what is written into.
+fn next_of<'a>(into: &mut &'a mut [u8], bytes: u64) -> io::Result<&'a mut [u8]> {
+    into.split_off_mut(..bytes as usize).ok_or_else(|| io::Error::from(io::ErrorKind::WriteZero))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::io::Write;
+
+    use super::*;
+
+    /// However near to each other pieces lie, and however long they are.
+    #[test]
+    fn pieces_are_read_as_they_lie() {
+        let all: Vec<u8> = (0..6 * SPAN as u32).map(|k| (k.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+        let mut file = tempfile::tempfile().unwrap();
+        file.write_all(&all).unwrap();
+        let lengths = [0, 1, 69, GAP, SPAN - GAP, SPAN, SPAN + 1];
+        let gaps = [0, 1, GAP - 1, GAP, GAP + 1];
+        for (first, second) in (0..7).flat_map(|first| (0..7).map(move |second| (first, second))) {
+            for gap in gaps {
+                let (mut pieces, mut start) = (Vec::new(), 7);
+                for (length, gap) in [(lengths[first], gap), (lengths[second], 1), (5, gap), (3, 2 * SPAN), (9, 0)] {
+                    pieces.push((start, length));
+                    start += length + gap;
+                }
+                let expected =
+                    pieces.iter().flat_map(|&(start, length)| &all[start as usize..(start + length) as usize]);
+                let expected: Vec<u8> = expected.copied().collect();
+                let mut found = vec![0; expected.len()];
+                read_pieces(&mut file, pieces.iter().copied(), &mut found).unwrap();
+                assert!(found == expected, "{pieces:?}");
+                assert!(read_pieces(&mut file, pieces.into_iter(), &mut found[1..]).is_err());
+            }
+        }
+        let past = [(all.len() as u64 - 4, 3), (all.len() as u64 - 1, 2)];
+        assert!(read_pieces(&mut file, past.into_iter(), &mut [0; 5]).is_err());
+    }
 }

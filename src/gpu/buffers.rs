@@ -32,16 +32,19 @@ impl<T: Pod> Buffer<T> {
 
     /// A storage buffer that the host reads where it lies, if the device can let it ([`Readback`]).
     pub(crate) fn readable(gpu: &Gpu, what: &str, len: u64) -> Result<Self> {
-        let lies_open = gpu.device.features().contains(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS);
-        let read = if lies_open { wgpu::BufferUsages::MAP_READ } else { wgpu::BufferUsages::empty() };
-        Self::create(gpu, what, len, wgpu::BufferUsages::STORAGE | read, gpu.buffer_limit())
+        Self::open(gpu, what, len, wgpu::BufferUsages::MAP_READ)
     }
 
     /// A storage buffer that the host writes where it lies, if the device can let it ([`write`](Self::write)).
     pub(crate) fn writable(gpu: &Gpu, what: &str, len: u64) -> Result<Self> {
+        Self::open(gpu, what, len, wgpu::BufferUsages::MAP_WRITE)
+    }
+
+    /// One that the host maps where it lies, if the device can let it.
+    fn open(gpu: &Gpu, what: &str, len: u64, maps: wgpu::BufferUsages) -> Result<Self> {
         let lies_open = gpu.device.features().contains(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS);
-        let write = if lies_open { wgpu::BufferUsages::MAP_WRITE } else { wgpu::BufferUsages::empty() };
-        Self::create(gpu, what, len, wgpu::BufferUsages::STORAGE | write, gpu.buffer_limit())
+        let maps = if lies_open { maps } else { wgpu::BufferUsages::empty() };
+        Self::create(gpu, what, len, wgpu::BufferUsages::STORAGE | maps, gpu.buffer_limit())
     }
 
     /// A storage buffer that may also hold the arguments of indirect dispatches.
@@ -136,21 +139,8 @@ impl<T: Pod> Buffer<T> {
         values: impl Fn(Range<usize>) -> Cow<'a, [T]>,
         progress: &dyn Progress,
     ) -> Result<()> {
-        let size = size_of::<T>();
         if len > 0 && self.raw.usage().contains(wgpu::BufferUsages::MAP_WRITE) {
-            let slice = self.raw.slice(..((len * size) as u64).next_multiple_of(4));
-            slice.map_async(wgpu::MapMode::Write, |_| {});
-            gpu.wait()?;
-            let mut view = slice.get_mapped_range_mut().map_err(|e| gpu.error(format!("writing failed: {e}")))?;
-            for first in (0..len).step_by((OPEN_PIECE / size).max(1)) {
-                let values = values(first..len.min(first + (OPEN_PIECE / size).max(1)));
-                let bytes: &[u8] = bytemuck::cast_slice(&values);
-                view.slice(first * size..first * size + bytes.len()).copy_from_slice(bytes);
-                progress.advance(values.len() as u64);
-            }
-            drop(view);
-            self.raw.unmap();
-            return gpu.check();
+            return self.write_where_it_lies(gpu, len, values, progress);
         }
         let per_piece = (PIECE / size_of::<T>() as u64).max(1) as usize;
         for first in (0..len).step_by(per_piece) {
@@ -162,6 +152,30 @@ impl<T: Pod> Buffer<T> {
             progress.advance(values.len() as u64);
         }
         Ok(())
+    }
+
+    fn write_where_it_lies<'a>(
+        &self,
+        gpu: &Gpu,
+        len: usize,
+        values: impl Fn(Range<usize>) -> Cow<'a, [T]>,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let size = size_of::<T>();
+        let per_piece = (OPEN_PIECE / size).max(1);
+        let slice = self.raw.slice(..((len * size) as u64).next_multiple_of(4));
+        slice.map_async(wgpu::MapMode::Write, |_| {});
+        gpu.wait()?;
+        let mut view = slice.get_mapped_range_mut().map_err(|e| gpu.error(format!("writing failed: {e}")))?;
+        for first in (0..len).step_by(per_piece) {
+            let values = values(first..len.min(first + per_piece));
+            let bytes: &[u8] = bytemuck::cast_slice(&values);
+            view.slice(first * size..first * size + bytes.len()).copy_from_slice(bytes);
+            progress.advance(values.len() as u64);
+        }
+        drop(view);
+        self.raw.unmap();
+        gpu.check()
     }
 
     /// The first `len` elements.

@@ -7,6 +7,7 @@ mod common;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use common::command::Folder;
 use epsplat::bench::{self, Definition};
 use epsplat::render::Backend;
 
@@ -72,6 +73,40 @@ fn a_study_without_an_adapter_measures_the_reference_against_itself() {
     assert_eq!(study.images.len(), 3);
     let needs_one = [SCENES, GPU].concat();
     assert!(bench::run(&definition(&needs_one), None, &()).unwrap_err().to_string().contains("adapter"));
+}
+
+/// A file with levels of detail that is read in part is drawn as the scene that it was made of.
+#[test]
+fn scenes_that_are_read_in_parts_have_the_pictures_of_whole_ones() {
+    let folder = Folder::new();
+    let run = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_epsplat"));
+        let status = command.current_dir(folder.path("")).args(arguments).output().unwrap().status;
+        assert!(status.success(), "{arguments:?}");
+    };
+    run(&["generate", "sphere", "--count", "3000", "-o", "sphere.ply"]);
+    run(&["lod", "sphere.ply", "-o", "levels.ply"]);
+    let place = "views = 2\neye = [0, 0, 16]\ntarget = [0, 0, 0]\n";
+    let scenes = format!(
+        "[[scene]]\nname = \"all\"\nshape = \"sphere\"\ncount = 3000\n{place}\
+         [[scene]]\nname = \"part\"\nfile = \"levels.ply\"\nsurfels = \"levels\"\n{place}"
+    );
+    let configs = "[[config]]\nname = \"3px\"\nbackend = \"reference\"\nlod = \"3px\"\n\
+                   [[config]]\nname = \"6px\"\nbackend = \"reference\"\nlod = \"6px\"\nsamples = \"4\"\n";
+    let text = ["name = \"n\"\nabout = \"a\"\nsize = [64, 64]\nruns = 1\n", &scenes, configs].concat();
+    let study = |text: &str| {
+        let definition = Definition::parse(text, &folder.path("study.toml")).unwrap();
+        bench::run(&definition, None, &()).map(|outcome| outcome.study)
+    };
+    let shown = study(&text).unwrap();
+    let cuts: Vec<_> = shown.measurements.iter().map(|m| (m.surfels, m.reconstruction["cut"])).collect();
+    assert_eq!((cuts[0], cuts[1]), (cuts[2], cuts[3]));
+    assert!(cuts[0].0 == 3000 && cuts[0].1 > 1.2 * cuts[1].1 && cuts[1].1 > 50.0, "{cuts:?}");
+    let pictures: Vec<_> = shown.images.iter().map(|set| &set.image.color).collect();
+    assert!(pictures[0] == pictures[2] && pictures[1] == pictures[3] && pictures[0] != pictures[1]);
+    // What has no levels of detail is told.
+    let error = study(&text.replace("levels.ply", "sphere.ply")).unwrap_err().to_string();
+    assert!(error.contains("sphere.ply") && error.contains("epsplat lod"), "{error}");
 }
 
 #[test]

@@ -312,6 +312,7 @@ fn broken_kernels_are_noticed() {
     for (file, from, to) in [
         ("select_fades_absent.wgsl", "size < held.levels.x", "size < 1.2 * held.levels.x"),
         ("select.wgsl", "if (away.x > away.y) {", "if (away.x > away.y - 0.5) {"),
+        ("select.wgsl", "let radius = node.radius * held.unit;", "let radius = 1.01 * node.radius * held.unit;"),
         ("select.wgsl", "return before;", "return before + counts;"),
         ("select.wgsl", "vec2<u32>(here, end);", "vec2<u32>(0u, end);"),
         ("select.wgsl", "reached[node.first] = fate;", "reached[node.first] = 0u;"),

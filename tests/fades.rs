@@ -33,14 +33,14 @@ fn a_sample_shows_the_cut_of_its_number() {
     let backend = Backend::gpu(gpu);
     let (scene, camera) = (levels(sphere(6000, 1.1)), sphere_camera(96, Projection::Pinhole));
     // Of flat nodes, as outlines of caps are nearly the same at any size.
-    let options = RenderOptions { detail_caps: false, ..fading(250.0) };
+    let options = RenderOptions { detail_caps: false, ..fading(400.0) };
     let [device, reference] =
         [&backend, &Backend::Reference].map(|backend| frame(&scene, &camera, &options, backend).color);
     let covers = |pixels: &[[f32; 4]]| pixels.iter().map(|color| color[3] == 1.0).collect::<Vec<bool>>();
     let mut outlines = BTreeSet::new();
     let (mut some, mut others) = (0, 0);
     for number in 0..64 {
-        let size = 250.0 * (0.5 + f64::from(number) / 128.0);
+        let size = 400.0 * (0.5 + f64::from(number) / 128.0);
         let plain = RenderOptions { detail: Detail::Pixels(size), detail_fades: false, ..options.clone() };
         let expected = covers(&frame(&scene, &camera, &plain, &backend).color);
         for (index, expected) in expected.iter().enumerate() {
@@ -70,7 +70,7 @@ fn fades_are_those_of_the_twin_in_every_organisation() {
     let flat = sphere(6000, 1.7);
     let (scene, camera) = (levels(flat.clone()), sphere_camera(100, Projection::Pinhole));
     for low_pass in [LowPass::None, LowPass::Max, LowPass::Ewa] {
-        let options = RenderOptions { low_pass, samples: Samples { across: 2, down: 2 }, ..fading(60.0) };
+        let options = RenderOptions { low_pass, samples: Samples { across: 2, down: 2 }, ..fading(200.0) };
         let reference = frame(&scene, &camera, &options, &Backend::Reference);
         let by = |organisation| RenderOptions { organisation, ..options.clone() };
         let all = [Organisation::Auto, Organisation::Scatter, Organisation::Tile].map(|organisation| {
@@ -83,7 +83,7 @@ fn fades_are_those_of_the_twin_in_every_organisation() {
         let wrong = differ(&all[0], &reference);
         assert!(wrong < 4, "{low_pass:?}: {wrong}");
         // A size of a hundredth more makes other fades.
-        let other = RenderOptions { detail: Detail::Pixels(60.6), ..options.clone() };
+        let other = RenderOptions { detail: Detail::Pixels(202.0), ..options.clone() };
         let others = differ(&frame(&scene, &camera, &other, &backend), &reference);
         assert!(others > 100, "{low_pass:?}: {others}");
     }

@@ -38,7 +38,7 @@ fn whole(path: &Path) -> Scene {
 }
 
 fn part(path: &Path, camera: &Camera, options: &RenderOptions) -> Result<(Scene, Taken)> {
-    taken(&opened(path), camera, options, |_| Ok(()), &())
+    taken(&opened(path), &[(camera, options)], |_| Ok(()), &())
 }
 
 /// Spheres in what a file may have: far from the origin, in one colour, in codes, in light, with lines, with normals, with trailing parts.
@@ -168,6 +168,32 @@ fn a_picture_of_a_part_is_that_of_the_whole() {
     assert!(less > 30 && apart > 15, "{less} {apart}");
 }
 
+/// What several pictures take together is enough for each of them, and no more than what each takes.
+#[test]
+fn a_part_of_several_pictures_is_enough_for_each() {
+    let Some(gpu) = common::gpu() else { return };
+    let backend = Backend::gpu(gpu);
+    let folder = tempfile::tempdir().unwrap();
+    let path = written(sphere(8000, 1.7), folder.path());
+    let whole = whole(&path);
+    let cameras: Vec<Camera> = views(&whole).into_iter().take(2).map(|(_, camera)| camera).collect();
+    let mut ways = ways().into_iter().skip(2);
+    let ways = [ways.next().unwrap(), ways.next().unwrap()];
+    let pictures: Vec<_> = cameras.iter().flat_map(|camera| ways.iter().map(move |way| (camera, way))).collect();
+    let (part, of_all) = taken(&opened(&path), &pictures, |_| Ok(()), &()).unwrap();
+    let mut apart = 0;
+    for (camera, options) in &pictures {
+        let all = render(&whole, camera, options, &backend, &()).unwrap().0;
+        assert!(bits(&all) == bits(&render(&part, camera, options, &backend, &()).unwrap().0), "{options:?}");
+        let of_one = taken(&opened(&path), &[(*camera, *options)], |_| Ok(()), &()).unwrap().1;
+        assert!(of_one.nodes <= of_all.nodes && of_one.surfels <= of_all.surfels);
+        // What one of them takes is not enough for another.
+        let other = taken(&opened(&path), &pictures[..1], |_| Ok(()), &()).unwrap().0;
+        apart += usize::from(bits(&all) != bits(&render(&other, camera, options, &backend, &()).unwrap().0));
+    }
+    assert!(apart >= 2 && of_all.surfels < 8000, "{apart} {of_all:?}");
+}
+
 /// What a picture takes is enough for it; of a finer one some nodes are missed, which are drawn as they are and leave no holes.
 #[test]
 fn what_is_missing_leaves_no_holes() {
@@ -217,7 +243,7 @@ fn a_part_may_not_fit() {
     let (_, taken) = part(&path, &camera, &options).unwrap();
     let limited = |most: u64| {
         let fits = |taken: &Taken| if taken.nodes <= most { Ok(()) } else { Err(Error::Usage("too much".into())) };
-        epsplat::render::taken(&opened(&path), &camera, &options, fits, &()).map(|(_, taken)| taken)
+        epsplat::render::taken(&opened(&path), &[(&camera, &options)], fits, &()).map(|(_, taken)| taken)
     };
     assert_eq!(limited(taken.nodes).unwrap(), taken);
     assert!(matches!(limited(taken.nodes - 1), Err(Error::Usage(_))));
@@ -243,7 +269,7 @@ fn damaged_files_are_told() {
         let other = folder.path().join("damaged.ply");
         std::fs::write(&other, bytes).unwrap();
         let opened = Levels::open(Input::open(&other, None).unwrap());
-        opened.and_then(|levels| taken(&levels.unwrap(), &camera, &options, |_| Ok(()), &()))
+        opened.and_then(|levels| taken(&levels.unwrap(), &[(&camera, &options)], |_| Ok(()), &()))
     };
     let told = |at: usize, with: &[u8], what: &str| match damaged(at, with) {
         Err(Error::Malformed { what: said, .. }) => assert!(said.contains(what), "{said}"),

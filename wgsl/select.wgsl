@@ -4,7 +4,7 @@
 // depends on tree and camera alone. Pages of surfels are drawn from where what was chosen lies.
 // Of cuts that fade into each other (select_fades.wgsl) all are made at once.
 // Host side and twin: src/passes/select.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xf9be819559b9c1cb
+// All loops end, by 1 of src/gpu/loops.rs: 0x2bc1cfd88810cae0
 
 @group(0) @binding(72) var<uniform> branch: Branch;
 @group(0) @binding(73) var<storage, read> tree_nodes: array<TreeNode>;
@@ -47,7 +47,7 @@ const UNSEEN: u32 = 0x7fu;
 // Its bits beside a number of surfels that a workgroup leaves: of each node itself and at most 4096 below it.
 const FATE_BITS: u32 = 7u;
 
-// A node's size is that of a disk as long as its image, not that of its image.
+// A node's size is that of the ball around it and all below it, as seen in the middle of the image, not that of its ellipse's image.
 override MEASURES_EXTENT: bool;
 
 const PI: f32 = 3.14159265;
@@ -123,10 +123,16 @@ fn turned_away(node: TreeNode, surfel: Surfel, relative: vec3<f32>, radius: f32)
 }
 
 // Square pixels of the image that a node is seen at.
-fn size_of(center: vec3<f32>, surfel: Surfel) -> f32 {
+fn size_of(center: vec3<f32>, node: TreeNode, surfel: Surfel) -> f32 {
+    if (MEASURES_EXTENT) {
+        let radius = node.radius * held.unit;
+        let across = axis_image(vec3<f32>(0.0, 0.0, center.z), vec3<f32>(radius, radius, 0.0)) * held.levels.yz;
+        let longest = max(across.x, across.y);
+        return PI * longest * longest;
+    }
     let s = axis_image(center, rotate_plain(vector(surfel.s) * held.unit)) * held.levels.yz;
     let t = axis_image(center, rotate_plain(vector(surfel.t) * held.unit)) * held.levels.yz;
-    return PI * select(abs(s.x * t.y - s.y * t.x), max(dot(s, s), dot(t, t)), MEASURES_EXTENT);
+    return PI * abs(s.x * t.y - s.y * t.x);
 }
 
 // What becomes of a node whose surfel's centre leaves out `low`, world units.
@@ -154,7 +160,7 @@ fn fate_of(node: TreeNode, surfel: Surfel, low: vec3<f32>) -> u32 {
     // One surfel is itself, with its lines and its cap; and where the surfels of a part of a tree are not there, no picture divides their leaf.
     let held = select(2u, node.below & COUNT_MASK, kind_of(node) == LEAF);
     let divided = reaches_near(ball) || !faces || held == 1u;
-    return select(select(cuts_that_divide(size_of(ball.center, surfel)), ALL_CUTS, divided), 0u, held == 0u);
+    return select(select(cuts_that_divide(size_of(ball.center, node, surfel)), ALL_CUTS, divided), 0u, held == 0u);
 }
 
 fn has_surfels(node: TreeNode) -> bool {

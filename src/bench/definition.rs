@@ -180,6 +180,8 @@ pub enum Making {
     Uniform,
     /// As `epsplat hybrid` does: samples of a mesh whose diagonal is seen as long as `count` pixels, and the triangles that stay.
     Hybrid,
+    /// Those that the cuts of the scene's configurations take of a file of `epsplat lod`, and nodes: it is not read whole.
+    Levels,
     /// Of a shape none: `count` triangles stand for it, and the orthographic camera comes so near that a disk of their mean area has a radius of
     /// `footprint_px`.
     Triangles,
@@ -301,6 +303,12 @@ impl Definition {
             scene.footprint_px = scene.quick_footprint_px.clone().or(scene.footprint_px.take());
         }
         self
+    }
+
+    /// The configurations that render the scene of `entry`.
+    pub(super) fn configs_of<'a>(&'a self, entry: &'a SceneEntry) -> impl Iterator<Item = &'a Config> {
+        let wants = |config: &&Config| entry.configs.as_ref().is_none_or(|names| names.contains(&config.name));
+        self.configs.iter().filter(wants)
     }
 
     /// The options of `config` on the scene of `entry`.

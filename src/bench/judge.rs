@@ -17,6 +17,9 @@ use crate::truth::{Surface, Truth};
 /// The side that pictures for the page are kept at, pixels.
 const PICTURE_SIDE: usize = 512;
 
+/// The maps of a reference that configurations are compared with.
+pub(super) const OF_REFERENCE: [Map; 2] = [Map::Count, Map::Decision];
+
 /// A configuration against the reference.
 pub(super) struct Errors {
     /// The worst of all cameras.
@@ -42,7 +45,7 @@ fn grouped<K: PartialEq>(keys: impl Iterator<Item = K>) -> Vec<(K, Vec<usize>)> 
 /// Compares all with the reference, which renders once what differs in nothing but how sums are kept.
 pub(super) fn against_reference(case: &Case<'_>, timed: &[Timed<'_>], progress: &dyn Progress) -> Result<Vec<Errors>> {
     let default = RenderOptions::default();
-    let maps = Maps::of(&[Map::Count, Map::Decision]);
+    let maps = Maps::of(&OF_REFERENCE);
     let key = |timed: &Timed<'_>| RenderOptions {
         accumulator: default.accumulator,
         // Layers that the rasteriser peels are others than those of lists.

@@ -8,12 +8,14 @@ pub mod card;
 mod case;
 pub mod config;
 pub mod definition;
+mod in_part;
 mod judge;
 pub mod machine;
 mod reading;
 mod runner;
 mod staging;
 pub mod table;
+mod view;
 
 pub use definition::Definition;
 pub use runner::{Outcome, run};

@@ -4,11 +4,11 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::config::Config;
-use super::definition::{Definition, Making, OneOrMany, SceneEntry};
+use super::definition::{Definition, Making, OneOrMany, Rims, SceneEntry};
 use crate::error::{Error, Result};
 use crate::plan::{BackendName, check};
-use crate::scene::Shading;
 use crate::scene::camera::check_size;
+use crate::scene::{Detail, Shading};
 
 impl Definition {
     /// Reads a definition.
@@ -49,6 +49,14 @@ impl Definition {
             scene.check().map_err(|what| format!("scene {:?}: {what}", scene.name))?;
             if let Some(name) = scene.configs.iter().flatten().find(|name| !configs.contains(name)) {
                 return Err(format!("scene {:?}: configs: there is no config {name:?}", scene.name));
+            }
+            let sized = |config: &&Config| config.cuts() && !matches!(config.lod, Some(Detail::Splats(_)));
+            let other = self.configs_of(scene).find(|config| scene.surfels == Making::Levels && !sized(config));
+            if let Some(config) = other {
+                let (scene, config) = (&scene.name, &config.name);
+                return Err(format!(
+                    "scene {scene:?}: surfels: of a file that is read in parts cuts of a size are drawn, and config {config:?} draws none"
+                ));
             }
         }
         for config in &self.configs {
@@ -150,6 +158,7 @@ impl SceneEntry {
                 not_beside("shirt", self.shirt.is_some(), "file")?;
                 let of_shape = matches!(self.surfels, Making::Gaussians | Making::Triangles);
                 not_beside("surfels = gaussians or triangles", of_shape, "file: they are made of a shape")?;
+                self.check_levels()?;
                 let is_mesh =
                     file.extension().is_some_and(|e| ["obj", "ply"].iter().any(|m| e.eq_ignore_ascii_case(m)));
                 if self.truth && !is_mesh {
@@ -176,6 +185,28 @@ impl SceneEntry {
             }
             (None, Some(_)) if self.count.is_none() => return Err("count: a shape needs its number of surfels".into()),
             (None, Some(_)) => {}
+        }
+        Ok(())
+    }
+
+    /// What is said of a file that is read in parts.
+    fn check_levels(&self) -> Result<(), String> {
+        if self.surfels != Making::Levels {
+            return Ok(());
+        }
+        let footprints = self.footprint_px.is_some() || self.quick_footprint_px.is_some();
+        let of_all = [
+            ("truth", self.truth),
+            ("footprint_px", footprints),
+            ("most_fragments", self.most_fragments.is_some()),
+            ("triangles", self.triangles.is_some()),
+            ("rims", self.rims != Rims::Curved),
+        ];
+        for (key, given) in of_all {
+            not_beside(key, given, "surfels = levels: it is of all surfels")?;
+        }
+        if self.eye.is_none() {
+            return Err("eye: of a file that is read in parts the view must be known".into());
         }
         Ok(())
     }
@@ -318,6 +349,16 @@ mod tests {
             ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 1\nfov = 9\northo = 1\n", &["ortho:", "fov"]),
             ("[[scene]]\nname = \"s\"\nshape = \"torus\"\ncount = 1\n", &["scene: two are called \"s\""]),
             ("[[config]]\nname = \"d\"\nbackend = \"cpu\"\n", &["line 5, backend:", "cpu", "raster"]),
+            ("[[scene]]\nname = \"t\"\nfile = \"a.ply\"\nsurfels = \"levels\"\n", &["eye:"]),
+            ("[[scene]]\nname = \"t\"\nfile = \"a.ply\"\nsurfels = \"levels\"\ntruth = true\n", &["truth", "levels"]),
+            ("[[scene]]\nname = \"t\"\nfile = \"a.ply\"\nsurfels = \"levels\"\nrims = \"flat\"\n", &["rims", "levels"]),
+            ("[[scene]]\nname = \"t\"\nfile = \"a.ply\"\nsurfels = \"levels\"\ncount = 5\n", &["count:"]),
+            (
+                "[[scene]]\nname = \"t\"\nfile = \"a.ply\"\nsurfels = \"levels\"\nquick_footprint_px = 2\n",
+                &["footprint_px", "levels"],
+            ),
+            ("[[scene]]\nname = \"t\"\nfile = \"a.ply\"\nsurfels = \"levels\"\neye = [1, 2, 3]\n", &["\"c\"", "cuts"]),
+            ("[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 1\nsurfels = \"levels\"\n", &["surfels", "shape"]),
             ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nepsilon = \"1\"\n", &["line 6, epsilon:", "rel:E"]),
             ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\naccumulator = \"f\"\n", &["accumulator:", "fixed32"]),
             ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nlowpass = \"box\"\n", &["lowpass:", "ewa"]),

@@ -83,8 +83,17 @@ pub(super) fn measure(
 }
 
 impl<'a> Case<'a> {
+    /// How many surfels the scene has; of one that is read in part all of its file.
     fn surfels(&self) -> u64 {
-        self.staged.scene.surfels.len() as u64
+        let scene = &self.staged.scene;
+        scene.part_of.as_ref().map_or(scene.surfels.len() as u64, |whole| whole.surfels.into())
+    }
+
+    /// How many surfels a device holds; of a scene that is read in part the nodes that were read, too.
+    fn held(&self) -> u64 {
+        let Scene { surfels, hierarchy, part_of, .. } = &self.staged.scene;
+        let nodes = hierarchy.as_ref().filter(|_| part_of.is_some()).map_or(0, |tree| tree.nodes.len());
+        (surfels.len() + nodes) as u64
     }
 
     pub fn backend(&self, config: &Config) -> &'a Backend {
@@ -101,10 +110,8 @@ impl<'a> Case<'a> {
     }
 
     fn run(&self, outcome: &mut Outcome, progress: &dyn Progress) -> Result<()> {
-        let wants = |config: &&Config| self.entry.configs.as_ref().is_none_or(|names| names.contains(&config.name));
-        let wanted = self.definition.configs.iter().filter(wants);
-        let plans: Vec<(&Config, RenderOptions)> =
-            wanted.map(|config| (config, self.definition.options(config, self.entry))).collect();
+        let planned = |config| (config, self.definition.options(config, self.entry));
+        let plans: Vec<(&Config, RenderOptions)> = self.definition.configs_of(self.entry).map(planned).collect();
         let timed = self.time(&plans, &mut outcome.notes, progress)?;
         let errors = judge::against_reference(self, &timed, progress)?;
         let mut truths = judge::against_truth(self, &timed, progress)?;
@@ -269,7 +276,7 @@ impl<'a> Case<'a> {
             passes: passes.collect(),
             splats_per_second: per_second(self.surfels() as f64),
             fragments_per_second: Some(per_second(error.fragments)),
-            bytes_per_splat: timed.bytes.splats as f64 / self.surfels().max(1) as f64,
+            bytes_per_splat: timed.bytes.splats as f64 / self.held().max(1) as f64,
             device_bytes: timed.bytes.splats + timed.bytes.pixels,
             numeric: Some(error.numeric),
             reconstruction,

@@ -4,16 +4,17 @@ use std::f64::consts::{PI, TAU};
 
 use std::path::{Path, PathBuf};
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 use super::config::Config;
 use super::definition::{Beside, Definition, Making, OneOrMany, Rims, SceneEntry};
+use super::in_part;
+use super::view::{cameras, footprint};
 use crate::error::{Error, Result};
 use crate::io::{self, Mesh, Points, ReadOptions, Texture};
 use crate::progress::Progress;
 use crate::random::Random;
-use crate::scene::camera::DEFAULT_FOV;
-use crate::scene::{Camera, Colors, Lens, Projection, Scene, Surfel};
+use crate::scene::{Camera, Colors, Scene, Surfel};
 use crate::surfels::analytic::{RADIUS_IN_SPACINGS, Shape, gaussians, generate, mesh};
 use crate::surfels::hybrid::Hybrid;
 use crate::surfels::sampling::voxels::Voxel;
@@ -70,6 +71,9 @@ pub(super) fn stage(
     point: Point,
     progress: &dyn Progress,
 ) -> Result<Staged> {
+    if let (Making::Levels, Some(file)) = (entry.surfels, &entry.file) {
+        return in_part::stage(definition, entry, file, progress);
+    }
     made(definition, entry, point, progress).map_err(|error| match (error, &entry.file) {
         (Error::EmptyScene(what), Some(file)) => Error::malformed(&definition.path_of(file), what),
         (error, _) => error,
@@ -189,7 +193,7 @@ fn beside(
 }
 
 /// The path of one of a scene's files.
-fn present(definition: &Definition, entry: &SceneEntry, file: &Path) -> Result<PathBuf> {
+pub(super) fn present(definition: &Definition, entry: &SceneEntry, file: &Path) -> Result<PathBuf> {
     let path = definition.path_of(file);
     match &entry.source {
         Some(source) if !path.exists() => {
@@ -233,8 +237,8 @@ fn of_file(
     let mut left = None;
     let stratified = Method::Stratified { priority: &priority, depth: None };
     let points = match entry.surfels {
-        // Gaussians and triangles are made of shapes: reading a definition makes sure of it.
-        Making::File | Making::Gaussians | Making::Triangles => {
+        // Gaussians and triangles are made of shapes, as reading a definition makes sure, and parts of files are staged otherwise.
+        Making::File | Making::Gaussians | Making::Triangles | Making::Levels => {
             let classes = entry.classes.unwrap_or_default();
             let points = io::read_with(file, ReadOptions { classes, ..ReadOptions::default() }, progress)?;
             if entry.classes.is_some() && points.classes.is_empty() {
@@ -305,52 +309,6 @@ fn scatter(points: &mut Points, sigma: f64) {
 
 /// Of the numbers that points are scattered by.
 const NOISE_SEED: u64 = 4;
-
-/// The first camera as the scene's entry says, and the others around the scene's centre.
-fn cameras([width, height]: [u32; 2], entry: &SceneEntry, scene: &Scene) -> Result<Vec<Camera>> {
-    let lens = match entry.ortho {
-        Some(height) => Lens::OrthographicHeight(height),
-        None => Lens::Fov(entry.fov.unwrap_or(DEFAULT_FOV)),
-    };
-    let (size, near) = ((width, height), Camera::default_near(scene));
-    let center = scene.origin + scene.framed().0.center();
-    let target = entry.target.map_or(center, DVec3::from);
-    let mut first = match entry.eye {
-        Some(eye) => Camera::look_at(size, lens, eye.into(), target, entry.up.map(DVec3::from), scene.up, near)?,
-        None => Camera::framing_centers(size, lens, scene, near)?,
-    };
-    let fill = entry.fill.unwrap_or(1.0);
-    match first.projection {
-        // Along the line of sight, so that the target stays where it is in the image.
-        Projection::Pinhole => first.eye = target + (first.eye - target) / fill,
-        Projection::Orthographic => (first.fx, first.fy) = (first.fx * fill, first.fy * fill),
-    }
-    let turned = |view: u32| {
-        let turn = DMat3::from_axis_angle(scene.up.axis(), TAU * f64::from(view) / f64::from(entry.views));
-        let eye = center + turn * (first.eye - center);
-        Camera { eye, rotation: first.rotation * turn.transpose(), ..first.clone() }
-    };
-    Ok((0..entry.views).map(turned).collect())
-}
-
-/// The mean over surfels and cameras of the longer half-axis in pixels, at the depth of the centre and as if seen face-on;
-/// surfels behind the near depth have none. Added in order, so that it is always the same.
-fn footprint(scene: &Scene, cameras: &[Camera]) -> f64 {
-    let (mut sum, mut seen) = (0.0, 0u64);
-    for camera in cameras {
-        let focal = (camera.fx * camera.fy).sqrt();
-        for (index, surfel) in scene.surfels.iter().enumerate() {
-            let center = camera.to_camera(scene.origin + scene.center(index));
-            if center.z < camera.near {
-                continue;
-            }
-            let depth = if camera.projection == Projection::Pinhole { center.z } else { 1.0 };
-            sum += f64::from(surfel.radius()) * focal / depth;
-            seen += 1;
-        }
-    }
-    sum / seen.max(1) as f64
-}
 
 #[cfg(test)]
 mod tests {

@@ -164,7 +164,7 @@ fn fate(node: &Node, low: DVec3, (origin, camera): (DVec3, &Camera), wanted: &Wa
     }
     // The place of what reaches the near depth in the image says nothing.
     let near = at.z - radius <= camera.near;
-    let seen = if near { f64::INFINITY } else { measure.of(&node.surfel, center, camera) };
+    let seen = if near { f64::INFINITY } else { measure.of(node, center, camera) };
     let seen = seen * (1.0 + slack * (SIZE_SLACK - 1.0));
     // The plane of one that faces away is left out, whatever is below it.
     if turned <= -slack * SINE_SLACK { Fate::Divided(divided(seen, size, fades)) } else { Fate::DIVIDED }
@@ -253,11 +253,8 @@ mod tests {
                     all.sort_unstable();
                     assert!(all.iter().copied().eq(0..8000), "{size}");
                     let seen = |index: &u32| {
-                        measure.of(
-                            &tree.nodes[*index as usize].surfel,
-                            tree_center(&tree, *index) - camera.eye,
-                            &camera,
-                        )
+                        let node = &tree.nodes[*index as usize];
+                        measure.of(node, tree_center(&tree, *index) - camera.eye, &camera)
                     };
                     assert!(cut.nodes.iter().all(|(index, _)| seen(index) < size));
                     if measure == DetailMeasure::Extent {

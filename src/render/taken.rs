@@ -9,28 +9,29 @@ use crate::scene::{Camera, Detail, Hierarchy, Scene};
 use crate::surfels::part::{self, Taken};
 use crate::{Progress, Result};
 
-/// The part of a file that the picture of `camera` with `options` is made of, to the bit as of all of it. It depends on the camera and the file alone.
+/// The part of a file that the pictures of `views`, cameras with options, are made of, to the bit as of all of it. It depends on the views and the file alone.
 ///
 /// # Errors
 ///
 /// [`Error::Read`](crate::Error::Read) and [`Error::Malformed`](crate::Error::Malformed) of the file, and whatever `fits` says of how much is taken so far.
 pub fn taken(
     levels: &Levels,
-    camera: &Camera,
-    options: &RenderOptions,
+    views: &[(&Camera, &RenderOptions)],
     fits: impl Fn(&Taken) -> Result<()> + Sync,
     progress: &dyn Progress,
 ) -> Result<(Scene, Taken)> {
     let (facts, origin) = (Facts::of(&part::nothing(levels)), levels.whole.origin);
-    // The size for a number of splats follows from all nodes in view.
-    let detail = if matches!(options.detail, Detail::Splats(_)) { Detail::FINEST } else { options.detail };
-    let wanted = |part: &RenderOptions| Wanted { detail, ..Wanted::of(part, culls_back(&facts, camera, part)) };
-    // Renders for colour and maps may leave out other backs, and look as far as their own samples.
-    let renders = parts(&facts, &encoded::of(&facts, options));
-    let all: Vec<Wanted> = renders.iter().map(wanted).collect();
+    let mut all: Vec<(&Camera, Wanted)> = Vec::new();
+    for &(camera, options) in views {
+        // The size for a number of splats follows from all nodes in view.
+        let detail = if matches!(options.detail, Detail::Splats(_)) { Detail::FINEST } else { options.detail };
+        let wanted = |part: &RenderOptions| Wanted { detail, ..Wanted::of(part, culls_back(&facts, camera, part)) };
+        // Renders for colour and maps may leave out other backs, and look as far as their own samples.
+        all.extend(parts(&facts, &encoded::of(&facts, options)).iter().map(|part| (camera, wanted(part))));
+    }
     let any = |tree: &Hierarchy, index: u32| {
-        all.iter()
-            .any(|wanted| select::may_divide(&tree.nodes[index as usize], tree.low(index), (origin, camera), wanted))
+        let (node, low) = (&tree.nodes[index as usize], tree.low(index));
+        all.iter().any(|(camera, wanted)| select::may_divide(node, low, (origin, camera), wanted))
     };
     part::part(levels, any, fits, progress)
 }

@@ -70,7 +70,8 @@ pub(crate) fn body(count: usize, position: impl Fn(usize) -> DVec3 + Sync) -> (B
 
 /// The same of places.
 fn body_of(places: &impl Places) -> (Bounds, u64) {
-    body_within(core(places), box_of(places, |_| true).0, places)
+    let (core, all) = core_and_box(places);
+    body_within(core, all, places)
 }
 
 /// The same, where the core, and the box of all places, are known.
@@ -89,16 +90,12 @@ pub(crate) fn body_within(core: Option<Bounds>, all: Bounds, places: &impl Place
 /// The box of what the default view shows of places, each with its radius, and how many are not in it: those that stray
 /// from the body, and those few that lie [apart](super::apart) from it.
 pub(crate) fn framed(places: &impl Places) -> (Bounds, u64) {
-    let (_, framed, left_out) = body_and_framed(places);
+    let (core, all) = core_and_box(places);
+    let (_, framed, left_out) = framed_within(core, all, places);
     (framed, left_out)
 }
 
-/// The body, the box of what the default view shows, and how many are not in that.
-pub(crate) fn body_and_framed(places: &impl Places) -> (Bounds, Bounds, u64) {
-    framed_within(core(places), box_of(places, |_| true).0, places)
-}
-
-/// The same, where the core, and the box of all places, are known.
+/// The body, the box of what the default view shows, and how many are not in that, where the core, and the box of all places, are known.
 pub(crate) fn framed_within(core: Option<Bounds>, all: Bounds, places: &impl Places) -> (Bounds, Bounds, u64) {
     let (body, strays) = body_within(core, all, places);
     let Some(core) = core.filter(|core| core.extent().max_element() >= SMALLEST_SCENE && !body.is_empty()) else {
@@ -117,13 +114,15 @@ fn box_of(places: &impl Places, wanted: impl Fn(DVec3) -> bool + Sync + Send) ->
     places.fold(|| (Bounds::EMPTY, 0), add, |a, b| (a.0.union(b.0), a.1 + b.1))
 }
 
-/// The box between the quantiles of the sampled positions, axis by axis; none if there are too few.
-fn core(places: &impl Places) -> Option<Bounds> {
-    let add = |mut sample: Sample, p: DVec3, _| {
+/// The box between the quantiles of the sampled positions, axis by axis, none if there are too few; and that of all.
+pub(crate) fn core_and_box(places: &impl Places) -> (Option<Bounds>, Bounds) {
+    let add = |(mut sample, all): (Sample, Bounds), p: DVec3, _| {
         sample.add(p);
-        sample
+        (sample, all.with_point(p))
     };
-    places.fold(|| Sample::of(places.count()), add, Sample::both).core()
+    let nothing = || (Sample::of(places.count()), Bounds::EMPTY);
+    let (sample, all) = places.fold(nothing, add, |a, b| (a.0.both(b.0), a.1.union(b.1)));
+    (sample.core(), all)
 }
 
 /// Positions that are looked at for the core: which of so many depends on the coordinates' own bits.

@@ -72,10 +72,11 @@ impl Cut {
         Some(cut)
     }
 
-    /// Nodes whose longest half-axis is shorter than `length`, world units, wherever they are seen from, and the surfels of leaves that are not.
+    /// Nodes with balls around them and all below them that are smaller than `length`, the radius in world units, wherever they are seen from, and the surfels
+    /// of leaves that are not.
     pub fn by_length(hierarchy: &Hierarchy, length: f64) -> Self {
         let fate = |index: u32| {
-            let short = f64::from(hierarchy.nodes[index as usize].surfel.radius()) < length;
+            let short = f64::from(hierarchy.nodes[index as usize].radius) < length;
             if short { Fate::DRAWN } else { Fate::DIVIDED }
         };
         Self::of(hierarchy, u64::MAX, fate).unwrap_or_default()

@@ -5,7 +5,8 @@ use std::str::FromStr;
 
 use glam::{DVec2, DVec3};
 
-use super::{Camera, Projection, Surfel};
+use super::hierarchy::Node;
+use super::{Camera, Projection};
 use crate::error::Error;
 
 /// The size of a node in the image that it is drawn at instead of what is below it.
@@ -61,12 +62,13 @@ impl FromStr for Detail {
     }
 }
 
-/// What of a node's ellipse is measured.
+/// What of a node is measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DetailMeasure {
-    /// The area of its image, as in Pajarola 2003: seen from its edge it has none, so outlines get the coarsest nodes.
+    /// The area of its ellipse's image, as in Pajarola 2003: seen from its edge it has none, so outlines get the coarsest nodes.
     Area,
-    /// The area of the disk that its longer half-axis is seen as: an outline is as fine as a surface that is seen from the front.
+    /// The area of the disk that the ball around it and all below it is seen as in the middle of an image: an outline is as fine as a surface that is
+    /// seen from the front, and a node that is as high as it is long, as at a ridge, is divided sooner.
     #[default]
     Extent,
 }
@@ -84,11 +86,11 @@ impl DetailMeasure {
     /// All of them, by name and what they measure.
     pub const ALL: [(Self, &'static str, &'static str); 2] = [
         (Self::Area, "area", "the area of a node's image, as in Pajarola 2003"),
-        (Self::Extent, "extent", "that of a disk as long as its image"),
+        (Self::Extent, "extent", "that of the ball around it and all below it"),
     ];
 
-    /// Square pixels of a surfel at the centre `center`, relative to the eye, as seen there; infinite at the eye's plane.
-    pub fn of(self, surfel: &Surfel, center: DVec3, camera: &Camera) -> f64 {
+    /// Square pixels of a node at the centre `center`, relative to the eye, as seen there; infinite at the eye's plane.
+    pub fn of(self, node: &Node, center: DVec3, camera: &Camera) -> f64 {
         let turned = |v: DVec3| camera.rotation * v;
         let (at, focal) = (turned(center), DVec2::new(camera.fx, camera.fy));
         if camera.projection == Projection::Pinhole && at.z <= camera.near {
@@ -101,10 +103,15 @@ impl DetailMeasure {
                 Projection::Orthographic => axis.truncate() * focal,
             }
         };
-        let [s, t] = [surfel.s, surfel.t].map(image);
         match self {
-            Self::Area => PI * s.perp_dot(t).abs(),
-            Self::Extent => PI * s.length_squared().max(t.length_squared()),
+            Self::Area => {
+                let [s, t] = [node.surfel.s, node.surfel.t].map(image);
+                PI * s.perp_dot(t).abs()
+            }
+            Self::Extent => {
+                let depth = if camera.projection == Projection::Pinhole { at.z } else { 1.0 };
+                PI * (f64::from(node.radius) / depth * focal.max_element()).powi(2)
+            }
         }
     }
 }
@@ -137,7 +144,7 @@ mod tests {
     use glam::{DMat3, Vec3};
 
     use super::*;
-    use crate::scene::Lens;
+    use crate::scene::{Cap, Lens, Surfel};
 
     #[test]
     fn sizes_are_read() {
@@ -152,23 +159,32 @@ mod tests {
         }
     }
 
+    fn node(surfel: Surfel) -> Node {
+        Node { surfel, cap: Cap::FLAT, color: [1.0; 4], radius: 0.5, cone: 1.0, first: 0, count: 1, leaf: true }
+    }
+
     #[test]
     fn a_disk_has_the_size_that_it_is_seen_at() {
         for (lens, pixels) in [(Lens::Fov(90.0), 50.0 / 4.0), (Lens::OrthographicHeight(10.0), 10.0)] {
             let camera = Camera::posed((100, 100), lens, DVec3::ZERO, DMat3::IDENTITY, 0.1).unwrap();
             let center = DVec3::new(0.0, 0.0, 4.0);
-            let front = Surfel::disk(Vec3::ZERO, Vec3::Z, 0.5);
+            let disk = |normal| node(Surfel::disk(Vec3::ZERO, normal, 0.5));
+            let front = disk(Vec3::Z);
             let (area, extent) = (DetailMeasure::Area, DetailMeasure::Extent);
             let expected = PI * (0.5 * pixels) * (0.5 * pixels);
             assert!((area.of(&front, center, &camera) / expected - 1.0).abs() < 1e-6);
             assert!((extent.of(&front, center, &camera) / expected - 1.0).abs() < 1e-6);
-            let edge = Surfel::disk(Vec3::ZERO, Vec3::X, 0.5);
+            let edge = disk(Vec3::X);
             assert!(area.of(&edge, center, &camera) < 1e-6 * expected);
             assert!((extent.of(&edge, center, &camera) / expected - 1.0).abs() < 1e-6);
+            let high = Node { radius: 2.0, ..front };
+            assert!((extent.of(&high, center, &camera) / expected - 16.0).abs() < 1e-5);
+            assert_eq!(area.of(&high, center, &camera), area.of(&front, center, &camera));
         }
         let camera = Camera::posed((9, 9), Lens::Fov(60.0), DVec3::ZERO, DMat3::IDENTITY, 0.1).unwrap();
-        let behind =
-            DetailMeasure::Area.of(&Surfel::disk(Vec3::ZERO, Vec3::Z, 1.0), DVec3::new(0.0, 0.0, -1.0), &camera);
-        assert_eq!(behind, f64::INFINITY);
+        for measure in DetailMeasure::ALL {
+            let one = node(Surfel::disk(Vec3::ZERO, Vec3::Z, 1.0));
+            assert_eq!(measure.0.of(&one, DVec3::new(0.0, 0.0, -1.0), &camera), f64::INFINITY);
+        }
     }
 }

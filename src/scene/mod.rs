@@ -36,9 +36,7 @@ pub mod triangles;
 pub mod whole;
 
 pub use atlas::Atlas;
-pub(crate) use body::{
-    Listed, Places, SMALLEST_SCENE, Sample, body, body_and_framed, body_within, framed, framed_within,
-};
+pub(crate) use body::{Listed, Places, SMALLEST_SCENE, Sample, body, body_within, core_and_box, framed, framed_within};
 pub use camera::{Camera, Lens, Projection};
 pub use cap::Cap;
 pub use clip::Clip;

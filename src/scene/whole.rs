@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::hierarchy::{Hierarchy, Node};
-use super::{Bounds, Listed, Scene, body_and_framed};
+use super::{Bounds, Listed, Scene, core_and_box, framed_within};
 use rayon::prelude::*;
 
 /// A scene with levels of detail as it is when all of it is there. A picture of a part of it is that of the whole to the bit, and some of what pictures
@@ -104,12 +104,14 @@ impl Whole {
     /// That of a scene that has all of its surfels and of their nodes; None of one without nodes.
     pub fn of(scene: &Scene) -> Option<Self> {
         let hierarchy = scene.hierarchy.as_deref()?;
-        let (body, framed, _) = body_and_framed(&Listed(scene.places(), |index| scene.place(index)));
+        let places = Listed(scene.places(), |index| scene.place(index));
+        let (core, bounds) = core_and_box(&places);
+        let (body, framed, _) = framed_within(core, bounds, &places);
         Some(Self {
             surfels: scene.surfels.len().try_into().ok()?,
             nodes: hierarchy.nodes.len().try_into().ok()?,
             origin: scene.origin,
-            bounds: scene.bounds(),
+            bounds,
             body,
             core: scene.core(),
             framed,

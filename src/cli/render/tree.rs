@@ -69,7 +69,7 @@ impl Tree {
         progress: &dyn Progress,
     ) -> Result<Part> {
         let fits = |taken: &Taken| memory.as_ref().map_or(Ok(()), |memory| memory.fits(taken));
-        let (scene, read) = taken(&self.levels, camera, options, fits, progress)?;
+        let (scene, read) = taken(&self.levels, &[(camera, options)], fits, progress)?;
         let (nodes, surfels) = (self.levels.whole.nodes.into(), self.levels.whole.surfels.into());
         let preparation = Preparation { points: surfels, surfels, ..Preparation::default() };
         let read = Read {

@@ -1,0 +1,56 @@
+//! Where the scenes of a study are seen from, and how large.
+
+use std::f64::consts::TAU;
+
+use glam::{DMat3, DVec3};
+
+use super::definition::SceneEntry;
+use crate::error::Result;
+use crate::scene::camera::DEFAULT_FOV;
+use crate::scene::{Camera, Lens, Projection, Scene};
+
+/// The first camera as the scene's entry says, and the others around the scene's centre.
+pub(super) fn cameras([width, height]: [u32; 2], entry: &SceneEntry, scene: &Scene) -> Result<Vec<Camera>> {
+    let lens = match entry.ortho {
+        Some(height) => Lens::OrthographicHeight(height),
+        None => Lens::Fov(entry.fov.unwrap_or(DEFAULT_FOV)),
+    };
+    let (size, near) = ((width, height), Camera::default_near(scene));
+    let center = scene.origin + scene.framed().0.center();
+    let target = entry.target.map_or(center, DVec3::from);
+    let mut first = match entry.eye {
+        Some(eye) => Camera::look_at(size, lens, eye.into(), target, entry.up.map(DVec3::from), scene.up, near)?,
+        None => Camera::framing_centers(size, lens, scene, near)?,
+    };
+    let fill = entry.fill.unwrap_or(1.0);
+    match first.projection {
+        // Along the line of sight, so that the target stays where it is in the image.
+        Projection::Pinhole => first.eye = target + (first.eye - target) / fill,
+        Projection::Orthographic => (first.fx, first.fy) = (first.fx * fill, first.fy * fill),
+    }
+    let turned = |view: u32| {
+        let turn = DMat3::from_axis_angle(scene.up.axis(), TAU * f64::from(view) / f64::from(entry.views));
+        let eye = center + turn * (first.eye - center);
+        Camera { eye, rotation: first.rotation * turn.transpose(), ..first.clone() }
+    };
+    Ok((0..entry.views).map(turned).collect())
+}
+
+/// The mean over surfels and cameras of the longer half-axis in pixels, at the depth of the centre and as if seen face-on;
+/// surfels behind the near depth have none. Added in order, so that it is always the same.
+pub(super) fn footprint(scene: &Scene, cameras: &[Camera]) -> f64 {
+    let (mut sum, mut seen) = (0.0, 0u64);
+    for camera in cameras {
+        let focal = (camera.fx * camera.fy).sqrt();
+        for (index, surfel) in scene.surfels.iter().enumerate() {
+            let center = camera.to_camera(scene.origin + scene.center(index));
+            if center.z < camera.near {
+                continue;
+            }
+            let depth = if camera.projection == Projection::Pinhole { center.z } else { 1.0 };
+            sum += f64::from(surfel.radius()) * focal / depth;
+            seen += 1;
+        }
+    }
+    sum / seen.max(1) as f64
+}

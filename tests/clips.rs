@@ -18,7 +18,7 @@ use epsplat::surfels::build;
 use epsplat::truth::{DiskTree, Surface, Truth};
 use glam::{DVec3, Vec3};
 
-mod common;
+use crate::common;
 
 /// Disks of all shapes, thin ones too, with lines of all kinds.
 fn clipped() -> Scene {

@@ -1,7 +1,7 @@
 //! What surfels leave uncovered of a mesh, and how far they are from it, where both have a formula.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
+use crate::common;
 
 use std::f64::consts::PI;
 

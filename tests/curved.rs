@@ -15,7 +15,7 @@ use epsplat::surfels::{FromPoints, Limits, build, build_within, from_points};
 use epsplat::truth::{Surface, Truth};
 use glam::Vec3;
 
-mod common;
+use crate::common;
 
 /// Caps of all shapes on a sphere, thin ones, flat ones and cut ones among them.
 fn curved() -> Scene {

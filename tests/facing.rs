@@ -17,7 +17,7 @@ use epsplat::scene::{
 use epsplat::surfels::{Limits, build_facing};
 use glam::{DVec2, DVec3, Vec3};
 
-mod common;
+use crate::common;
 
 /// Points of all sizes on a sphere, thin surfels among them.
 fn points() -> Scene {

@@ -125,4 +125,4 @@ fn the_gpu_renders_the_golden_images() {
     }
 }
 
-mod common;
+use crate::common;

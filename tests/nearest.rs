@@ -15,7 +15,7 @@ use epsplat::scene::{
 };
 use glam::Vec3;
 
-mod common;
+use crate::common;
 
 /// A sphere of surfels of a colour each, and of alphas from a third on.
 fn colored(count: u64) -> Scene {

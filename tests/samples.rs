@@ -11,7 +11,7 @@ use epsplat::plan::{Accumulator, Organisation, RenderOptions};
 use epsplat::render::{Backend, render};
 use epsplat::scene::{Camera, Clip, Colors, Map, Maps, Projection, Samples, Scene, Shading};
 
-mod common;
+use crate::common;
 
 fn samples(count: &str) -> Samples {
     count.parse().unwrap()

@@ -1,7 +1,7 @@
 //! Sampling of meshes: evenly, by priority, on the surface, without holes; and the baseline that it must beat.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
+use crate::common;
 
 use std::f64::consts::PI;
 use std::path::Path;

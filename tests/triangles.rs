@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
+use crate::common;
 
 use common::scenes::{front, sphere, sphere_camera};
 use common::{Random, bits, meshes};

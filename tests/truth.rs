@@ -1,7 +1,7 @@
 //! The ray-cast truth against closed forms, and a mesh against the surface that it approximates.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod common;
+use crate::common;
 
 use std::f64::consts::PI;
 use std::path::Path;

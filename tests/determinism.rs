@@ -130,14 +130,18 @@ fn an_adapters_64_bit_atomics_do_not_change_a_bit() {
         assert!(report.needs.contains(&"atomics-u64") && !plain.needs.contains(&"atomics-u64"));
         seen[usize::from(report.needs.contains(&"wide-sums"))] = true;
         assert!(bits(&one) == bits(&other), "{name}: other bits without 64-bit atomics");
-        for (backend, noticed) in broken.iter().zip(&mut noticed) {
+        // Most of a case's time is to compile its kernels: each control is tried until it is noticed.
+        for (backend, noticed) in broken.iter().zip(&mut noticed).filter(|(_, noticed)| !**noticed) {
             let (frame, _) = render(&scene, &camera, &options, backend, &()).unwrap();
-            *noticed |= bits(&frame) != bits(&other);
+            *noticed = bits(&frame) != bits(&other);
         }
     }
     assert_eq!(seen, [true; 2], "both widths of terms");
     assert_eq!(noticed, [true; 2], "wrong carries do not show");
 }
+
+/// A control that more cases than this notice is one.
+const ENOUGH: u32 = 3;
 
 /// Splats that are left out as hidden would have added nothing; those that are left out wrongly show.
 #[test]
@@ -154,12 +158,13 @@ fn hidden_splats_do_not_change_a_bit() {
     let hard = cases().unwrap().into_iter().map(|case| (case.name, case.scene, case.camera, case.options));
     let mut noticed = 0;
     for (name, scene, camera, options) in crowded.chain(hard) {
-        let [own, all, fewer] =
-            [&own, &none, &too_many].map(|backend| bits(&render(&scene, &camera, &options, backend, &()).unwrap().0));
-        assert!(own == all, "{name}: leaving out hidden splats shows");
-        noticed += u32::from(fewer != all);
+        let shown = |backend| bits(&render(&scene, &camera, &options, backend, &()).unwrap().0);
+        let all = shown(&none);
+        assert!(shown(&own) == all, "{name}: leaving out hidden splats shows");
+        // Most of a case's time is to compile its kernels: the control is tried until it is noticed often enough.
+        noticed += u32::from(noticed <= ENOUGH && shown(&too_many) != all);
     }
-    assert!(noticed > 3, "{noticed}");
+    assert!(noticed > ENOUGH, "{noticed}");
 }
 
 /// Batches that are left out, as they are hidden or out of view, would have added nothing; those that are left out wrongly

@@ -248,7 +248,7 @@ fn the_outline_of_a_few_caps_is_that_of_their_sphere() {
 }
 
 /// A cap is worth its shape and its normals. With either alone, on a sphere of so many surfels:
-/// `cargo test --release --test curved what_normals -- --nocapture` prints decibels.
+/// `cargo test --release --test pictures curved::what_normals -- --nocapture` prints decibels.
 #[test]
 fn what_normals_across_a_splat_are_worth_alone() {
     let Some(gpu) = common::gpu() else { return };

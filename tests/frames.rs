@@ -5,7 +5,7 @@
 //! before a change and after it, and compare. `EPSPLAT_TEST_ADAPTER` chooses the adapter.
 //!
 //! ```text
-//! EPSPLAT_FRAMES=before.txt cargo test --release --test frames
+//! EPSPLAT_FRAMES=before.txt cargo test --release --test pictures frames::
 //! ```
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]

@@ -1,5 +1,5 @@
 //! Every struct and constant that host and device share, and nothing else. `wgsl/layout.wgsl` states the layout; the
-//! test in `tests/layout.rs` compares it with this mirror field by field.
+//! test in `tests/layout` compares it with this mirror field by field.
 
 use bytemuck::{Pod, Zeroable};
 

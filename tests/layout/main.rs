@@ -3,9 +3,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-#[path = "../common/mod.rs"]
-mod common;
 mod mirrors;
+
+use crate::common;
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -12,6 +12,8 @@ mod double;
 mod extremes;
 #[path = "../index.rs"]
 mod index;
+#[path = "../layout/main.rs"]
+mod layout;
 #[path = "../long_lists.rs"]
 mod long_lists;
 #[path = "../lowpass.rs"]

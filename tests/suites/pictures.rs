@@ -42,6 +42,8 @@ mod raster;
 mod samples;
 #[path = "../separate.rs"]
 mod separate;
+#[path = "../texture/main.rs"]
+mod texture;
 #[path = "../transparency.rs"]
 mod transparency;
 #[path = "../triangles.rs"]

@@ -2,9 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-#[path = "../common/mod.rs"]
-mod common;
 mod several;
+
+use crate::common;
 
 use std::f64::consts::{PI, TAU};
 use std::process::Command;

@@ -168,7 +168,7 @@ fn a_picture_of_a_part_is_that_of_the_whole() {
     assert!(less > 30 && apart > 15, "{less} {apart}");
 }
 
-/// What several pictures take together is enough for each of them, and no more than what each takes.
+/// What several pictures take together is enough for each of them, and what one of them takes alone is not.
 #[test]
 fn a_part_of_several_pictures_is_enough_for_each() {
     let Some(gpu) = common::gpu() else { return };

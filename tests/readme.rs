@@ -57,3 +57,30 @@ fn every_command_of_the_readme_runs() {
     let autzen = std::fs::metadata(folder.path().join("autzen.png")).expect("the first command writes autzen.png");
     assert!(autzen.len() > 100_000);
 }
+
+/// Cargo looks for no tests by itself (`autotests`), so a file or a folder of tests that no program names would never run.
+#[test]
+fn every_file_of_tests_is_in_a_program() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut programs = std::fs::read_to_string(root.join("Cargo.toml")).unwrap();
+    let names = |folder: &Path| -> Vec<String> {
+        let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name());
+        entries.map(|name| name.into_string().unwrap()).collect()
+    };
+    for suite in names(&root.join("tests/suites")) {
+        let path = format!("tests/suites/{suite}");
+        assert!(programs.contains(&format!("\"{path}\"")), "{path} is no program");
+        programs += &std::fs::read_to_string(root.join(path)).unwrap();
+    }
+    let mut found = 0;
+    for name in names(&root.join("tests")) {
+        let main = format!("{name}/main.rs");
+        let file = if name.ends_with(".rs") { name } else { main };
+        if root.join("tests").join(&file).is_file() {
+            let named = [format!("\"../{file}\""), format!("\"tests/{file}\"")];
+            assert!(named.iter().any(|named| programs.contains(named)), "no program has tests/{file}");
+            found += 1;
+        }
+    }
+    assert!(found >= 50, "{found}");
+}

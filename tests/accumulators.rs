@@ -201,7 +201,7 @@ fn a_broken_accumulator_kernel_or_epsilon_is_noticed() {
     }
     let radius = case("hat", EPSILONS[2], Projection::Pinhole);
     let file = "epsilon_radius.wgsl";
-    noticed(&radius, row, file, "min(length(s), length(t))", "1.05 * max(length(s), length(t))");
+    noticed(&radius, row, file, "min(norm3(s), norm3(t))", "1.05 * max(norm3(s), norm3(t))");
     noticed(&radius, row, file, "held.epsilon_radius * radius", "held.epsilon_deepest");
     let ray = case("hat", EPSILONS[3], Projection::Pinhole);
     noticed(&ray, row, "epsilon_ray.wgsl", " * along_axis(image)", "");

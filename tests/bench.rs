@@ -126,7 +126,8 @@ fn each_backend_has_its_error_its_memory_and_its_ratio() {
             _ => assert!(rmse > 0.0 && rmse < 1e-5 && m.device_bytes > 48 * 48 * 4, "{m:?}"),
         }
         assert_eq!(m.bytes_per_splat > 36.0, m.backend != "reference", "{m:?}");
-        assert_eq!(m.passes.len(), 4, "{m:?}");
+        // A card draws small splats one by one and large ones by tiles.
+        assert!((4..=5).contains(&m.passes.len()), "{m:?}");
     }
     assert!(!outcome.study.machine.adapter.is_empty());
 }

@@ -163,7 +163,7 @@ fn a_line_that_is_turned_the_wrong_way_is_noticed() {
     let (reference, _) = render(&scene, &camera, &decided, &Backend::Reference, &()).unwrap();
     for (from, to) in [
         ("line.x * turn.x + line.y * turn.y", "line.x * turn.x - line.y * turn.y"),
-        ("dot(clip.second, p) < 0.0", "dot(clip.second, p) < 0.01"),
+        ("dot3(clip.second, p) < 0.0", "dot3(clip.second, p) < 0.01"),
         ("vec3<f32>(first.w, second.xy)", "vec3<f32>(first.w, second.yx)"),
     ] {
         let Some(gpu) = common::gpu() else { return };

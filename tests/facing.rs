@@ -92,8 +92,8 @@ fn kernels_and_twins_draw_the_same_points() {
 fn broken_points_are_noticed() {
     let (scene, camera) = (points(), sphere_camera(160, Projection::Pinhole));
     for (shape, file, from, to) in [
-        (PointShape::Circle, "facing.wgsl", "min(dot(beside, beside), largest2(own))", "dot(beside, beside)"),
-        (PointShape::Square, "facing.wgsl", "largest2(beside), SQUARE", "dot(beside, beside), SQUARE"),
+        (PointShape::Circle, "facing.wgsl", "min(dot2(beside, beside), largest2(own))", "dot2(beside, beside)"),
+        (PointShape::Square, "facing.wgsl", "largest2(beside), SQUARE", "dot2(beside, beside), SQUARE"),
         (PointShape::Sphere, "facing.wgsl", "rise(rho2) * radius_across", "0.99 * rise(rho2) * radius_across"),
         (PointShape::Cone, "shape_cone.wgsl", "1.0 - sqrt(rho2)", "1.0 - rho2"),
         (PointShape::Circle, "axes_facing.wgsl", "LEAST_RADIUS * row", "0.9 * LEAST_RADIUS * row"),

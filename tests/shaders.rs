@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use common::modules::{self, Made, Reflected};
 use epsplat::gpu::Sources;
 use epsplat::gpu::adapter::STORAGE_BUFFERS;
-use epsplat::gpu::kernel::reflect;
+use epsplat::gpu::interface::reflect;
 use epsplat::gpu::sources::FILES;
 use epsplat::passes;
 use epsplat::plan::pass::Making;
@@ -338,6 +338,24 @@ fn an_invalid_kernel_or_one_with_a_feature_is_noticed() {
     let text = wide.join(&passes::modules(&needs)[0].files);
     let module = naga::front::wgsl::parse_str(&text).unwrap();
     assert!(Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module).is_err());
+}
+
+/// They leave the order of their terms, and so the rounding, to the driver: `vectors.wgsl`.
+#[test]
+fn no_kernel_uses_a_product_whose_order_is_not_written() {
+    let left_open = |text: &str| {
+        let code = text.lines().map(|line| line.split("//").next().unwrap_or(line)).collect::<Vec<_>>().join("\n");
+        let calls =
+            code.split('(').filter_map(|before| before.rsplit(|c: char| !c.is_alphanumeric() && c != '_').next());
+        let built_in = ["dot", "cross", "length", "distance", "normalize", "mix", "fma", "reflect", "smoothstep"];
+        calls.filter(|name| built_in.contains(name)).map(str::to_owned).collect::<Vec<_>>()
+    };
+    for (file, text) in FILES {
+        assert_eq!(left_open(text), [""; 0], "{file}");
+        // Nor products of matrices; one of rows is a list of them.
+        assert!(!text.contains("* m;") && !text.contains("transpose("), "{file}");
+    }
+    assert_eq!(left_open("let a = dot(b, c) + my_dot(d); // dot(e)"), ["dot"]);
 }
 
 #[test]

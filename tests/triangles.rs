@@ -298,7 +298,7 @@ fn kernels_and_twins_join_alike() {
         (Join::Corrected, "join_corrected.wgsl", "splats.depth < triangle", "splats.depth * 1.01 < triangle"),
         (Join::Nearest, "join_nearest.wgsl", "front < triangle", "front > triangle"),
         (Join::Blended, "join_blended.wgsl", "2.0 * epsilon", "epsilon"),
-        (Join::Blended, "join.wgsl", "mix(triangle.normal, splats.normal, share)", "triangle.normal"),
+        (Join::Blended, "join.wgsl", "triangle.normal * rest + splats.normal * share", "triangle.normal"),
         (Join::Corrected, "triangles_once.wgsl", "atomicMax", "atomicMin"),
         (Join::Corrected, "triangles_attributes.wgsl", "parts[corner] *", "0.3333333 *"),
         (Join::Corrected, "triangles.wgsl", "quotient(a.area, homogeneous_depth(triangle.a))", "a.area"),

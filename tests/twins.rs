@@ -258,7 +258,7 @@ fn a_broken_projection_is_noticed() {
         compare_splats(case, &twins, &run(case, &options, &gpu, &sources)).expect_noticed(name);
     };
     let camera = "camera_pinhole.wgsl";
-    let shift = broken(camera, "select(-dot(a.xy, offset),", "select(-dot(a.xy, offset + 1e-4),");
+    let shift = broken(camera, "select(-dot2(a.xy, offset),", "select(-dot2(a.xy, offset + 1e-4),");
     noticed(&all[0], shift, "a row moved by 1e-4 pixels");
     noticed(&all[0], broken(camera, "1.0 / p.z - dot", "1.00001 / p.z - dot"), "depth longer by 1e-5");
     let plain =
@@ -272,9 +272,9 @@ fn a_broken_projection_is_noticed() {
     noticed(&all[0], broken("center.wgsl", "d.low - held.eye_low[i]", "d.low * 0.0"), "eye of 24 bits");
     noticed(&all[0], broken("project.wgsl", "AWAY, h.away > 0.0", "AWAY, h.away < 0.0"), "the other side");
     let camera = "camera_orthographic.wgsl";
-    noticed(&all[1], broken(camera, "p_z - dot(c, offset)", "p_z * 1.00001 - dot(c, offset)"), "orthographic depth");
+    noticed(&all[1], broken(camera, "p_z - dot2(c, offset)", "p_z * 1.00001 - dot2(c, offset)"), "orthographic depth");
     let case = &all[7];
-    let near = broken("camera_pinhole.wgsl", "dot(c * unscaled, d)", "dot(c * unscaled, d) * 1.001");
+    let near = broken("camera_pinhole.wgsl", "dot3(c * unscaled, d)", "dot3(c * unscaled, d) * 1.001");
     noticed(case, near, "depth of disks across the near depth");
 }
 

@@ -21,7 +21,7 @@ fn half_axes(surfel: Surfel, depth: f32) -> Axes {
     let s = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * held.unit;
     let t = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]) * held.unit;
     let row = widening(depth) / held.intrinsics.y;
-    let limited = min(max(max(length(s), length(t)), LEAST_RADIUS * row), MOST_RADIUS * row);
+    let limited = min(max(max(norm3(s), norm3(t)), LEAST_RADIUS * row), MOST_RADIUS * row);
     // And no smaller than a sample, at which it shows.
     let r = max(limited, 0.5 * widening(depth) / min(held.intrinsics.x, held.intrinsics.y));
     return Axes(

@@ -78,9 +78,9 @@ fn homography(
     let a = vec2<f32>(t.y, -t.x) * scale;
     let b = vec2<f32>(-s.y, s.x) * scale;
     let c = s.z * a + t.z * b;
-    h.a = vec3<f32>(a, select(-dot(a, offset), 2.0, edge_on));
-    h.b = vec3<f32>(b, -dot(b, offset));
-    h.c = vec3<f32>(c, p_z - dot(c, offset));
+    h.a = vec3<f32>(a, select(-dot2(a, offset), 2.0, edge_on));
+    h.b = vec3<f32>(b, -dot2(b, offset));
+    h.c = vec3<f32>(c, p_z - dot2(c, offset));
     if (is_thin(a, b)) {
         if (!every) {
             h.rare = true;
@@ -114,7 +114,7 @@ struct Fragment {
 }
 
 fn intersect(abc: vec3<f32>) -> Fragment {
-    let rho2 = dot(abc.xy, abc.xy);
+    let rho2 = dot2(abc.xy, abc.xy);
     var spot: Spot;
     return Fragment(rho2 <= 1.0 && abc.z >= held.near, abc.z, rho2, 1.0, spot);
 }
@@ -149,8 +149,8 @@ fn seen_at(x: u32, y: u32, depth: f32) -> vec3<f32> {
 }
 
 fn area_in_pixel(normal: vec3<f32>, point: vec3<f32>, depth: f32) -> f32 {
-    let facing = max(abs(dot(normal, held.rotation[2].xyz)), 1e-30);
-    return dot(normal, normal) / facing / (held.intrinsics.x * held.intrinsics.y);
+    let facing = max(abs(dot3(normal, held.rotation[2].xyz)), 1e-30);
+    return dot3(normal, normal) / facing / (held.intrinsics.x * held.intrinsics.y);
 }
 
 fn homogeneous_row(splat: Splat) -> vec3<f32> {

@@ -1,6 +1,6 @@
 // The pinhole camera x = fx X/Z + cx: homography and bounds of a disk, and the evaluation at a pixel.
 // Twin: src/passes/homography.rs and src/passes/footprint.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xee17ce54e305f138
+// All loops end, by 1 of src/gpu/loops.rs: 0x595e57151ede850c
 
 fn image_of(position: Double, depth: Double, axis: u32) -> Double {
     let focal = Double(held.intrinsics[axis], held.intrinsics_low[axis]);
@@ -153,8 +153,8 @@ fn scaled_homography(
 ) -> Homography {
     let p = vec3<f32>(center[0].high, center[1].high, center[2].high);
     let slope = sqrt(s.z * s.z + t.z * t.z);
-    let normal = cross(s, t);
-    let away = dot(p, normal);
+    let normal = cross3(s, t);
+    let away = dot3(p, normal);
     var h: Homography;
     h.turn = vec2<f32>(1.0, 0.0);
     h.away = away;
@@ -167,8 +167,8 @@ fn scaled_homography(
     // Edge-on the rows vanish, and then u is set to 2: outside the disk.
     let edge_on = away == 0.0;
     let scale = select(vec3<f32>(1.0 / (away * focal), 1.0 / away), vec3<f32>(0.0), edge_on);
-    let a = cross(t, p) * scale;
-    let b = cross(p, s) * scale;
+    let a = cross3(t, p) * scale;
+    let b = cross3(p, s) * scale;
     let c = normal * scale;
     if (p.z - slope >= near) {
         let x = image_of(center[0], center[2], 0u);
@@ -181,9 +181,9 @@ fn scaled_homography(
             // The centre of the splat relative to the centre of its pixel: the digits that make the image stable.
             let offset = (image - pixel) + vec2<f32>(x.low, y.low) - 0.5;
             h.anchor = vec2<i32>(pixel);
-            h.a = vec3<f32>(a.xy, select(-dot(a.xy, offset), 2.0 / p.z, edge_on));
-            h.b = vec3<f32>(b.xy, -dot(b.xy, offset));
-            h.c = vec3<f32>(c.xy, 1.0 / p.z - dot(c.xy, offset));
+            h.a = vec3<f32>(a.xy, select(-dot2(a.xy, offset), 2.0 / p.z, edge_on));
+            h.b = vec3<f32>(b.xy, -dot2(b.xy, offset));
+            h.c = vec3<f32>(c.xy, 1.0 / p.z - dot2(c.xy, offset));
             if (is_thin(a.xy, b.xy)) {
                 if (!every) {
                     h.rare = true;
@@ -222,9 +222,9 @@ fn scaled_homography(
     h.anchor = vec2<i32>(vec2<u32>(held.width, held.height) / 2u);
     let d = vec3<f32>((vec2<f32>(h.anchor) + 0.5 - held.intrinsics.zw) / focal, 1.0);
     let unscaled = vec3<f32>(focal, 1.0);
-    h.a = vec3<f32>(a.xy, dot(a * unscaled, d));
-    h.b = vec3<f32>(b.xy, dot(b * unscaled, d));
-    h.c = vec3<f32>(c.xy, dot(c * unscaled, d));
+    h.a = vec3<f32>(a.xy, dot3(a * unscaled, d));
+    h.b = vec3<f32>(b.xy, dot3(b * unscaled, d));
+    h.c = vec3<f32>(c.xy, dot3(c * unscaled, d));
     var end_0 = vec2<f32>(0.0);
     var end_1 = vec2<f32>(0.0);
     if (slope > 0.0) {
@@ -255,11 +255,11 @@ struct Fragment {
 
 // The intersection of the ray through d (relative to the anchor's centre) with the splat's disk, and its weight's rho.
 fn intersect(abc: vec3<f32>) -> Fragment {
-    let reached = dot(abc.xy, abc.xy) <= abc.z * abc.z && abc.z > 0.0;
+    let reached = dot2(abc.xy, abc.xy) <= abc.z * abc.z && abc.z > 0.0;
     let depth = 1.0 / abc.z;
     let uv = abc.xy * depth;
     // Behind the camera rho is infinite.
-    let rho2 = select(3e38, dot(uv, uv), abc.z > 0.0);
+    let rho2 = select(3e38, dot2(uv, uv), abc.z > 0.0);
     var spot: Spot;
     return Fragment(reached && depth >= held.near, depth, select(rho2, min(rho2, 1.0), reached), 1.0, spot);
 }
@@ -287,12 +287,12 @@ fn plane_depth(abc: vec3<f32>, low: f32, high: f32) -> f32 {
 // The world direction, of unit length, of the ray through the centre of the pixel.
 fn ray(x: u32, y: u32) -> vec3<f32> {
     let image = (vec2<f32>(f32(x), f32(y)) + 0.5 - held.intrinsics.zw) / held.intrinsics.xy;
-    return normalize(image.x * held.rotation[0].xyz + image.y * held.rotation[1].xyz + held.rotation[2].xyz);
+    return unit3(image.x * held.rotation[0].xyz + image.y * held.rotation[1].xyz + held.rotation[2].xyz);
 }
 
 // The direction in which the point `relative` to the eye is seen, unit; none at the eye.
 fn ray_to(relative: vec3<f32>) -> vec3<f32> {
-    return relative * inverseSqrt(max(dot(relative, relative), 1e-36));
+    return relative * inverseSqrt(max(dot3(relative, relative), 1e-36));
 }
 
 // The point at a depth on that ray, relative to the eye, device units.
@@ -304,8 +304,8 @@ fn seen_at(x: u32, y: u32, depth: f32) -> vec3<f32> {
 // What a pixel has of a measure of the plane through `point`, relative to the eye: the measure's normal is as long as what a unit of area has
 // of it. Device units; at depth 0, where nothing is, 0.
 fn area_in_pixel(normal: vec3<f32>, point: vec3<f32>, depth: f32) -> f32 {
-    let facing = max(abs(dot(normal, point / max(depth, held.near))), 1e-30);
-    return dot(normal, normal) / facing * (depth / held.intrinsics.x) * (depth / held.intrinsics.y);
+    let facing = max(abs(dot3(normal, point / max(depth, held.near))), 1e-30);
+    return dot3(normal, normal) / facing * (depth / held.intrinsics.x) * (depth / held.intrinsics.y);
 }
 
 // The third row of the matrix that takes an image point to (u, v, 1), up to a factor.
@@ -326,7 +326,7 @@ fn depth_order(z: f32) -> f32 {
 
 fn along_axis(image: vec2<f32>) -> f32 {
     let d = (image - held.intrinsics.zw) / held.intrinsics.xy;
-    return inverseSqrt(1.0 + dot(d, d));
+    return inverseSqrt(1.0 + dot2(d, d));
 }
 
 // For caps (curved.wgsl): whether the anchor's pixel holds the splat's centre; how much wider than at a depth of 1 the image is at

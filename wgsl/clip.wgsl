@@ -47,7 +47,7 @@ fn clip_in(record: SplatRecord) -> Clip {
 
 // Whether a line, or a polygon's side, has the point, (u, v, 1) times a positive factor, on its far side.
 fn cuts(clip: Clip, p: vec3<f32>) -> bool {
-    return p.z > 0.0 && (dot(clip.first, p) < 0.0 || dot(clip.second, p) < 0.0 || beyond_outline(clip.turn, p));
+    return p.z > 0.0 && (dot3(clip.first, p) < 0.0 || dot3(clip.second, p) < 0.0 || beyond_outline(clip.turn, p));
 }
 
 fn clipped(fragment: Fragment, clip: Clip, abc: vec3<f32>) -> Fragment {

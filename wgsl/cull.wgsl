@@ -3,7 +3,7 @@
 // its fragments could be nearest or within epsilon of the nearest, so no image depends on it. The splats of the others are
 // stored one batch after the other, in slots: those that are left out take no room.
 // Host side and twin: src/passes/cull.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x2d45421bb5698868
+// All loops end, by 1 of src/gpu/loops.rs: 0x008e3cc91354b9ec
 
 // A batch's bounding ball: centre and radius, world units relative to the scene's origin.
 @group(0) @binding(23) var<storage, read> balls: array<vec4<f32>>;
@@ -57,7 +57,7 @@ fn ball_of_batch(batch: u32) -> Ball {
     let sphere = balls[batch];
     let relative = sphere.xyz * held.unit - held.eye.xyz;
     // Ten roundings of f32 in these lengths.
-    return ball_at(relative, sphere.w * held.unit + 1e-6 * (length(relative) + length(held.eye.xyz)));
+    return ball_at(relative, sphere.w * held.unit + 1e-6 * (norm3(relative) + norm3(held.eye.xyz)));
 }
 
 // The batch's pixels, as far as they lie in the band; empty if a first lies past a last.

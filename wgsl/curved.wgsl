@@ -50,30 +50,30 @@ fn cap_height(index: u32) -> f32 {
 // The least and largest height over the unit disk.
 fn extremes(heights: vec3<f32>) -> vec2<f32> {
     let mean = 0.25 * (heights.x + heights.z);
-    let spread = length(vec2<f32>(0.25 * (heights.x - heights.z), 0.5 * heights.y));
+    let spread = norm2(vec2<f32>(0.25 * (heights.x - heights.z), 0.5 * heights.y));
     return vec2<f32>(min(mean - spread, 0.0), max(mean + spread, 0.0));
 }
 
 // The inverse of [s t n] by rows, n the unit normal of s and t.
 fn inverse_of(s: vec3<f32>, t: vec3<f32>) -> mat3x3<f32> {
-    let across = cross(s, t);
-    let size = length(across);
+    let across = cross3(s, t);
+    let size = norm3(across);
     let n = across / size;
-    return mat3x3<f32>(cross(t, n) / size, cross(n, s) / size, n);
+    return mat3x3<f32>(cross3(t, n) / size, cross3(n, s) / size, n);
 }
 
 // How the surfel curves whose disk has the homography h, in which rows and extent become those of the cap; and whether all of it shows
 // its back.
 fn curve(h: ptr<function, Homography>, index: u32, center: array<Double, 3>, s: vec3<f32>, t: vec3<f32>) -> Cap {
     let p = vec3<f32>(center[0].high, center[1].high, center[2].high);
-    let r = max(length(s), length(t));
+    let r = max(norm3(s), norm3(t));
     // In units of r, so that no product under- or overflows.
     let unit_s = s / r;
     let unit_t = t / r;
     let m = inverse_of(unit_s, unit_t);
     let heights = world_heights(index) * (held.unit / r);
     let height = extremes(heights) * r;
-    let slope = length(vec2<f32>(s.z, t.z));
+    let slope = norm2(vec2<f32>(s.z, t.z));
     let low_shift = m[2] * height.x;
     let high_shift = m[2] * height.y;
     // The rounding of these sums is less than 4 * 2^-24 of the magnitudes: a quarter of this.
@@ -105,11 +105,12 @@ fn curve(h: ptr<function, Homography>, index: u32, center: array<Double, 3>, s: 
         start = (ray * depth - p.xy) / r;
         start_z = (depth - p.z) / r;
     }
-    (*h).a = vec3<f32>(m[0].xy * per_pixel, dot(m[0].xy, start) + m[0].z * start_z);
-    (*h).b = vec3<f32>(m[1].xy * per_pixel, dot(m[1].xy, start) + m[1].z * start_z);
-    (*h).c = vec3<f32>(m[2].xy * per_pixel, dot(m[2].xy, start) + m[2].z * start_z);
+    (*h).a = vec3<f32>(m[0].xy * per_pixel, dot2(m[0].xy, start) + m[0].z * start_z);
+    (*h).b = vec3<f32>(m[1].xy * per_pixel, dot2(m[1].xy, start) + m[1].z * start_z);
+    (*h).c = vec3<f32>(m[2].xy * per_pixel, dot2(m[2].xy, start) + m[2].z * start_z);
     // The vector times the matrix whose columns are the rows m.
-    (*h).a_low = toward(p, depth) * m;
+    let forward = toward(p, depth);
+    (*h).a_low = vec3<f32>(dot3(forward, m[0]), dot3(forward, m[1]), dot3(forward, m[2]));
     let extent = box_extent(*h, array<vec3<f32>, 5>(p, s, t, low_shift, high_shift), depths);
     (*h).low = extent.xy;
     (*h).high = extent.zw;
@@ -128,7 +129,7 @@ fn box_extent(h: Homography, disk: array<vec3<f32>, 5>, depths: vec2<f32>) -> ve
     let t = disk[2].xy - ratio * disk[2].z;
     let low = disk[3].xy - ratio * disk[3].z;
     let high = disk[4].xy - ratio * disk[4].z;
-    let longer = max(length(disk[1]), length(disk[2]));
+    let longer = max(norm3(disk[1]), norm3(disk[2]));
     let half = sqrt(s * s + t * t) * (1.0 + 1e-6) + 1e-6 * (longer + max(abs(rest.x), abs(rest.y)));
     let first = rest - half + min(low, high);
     let last = rest + half + max(low, high);
@@ -148,11 +149,11 @@ fn box_extent(h: Homography, disk: array<vec3<f32>, 5>, depths: vec2<f32>) -> ve
 // Whether all of the cap shows its back, or nothing of it is known: see the twin.
 fn is_back(h: Homography, cap: Cap) -> bool {
     let p = vec3<f32>(h.a_low[0], h.a_low[1], h.a_low[2]);
-    let gradient = length(vec2<f32>(
+    let gradient = norm2(vec2<f32>(
         cap.heights.x * p.x + cap.heights.y * p.y,
         cap.heights.y * p.x + cap.heights.z * p.y,
     ));
-    return p.z - extremes(cap.heights).y * cap.spread - gradient > 1e-6 * (1.0 + length(p.xy));
+    return p.z - extremes(cap.heights).y * cap.spread - gradient > 1e-6 * (1.0 + norm2(p.xy));
 }
 
 // Its rows in a splat's record, the last ones.
@@ -183,7 +184,7 @@ fn bent(heights: vec3<f32>, a: vec2<f32>, b: vec2<f32>) -> f32 {
 // The point of a pixel's ray that lies sigma behind the depth of `start`, as a fragment.
 fn on_cap(splat: Splat, start: vec3<f32>, step: vec3<f32>, sigma: f32, away: bool) -> Fragment {
     let uv = start.xy + sigma * step.xy;
-    let rho2 = dot(uv, uv);
+    let rho2 = dot2(uv, uv);
     let depth = splat.cap.depth + splat.cap.radius * sigma;
     let hit = rho2 <= 1.0 && abs(sigma) <= FARTHEST_HIT && depth >= held.near && !(CULL_BACK && away)
         && !cuts(splat.clip, vec3<f32>(uv, 1.0));

@@ -1,8 +1,8 @@
 // Arithmetic with twice the digits of f32: a number is an unevaluated sum high + low, |low| <= ulp(high) / 2.
 // Dekker 1971, "A floating-point technique for extending the available precision"; Knuth's two-sum.
 //
-// WGSL lets an implementation reassociate where it believes the result no worse, and Mesa's optimiser does rewrite
-// (a + b) - a to b, which is just the rounding error these functions are after. `keep` passes a value through an
+// WGSL lets an implementation reassociate where it believes the result no worse: Mesa's optimiser and NVIDIA's compiler rewrite
+// (a + b) - a to b, which is just the rounding error these functions are after, and the latter a / b + c / b to (a + c) / b. `keep` passes a value through an
 // exclusive or with a uniform that is always zero: exact, one integer instruction, and opaque to every compiler.
 
 struct Double {
@@ -54,7 +54,7 @@ fn product(a: Double, b: Double) -> Double {
 }
 
 fn quotient(a: Double, b: Double) -> Double {
-    let q = a.high / b.high;
+    let q = keep(a.high / b.high);
     let back = two_product(q, b.high);
     let rest = keep(a.high - back.high) - back.low + (a.low - q * b.low);
     return quick_two_sum(q, rest / b.high);

@@ -5,7 +5,7 @@ fn radius_of(index: u32) -> f32 {
     let surfel = surfel_at(index);
     let s = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * held.unit;
     let t = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]) * held.unit;
-    return min(length(s), length(t));
+    return min(norm3(s), norm3(t));
 }
 
 // Of the largest surfel: what depths are measured by.

@@ -59,7 +59,7 @@ fn met(splat: Splat, filter_: Filter, d: vec2<f32>) -> Fragment {
     let beside = abs(uv.xy) * (1.0 / uv.z);
     // A point always shows at the pixel that it lies in, as if it were a square of that size.
     let own = abs(uv.xy) * (2.0 / change);
-    let rho2 = select(min(dot(beside, beside), largest2(own)), largest2(beside), SQUARE);
+    let rho2 = select(min(dot2(beside, beside), largest2(own)), largest2(beside), SQUARE);
     let depth = flat_.depth - rise(rho2) * radius_across(splat);
     var spot: Spot;
     return Fragment(rho2 <= 1.0 && depth >= held.near, depth, rho2, 1.0, spot);

@@ -43,5 +43,5 @@ fn least_filtered(filter_: Filter) -> f32 {
 fn filter_rho2(filter_: Filter, d: vec2<f32>) -> f32 {
     let x = d - vec2<f32>(filter_.center_x, filter_.center_y);
     let r = vec2<f32>(filter_.r_xx * x.x + filter_.r_xy * x.y, filter_.r_yy * x.y);
-    return dot(r, r);
+    return dot2(r, r);
 }

@@ -57,6 +57,7 @@ fn nearest_on(splat: Splat, first: vec2<f32>, last: vec2<f32>) -> f32 {
     let low = min(c * first, c * last);
     let high = max(c * first, c * last);
     // The two products and two sums of `met` round by less than 4 * 2^-24 of these magnitudes: a sixteenth of this.
-    let slack = 4e-6 * (dot(max(abs(low), abs(high)), vec2<f32>(1.0)) + abs(splat.c[2]));
+    let most = max(abs(low), abs(high));
+    let slack = 4e-6 * (most.x + most.y + abs(splat.c[2]));
     return nearest_between(low.x + low.y + splat.c[2] - slack, high.x + high.y + splat.c[2] + slack);
 }

@@ -21,13 +21,14 @@ fn joined(splats: Surface, pixel: u32, x: u32, row: u32) -> Surface {
 }
 
 fn mean_of(splats: Surface, triangle: Surface, share: f32) -> Surface {
-    let alpha = mix(triangle.color.a, splats.color.a, share);
-    let color = mix(triangle.color.rgb * triangle.color.a, splats.color.rgb * splats.color.a, share);
-    let normal = mix(triangle.normal, splats.normal, share);
+    let rest = 1.0 - share;
+    let alpha = triangle.color.a * rest + splats.color.a * share;
+    let color = triangle.color.rgb * triangle.color.a * rest + splats.color.rgb * splats.color.a * share;
+    let normal = triangle.normal * rest + splats.normal * share;
     return Surface(
         vec4<f32>(select(vec3<f32>(0.0), color / alpha, alpha > 0.0), alpha),
-        normal * inverseSqrt(max(dot(normal, normal), 1e-12)),
-        mix(triangle.depth, splats.depth, share),
+        normal * inverseSqrt(max(dot3(normal, normal), 1e-12)),
+        triangle.depth * rest + splats.depth * share,
         splats.weight,
         splats.count,
         splats.place,

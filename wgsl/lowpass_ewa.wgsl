@@ -16,7 +16,7 @@ fn low_pass(h: ptr<function, Homography>) -> Filter {
     let yy = s.y * s.y + t.y * t.y + FILTER_BLUR;
     // |Q| = |J|^2 + BLUR trace(J J^T) + BLUR^2, of which no term cancels.
     let area = s.x * t.y - s.y * t.x;
-    let determinant = area * area + FILTER_BLUR * (dot(s, s) + dot(t, t)) + FILTER_BLUR * FILTER_BLUR;
+    let determinant = area * area + FILTER_BLUR * (dot2(s, s) + dot2(t, t)) + FILTER_BLUR * FILTER_BLUR;
     // x^T Q^-1 x = (sqrt(yy / |Q|) (x - y xy / yy))^2 + y^2 / yy.
     let r_xx = sqrt(yy / determinant);
     let center = vec2<f32>((*h).anchor) + 0.5 + (*h).offset;

@@ -1,7 +1,7 @@
 // Normals, each turned toward the viewer and mapped from [-1, 1] to [0, 1] before they are summed: those of the front and the back
 // of a thin part would cancel.
 // Twin: src/passes/accumulate.rs, src/passes/resolve.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xef9a56c180a9394f
+// All loops end, by 1 of src/gpu/loops.rs: 0x5f4eb9a33ee59bf8
 
 override NORMAL_CHANNEL: u32;
 // The rasteriser's own depth test blends both sides of a surface, and normals as they are given (src/passes/raster.rs).
@@ -18,6 +18,6 @@ fn resolve_normal(pixel: u32, weight: f32, front: f32) -> vec3<f32> {
     for (var k = 0u; k < 3u; k++) {
         mean[k] = sum_at(pixel, NORMAL_CHANNEL + k) / weight * 2.0 - 1.0;
     }
-    let length_2 = dot(mean, mean);
+    let length_2 = dot3(mean, mean);
     return select(vec3<f32>(0.0), mean * (side_of(front) * inverseSqrt(length_2)), length_2 > 1e-12);
 }

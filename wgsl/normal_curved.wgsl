@@ -11,7 +11,7 @@ fn bend_of(index: u32) -> Bend {
     let surfel = surfel_at(index);
     let s = vec3<f32>(surfel.s[0], surfel.s[1], surfel.s[2]) * held.unit;
     let t = vec3<f32>(surfel.t[0], surfel.t[1], surfel.t[2]) * held.unit;
-    let r = max(length(s), length(t));
+    let r = max(norm3(s), norm3(t));
     let m = inverse_of(s / r, t / r);
     let heights = world_heights(index) * (held.unit / r);
     return Bend(-(m[0] * heights.x + m[1] * heights.y), -(m[0] * heights.y + m[1] * heights.z));
@@ -20,6 +20,6 @@ fn bend_of(index: u32) -> Bend {
 // Unit, turned, mapped to [0, 1].
 fn normal_at(attributes: Attributes, spot: Spot) -> vec3<f32> {
     let n = attributes.normal + attributes.bend.u * spot.uv.x + attributes.bend.v * spot.uv.y;
-    let unit_normal = n * inverseSqrt(max(dot(n, n), 1e-12));
+    let unit_normal = n * inverseSqrt(max(dot3(n, n), 1e-12));
     return select(unit_normal, -unit_normal, TURNS && spot.away) * 0.5 + 0.5;
 }

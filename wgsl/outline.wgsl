@@ -1,6 +1,6 @@
 // Polygons instead of disks (paper 001, section 3): what lies past a side of the regular polygon inscribed in the unit disk is left out.
 // One corner lies at u = 1, so the sides above v = 0 are those below it.
-// All loops end, by 1 of src/gpu/loops.rs: 0xbbf912629e09926c
+// All loops end, by 1 of src/gpu/loops.rs: 0x21ca402a3cfbd5fc
 // Same interface as outline_absent.wgsl. Twin: src/scene/outline.rs.
 
 // Sides whose middles have v >= 0.
@@ -16,7 +16,7 @@ fn beyond_outline(turn: vec2<f32>, p: vec3<f32>) -> bool {
     var middle = vec2<f32>(OUTLINE_COS, OUTLINE_SIN);
     var farthest = 0.0;
     for (var side = 0u; side < OUTLINE_SIDES; side += 1u) {
-        farthest = max(farthest, dot(own, middle));
+        farthest = max(farthest, dot2(own, middle));
         middle = vec2<f32>(middle.x * step.x - middle.y * step.y, middle.x * step.y + middle.y * step.x);
     }
     return farthest > OUTLINE_COS * p.z;

@@ -1,7 +1,7 @@
 // Stage 1: every surfel becomes a splat, once. One invocation a surfel; the rare ones that take longer (thin splats, disks
 // that reach the near depth, large splats) are listed and done together, so that the others of a subgroup need not wait.
 // Twin: src/passes/project.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x36cb894939cc0f08
+// All loops end, by 1 of src/gpu/loops.rs: 0x20f7c987e4d23957
 
 @group(0) @binding(3) var<storage, read_write> splats: array<SplatRecord>;
 // Word 0 counts the large splats, word 1 all that are out of view; three words from QUEUE_GRID on are a grid with a workgroup
@@ -40,9 +40,9 @@ fn rotate(world: array<Double, 3>) -> array<Double, 3> {
 
 fn rotate_plain(world: vec3<f32>) -> vec3<f32> {
     return vec3<f32>(
-        dot(held.rotation[0].xyz, world),
-        dot(held.rotation[1].xyz, world),
-        dot(held.rotation[2].xyz, world),
+        dot3(held.rotation[0].xyz, world),
+        dot3(held.rotation[1].xyz, world),
+        dot3(held.rotation[2].xyz, world),
     );
 }
 

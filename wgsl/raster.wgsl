@@ -52,9 +52,9 @@ fn corner_image(splat: Splat, number: u32) -> vec2<f32> {
     let b = vec3<f32>(splat.b[0], splat.b[1], splat.b[2]);
     let c = homogeneous_row(splat);
     // The columns of the rows' inverse, up to a factor; at the disk's centre u = v = 0.
-    let u = cross(b, c);
-    let v = cross(c, a);
-    let center = cross(a, b);
+    let u = cross3(b, c);
+    let v = cross3(c, a);
+    let center = cross3(a, b);
     let thin = any(vec3<f32>(splat.a_low[0], splat.a_low[1], splat.a_low[2]) != vec3<f32>(0.0));
     // Corners are within 2 of the centre: there the homogeneous coordinate stays within half of the centre's.
     let level = 4.0 * (abs(u.z) + abs(v.z)) < abs(center.z);
@@ -62,7 +62,7 @@ fn corner_image(splat: Splat, number: u32) -> vec2<f32> {
         return boxed;
     }
     // A step of a pixel changes u and v by less than this, anywhere on such a disk.
-    let change = 2.0 * abs(center.z / dot(a, u))
+    let change = 2.0 * abs(center.z / dot3(a, u))
         * vec2<f32>(abs(a.x) + abs(a.y) + abs(c.x) + abs(c.y), abs(b.x) + abs(b.y) + abs(c.x) + abs(c.y));
     let corner = disk_corner(number) * (1.0 + SHAPE_MARGIN * max(change.x, change.y));
     let d = u * corner.x + v * corner.y + center;

@@ -3,7 +3,7 @@
 
 fn corner_depth(splat: Splat, image: vec2<f32>, index: u32) -> f32 {
     let d = vec3<f32>(image - 0.5 - vec2<f32>(f32(splat.anchor_x), f32(splat.anchor_y)), 1.0);
-    return depth_order(depth_of(dot(vec3<f32>(splat.c[0], splat.c[1], splat.c[2]), d)));
+    return depth_order(depth_of(dot3(vec3<f32>(splat.c[0], splat.c[1], splat.c[2]), d)));
 }
 
 fn front_at(pixel: u32) -> f32 {

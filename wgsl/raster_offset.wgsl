@@ -8,7 +8,7 @@ override MOVED: bool;
 
 fn corner_depth(splat: Splat, image: vec2<f32>, index: u32) -> f32 {
     let d = vec3<f32>(image - 0.5 - vec2<f32>(f32(splat.anchor_x), f32(splat.anchor_y)), 1.0);
-    let z = depth_of(dot(vec3<f32>(splat.c[0], splat.c[1], splat.c[2]), d));
+    let z = depth_of(dot3(vec3<f32>(splat.c[0], splat.c[1], splat.c[2]), d));
     if (!MOVED) {
         return depth_order(z);
     }

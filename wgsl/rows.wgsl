@@ -39,7 +39,7 @@ struct Rows {
 }
 
 fn is_thin(a: vec2<f32>, b: vec2<f32>) -> bool {
-    return dot(a, a) + dot(b, b) > 8.0 * abs(a.x * b.y - a.y * b.x);
+    return dot2(a, a) + dot2(b, b) > 8.0 * abs(a.x * b.y - a.y * b.x);
 }
 
 fn single(x: f32) -> Double {
@@ -69,7 +69,7 @@ fn thin_rows(a_x: Double, a_y: Double, b_x: Double, b_y: Double, offset_x: Doubl
     let a_2 = a_x.high * a_x.high + a_y.high * a_y.high;
     let b_2 = b_x.high * b_x.high + b_y.high * b_y.high;
     let angle = 0.5 * atan2(2.0 * (a_x.high * b_x.high + a_y.high * b_y.high), a_2 - b_2);
-    let turn = normalize(vec2<f32>(cos(angle), sin(angle)));
+    let turn = unit2(vec2<f32>(cos(angle), sin(angle)));
     let cosine = single(turn.x);
     let sine = single(turn.y);
     let wide_x = sum(product(cosine, a_x), product(sine, b_x));

@@ -4,7 +4,7 @@
 // depends on tree and camera alone. Pages of surfels are drawn from where what was chosen lies.
 // Of cuts that fade into each other (select_fades.wgsl) all are made at once.
 // Host side and twin: src/passes/select.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x2bc1cfd88810cae0
+// All loops end, by 1 of src/gpu/loops.rs: 0x7943e729da183421
 
 @group(0) @binding(72) var<uniform> branch: Branch;
 @group(0) @binding(73) var<storage, read> tree_nodes: array<TreeNode>;
@@ -112,10 +112,10 @@ fn vector(parts: array<f32, 3>) -> vec3<f32> {
 
 // The sine by which its plane faces away from the eye, and that past which all below it does.
 fn turned_away(node: TreeNode, surfel: Surfel, relative: vec3<f32>, radius: f32) -> vec2<f32> {
-    let normal = cross(vector(surfel.s) * held.unit, vector(surfel.t) * held.unit);
-    let turned = dot(ray_to(relative), normal * inverseSqrt(max(dot(normal, normal), 1e-38)));
+    let normal = cross3(vector(surfel.s) * held.unit, vector(surfel.t) * held.unit);
+    let turned = dot3(ray_to(relative), normal * inverseSqrt(max(dot3(normal, normal), 1e-38)));
     // Of the cone's angle and the ball's together, if they are less than a right angle; else nothing is told.
-    let ball = ball_sine(radius, length(relative));
+    let ball = ball_sine(radius, norm3(relative));
     let cone = sqrt(max(1.0 - node.cone * node.cone, 0.0));
     let ball_cosine = sqrt(max(1.0 - ball * ball, 0.0));
     let narrow = node.cone * ball_cosine - cone * ball > SINE_SLACK;
@@ -144,7 +144,7 @@ fn fate_of(node: TreeNode, surfel: Surfel, low: vec3<f32>) -> u32 {
     // Leading parts cancel, and what is left is as exact as the trailing ones.
     let relative = (vector(surfel.center) * held.unit - held.eye.xyz) + (low * held.unit - held.eye_low.xyz);
     // Ten roundings of f32 in this length.
-    let ball = ball_at(relative, node.radius * held.unit + BALL_ROUNDING * length(relative));
+    let ball = ball_at(relative, node.radius * held.unit + BALL_ROUNDING * norm3(relative));
     if (ball.farthest < held.near || is_beside(ball.center, ball.radius, FILTER_REACH + 2.0)) {
         return UNSEEN;
     }

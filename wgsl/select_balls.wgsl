@@ -1,6 +1,6 @@
 // Stage 0 of cuts of which hidden batches are left out (cull.wgsl): the ball of each batch of what was chosen (select.wgsl). As ball in
 // src/passes/cull.rs, but for the middle.
-// All loops end, by 1 of src/gpu/loops.rs: 0x52ecbba18d550e06
+// All loops end, by 1 of src/gpu/loops.rs: 0x38b9b152cd1b32dc
 
 @group(0) @binding(85) var<storage, read_write> made_balls: array<vec4<f32>>;
 
@@ -19,9 +19,9 @@ var<workgroup> farthest: array<f32, WORKGROUP>;
 fn longest_of(surfel: Surfel) -> f32 {
     let s = vector(surfel.s) * held.unit;
     let t = vector(surfel.t) * held.unit;
-    let difference = dot(s, s) - dot(t, t);
-    let product = 2.0 * dot(s, t);
-    return sqrt(0.5 * (dot(s, s) + dot(t, t) + sqrt(difference * difference + product * product)));
+    let difference = dot3(s, s) - dot3(t, t);
+    let product = 2.0 * dot3(s, t);
+    return sqrt(0.5 * (dot3(s, s) + dot3(t, t) + sqrt(difference * difference + product * product)));
 }
 
 // READERS invocations a batch.
@@ -53,7 +53,7 @@ fn select_balls(
     for (var k = 0u; k < BALL_PART; k++) {
         let index = surfel_of(min(first + k * READERS, last));
         let surfel = surfel_at(index);
-        let distance = length((vector(surfel.center) - middle) * held.unit);
+        let distance = norm3((vector(surfel.center) - middle) * held.unit);
         radius = max(radius, distance + longest_of(surfel) + cap_height(index) * held.unit);
     }
     farthest[local] = radius;

@@ -1,5 +1,5 @@
 // Stage 4: every fragment of a pixel by itself, from front to back. Twin: src/passes/sorted.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x656c9e3b65d0e22a
+// All loops end, by 1 of src/gpu/loops.rs: 0x296fe3b00e53d0eb
 
 // Rules in the twin.
 override MOST_ALPHA: f32;
@@ -12,7 +12,7 @@ fn composite_on(before: Compositing, end: u32, out: u32, x: u32, y: u32) -> Comp
         let key = keys[so_far.first];
         let record = record_at(key.y);
         let mapped = listed_normal(record) * 2.0 - 1.0;
-        let normal = mapped * (side_of(bitcast<f32>(key.x)) * inverseSqrt(max(dot(mapped, mapped), 1e-12)));
+        let normal = mapped * (side_of(bitcast<f32>(key.x)) * inverseSqrt(max(dot3(mapped, mapped), 1e-12)));
         let color = shaded(held.color_low + held.color_span * listed_color(record), normal, x, y);
         let alpha = min(color.a * listed_weight(record), MOST_ALPHA);
         let next = with_behind(so_far.shown, vec4<f32>(color.rgb, alpha));

@@ -1,6 +1,6 @@
 // Surfels that are painted by textures: what is summed of their places in them, and the lookup (textures.wgsl) at the mean of these.
 // Twin: src/scene/texture.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x65ded473bf293722
+// All loops end, by 1 of src/gpu/loops.rs: 0x4be836dc6aedd403
 
 override PLACE_CHANNEL: u32;
 
@@ -32,13 +32,13 @@ fn place_of(index: u32) -> Place {
 fn accumulate_place(pixel: u32, weight: Term, place: Place, at: vec2<u32>, depth: f32) {
     let point = seen_at(at.x, at.y, depth);
     let step = (point - place.position) * held.world;
-    let seen = place.center + vec2<f32>(dot(step, place.u_slope), dot(step, place.v_slope));
+    let seen = place.center + vec2<f32>(dot3(step, place.u_slope), dot3(step, place.v_slope));
     let offset = seen - 0.5;
     add_pair(pixel, PLACE_CHANNEL, term(weight, seen.x), term(weight, seen.y));
     // Of coordinates in [0, 1] the squared distance from the middle is at most 1/2.
-    add_pair(pixel, PLACE_CHANNEL + 2u, term(weight, 2.0 * dot(offset, offset)), term(weight, place.reach_2));
+    add_pair(pixel, PLACE_CHANNEL + 2u, term(weight, 2.0 * dot2(offset, offset)), term(weight, place.reach_2));
     // Of the whole texture what a pixel covers; with slopes for a device unit, so that no square overflows.
-    let area = cross(place.u_slope * held.world, place.v_slope * held.world);
+    let area = cross3(place.u_slope * held.world, place.v_slope * held.world);
     let covered_part = area_in_pixel(area, point, depth) * held.place.z * held.place.z;
     add(pixel, PLACE_CHANNEL + 4u, term(weight, covered_part));
 }
@@ -68,7 +68,7 @@ fn textured(pixel: u32, weight: f32, blended: vec4<f32>) -> vec4<f32> {
         mean[k] = sum_at(pixel, PLACE_CHANNEL + k) / weight;
     }
     let offset = mean.xy - 0.5;
-    let variance = 0.5 * mean.z - dot(offset, offset);
+    let variance = 0.5 * mean.z - dot2(offset, offset);
     let share = clamp(2.0 - variance / (mean.w * held.place.w), 0.0, 1.0);
     let place = held.place.xy + offset * held.place.z;
     let covered_part = sum_at(pixel, PLACE_CHANNEL + 4u) / weight;

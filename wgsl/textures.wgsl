@@ -28,9 +28,9 @@ fn level_color(level: Level, place: vec2<f32>) -> vec4<f32> {
     let share = at - low;
     let column = i32(low.x);
     let row = i32(low.y);
-    let above = mix(level_texel(level, column, row), level_texel(level, column + 1, row), share.x);
-    let below = mix(level_texel(level, column, row + 1), level_texel(level, column + 1, row + 1), share.x);
-    return mix(above, below, share.y);
+    let above = between(level_texel(level, column, row), level_texel(level, column + 1, row), share.x);
+    let below = between(level_texel(level, column, row + 1), level_texel(level, column + 1, row + 1), share.x);
+    return between(above, below, share.y);
 }
 
 // Of a texture by its number, where a pixel covers a `part` of it: between the two levels whose texels are the next smaller and larger ones.
@@ -43,5 +43,5 @@ fn seen_texture(number: u32, place: vec2<f32>, part: f32) -> vec4<f32> {
     let low = floor(level);
     let near = level_color(level_at(head, u32(low)), place);
     let far = level_color(level_at(head, u32(min(low + 1.0, last))), place);
-    return mix(near, far, level - low);
+    return between(near, far, level - low);
 }

@@ -22,8 +22,8 @@ fn span(x: vec2<f32>, y: vec2<f32>, rest: vec2<f32>, low: vec2<f32>, high: vec2<
 fn exceeds(s: Span, length: f32) -> bool {
     let one = s.right + s.down;
     let other = s.right - s.down;
-    let shortest = length + s.slack + sqrt(max(dot(one, one), dot(other, other)));
-    return dot(s.middle, s.middle) * (1.0 - 2e-6) > shortest * shortest;
+    let shortest = length + s.slack + sqrt(max(dot2(one, one), dot2(other, other)));
+    return dot2(s.middle, s.middle) * (1.0 - 2e-6) > shortest * shortest;
 }
 
 // Of eight rows of the tile from `row` on: whether the splat could have a fragment there no deeper than `deepest`.

@@ -83,7 +83,7 @@ fn cross_plainly(triangle: Triangle, p: vec2<f32>) -> Crossing {
     let weighed = areas * vec3<f32>(triangle.a.share, triangle.b.share, triangle.c.share);
     let parts = weighed / (weighed.x + weighed.y + weighed.z);
     let depths = vec3<f32>(triangle.a.depth.high, triangle.b.depth.high, triangle.c.depth.high);
-    let depth = dot(parts, depths);
+    let depth = dot3(parts, depths);
     return Crossing(is_hit(sides, depth), depth, parts, 0.0);
 }
 
@@ -145,7 +145,7 @@ fn cross_precisely(triangle: Triangle, p: vec2<f32>) -> Crossing {
     let told = vec3<f32>(weighed_a.high, weighed_b.high, weighed_c.high) / whole.high;
     let parts = select(vec3<f32>(1.0 / 3.0), told, is_told);
     let depths = vec3<f32>(triangle.a.depth.high, triangle.b.depth.high, triangle.c.depth.high);
-    let depth = select(dot(parts, depths), quotient(of_depth, whole).high, is_told);
+    let depth = select(dot3(parts, depths), quotient(of_depth, whole).high, is_told);
     let spread = abs(spread_of_parts(triangle, depth, of_depth.high));
     return Crossing(is_hit(vec3<f32>(a.side, b.side, c.side), depth), depth, parts, spread);
 }

@@ -1,5 +1,5 @@
 // Triangles, their attribute pass: what the nearest one of each pixel shows there. One workgroup a tile in which any shows. Twin: src/passes/triangles.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x063edf382cd1e3eb
+// All loops end, by 1 of src/gpu/loops.rs: 0x90b41a6bc9bc43a3
 
 // A record a triangle: its corners' normals, if it has some, then their premultiplied colours, then their places in a texture and its number. If all
 // have one colour, that is before the
@@ -28,7 +28,7 @@ fn triangle_vector(word: u32) -> vec3<f32> {
 fn normal_of_triangle(number: u32, triangle: Triangle, parts: vec3<f32>) -> vec3<f32> {
     if (!TRIANGLE_NORMALS) {
         let a = vertex_at(triangle.numbers.x);
-        return cross((vertex_at(triangle.numbers.y) - a) * held.unit, (vertex_at(triangle.numbers.z) - a) * held.unit);
+        return cross3((vertex_at(triangle.numbers.y) - a) * held.unit, (vertex_at(triangle.numbers.z) - a) * held.unit);
     }
     let first = TRIANGLE_RECORDS + number * TRIANGLE_WORDS;
     let mean = parts.x * triangle_vector(first) + parts.y * triangle_vector(first + 3u);
@@ -71,7 +71,7 @@ fn shade_triangles(
     // Lengths of facets are squares of small ones.
     let long = normal_of_triangle(number, triangle, crossed.parts);
     let scaled = long / max(max(abs(long.x), abs(long.y)), max(abs(long.z), 1e-38));
-    let normal = scaled * inverseSqrt(max(dot(scaled, scaled), 1e-12));
+    let normal = scaled * inverseSqrt(max(dot3(scaled, scaled), 1e-12));
     let record = TRIANGLE_RECORDS + number * TRIANGLE_WORDS;
     let painted = color_of_triangle(number, crossed.parts) * triangle_texture(record, crossed.parts, crossed.spread);
     triangle_pixels[2u * pixel] = shaded(painted, normal, x, y);

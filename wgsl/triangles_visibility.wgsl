@@ -1,6 +1,6 @@
 // Triangles, their visibility pass: the nearest one at every pixel, of those at one depth the one of the greatest number. One invocation a
 // triangle, one workgroup a large one, or a rare one that f32 does not tell. Twin: src/passes/triangles.rs.
-// All loops end, by 1, 2 of src/gpu/loops.rs: 0x7df791e82f48fb01
+// All loops end, by 1, 2 of src/gpu/loops.rs: 0xbcd81421c0e56bd5
 
 // In the form of the queue of large splats (project.wgsl): how many there are, a grid with a workgroup for each, and their numbers.
 @group(0) @binding(56) var<storage, read_write> large_triangles: array<atomic<u32>>;
@@ -71,7 +71,7 @@ fn is_ill_formed(triangle: Triangle) -> bool {
     let nearest_depth = min(min(depths.x, depths.y), depths.z);
     let span = max(max(depths.x, depths.y), depths.z) - nearest_depth;
     let area = abs(b.x * c.y - b.y * c.x);
-    let length_2 = max(dot(b, b), dot(c, c));
+    let length_2 = max(dot2(b, b), dot2(c, c));
     return !(length_2 * span <= 4.0 * area * nearest_depth && area > 1e-6 * length_2);
 }
 

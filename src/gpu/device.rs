@@ -6,13 +6,15 @@ use super::adapter::AdapterDescription;
 use super::program::Programs;
 use crate::error::{Error, Result};
 
-/// Features that are used where an adapter has them: GPU times, atomics of some accumulators, and a format of blending.
+/// Features that are used where an adapter has them: GPU times, atomics of some accumulators, a format of blending, and
+/// kernels in the device's own language (`spirv.rs`).
 const OPTIONAL_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
     .union(wgpu::Features::SHADER_INT64)
     .union(wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS)
     .union(wgpu::Features::SHADER_FLOAT32_ATOMIC)
     .union(wgpu::Features::SUBGROUP)
-    .union(wgpu::Features::FLOAT32_BLENDABLE);
+    .union(wgpu::Features::FLOAT32_BLENDABLE)
+    .union(wgpu::Features::PASSTHROUGH_SHADERS);
 
 /// Of an adapter whose memory is the host's the host reads and writes buffers where they lie; a card's would then have them in slow memory.
 const SOFTWARE_FEATURES: wgpu::Features = wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
@@ -78,12 +80,12 @@ impl Gpu {
     }
 
     /// The adapter that [`open`](Self::open) chooses, as a device that can do what every WebGPU implementation can, a browser's or a
-    /// phone's too, and no more: no optional feature, and core limits.
+    /// phone's too, and no more: no optional feature, and core limits. Kernels come to it as to others.
     pub fn open_core(name: Option<&str>) -> Result<Self> {
         let (adapter, handle) = best(name)?;
         let AdapterDescription { name, api, kind, driver, vertex_storage, .. } = adapter;
         let adapter = AdapterDescription { name, api, kind, driver, vertex_storage, ..AdapterDescription::core() };
-        Self::of(adapter, &handle, wgpu::Features::empty(), wgpu::Limits::default())
+        Self::of(adapter, &handle, handle.features() & wgpu::Features::PASSTHROUGH_SHADERS, wgpu::Limits::default())
     }
 
     fn of(
@@ -153,6 +155,11 @@ impl Gpu {
             .poll(wgpu::PollType::wait_indefinitely())
             .map_err(|e| self.error(format!("waiting for the device failed: {e}")))?;
         self.check()
+    }
+
+    /// Whether kernels are handed to it in SPIR-V: whether its operations are rounded as they stand (`spirv.rs`).
+    pub(super) fn takes_spirv(&self) -> bool {
+        self.adapter.api == "vulkan" && self.device.features().contains(wgpu::Features::PASSTHROUGH_SHADERS)
     }
 
     /// Bytes that one buffer and one binding of it may have.

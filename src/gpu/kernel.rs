@@ -1,47 +1,15 @@
-//! WGSL: joined files are compiled, bindings are found by name, overrides set by name.
+//! Pipelines of kernels: they are compiled, and dispatched with what they bind, by name.
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, PoisonError};
 
 use rayon::prelude::*;
 
 use super::device::Gpu;
 use super::layout::WORKGROUP;
-use super::program::{Bindings, Draw, Program, Programs};
+use super::module::Module;
+use super::program::{Draw, Program, Programs};
 use super::sources::Sources;
 use crate::error::{Error, Result};
-
-/// Parses and validates a module; the names of its overrides and the bindings of its entry points.
-pub fn reflect(text: &str) -> std::result::Result<(naga::Module, Bindings, Vec<String>), String> {
-    let module = naga::front::wgsl::parse_str(text).map_err(|e| e.emit_to_string(text))?;
-    let info = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::all())
-        .validate(&module)
-        .map_err(|e| e.emit_to_string(text))?;
-    let mut bindings = Bindings::new();
-    for (index, entry) in module.entry_points.iter().enumerate() {
-        let uses = info.get_entry_point(index);
-        let used = module.global_variables.iter().filter(|(handle, _)| !uses[*handle].is_empty());
-        let named = used.filter_map(|(_, variable)| Some((variable.name.clone()?, variable.binding.as_ref()?.binding)));
-        bindings.insert(entry.name.clone(), named.collect());
-    }
-    let overrides = module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect();
-    Ok((module, bindings, overrides))
-}
-
-/// The module of `files` of `sources`, whose joined text is `text`.
-fn module(gpu: &Gpu, sources: &Sources, files: &[&str], text: String) -> wgpu::ShaderModule {
-    let descriptor =
-        wgpu::ShaderModuleDescriptor { label: Some("epsplat"), source: wgpu::ShaderSource::Wgsl(text.into()) };
-    if !sources.all_end(files) {
-        return gpu.device.create_shader_module(descriptor);
-    }
-    let checks = wgpu::ShaderRuntimeChecks { force_loop_bounding: false, ..wgpu::ShaderRuntimeChecks::checked() };
-    // SAFETY: of all run-time checks the bounds of loops alone are left out, and each loop of these files ends (see above).
-    #[allow(unsafe_code)]
-    unsafe {
-        gpu.device.create_shader_module_trusted(descriptor, checks)
-    }
-}
 
 impl Programs {
     /// The entry points `stages` of the module of `files`, and `draws`.
@@ -60,96 +28,96 @@ impl Programs {
         if let Some(program) = programs.get(&key) {
             return Ok(Arc::clone(program));
         }
-        let program = Arc::new(Program::compile(gpu, (sources, files), stages, draws, constants)?);
+        let text = (sources.join(files), !sources.all_end(files));
+        let program = Arc::new(Program::compile(gpu, text, stages, draws, constants)?);
         programs.insert(key, Arc::clone(&program));
         Ok(program)
     }
 }
 
 impl Draw {
-    /// The pipeline in `module`, with `constants` and its own, of those that are `declared`.
+    /// The pipeline of `module`, with `constants` and its own, and what it binds.
     fn pipeline(
         &self,
         gpu: &Gpu,
-        module: &wgpu::ShaderModule,
+        module: &Module,
         constants: &[(&str, f64)],
-        declared: &[String],
-    ) -> wgpu::RenderPipeline {
-        let own = self.constant.filter(|(name, _)| declared.iter().any(|d| d == name));
-        let constants: Vec<_> = constants.iter().copied().chain(own).collect();
-        let compilation_options = wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() };
+    ) -> Result<(wgpu::RenderPipeline, Vec<(String, u32)>)> {
+        let constants: Vec<_> = constants.iter().copied().chain(self.constant).collect();
+        let bound = module
+            .bind(gpu, &[(wgpu::ShaderStages::VERTEX, self.vertex), (wgpu::ShaderStages::FRAGMENT, self.fragment)])?;
+        let vertex = module.entry(gpu, (naga::ShaderStage::Vertex, self.vertex), &bound, &constants)?;
+        let fragment = module.entry(gpu, (naga::ShaderStage::Fragment, self.fragment), &bound, &constants)?;
         let targets: Vec<_> = self.targets.iter().cloned().map(Some).collect();
-        gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        let pipeline = gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(self.name),
-            layout: None,
+            layout: Some(&bound.layout),
             vertex: wgpu::VertexState {
-                module,
+                module: &vertex.module,
                 entry_point: Some(self.vertex),
-                compilation_options: compilation_options.clone(),
+                compilation_options: vertex.options(),
                 buffers: &[],
             },
             primitive: wgpu::PrimitiveState { topology: wgpu::PrimitiveTopology::TriangleList, ..Default::default() },
             depth_stencil: self.depth.clone(),
             multisample: Default::default(),
             fragment: Some(wgpu::FragmentState {
-                module,
+                module: &fragment.module,
                 entry_point: Some(self.fragment),
-                compilation_options,
+                compilation_options: fragment.options(),
                 targets: &targets,
             }),
             multiview_mask: None,
             cache: None,
-        })
+        });
+        Ok((pipeline, bound.variables))
     }
 }
 
 impl Program {
-    /// Compiles the entry points `stages` of the module of `files`, and `draws`. Of `constants` those are set that it declares.
-    fn compile(
+    /// Compiles the entry points `stages` of the module of `text`, whose loops are counted if `counts_loops`, and `draws`. Of
+    /// `constants` those are set that it declares.
+    pub(crate) fn compile(
         gpu: &Gpu,
-        (sources, files): (&Sources, &[&str]),
+        (text, counts_loops): (String, bool),
         stages: &[&str],
         draws: &[Draw],
         constants: &[(&str, f64)],
     ) -> Result<Self> {
-        let text = sources.join(files);
-        let (_, mut bindings, declared) =
-            reflect(&text).map_err(|e| gpu.error(format!("a kernel is not valid WGSL: {e}")))?;
-        let constants: Vec<_> =
-            constants.iter().copied().filter(|(name, _)| declared.iter().any(|d| d == name)).collect();
-        let guard = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
-        let module = module(gpu, sources, files, text);
-        let refused = |error| gpu.error(format!("the driver refused a kernel: {error}"));
+        // Errors are told to the thread that made them.
+        let watched = || gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let passed = |guard: wgpu::ErrorScopeGuard| match pollster::block_on(guard.pop()) {
+            Some(error) => Err(gpu.error(format!("the driver refused a kernel: {error}"))),
+            None => Ok(()),
+        };
+        let guard = watched();
+        let module = Module::of(gpu, text, counts_loops)?;
         // Each on a thread of its own: half of a first frame's time would else go by here.
-        let pipelines = stages.par_iter().map(|&stage| {
-            // Errors are told to the thread that made them.
-            let guard = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let compiled = stages.par_iter().map(|&stage| {
+            let guard = watched();
+            let bound = module.bind(gpu, &[(wgpu::ShaderStages::COMPUTE, stage)])?;
+            let entry = module.entry(gpu, (naga::ShaderStage::Compute, stage), &bound, constants)?;
             let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                 label: Some(stage),
-                layout: None,
-                module: &module,
+                layout: Some(&bound.layout),
+                module: &entry.module,
                 entry_point: Some(stage),
-                compilation_options: wgpu::PipelineCompilationOptions {
-                    constants: &constants,
-                    // Nothing here is read before it is written, and workgroup memory starts at zero by WGSL.
-                    ..Default::default()
-                },
+                compilation_options: entry.options(),
                 cache: None,
             });
-            pollster::block_on(guard.pop()).map_or(Ok((stage.to_owned(), pipeline)), |error| Err(refused(error)))
+            passed(guard).map(|()| (stage.to_owned(), pipeline, bound.variables))
         });
-        let pipelines = pipelines.collect::<Result<BTreeMap<_, _>>>()?;
-        let mut drawn = BTreeMap::new();
+        let mut program = Self { counts_loops, ..Self::default() };
+        for (stage, pipeline, variables) in compiled.collect::<Result<Vec<_>>>()? {
+            program.pipelines.insert(stage.clone(), pipeline);
+            program.bindings.insert(stage, variables);
+        }
         for draw in draws {
-            drawn.insert(draw.name.to_owned(), draw.pipeline(gpu, &module, &constants, &declared));
-            let of = |entry: &str| bindings.get(entry).cloned().unwrap_or_default();
-            let both: BTreeSet<_> = of(draw.vertex).into_iter().chain(of(draw.fragment)).collect();
-            bindings.insert(draw.name.to_owned(), both.into_iter().collect());
+            let (pipeline, variables) = draw.pipeline(gpu, &module, constants)?;
+            program.draws.insert(draw.name.to_owned(), pipeline);
+            program.bindings.insert(draw.name.to_owned(), variables);
         }
-        if let Some(error) = pollster::block_on(guard.pop()) {
-            return Err(refused(error));
-        }
-        Ok(Self { pipelines, draws: drawn, bindings, counts_loops: !sources.all_end(files) })
+        passed(guard).map(|()| program)
     }
 
     /// What `stage` binds: each of its variables as `binding` says.

@@ -3,11 +3,14 @@
 pub mod adapter;
 pub mod buffers;
 pub mod device;
+pub mod interface;
 pub mod kernel;
 pub mod layout;
 mod loops;
+mod module;
 pub mod program;
 pub mod sources;
+mod spirv;
 pub mod timing;
 
 pub use adapter::AdapterDescription;

@@ -3,10 +3,10 @@
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Mutex};
 
-/// Bindings of a module's kernels, by entry point: the names of the variables each uses and their numbers.
-pub type Bindings = BTreeMap<String, Vec<(String, u32)>>;
+use super::interface::Bindings;
 
 /// The compiled kernels of a render.
+#[derive(Default)]
 pub struct Program {
     pub(super) pipelines: BTreeMap<String, wgpu::ComputePipeline>,
     pub(super) draws: BTreeMap<String, wgpu::RenderPipeline>,

@@ -9,6 +9,7 @@ pub const PASS: Pass = Pass {
         let pick = |needed, file, absent| if needed { file } else { absent };
         let mut files = vec![
             "layout.wgsl",
+            "vectors.wgsl",
             pick(needs.long_words, "words_long.wgsl", "words.wgsl"),
             "records.wgsl",
             pick(needs.clips, "clip.wgsl", "clip_absent.wgsl"),

@@ -11,8 +11,9 @@ use super::sums::Sums;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::buffers::Buffer;
-use crate::gpu::kernel::{grid, reflect};
+use crate::gpu::kernel::{Grid, grid};
 use crate::gpu::layout::{Splat, View};
+use crate::gpu::program::Program;
 use crate::gpu::{Gpu, Sources};
 use crate::passes::upload::upload;
 use crate::plan::steps::{Stage, Step, Twin};
@@ -115,49 +116,19 @@ fn splats(gpu: &Gpu, needs: &SceneNeeds, order: &[u32], store: &Store) -> Result
 /// A module that is not valid, binds anything else, or fails on the device.
 pub fn evaluate<I: Pod, O: Pod>(gpu: &Gpu, text: &str, view: &View, inputs: &[I], output_len: u64) -> Result<Vec<O>> {
     const ENTRY: &str = "evaluate";
-    let (_, bindings, _) = reflect(text).map_err(|e| Error::Usage(format!("the kernel is not valid WGSL: {e}")))?;
-    let variables =
-        bindings.get(ENTRY).ok_or_else(|| Error::Usage(format!("the kernel has no entry point {ENTRY}")))?;
     let view = Buffer::uniform(gpu, "view", view)?;
     let source = Buffer::storage(gpu, "inputs", inputs.len() as u64)?;
     source.write(gpu, inputs.len(), |range| inputs[range].into(), &())?;
     let target = Buffer::<O>::storage(gpu, "outputs", output_len)?;
     let buffers = [("view", &view.raw), ("inputs", &source.raw), ("outputs", &target.raw)];
-    let guard = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
-    let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some(ENTRY),
-        source: wgpu::ShaderSource::Wgsl(text.into()),
-    });
-    let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some(ENTRY),
-        layout: None,
-        module: &module,
-        entry_point: Some(ENTRY),
-        compilation_options: Default::default(),
-        cache: None,
-    });
-    if let Some(error) = pollster::block_on(guard.pop()) {
-        return Err(gpu.error(format!("the driver refused the kernel: {error}")));
-    }
-    let mut entries = Vec::with_capacity(variables.len());
-    for (name, binding) in variables {
-        let (_, buffer) = buffers
-            .iter()
-            .find(|(given, _)| given == name)
-            .ok_or_else(|| Error::Usage(format!("the kernel binds {name}, which is none of view, inputs, outputs")))?;
-        entries.push(wgpu::BindGroupEntry { binding: *binding, resource: buffer.as_entire_binding() });
-    }
-    let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some(ENTRY),
-        layout: &pipeline.get_bind_group_layout(0),
-        entries: &entries,
-    });
-    let (x, y) = grid(gpu, inputs.len() as u64)?;
+    let program = Program::compile(gpu, (text.to_owned(), true), &[ENTRY], &[], &[])?;
+    let binding = |name: &str| {
+        let (_, buffer) = buffers.iter().find(|(given, _)| *given == name)?;
+        Some(buffer.as_entire_binding())
+    };
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     let mut pass = encoder.begin_compute_pass(&Default::default());
-    pass.set_pipeline(&pipeline);
-    pass.set_bind_group(0, &group, &[]);
-    pass.dispatch_workgroups(x, y, 1);
+    program.dispatch(gpu, &mut pass, ENTRY, &binding, Grid::Of(grid(gpu, inputs.len() as u64)?))?;
     drop(pass);
     gpu.queue.submit([encoder.finish()]);
     gpu.wait()?;

@@ -4,8 +4,8 @@ use std::collections::HashMap;
 use std::sync::LazyLock;
 
 use epsplat::gpu::Sources;
-use epsplat::gpu::kernel::reflect;
-use epsplat::gpu::program::Bindings;
+use epsplat::gpu::interface::Bindings;
+use epsplat::gpu::interface::reflect;
 use epsplat::passes::modules;
 use epsplat::passes::select::CHOOSING;
 use epsplat::plan::SceneNeeds;

@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use common::modules;
 use epsplat::gpu::Sources;
-use epsplat::gpu::kernel::reflect;
+use epsplat::gpu::interface::reflect;
 use epsplat::gpu::layout::{
     AWAY, BALL_PART, BATCH, BLOCK_SIDE, COVERED_GRID, COVERED_GRID_OF_EIGHTS, COVERED_LIST, FATE_BITS, INNER,
     JUDGE_GRID, KIND_SHIFT, LEAF, LIST_ENDS, LIST_FAR, LIST_START, MOST_GROUPS, OCCLUSION_TILE, ONE, OTHER_BRANCH,

@@ -22,6 +22,8 @@ mod lowpass;
 mod optimisations;
 #[path = "../plans.rs"]
 mod plans;
+#[path = "../rounding.rs"]
+mod rounding;
 #[path = "../shaders.rs"]
 mod shaders;
 #[path = "../slots.rs"]

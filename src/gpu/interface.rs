@@ -1,0 +1,106 @@
+//! What kernels bind: the variables of each entry point, by name, and the layout that tells wgpu of them.
+
+use std::collections::BTreeMap;
+
+use naga::valid::ModuleInfo;
+use naga::{AddressSpace, Handle, ImageClass, Module, ScalarKind, StorageAccess, TypeInner};
+
+/// Bindings of a module's kernels, by entry point: the names of the variables each uses and their numbers.
+pub type Bindings = BTreeMap<String, Vec<(String, u32)>>;
+
+/// A module as it was parsed.
+pub(super) struct Interface {
+    pub module: Module,
+    pub info: ModuleInfo,
+}
+
+impl Interface {
+    /// Parses and validates `text`; what is wrong with it in words.
+    pub fn of(text: &str) -> Result<Self, String> {
+        let module = naga::front::wgsl::parse_str(text).map_err(|e| e.emit_to_string(text))?;
+        let info = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::all())
+            .validate(&module)
+            .map_err(|e| e.emit_to_string(text))?;
+        Ok(Self { module, info })
+    }
+
+    /// The names of its overrides.
+    pub fn overrides(&self) -> Vec<String> {
+        self.module.overrides.iter().filter_map(|(_, o)| o.name.clone()).collect()
+    }
+
+    /// The bindings of its entry points.
+    pub fn bindings(&self) -> Bindings {
+        let variables = &self.module.global_variables;
+        let named = |handle: Handle<naga::GlobalVariable>| {
+            Some((variables[handle].name.clone()?, variables[handle].binding.as_ref()?.binding))
+        };
+        let of = |(index, entry): (usize, &naga::EntryPoint)| {
+            (entry.name.clone(), self.bound(index).filter_map(named).collect::<Vec<_>>())
+        };
+        self.module.entry_points.iter().enumerate().map(of).collect()
+    }
+
+    /// The variables with a binding that an entry point uses.
+    fn bound(&self, entry: usize) -> impl Iterator<Item = Handle<naga::GlobalVariable>> + '_ {
+        let uses = self.info.get_entry_point(entry);
+        let bound = |(handle, variable): &(Handle<naga::GlobalVariable>, &naga::GlobalVariable)| {
+            variable.binding.is_some() && !uses[*handle].is_empty()
+        };
+        self.module.global_variables.iter().filter(bound).map(|(handle, _)| handle)
+    }
+
+    /// What the entry points `entries` of one pipeline bind together, each with the stage it is of: names and layout, in the order of
+    /// their numbers.
+    pub fn layout(
+        &self,
+        entries: &[(wgpu::ShaderStages, &str)],
+    ) -> Result<Vec<(String, wgpu::BindGroupLayoutEntry)>, String> {
+        let mut layout: BTreeMap<u32, (String, wgpu::BindGroupLayoutEntry)> = BTreeMap::new();
+        for &(stage, name) in entries {
+            let entry = self.module.entry_points.iter().position(|entry| entry.name == name);
+            for handle in self.bound(entry.ok_or_else(|| format!("there is no entry point {name}"))?) {
+                let variable = &self.module.global_variables[handle];
+                let (Some(name), Some(naga::ResourceBinding { binding, .. })) = (&variable.name, variable.binding)
+                else {
+                    continue;
+                };
+                let new =
+                    wgpu::BindGroupLayoutEntry { binding, visibility: stage, ty: self.kind(handle)?, count: None };
+                layout.entry(binding).or_insert_with(|| (name.clone(), new)).1.visibility |= stage;
+            }
+        }
+        Ok(layout.into_values().collect())
+    }
+
+    /// What a variable binds.
+    fn kind(&self, handle: Handle<naga::GlobalVariable>) -> Result<wgpu::BindingType, String> {
+        let variable = &self.module.global_variables[handle];
+        let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+        match (variable.space, &self.module.types[variable.ty].inner) {
+            (AddressSpace::Uniform, _) => Ok(buffer(wgpu::BufferBindingType::Uniform)),
+            (AddressSpace::Storage { access }, _) => {
+                Ok(buffer(wgpu::BufferBindingType::Storage { read_only: !access.contains(StorageAccess::STORE) }))
+            }
+            (_, &TypeInner::Image { class: ImageClass::Sampled { kind, multi: false }, .. }) => {
+                Ok(wgpu::BindingType::Texture {
+                    sample_type: match kind {
+                        ScalarKind::Uint => wgpu::TextureSampleType::Uint,
+                        ScalarKind::Sint => wgpu::TextureSampleType::Sint,
+                        _ => wgpu::TextureSampleType::Float { filterable: false },
+                    },
+                    view_dimension: wgpu::TextureViewDimension::D2,
+                    multisampled: false,
+                })
+            }
+            _ => Err(format!("{} is neither a buffer nor a texture", variable.name.as_deref().unwrap_or("a variable"))),
+        }
+    }
+}
+
+/// Parses and validates a module; the names of its overrides and the bindings of its entry points.
+pub fn reflect(text: &str) -> Result<(Module, Bindings, Vec<String>), String> {
+    let interface = Interface::of(text)?;
+    let (bindings, overrides) = (interface.bindings(), interface.overrides());
+    Ok((interface.module, bindings, overrides))
+}

@@ -1,0 +1,125 @@
+//! Modules of WGSL, and their entry points as a device takes them.
+
+use super::device::Gpu;
+use super::interface::Interface;
+use super::spirv;
+use crate::error::Result;
+
+/// A module of kernels.
+pub(super) struct Module {
+    interface: Interface,
+    counts_loops: bool,
+    /// Where the device takes no SPIR-V: the text, which wgpu translates.
+    text: Option<wgpu::ShaderModule>,
+}
+
+/// What a pipeline binds.
+pub(super) struct Bound {
+    /// Its variables' names and numbers.
+    pub variables: Vec<(String, u32)>,
+    pub layout: wgpu::PipelineLayout,
+    entries: Vec<wgpu::BindGroupLayoutEntry>,
+    /// The number that each has in the text.
+    of_text: Vec<u32>,
+}
+
+/// An entry point to compile.
+pub(super) struct Entry<'a> {
+    pub module: wgpu::ShaderModule,
+    constants: Vec<(&'a str, f64)>,
+}
+
+impl Entry<'_> {
+    /// What remains to be set.
+    pub fn options(&self) -> wgpu::PipelineCompilationOptions<'_> {
+        wgpu::PipelineCompilationOptions { constants: &self.constants, ..Default::default() }
+    }
+}
+
+impl Module {
+    /// The module of `text`, whose loops are counted if `counts_loops`.
+    pub fn of(gpu: &Gpu, text: String, counts_loops: bool) -> Result<Self> {
+        let interface = Interface::of(&text).map_err(|e| gpu.error(format!("a kernel is not valid WGSL: {e}")))?;
+        let text = (!gpu.takes_spirv()).then(|| translated_by_wgpu(gpu, text, counts_loops));
+        Ok(Self { interface, counts_loops, text })
+    }
+
+    /// What a pipeline of `entries` binds, each with the stage it is of.
+    pub fn bind(&self, gpu: &Gpu, entries: &[(wgpu::ShaderStages, &str)]) -> Result<Bound> {
+        let layout = self.interface.layout(entries).map_err(|e| gpu.error(format!("a kernel cannot be bound: {e}")))?;
+        let of_text = layout.iter().map(|(_, entry)| entry.binding).collect();
+        let (mut variables, mut entries) = (Vec::new(), Vec::new());
+        for (place, (name, mut entry)) in layout.into_iter().enumerate() {
+            if self.text.is_none() {
+                // Numbers without gaps are those that Vulkan is told, whether wgpu numbers anew or not.
+                entry.binding = place as u32;
+            }
+            variables.push((name, entry.binding));
+            entries.push(entry);
+        }
+        let group =
+            gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries });
+        let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: None,
+            bind_group_layouts: &[Some(&group)],
+            ..Default::default()
+        });
+        Ok(Bound { variables, layout, entries, of_text })
+    }
+
+    /// The entry point `name` of a pipeline that binds `bound`. Of `constants` those are set that the module declares.
+    pub fn entry<'a>(
+        &self,
+        gpu: &Gpu,
+        (stage, name): (naga::ShaderStage, &str),
+        bound: &Bound,
+        constants: &[(&'a str, f64)],
+    ) -> Result<Entry<'a>> {
+        let declared = self.interface.overrides();
+        let constants: Vec<_> =
+            constants.iter().copied().filter(|(name, _)| declared.iter().any(|d| d == name)).collect();
+        if let Some(text) = &self.text {
+            return Ok(Entry { module: text.clone(), constants });
+        }
+        let numbers = bound.of_text.iter().zip(&bound.entries).map(|(&of_text, entry)| (of_text, entry.binding));
+        let options = spirv::options(gpu.device.features(), numbers, self.counts_loops);
+        let words = spirv::translate(&self.interface, (stage, name), &constants, &options)
+            .map_err(|e| gpu.error(format!("the kernel {name} cannot be translated: {e}")))?;
+        Ok(Entry { module: translated_here(gpu, name, &words), constants: Vec::new() })
+    }
+}
+
+fn translated_by_wgpu(gpu: &Gpu, text: String, counts_loops: bool) -> wgpu::ShaderModule {
+    let descriptor =
+        wgpu::ShaderModuleDescriptor { label: Some("epsplat"), source: wgpu::ShaderSource::Wgsl(text.into()) };
+    let checks =
+        wgpu::ShaderRuntimeChecks { force_loop_bounding: counts_loops, ..wgpu::ShaderRuntimeChecks::checked() };
+    // SAFETY: of all run-time checks the bounds of loops alone are left out, and only where each loop ends (src/gpu/loops.rs).
+    #[allow(unsafe_code)]
+    unsafe {
+        gpu.device.create_shader_module_trusted(descriptor, checks)
+    }
+}
+
+fn translated_here(gpu: &Gpu, name: &str, words: &[u32]) -> wgpu::ShaderModule {
+    let entry = [wgpu::PassthroughShaderEntryPoint { name: name.into(), workgroup_size: (1, 1, 1) }];
+    let descriptor = wgpu::ShaderModuleDescriptorPassthrough {
+        label: Some(name),
+        entry_points: entry.as_slice().into(),
+        spirv: Some(words.into()),
+        ..Default::default()
+    };
+    // SAFETY: what wgpu checks of WGSL and not of SPIR-V holds without it.
+    // - The words are valid: `naga` wrote them, as it does for wgpu, of a module that it found valid, and was told to use what the
+    //   device's features allow and nothing else; the decorations beside them are of results of the kind that may have it.
+    // - They bind what the pipeline's layout says: both are made of the same module's variables (`Interface::layout`).
+    // - No access leaves its variable: indices are restricted, but for those of buffers, which wgpu has the device itself
+    //   bound (`robustBufferAccess`, which all of Vulkan has and wgpu asks for): what lies outside is another part of that buffer.
+    // - Memory is defined: workgroups' starts at zero, and buffers' is wgpu's.
+    // - Loops end: they are counted, but for those that are known to (src/gpu/loops.rs). Integers are not divided by zero: checked.
+    // - Workgroups are within the device's limits: an adapter on which they are not is refused (`AdapterDescription::usable`).
+    #[allow(unsafe_code)]
+    unsafe {
+        gpu.device.create_shader_module_passthrough(descriptor)
+    }
+}

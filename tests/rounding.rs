@@ -1,0 +1,92 @@
+//! Operations on the device, each rounded by itself and as it stands, against the processor's own.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use crate::common;
+
+use bytemuck::Zeroable;
+use common::Random;
+use epsplat::gpu::Gpu;
+use epsplat::gpu::layout::View;
+use epsplat::gpu::sources::FILES;
+use epsplat::inspect::evaluate;
+
+/// What a compiler may round once, or rewrite, if nothing forbids it.
+const KERNEL: &str = "
+@group(0) @binding(20) var<storage, read> inputs: array<vec4<f32>>;
+@group(0) @binding(21) var<storage, read_write> outputs: array<vec4<f32>>;
+
+@compute @workgroup_size(WORKGROUP)
+fn evaluate(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let index = linear_index(workgroup, workgroups, local);
+    if (index >= arrayLength(&inputs)) {
+        return;
+    }
+    let x = inputs[index];
+    outputs[2u * index] = vec4<f32>(x.x * x.y + x.z, (x.x + x.y) - x.x, x.x * x.y - x.z * x.w, x.x * x.z + x.y * x.z);
+    outputs[2u * index + 1u] = vec4<f32>(dot3(x.xyz, x.yzw), cross3(x.xyz, x.yzw).x, (x * x.w + x.yzwx).x, x.x * 3.0 - x.x);
+}
+";
+
+fn on_the_device(gpu: &Gpu, kernel: &str, inputs: &[[f32; 4]]) -> Vec<[f32; 4]> {
+    let of = |name: &str| FILES.iter().find(|(file, _)| *file == name).unwrap().1;
+    let lacking = "struct Clip { nothing: u32 } struct Cap { nothing: u32 } struct Fade { nothing: u32 }";
+    let text = [of("layout.wgsl"), lacking, of("vectors.wgsl"), kernel].join("\n");
+    evaluate(gpu, &text, &View::zeroed(), inputs, 2 * inputs.len() as u64).unwrap()
+}
+
+fn on_the_processor(inputs: &[[f32; 4]]) -> Vec<[f32; 4]> {
+    let of = |&[x, y, z, w]: &[f32; 4]| {
+        [
+            [x * y + z, (x + y) - x, x * y - z * w, x * z + y * z],
+            [x * y + y * z + z * w, y * w - z * z, x * w + y, x * 3.0 - x],
+        ]
+    };
+    inputs.iter().flat_map(of).collect()
+}
+
+fn inputs() -> Vec<[f32; 4]> {
+    let mut random = Random(3);
+    let mut number = || (random.between(-1.0, 1.0) * random.between(-12.0, 12.0).round().exp2()) as f32;
+    (0..20_000).map(|_| std::array::from_fn(|_| number())).collect()
+}
+
+/// Values that differ in a bit.
+fn wrong(a: &[[f32; 4]], b: &[[f32; 4]]) -> usize {
+    assert_eq!(a.len(), b.len());
+    a.as_flattened().iter().zip(b.as_flattened()).filter(|(a, b)| a.to_bits() != b.to_bits()).count()
+}
+
+/// Of what Vulkan does; other interfaces have no word for it, so there it is said and not asserted.
+#[test]
+fn sums_and_products_are_those_of_the_processor() {
+    let Some(gpu) = common::gpu() else { return };
+    let (inputs, core) = (inputs(), common::core_gpu().unwrap());
+    let expected = on_the_processor(&inputs);
+    for gpu in [&gpu, &core] {
+        let wrong = wrong(&on_the_device(gpu, KERNEL, &inputs), &expected);
+        eprintln!("{} ({}): {wrong} of {} differ", gpu.adapter.name, gpu.adapter.api, 4 * expected.len());
+        assert!(wrong == 0 || gpu.adapter.api != "vulkan");
+    }
+}
+
+/// The control: what a compiler may make of them is noticed.
+#[test]
+fn other_roundings_are_noticed() {
+    let Some(gpu) = common::gpu() else { return };
+    let inputs = inputs();
+    let expected = on_the_processor(&inputs);
+    for (from, to) in [
+        ("(x.x + x.y) - x.x", "x.y"),
+        ("x.x * x.z + x.y * x.z", "(x.x + x.y) * x.z"),
+        ("dot3(x.xyz, x.yzw)", "x.x * x.y + (x.y * x.z + x.z * x.w)"),
+        ("x.x * 3.0 - x.x", "x.x * 2.0"),
+    ] {
+        assert_eq!(KERNEL.matches(from).count(), 1, "{from}");
+        assert!(wrong(&on_the_device(&gpu, &KERNEL.replace(from, to), &inputs), &expected) > 1000, "{from}");
+    }
+}

@@ -1,0 +1,35 @@
+// Products of vectors, whose terms are added in the order that stands here. Of the built-in dot, cross, length, normalize and mix WGSL leaves the
+// order, and with it the rounding, to the driver, which NVIDIA's chooses by what stands around: src/gpu/spirv.rs. A test looks for them.
+
+fn dot2(a: vec2<f32>, b: vec2<f32>) -> f32 {
+    return a.x * b.x + a.y * b.y;
+}
+
+fn dot3(a: vec3<f32>, b: vec3<f32>) -> f32 {
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+fn cross3(a: vec3<f32>, b: vec3<f32>) -> vec3<f32> {
+    return a.yzx * b.zxy - a.zxy * b.yzx;
+}
+
+fn norm2(a: vec2<f32>) -> f32 {
+    return sqrt(dot2(a, a));
+}
+
+fn norm3(a: vec3<f32>) -> f32 {
+    return sqrt(dot3(a, a));
+}
+
+fn unit2(a: vec2<f32>) -> vec2<f32> {
+    return a / norm2(a);
+}
+
+fn unit3(a: vec3<f32>) -> vec3<f32> {
+    return a / norm3(a);
+}
+
+// Exact at both ends.
+fn between(a: vec4<f32>, b: vec4<f32>, share: f32) -> vec4<f32> {
+    return a * (1.0 - share) + b * share;
+}

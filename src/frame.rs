@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
+
 use crate::scene::Camera;
 use crate::scene::maps::{Map, Maps};
 
@@ -88,6 +90,15 @@ impl Frame {
     /// The values of a map of whole numbers, [`Map::width`] of them a pixel.
     pub fn numbers(&self, map: Map) -> Option<&[u32]> {
         self.map(map).filter(|_| map.row().numbers).map(bytemuck::cast_slice)
+    }
+
+    /// Adds `colors` of pixels under those that there are, and as many zeros to each map: the first of these pixels. Rows are not counted.
+    pub(crate) fn extend(&mut self, colors: impl IndexedParallelIterator<Item = [f32; 4]>) -> usize {
+        let first = self.color.len();
+        // They are written where they are to be: an image of zeros to write over takes as long as the rest of a card's frame.
+        self.color.par_extend(colors);
+        self.maps.iter_mut().for_each(|(map, values)| values.resize(self.color.len() * map.width(), 0.0));
+        first
     }
 
     /// Puts the rows of `below` under these; both have the same width and maps.

@@ -183,7 +183,7 @@ impl<T: Pod> Buffer<T> {
         let len = len.min(self.len);
         let mut values: Vec<T> = Vec::with_capacity(len as usize);
         let bytes = len * size_of::<T>() as u64;
-        Readback::new(gpu, self, bytes, size_of::<T>() as u64).visit(gpu, self, bytes, |_, bytes| {
+        Readback::new(gpu, self, bytes, size_of::<T>() as u64).visit(gpu, self, bytes, |bytes| {
             // A mapped range need not be aligned for T, so elements are copied bytewise.
             values.extend(bytes.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned::<T>));
         })?;
@@ -219,13 +219,13 @@ impl Readback {
         self.staging.as_ref().map_or(0, wgpu::Buffer::size)
     }
 
-    /// Calls `piece` with the place and the bytes of each piece of the first `bytes` of `buffer`.
+    /// Calls `piece` with the bytes of each piece of the first `bytes` of `buffer`, in their order.
     pub(crate) fn visit<T>(
         &self,
         gpu: &Gpu,
         buffer: &Buffer<T>,
         bytes: u64,
-        mut piece: impl FnMut(u64, &[u8]),
+        mut piece: impl FnMut(&[u8]),
     ) -> Result<()> {
         let bytes = bytes.min(buffer.raw.size());
         let mut offset = 0;
@@ -243,7 +243,7 @@ impl Readback {
             slice.map_async(wgpu::MapMode::Read, |_| {});
             gpu.wait()?;
             let view = slice.get_mapped_range().map_err(|e| gpu.error(format!("reading back failed: {e}")))?;
-            piece(offset, &view);
+            piece(&view);
             offset += view.len() as u64;
             drop(view);
             read.unmap();

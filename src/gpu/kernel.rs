@@ -1,8 +1,8 @@
 //! Pipelines of kernels: they are compiled, and dispatched with what they bind, by name.
 
-use std::sync::{Arc, PoisonError};
-
-use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
 
 use super::device::Gpu;
 use super::layout::WORKGROUP;
@@ -33,6 +33,34 @@ impl Programs {
         programs.insert(key, Arc::clone(&program));
         Ok(program)
     }
+}
+
+/// The stack of a thread that compiles: that of a process's first thread, which compilers of drivers are tried on.
+const COMPILER_STACK: usize = 8 << 20;
+
+/// What `make` makes of each of `stages`, on threads of their own: a pool's would take up other work while they wait, on top of it on a stack
+/// a quarter as large, and some that waits for these very kernels.
+fn side_by_side<'a, T: Send>(
+    stages: &[&'a str],
+    make: impl Fn(&'a str) -> Result<T> + Sync,
+) -> Vec<(&'a str, Result<T>)> {
+    let next = AtomicUsize::new(0);
+    let made = Mutex::new(Vec::new());
+    let work = || {
+        while let Some(&stage) = stages.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let result = make(stage);
+            made.lock().unwrap_or_else(PoisonError::into_inner).push((stage, result));
+        }
+    };
+    let threads = thread::available_parallelism().map_or(1, usize::from).min(stages.len());
+    thread::scope(|scope| {
+        let starts = |_: &usize| thread::Builder::new().stack_size(COMPILER_STACK).spawn_scoped(scope, &work).is_ok();
+        // Where there can be no thread more, this one does it all.
+        if (0..threads).filter(starts).count() == 0 {
+            work();
+        }
+    });
+    made.into_inner().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Draw {
@@ -92,8 +120,8 @@ impl Program {
         };
         let guard = watched();
         let module = Module::of(gpu, text, counts_loops)?;
-        // Each on a thread of its own: half of a first frame's time would else go by here.
-        let compiled = stages.par_iter().map(|&stage| {
+        // Half of a first frame's time would else go by here.
+        let compiled = side_by_side(stages, |stage| {
             let guard = watched();
             let bound = module.bind(gpu, &[(wgpu::ShaderStages::COMPUTE, stage)])?;
             let entry = module.entry(gpu, (naga::ShaderStage::Compute, stage), &bound, constants)?;
@@ -105,12 +133,13 @@ impl Program {
                 compilation_options: entry.options(),
                 cache: None,
             });
-            passed(guard).map(|()| (stage.to_owned(), pipeline, bound.variables))
+            passed(guard).map(|()| (pipeline, bound.variables))
         });
         let mut program = Self { counts_loops, ..Self::default() };
-        for (stage, pipeline, variables) in compiled.collect::<Result<Vec<_>>>()? {
-            program.pipelines.insert(stage.clone(), pipeline);
-            program.bindings.insert(stage, variables);
+        for (stage, compiled) in compiled {
+            let (pipeline, variables) = compiled?;
+            program.pipelines.insert(stage.to_owned(), pipeline);
+            program.bindings.insert(stage.to_owned(), variables);
         }
         for draw in draws {
             let (pipeline, variables) = draw.pipeline(gpu, &module, constants)?;

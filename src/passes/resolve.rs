@@ -282,8 +282,8 @@ pub fn steps(plan: &Plan, band: usize) -> Stage {
 /// Words of a pixel of [`Map::Surfaces`].
 const WORDS_OF_SURFACES: usize = 2 * SURFACES;
 
-/// Puts `bytes` of resolved pixels into `frame`, from its pixel `first` on.
-pub fn unpack(layout: &PixelLayout, bytes: &[u8], first: usize, frame: &mut Frame) {
+/// Puts `bytes` of resolved pixels under those that `frame` has; its rows are counted by whoever knows when they are whole.
+pub fn unpack(layout: &PixelLayout, bytes: &[u8], frame: &mut Frame) {
     let record = layout.image_words as usize * 4;
     // The N words of each pixel from `word` on.
     fn copy<const N: usize>(map: &mut [[f32; N]], bytes: &[u8], record: usize, word: u32) {
@@ -292,12 +292,12 @@ pub fn unpack(layout: &PixelLayout, bytes: &[u8], first: usize, frame: &mut Fram
             *value = bytemuck::pod_read_unaligned(&bytes[at..at + 4 * N]);
         });
     }
-    let range = first..first + bytes.len() / record;
-    copy(&mut frame.color[range.clone()], bytes, record, 0);
+    let colors = bytes.par_chunks_exact(record).with_min_len(1 << 14);
+    let first = frame.extend(colors.map(|bytes| bytemuck::pod_read_unaligned(&bytes[..16])));
     for (row, word) in MAPS.iter().zip(layout.map_words).filter(|(row, _)| row.image_word.is_some()) {
         let width = row.map.width();
         let Some(map) = frame.map_mut(row.map) else { continue };
-        let map = &mut map[range.start * width..range.end * width];
+        let map = &mut map[first * width..];
         match width {
             1 => copy::<1>(bytemuck::cast_slice_mut(map), bytes, record, word),
             2 => copy::<2>(bytemuck::cast_slice_mut(map), bytes, record, word),

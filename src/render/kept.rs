@@ -69,7 +69,7 @@ impl Kept {
             let start = Instant::now();
             store.set_view(gpu, &View::new(&self.facts, camera, &self.options));
             let mut run = Run::new(gpu, &plan, kernels, store, &mut self.known);
-            let mut frame = Frame::new(image, self.options.maps);
+            let mut frame = Frame::empty(image, self.options.maps);
             let all = run.steps(&sequence::steps(&plan), &mut frame, progress)?;
             let spent = start.elapsed();
             total_ms += spent.as_secs_f64() * 1e3;

@@ -267,11 +267,9 @@ impl<'a> Run<'a> {
         let Some((image, readback)) = self.store.image() else { return Ok(()) };
         let (layout, pixels) = (&self.plan.pixel, self.plan.image_pixels(band));
         let record = u64::from(layout.image_words) * 4;
-        let first_row = self.plan.bands[band].first / self.plan.needs.samples.down;
-        let start = first_row as usize * frame.width as usize;
-        readback.visit(self.gpu, image, pixels * record, |offset, bytes| {
-            resolve::unpack(layout, bytes, start + (offset / record) as usize, frame);
-        })
+        readback.visit(self.gpu, image, pixels * record, |bytes| resolve::unpack(layout, bytes, frame))?;
+        frame.height += self.plan.bands[band].rows / self.plan.needs.samples.down;
+        Ok(())
     }
 
     /// That it goes on trying makes no sense.

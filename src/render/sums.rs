@@ -202,7 +202,7 @@ pub fn resolve(
     let mut store = Store::new(gpu, scene_wide, &plan.needs)?;
     store.fit(gpu, &plan, &known)?;
     store.set_view(gpu, &view);
-    let mut frame = Frame::new(camera, options.maps);
+    let mut frame = Frame::empty(camera, options.maps);
     let mut run = Run::new(gpu, &plan, &kernels, &mut store, &mut known);
     for band in 0..plan.bands.len() {
         sums.put(gpu, &plan, run.store, band)?;

@@ -54,7 +54,7 @@ fn side_by_side<'a, T: Send>(
     };
     let threads = thread::available_parallelism().map_or(1, usize::from).min(stages.len());
     thread::scope(|scope| {
-        let starts = |_: &usize| thread::Builder::new().stack_size(COMPILER_STACK).spawn_scoped(scope, &work).is_ok();
+        let starts = |_: &usize| thread::Builder::new().stack_size(COMPILER_STACK).spawn_scoped(scope, work).is_ok();
         // Where there can be no thread more, this one does it all.
         if (0..threads).filter(starts).count() == 0 {
             work();

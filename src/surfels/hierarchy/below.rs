@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 
-use super::Made;
 use super::octree::{Octree, Set};
 use super::sums::Scales;
+use crate::scene::hierarchy::{Node, NodeAndLow};
 use crate::scene::{Cap, Scene, Surfel};
 
 /// A surfel of a leaf.
@@ -46,7 +46,9 @@ impl Known {
 /// A node below another one.
 pub(super) struct Child<'a, Key> {
     pub key: Key,
-    pub made: &'a Made,
+    pub node: &'a Node,
+    /// What its f32 centre leaves out.
+    pub low: [f32; 3],
     /// The surfels below it; of a node that does not come right below one that is being made it may be 0.
     pub surfels: u64,
 }
@@ -66,23 +68,46 @@ pub(super) trait Below: Sync {
     fn disks(&self, of: Self::Key, see: impl FnMut(Disk));
 }
 
+/// How a node is stored while the tree is made: with what its f32 centre leaves out, or without where that is nothing.
+pub(super) trait Stored: Copy + Send + Sync + From<NodeAndLow> {
+    fn told(&self) -> (&Node, [f32; 3]);
+}
+
+impl Stored for NodeAndLow {
+    fn told(&self) -> (&Node, [f32; 3]) {
+        (&self.0, self.1)
+    }
+}
+
+impl Stored for Node {
+    fn told(&self) -> (&Node, [f32; 3]) {
+        (self, [0.0; 3])
+    }
+}
+
+impl From<NodeAndLow> for Node {
+    fn from((node, _): NodeAndLow) -> Self {
+        node
+    }
+}
+
 /// A tree in memory, of which the nodes below a level are known.
 #[derive(Clone, Copy)]
-pub(super) struct InMemory<'a> {
+pub(super) struct InMemory<'a, N> {
     pub scene: &'a Scene,
     pub tree: &'a Octree,
     /// Those from the first one on that is known.
     pub first: usize,
-    pub nodes: &'a [Made],
+    pub nodes: &'a [N],
 }
 
-impl InMemory<'_> {
+impl<N> InMemory<'_, N> {
     fn set(&self, number: u32) -> &Set {
         &self.tree.sets[number as usize]
     }
 }
 
-impl Below for InMemory<'_> {
+impl<N: Stored> Below for InMemory<'_, N> {
     /// The number of its set.
     type Key = u32;
 
@@ -93,11 +118,8 @@ impl Below for InMemory<'_> {
     fn children(&self, of: u32, mut see: impl FnMut(Child<'_, u32>)) {
         let set = self.set(of);
         for key in set.first_child..set.first_child + set.children {
-            see(Child {
-                key,
-                made: &self.nodes[key as usize - self.first],
-                surfels: self.set(key).range().len() as u64,
-            });
+            let (node, low) = self.nodes[key as usize - self.first].told();
+            see(Child { key, node, low, surfels: self.set(key).range().len() as u64 });
         }
     }
 

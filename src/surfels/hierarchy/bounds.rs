@@ -91,7 +91,7 @@ fn bound_from<B: Below>(of: &Bounding, key: B::Key, below: &B, sided: bool) -> B
     let mut open: Vec<(Bound, B::Key)> = Vec::new();
     let push = |key: B::Key, open: &mut Vec<(Bound, B::Key)>| {
         let first = open.len();
-        below.children(key, |child| open.push((of.of_node(&child.made.0, child.made.1), child.key)));
+        below.children(key, |child| open.push((of.of_node(child.node, child.low), child.key)));
         // What reaches farthest comes first.
         open[first..].sort_by(|a, b| a.0.rim.total_cmp(&b.0.rim));
     };

@@ -35,8 +35,8 @@ pub(super) fn heights<B: Below>(of: B::Key, below: &B, center: DVec3, plane: [DV
         below.disks(of, |disk| right_below.push((disk.center - center, normal_of(&disk.surfel), 1.0)));
     } else {
         below.children(of, |child| {
-            let (node, low) = child.made;
-            let [place, low] = [node.surfel.center, *low].map(|part| DVec3::from_array(part.map(f64::from)));
+            let node = child.node;
+            let [place, low] = [node.surfel.center, child.low].map(|part| DVec3::from_array(part.map(f64::from)));
             right_below.push((place + low - center, normal_of(&node.surfel), child.surfels as f64));
         });
     }

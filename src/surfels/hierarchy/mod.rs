@@ -47,21 +47,27 @@ pub fn build(scene: Scene, progress: &dyn Progress) -> Result<(Scene, Arc<Hierar
     }
     let scene = scene_as_in_a_file(scene);
     progress.begin("dividing points", count.into());
-    let mut tree = Octree::grow(count, |index| scene.center(index as usize), |points| progress.advance(points));
+    let (tree, points) = Octree::grow(count, |index| scene.center(index as usize), |points| progress.advance(points));
     progress.end();
-    let scene = sorted(&mut tree, scene);
-    let (nodes, _) = nodes::nodes(&tree, &scene, &Known::of(&scene), progress);
-    drop(tree);
-    let low = if scene.low.is_empty() { Vec::new() } else { nodes.iter().map(|(_, low)| *low).collect() };
-    let hierarchy = Arc::new(Hierarchy { nodes: nodes.into_iter().map(|(node, _)| node).collect(), low });
+    let (scene, places) = sorted(&tree, points, scene);
+    let (tree, known) = ((&tree, &places[..]), Known::of(&scene));
+    let hierarchy = if known.low {
+        let (made, _) = nodes::nodes::<Made>(tree, &scene, &known, progress);
+        let (nodes, low) = made.into_iter().unzip();
+        Hierarchy { nodes, low }
+    } else {
+        Hierarchy { nodes: nodes::nodes(tree, &scene, &known, progress).0, low: Vec::new() }
+    };
+    let hierarchy = Arc::new(hierarchy);
     Ok((Scene { hierarchy: Some(hierarchy.clone()), ..scene }, hierarchy))
 }
 
-/// The scene in the order of the tree.
-fn sorted(tree: &mut Octree, scene: Scene) -> Scene {
-    in_order(tree, &scene);
-    let order: Vec<u32> = tree.elements.iter().map(|element| element.index).collect();
-    scene.into_order(&order)
+/// The scene in the order of the tree, of which these are the points, and their places.
+fn sorted(tree: &Octree, mut points: Vec<Element>, scene: Scene) -> (Scene, Vec<i32>) {
+    in_order(tree, &mut points, &scene);
+    let order: Vec<u32> = points.par_iter().map(|element| element.index).collect();
+    let places = octree::places(points);
+    (scene.into_order(&order), places)
 }
 
 /// A centre in f32, and what it leaves out.
@@ -86,10 +92,10 @@ fn scene_as_in_a_file(mut scene: Scene) -> Scene {
 }
 
 /// Puts the points of each leaf in an order of their own.
-fn in_order(tree: &mut Octree, scene: &Scene) {
+fn in_order(tree: &Octree, points: &mut [Element], scene: &Scene) {
     let mut leaves: Vec<&Set> = tree.sets.iter().filter(|set| set.is_leaf()).collect();
     leaves.par_sort_unstable_by_key(|set| set.first);
-    let mut rest = &mut tree.elements[..];
+    let mut rest = points;
     let mut slices: Vec<&mut [Element]> = Vec::with_capacity(leaves.len());
     for leaf in leaves {
         let (own, after) = rest.split_at_mut(leaf.range().len());

@@ -3,7 +3,6 @@
 
 use glam::DVec3;
 
-use super::octree::Element;
 use crate::surfels::eigen::Symmetric3;
 
 /// The matrix M̄ = Σ p' p'ᵀ of EQ 1, p' = (p, 1), in steps of a lattice: ten whole numbers, exact.
@@ -29,11 +28,6 @@ impl Moments {
             PAIRS.iter().zip(&mut all.squares).for_each(|(&[i, j], sum)| *sum += i128::from(place[i] * place[j]));
         }
         all
-    }
-
-    /// Those of elements.
-    pub fn of_elements(elements: &[Element]) -> Self {
-        Self::of(elements.iter().map(|element| element.place))
     }
 
     /// EQ 4.

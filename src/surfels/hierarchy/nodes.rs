@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::below::{InMemory, Known};
+use super::below::{InMemory, Known, Stored};
 use super::moments::Moments;
 use super::octree::{Octree, Set};
 use super::sums::Sums;
@@ -23,89 +23,101 @@ const NOTHING: Node = Node {
     leaf: true,
 };
 
-/// The nodes of a tree, whose points are in the order of `scene`, and the sums of its root.
-pub(super) fn nodes(tree: &Octree, scene: &Scene, known: &Known, progress: &dyn Progress) -> (Vec<Made>, Sums) {
-    let sets = Sets { tree, scene, known };
+/// The nodes of a tree, whose points are at these places in the order of `scene`, and the sums of its root.
+pub(super) fn nodes<N: Stored>(
+    (tree, places): (&Octree, &[i32]),
+    scene: &Scene,
+    known: &Known,
+    progress: &dyn Progress,
+) -> (Vec<N>, Sums) {
+    let sets = Sets { tree, places: places.as_chunks().0, scene, known };
     if tree.sets[0].is_leaf() {
         let root = sets.of_points(&tree.sets[0]);
         return (vec![sets.leaf(0, &root)], root);
     }
-    let mut all: Vec<Made> = vec![(NOTHING, [0.0; 3]); tree.sets.len()];
-    // Those of the level below.
-    let mut sums: Vec<Option<Box<Sums>>> = Vec::new();
+    let mut all: Vec<N> = vec![(NOTHING, [0.0; 3]).into(); tree.sets.len()];
+    // Those of the sets of the level below that are divided.
+    let mut sums: Vec<Sums> = Vec::new();
     progress.begin("bounding nodes", tree.sets.len() as u64);
     for level in tree.levels.windows(2).rev() {
+        let own = &tree.sets[level[0]..level[1]];
+        let divided: Vec<u32> =
+            (level[0] as u32..).zip(own).filter(|(_, set)| !set.is_leaf()).map(|(n, _)| n).collect();
         let (here, lower) = all.split_at_mut(level[1]);
-        let below = |child: u32| sums[child as usize - level[1]].as_deref().copied();
         // The children of the sets of a level follow each other.
-        let mut children: Vec<&mut [Made]> = Vec::with_capacity(level[1] - level[0]);
-        let mut rest = &mut *lower;
-        for set in &tree.sets[level[0]..level[1]] {
-            let (own, after) = rest.split_at_mut(set.children as usize);
-            children.push(own);
-            rest = after;
+        let mut children: Vec<(&mut [N], &[Sums])> = Vec::with_capacity(divided.len());
+        let (mut rest, mut below) = (&mut *lower, &sums[..]);
+        for &number in &divided {
+            let (nodes, after) = rest.split_at_mut(tree.sets[number as usize].children as usize);
+            let (sums, others) = below.split_at(sets.children(number).filter(|child| !child.is_leaf()).count());
+            children.push((nodes, sums));
+            (rest, below) = (after, others);
         }
-        let numbers = || (level[0] as u32..level[1] as u32).into_par_iter();
-        let summed = numbers().zip(children).map(|(number, children)| sets.summed(number, children, below));
+        let summed = divided.par_iter().zip(children).map(|(&number, children)| sets.summed(number, children));
         sums = summed.collect();
-        let here = here[level[0]..].par_iter_mut().zip(numbers()).zip(&sums);
-        here.for_each(|((node, number), sums)| {
-            if let Some(sums) = sums {
-                *node = sets.inner(number, sums, (level[1], lower));
-            }
+        let here = here[level[0]..].iter_mut().zip(own).filter(|(_, set)| !set.is_leaf()).map(|(node, _)| node);
+        let here: Vec<&mut N> = here.collect();
+        here.into_par_iter().zip(&divided).zip(&sums).for_each(|((node, &number), sums)| {
+            *node = sets.inner(number, sums, (level[1], lower));
         });
         progress.advance((level[1] - level[0]) as u64);
     }
     progress.end();
-    let root = sums.first().and_then(|sums| sums.as_deref().copied()).unwrap_or_default();
-    (all, root)
+    (all, sums.first().copied().unwrap_or_default())
 }
 
 /// What nodes are made of.
 struct Sets<'a> {
     tree: &'a Octree,
+    places: &'a [[i32; 3]],
     scene: &'a Scene,
     known: &'a Known,
 }
 
 impl Sets<'_> {
+    /// The sets that a set is divided into.
+    fn children(&self, number: u32) -> std::slice::Iter<'_, Set> {
+        let set = &self.tree.sets[number as usize];
+        self.tree.sets[set.first_child as usize..][..set.children as usize].iter()
+    }
+
     /// The sums of a leaf.
     fn of_points(&self, set: &Set) -> Sums {
-        Sums::of(&self.tree.elements[set.range()], self.scene, set.first as usize, &self.known.scales)
+        Sums::of(&self.places[set.range()], self.scene, set.first as usize, &self.known.scales)
     }
 
     /// The node of a set, where those from number `nodes.0` on are known.
-    fn made(&self, number: u32, sums: &Sums, (first, nodes): (usize, &[Made])) -> Made {
+    fn made<N: Stored>(&self, number: u32, sums: &Sums, (first, nodes): (usize, &[N])) -> Made {
         let lattice = &self.tree.lattices[self.tree.sets[number as usize].lattice as usize];
         let below = InMemory { scene: self.scene, tree: self.tree, first, nodes };
         bounds::node(number, sums, lattice, &below, self.known)
     }
 
     /// The node of a leaf.
-    fn leaf(&self, number: u32, sums: &Sums) -> Made {
+    fn leaf<N: Stored>(&self, number: u32, sums: &Sums) -> N {
         let set = &self.tree.sets[number as usize];
         if set.range().len() == 1 {
-            return bounds::of_one(self.scene, set.first as usize, sums, self.known);
+            return bounds::of_one(self.scene, set.first as usize, sums, self.known).into();
         }
-        let (node, low) = self.made(number, sums, (0, &[]));
-        (Node { first: set.first, count: set.range().len() as u32, ..node }, low)
+        let (node, low) = self.made::<N>(number, sums, (0, &[]));
+        (Node { first: set.first, count: set.range().len() as u32, ..node }, low).into()
     }
 
     /// The node of a set that is divided, where those from number `nodes.0` on are known.
-    fn inner(&self, number: u32, sums: &Sums, nodes: (usize, &[Made])) -> Made {
+    fn inner<N: Stored>(&self, number: u32, sums: &Sums, nodes: (usize, &[N])) -> N {
         let set = &self.tree.sets[number as usize];
         let (node, low) = self.made(number, sums, nodes);
-        (Node { first: set.first_child, count: set.children, leaf: false, ..node }, low)
+        (Node { first: set.first_child, count: set.children, leaf: false, ..node }, low).into()
     }
 
-    /// The sums of a set's children together (EQ 4), of which those that are divided are known, and the nodes of the others; none of a leaf. Of children
-    /// on another lattice the moments are made anew on this one.
-    fn summed(&self, number: u32, nodes: &mut [Made], below: impl Fn(u32) -> Option<Sums>) -> Option<Box<Sums>> {
+    /// The sums of the children of a set that is divided together (EQ 4), of which those that are divided are `known`, and the nodes of the others. Of children on another lattice
+    /// the moments are made anew on this one.
+    fn summed<N: Stored>(&self, number: u32, (nodes, known): (&mut [N], &[Sums])) -> Sums {
         let set = &self.tree.sets[number as usize];
-        let mut all = Sums::default();
-        for (number, node) in (set.first_child..).zip(nodes) {
-            let child = &self.tree.sets[number as usize];
-            let mut own = below(number).unwrap_or_else(|| {
+        let (mut all, mut known) = (Sums::default(), known.iter());
+        for ((number, child), node) in (set.first_child..).zip(self.children(number)).zip(nodes) {
+            let known = if child.is_leaf() { None } else { known.next().copied() };
+            let mut own = known.unwrap_or_else(|| {
                 let own = self.of_points(child);
                 *node = self.leaf(number, &own);
                 own
@@ -116,6 +128,6 @@ impl Sets<'_> {
             }
             all.add(&own);
         }
-        (!set.is_leaf()).then(|| Box::new(all))
+        all
     }
 }

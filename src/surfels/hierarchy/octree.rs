@@ -1,5 +1,6 @@
 //! The tree: sets of points divided at their mean (Pajarola 2003, section 3.2).
 
+use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -15,7 +16,8 @@ pub(super) const FEWEST_STEPS: i64 = 1 << 16;
 const MANY: usize = 1 << 16;
 
 /// A point.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
 pub(super) struct Element {
     /// On the lattice of the smallest set that it is in.
     pub place: [i32; 3],
@@ -45,13 +47,22 @@ impl Set {
     }
 }
 
-/// All sets level by level, and the points in the order of the leaves.
+/// All sets, level by level.
 pub(super) struct Octree {
-    pub elements: Vec<Element>,
     pub sets: Vec<Set>,
     /// Where each level starts, and the end.
     pub levels: Vec<usize>,
     pub lattices: Vec<Lattice>,
+}
+
+/// The places of points, three numbers each, in the memory that the points had.
+pub(super) fn places(elements: Vec<Element>) -> Vec<i32> {
+    let count = elements.len();
+    let mut places: Vec<i32> = bytemuck::cast_vec(elements);
+    (0..count).for_each(|k| places.copy_within(4 * k..4 * k + 3, 3 * k));
+    places.truncate(3 * count);
+    places.shrink_to_fit();
+    places
 }
 
 /// What becomes of a set.
@@ -62,8 +73,9 @@ struct Divided {
 }
 
 impl Octree {
-    /// Divides `count` points, fewer than 2^32, at `position`. The sets depend on the positions alone; `told` hears of each point that came to a leaf.
-    pub fn grow(count: u32, position: impl Fn(u32) -> DVec3 + Sync, told: impl Fn(u64)) -> Self {
+    /// Divides `count` points, fewer than 2^32, at `position`; they come in the order of the leaves. The sets depend on the positions alone; `told` hears of each point
+    /// that came to a leaf.
+    pub fn grow(count: u32, position: impl Fn(u32) -> DVec3 + Sync, told: impl Fn(u64)) -> (Self, Vec<Element>) {
         let bounds = Bounds::of((0..count).into_par_iter().with_min_len(4096).map(&position));
         Self::grow_below((Lattice::over(&bounds), 0), count, position, told)
     }
@@ -74,23 +86,29 @@ impl Octree {
         count: u32,
         position: impl Fn(u32) -> DVec3 + Sync,
         told: impl Fn(u64),
-    ) -> Self {
+    ) -> (Self, Vec<Element>) {
         let element = |index: u32| Element { place: root.place(position(index)), index };
-        let elements: Vec<Element> = (0..count).into_par_iter().with_min_len(4096).map(element).collect();
+        let mut elements: Vec<Element> = (0..count).into_par_iter().with_min_len(4096).map(element).collect();
         let all = Set { first: 0, end: count, lattice: 0, first_child: 0, children: 0 };
-        let mut tree = Self { elements, sets: vec![all], levels: vec![0, 1], lattices: vec![root] };
-        while tree.divide_level(depth, &position, &told) {}
-        tree
+        let mut tree = Self { sets: vec![all], levels: vec![0, 1], lattices: vec![root] };
+        while tree.divide_level(depth, &mut elements, &position, &told) {}
+        (tree, elements)
     }
 
     /// Divides the sets of the last level, of a tree that starts at this depth; whether there is another one.
-    fn divide_level(&mut self, depth: usize, position: &(impl Fn(u32) -> DVec3 + Sync), told: &impl Fn(u64)) -> bool {
+    fn divide_level(
+        &mut self,
+        depth: usize,
+        elements: &mut [Element],
+        position: &(impl Fn(u32) -> DVec3 + Sync),
+        told: &impl Fn(u64),
+    ) -> bool {
         let [.., begin, end] = self.levels[..] else { return false };
         // One level deeper there is none to divide them into.
         let deepest = depth + self.levels.len() - 2 == DEEPEST;
         let level = &self.sets[begin..end];
         let mut slices = Vec::with_capacity(level.len());
-        let (mut rest, mut at) = (&mut self.elements[..], 0);
+        let (mut rest, mut at) = (elements, 0);
         for set in level {
             let (own, after) = rest.split_at_mut(set.first as usize - at).1.split_at_mut(set.range().len());
             (rest, at) = (after, set.end as usize);
@@ -209,7 +227,7 @@ mod tests {
         (0..count).map(|_| DVec3::from_array(std::array::from_fn(|_| spread * random.number()))).collect()
     }
 
-    fn grown(points: &[DVec3]) -> Octree {
+    fn grown(points: &[DVec3]) -> (Octree, Vec<Element>) {
         Octree::grow(points.len() as u32, |index| points[index as usize], |_| ())
     }
 
@@ -231,15 +249,17 @@ mod tests {
     fn sets_are_those_of_a_plain_division() {
         for (count, copies) in [(1, 1), (8, 1), (9, 1), (5000, 1), (700, 12)] {
             let points: Vec<DVec3> = positions(count, 3.0).into_iter().flat_map(|point| vec![point; copies]).collect();
-            let tree = grown(&points);
+            let (tree, elements) = grown(&points);
             assert_eq!(tree.sets.len(), plain(points.clone()), "{count} x {copies}");
             let mut leaves: Vec<&Set> = tree.sets.iter().filter(|set| set.is_leaf()).collect();
             leaves.sort_by_key(|set| set.first);
             assert!(leaves.windows(2).all(|two| two[0].end == two[1].first));
             assert_eq!((leaves[0].first, leaves[leaves.len() - 1].end as usize), (0, points.len()));
-            let mut seen: Vec<u32> = tree.elements.iter().map(|element| element.index).collect();
+            let mut seen: Vec<u32> = elements.iter().map(|element| element.index).collect();
             seen.sort_unstable();
             assert!(seen.iter().copied().eq(0..points.len() as u32));
+            let of_elements: Vec<i32> = elements.iter().flat_map(|element| element.place).collect();
+            assert_eq!(places(elements), of_elements);
         }
     }
 
@@ -247,13 +267,13 @@ mod tests {
     fn points_that_stray_cost_others_no_digits() {
         let near = positions(3000, 1.0);
         let with_stray: Vec<DVec3> = near.iter().copied().chain([DVec3::splat(1e17)]).collect();
-        let (tree, alone) = (grown(&with_stray), grown(&near));
+        let ((tree, _), (alone, _)) = (grown(&with_stray), grown(&near));
         assert_eq!(tree.sets.len(), alone.sets.len() + 2);
         // And so do nests of clusters; what no lattice tells apart is one leaf.
         let nested: Vec<DVec3> = (0..400).map(|k| DVec3::splat(0.5f64.powi(k))).collect();
-        let tree = grown(&nested);
+        let (tree, _) = grown(&nested);
         assert!(tree.levels.len() <= DEEPEST + 2);
-        let equal = grown(&vec![DVec3::splat(0.3); 100]);
+        let (equal, _) = grown(&vec![DVec3::splat(0.3); 100]);
         assert_eq!((equal.sets.len(), equal.levels.len()), (1, 2));
     }
 
@@ -262,11 +282,11 @@ mod tests {
         let points = positions(4000, 2.0);
         let turned: Vec<DVec3> = points.iter().rev().copied().collect();
         let (one, other) = (grown(&points), grown(&turned));
-        assert_eq!(one.sets, other.sets);
-        for set in one.sets.iter().filter(|set| set.is_leaf()) {
-            let own = |tree: &Octree, flip: bool| {
+        assert_eq!(one.0.sets, other.0.sets);
+        for set in one.0.sets.iter().filter(|set| set.is_leaf()) {
+            let own = |(_, elements): &(Octree, Vec<Element>), flip: bool| {
                 let number = |e: &Element| if flip { points.len() as u32 - 1 - e.index } else { e.index };
-                let mut all: Vec<u32> = tree.elements[set.range()].iter().map(number).collect();
+                let mut all: Vec<u32> = elements[set.range()].iter().map(number).collect();
                 all.sort_unstable();
                 all
             };

@@ -5,7 +5,6 @@ use rayon::prelude::*;
 
 use super::lattice::Lattice;
 use super::moments::Moments;
-use super::octree::Element;
 use crate::scene::color::srgb8;
 use crate::scene::{Colors, Scene, Surfel};
 use crate::surfels::eigen::Symmetric3;
@@ -92,11 +91,11 @@ pub(super) fn normal_of(surfel: &Surfel) -> DVec3 {
 }
 
 impl Sums {
-    /// Those of `elements`, in the order of the surfels of `scene`, of which the first is number `first`.
-    pub fn of(elements: &[Element], scene: &Scene, first: usize, scale: &Scales) -> Self {
-        let mut all = Self { moments: Moments::of_elements(elements), ..Self::default() };
+    /// Those of points at `places`, in the order of the surfels of `scene`, of which the first is number `first`.
+    pub fn of(places: &[[i32; 3]], scene: &Scene, first: usize, scale: &Scales) -> Self {
+        let mut all = Self { moments: Moments::of(places.iter().copied()), ..Self::default() };
         let products = |v: DVec3| [v.x * v.x, v.y * v.y, v.z * v.z, v.x * v.y, v.x * v.z, v.y * v.z];
-        for index in first..first + elements.len() {
+        for index in first..first + places.len() {
             let surfel = &scene.surfels[index];
             let n = normal_of(surfel);
             all.normal.iter_mut().zip(n.to_array()).for_each(|(sum, value)| *sum += whole(value * NORMAL_ONE));

@@ -186,7 +186,7 @@ impl Below for Kept<'_> {
             Key::Above(number) => {
                 let Part::Above { children, .. } = &self.parts[number as usize] else { return };
                 for Branch { key, made, surfels } in children {
-                    see(Child { key: *key, made, surfels: *surfels });
+                    see(Child { key: *key, node: &made.0, low: made.1, surfels: *surfels });
                 }
             }
             Key::Within { first, count, subtree, .. } => {
@@ -195,8 +195,8 @@ impl Below for Kept<'_> {
                     wanted,
                     |rows| self.nodes.read(rows),
                     |nodes, of| {
-                        for made in &nodes[of] {
-                            see(Child { key: within(&made.0, subtree), made, surfels: 0 });
+                        for (node, low) in &nodes[of] {
+                            see(Child { key: within(node, subtree), node, low: *low, surfels: 0 });
                         }
                     },
                 );

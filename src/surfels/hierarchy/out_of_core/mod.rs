@@ -181,10 +181,10 @@ impl Divider<'_> {
         let inherited = self.lattices[self.lattices.len() - 1];
         progress.begin("dividing points", count.into());
         let center = |index: u32| scene.center(index as usize);
-        let mut tree = Octree::grow_below((inherited, depth), count, center, |points| progress.advance(points));
+        let (tree, points) = Octree::grow_below((inherited, depth), count, center, |points| progress.advance(points));
         progress.end();
-        let scene = sorted(&mut tree, scene);
-        let (nodes, sums) = nodes::nodes(&tree, &scene, &survey.known, progress);
+        let (scene, places) = sorted(&tree, points, scene);
+        let (nodes, sums) = nodes::nodes((&tree, &places), &scene, &survey.known, progress);
         let on = |lattice: &Lattice| Moments::of((0..scene.surfels.len()).map(|k| lattice.place(scene.center(k))));
         let mut moments: Vec<Moments> = Vec::with_capacity(self.lattices.len());
         for (index, lattice) in self.lattices.iter().enumerate() {

@@ -34,14 +34,14 @@ impl PartialEq for Frame {
 }
 
 impl Frame {
-    /// An empty frame with room for `maps`.
+    /// A frame of zeros with `maps`.
     pub fn new(camera: &Camera, maps: Maps) -> Self {
         let pixels = camera.pixels();
         let maps = maps.iter().map(|map| (map, vec![0.0; pixels * map.width()])).collect();
         Self { width: camera.width, height: camera.height, color: vec![[0.0; 4]; pixels], maps }
     }
 
-    /// A frame of no rows, to [`append`](Self::append) to.
+    /// A frame of no rows, to [`append`](Self::append) to and to extend.
     pub fn empty(camera: &Camera, maps: Maps) -> Self {
         let mut frame = Self::new(&Camera { height: 0, ..camera.clone() }, maps);
         let pixels = camera.pixels();
@@ -92,7 +92,7 @@ impl Frame {
         self.map(map).filter(|_| map.row().numbers).map(bytemuck::cast_slice)
     }
 
-    /// Adds `colors` of pixels under those that there are, and as many zeros to each map: the first of these pixels. Rows are not counted.
+    /// Adds `colors` of pixels under those that there are, and as many zeros to each map. Returns the number of the first; rows are not counted.
     pub(crate) fn extend(&mut self, colors: impl IndexedParallelIterator<Item = [f32; 4]>) -> usize {
         let first = self.color.len();
         // They are written where they are to be: an image of zeros to write over takes as long as the rest of a card's frame.

@@ -80,6 +80,9 @@ fn other_roundings_are_noticed() {
     let Some(gpu) = common::gpu() else { return };
     let inputs = inputs();
     let expected = on_the_processor(&inputs);
+    // A device may round once or twice what is asked of it as one operation; the processor rounds once.
+    let once = inputs.iter().filter(|[x, y, z, _]| x.mul_add(*y, *z).to_bits() != (x * y + z).to_bits()).count();
+    assert!(once > 1000, "{once}");
     for (from, to) in [
         ("(x.x + x.y) - x.x", "x.y"),
         ("x.x * x.z + x.y * x.z", "(x.x + x.y) * x.z"),

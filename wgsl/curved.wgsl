@@ -55,11 +55,11 @@ fn extremes(heights: vec3<f32>) -> vec2<f32> {
 }
 
 // The inverse of [s t n] by rows, n the unit normal of s and t.
-fn inverse_of(s: vec3<f32>, t: vec3<f32>) -> mat3x3<f32> {
+fn inverse_of(s: vec3<f32>, t: vec3<f32>) -> array<vec3<f32>, 3> {
     let across = cross3(s, t);
     let size = norm3(across);
     let n = across / size;
-    return mat3x3<f32>(cross3(t, n) / size, cross3(n, s) / size, n);
+    return array<vec3<f32>, 3>(cross3(t, n) / size, cross3(n, s) / size, n);
 }
 
 // How the surfel curves whose disk has the homography h, in which rows and extent become those of the cap; and whether all of it shows

@@ -5,6 +5,9 @@ use serde::Serialize;
 use super::layout::{TILE, TILE_WIDTH, WORKGROUP};
 use crate::error::Error;
 
+/// Invocations of the largest workgroup, that of `bin.wgsl`.
+const LARGEST_WORKGROUP: u32 = 256;
+
 /// What an adapter is and what of it matters here.
 #[derive(Clone, Debug, Serialize)]
 pub struct AdapterDescription {
@@ -80,8 +83,8 @@ impl AdapterDescription {
             vertex_storage: able.contains(wgpu::DownlevelFlags::VERTEX_STORAGE),
             usable: able.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
                 && limits.max_storage_buffers_per_shader_stage >= STORAGE_BUFFERS
-                && limits.max_compute_invocations_per_workgroup >= WORKGROUP.max(TILE * TILE)
-                && limits.max_compute_workgroup_size_x >= WORKGROUP.max(TILE)
+                && limits.max_compute_invocations_per_workgroup >= LARGEST_WORKGROUP.max(WORKGROUP.max(TILE * TILE))
+                && limits.max_compute_workgroup_size_x >= LARGEST_WORKGROUP.max(TILE)
                 && limits.max_compute_workgroup_size_y >= TILE,
         }
     }

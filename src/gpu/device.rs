@@ -1,20 +1,23 @@
 //! Adapters and the device: the sole owner of wgpu's instance, limits and errors.
 
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 use super::adapter::AdapterDescription;
 use super::program::Programs;
 use crate::error::{Error, Result};
 
-/// Features that are used where an adapter has them: GPU times, atomics of some accumulators, a format of blending, and
-/// kernels in the device's own language (`spirv.rs`).
+/// Features that are used where an adapter has them: GPU times, atomics of some accumulators, and a format of blending.
 const OPTIONAL_FEATURES: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
     .union(wgpu::Features::SHADER_INT64)
     .union(wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS)
     .union(wgpu::Features::SHADER_FLOAT32_ATOMIC)
     .union(wgpu::Features::SUBGROUP)
-    .union(wgpu::Features::FLOAT32_BLENDABLE)
-    .union(wgpu::Features::PASSTHROUGH_SHADERS);
+    .union(wgpu::Features::FLOAT32_BLENDABLE);
+
+/// Kernels can be handed over in SPIR-V (`spirv.rs`); Vulkan alone takes it.
+fn of_spirv(adapter: &AdapterDescription) -> wgpu::Features {
+    if adapter.api == "vulkan" { wgpu::Features::PASSTHROUGH_SHADERS } else { wgpu::Features::empty() }
+}
 
 /// Of an adapter whose memory is the host's the host reads and writes buffers where they lie; a card's would then have them in slow memory.
 const SOFTWARE_FEATURES: wgpu::Features = wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
@@ -23,10 +26,16 @@ const SOFTWARE_FEATURES: wgpu::Features = wgpu::Features::MAPPABLE_PRIMARY_BUFFE
 pub const INSTALL_HINT: &str = "install a Vulkan driver (on Debian or Ubuntu without a GPU: \
     apt-get install mesa-vulkan-drivers libvulkan1) or render with --backend reference";
 
-fn enumerate(backends: wgpu::Backends) -> Vec<(AdapterDescription, wgpu::Adapter)> {
-    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
-    descriptor.backends &= backends;
-    let instance = wgpu::Instance::new(descriptor);
+/// The adapters that OpenGL reaches, or those of all other interfaces.
+fn enumerate(of_gl: bool) -> Vec<(AdapterDescription, wgpu::Adapter)> {
+    // One instance for the whole run: NVIDIA's driver crashes where threads make and drop instances beside each other (gfx-rs/wgpu#5930).
+    static INSTANCES: [OnceLock<wgpu::Instance>; 2] = [const { OnceLock::new() }; 2];
+    let backends = if of_gl { wgpu::Backends::GL } else { wgpu::Backends::all() - wgpu::Backends::GL };
+    let instance = INSTANCES[usize::from(of_gl)].get_or_init(|| {
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
+        descriptor.backends &= backends;
+        wgpu::Instance::new(descriptor)
+    });
     let adapters = pollster::block_on(instance.enumerate_adapters(backends));
     let mut described: Vec<_> = adapters.into_iter().map(|a| (AdapterDescription::of(&a), a)).collect();
     described.sort_by_key(|(description, _)| description.rank());
@@ -36,16 +45,18 @@ fn enumerate(backends: wgpu::Backends) -> Vec<(AdapterDescription, wgpu::Adapter
 /// All adapters, in the order in which `auto` prefers them. The environment variable `WGPU_BACKEND` (vulkan, gl, ...)
 /// narrows them down.
 pub fn adapters() -> Vec<AdapterDescription> {
-    enumerate(wgpu::Backends::all()).into_iter().map(|(description, _)| description).collect()
+    let mut all: Vec<_> = [false, true].into_iter().flat_map(enumerate).map(|(description, _)| description).collect();
+    all.sort_by_key(AdapterDescription::rank);
+    all
 }
 
 /// The best adapter of this name; see [`Gpu::open`].
 fn best(name: Option<&str>) -> Result<(AdapterDescription, wgpu::Adapter)> {
     let wanted = |d: &AdapterDescription| d.usable && name.is_none_or(|name| d.is_meant_by(name));
     // GL is asked last and only if it must be: its libraries complain on stderr where there is no display.
-    let mut all = enumerate(wgpu::Backends::all() - wgpu::Backends::GL);
+    let mut all = enumerate(false);
     if !all.iter().any(|(d, _)| wanted(d)) {
-        all.extend(enumerate(wgpu::Backends::GL));
+        all.extend(enumerate(true));
     }
     let known = all.iter().map(|(d, _)| format!("{} ({})", d.name, d.api)).collect::<Vec<_>>().join(", ");
     all.into_iter().find(|(d, _)| wanted(d)).ok_or_else(|| {
@@ -75,17 +86,19 @@ impl Gpu {
     pub fn open(name: Option<&str>) -> Result<Self> {
         let (adapter, handle) = best(name)?;
         let software = if adapter.is_software() { SOFTWARE_FEATURES } else { wgpu::Features::empty() };
-        let (features, limits) = (handle.features() & (OPTIONAL_FEATURES | software), handle.limits());
+        let wanted = OPTIONAL_FEATURES | software | of_spirv(&adapter);
+        let (features, limits) = (handle.features() & wanted, handle.limits());
         Self::of(adapter, &handle, features, limits)
     }
 
     /// The adapter that [`open`](Self::open) chooses, as a device that can do what every WebGPU implementation can, a browser's or a
-    /// phone's too, and no more: no optional feature, and core limits. Kernels come to it as to others.
+    /// phone's too, and no more: core limits, and no optional feature but that of SPIR-V, so that kernels come to it on the same way.
     pub fn open_core(name: Option<&str>) -> Result<Self> {
         let (adapter, handle) = best(name)?;
         let AdapterDescription { name, api, kind, driver, vertex_storage, .. } = adapter;
         let adapter = AdapterDescription { name, api, kind, driver, vertex_storage, ..AdapterDescription::core() };
-        Self::of(adapter, &handle, handle.features() & wgpu::Features::PASSTHROUGH_SHADERS, wgpu::Limits::default())
+        let features = handle.features() & of_spirv(&adapter);
+        Self::of(adapter, &handle, features, wgpu::Limits::default())
     }
 
     fn of(
@@ -159,7 +172,7 @@ impl Gpu {
 
     /// Whether kernels are handed to it in SPIR-V: whether its operations are rounded as they stand (`spirv.rs`).
     pub(super) fn takes_spirv(&self) -> bool {
-        self.adapter.api == "vulkan" && self.device.features().contains(wgpu::Features::PASSTHROUGH_SHADERS)
+        self.device.features().contains(wgpu::Features::PASSTHROUGH_SHADERS)
     }
 
     /// Bytes that one buffer and one binding of it may have.

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use naga::valid::ModuleInfo;
-use naga::{AddressSpace, Handle, ImageClass, Module, ScalarKind, StorageAccess, TypeInner};
+use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
+use naga::{AddressSpace, Handle, ImageClass, ImageDimension, Module, ScalarKind, StorageAccess, TypeInner};
 
-/// Bindings of a module's kernels, by entry point: the names of the variables each uses and their numbers.
+/// Bindings of a module's kernels, by entry point: the names of the variables each uses and their numbers, in the text or, of a compiled program, in its pipelines.
 pub type Bindings = BTreeMap<String, Vec<(String, u32)>>;
 
 /// A module as it was parsed.
@@ -15,10 +15,10 @@ pub(super) struct Interface {
 }
 
 impl Interface {
-    /// Parses and validates `text`; what is wrong with it in words.
-    pub fn of(text: &str) -> Result<Self, String> {
+    /// Parses and validates `text`, which may use these capabilities; what is wrong with it in words.
+    pub fn of(text: &str, capabilities: Capabilities) -> Result<Self, String> {
         let module = naga::front::wgsl::parse_str(text).map_err(|e| e.emit_to_string(text))?;
-        let info = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::all())
+        let info = Validator::new(ValidationFlags::all(), capabilities)
             .validate(&module)
             .map_err(|e| e.emit_to_string(text))?;
         Ok(Self { module, info })
@@ -67,7 +67,11 @@ impl Interface {
                 };
                 let new =
                     wgpu::BindGroupLayoutEntry { binding, visibility: stage, ty: self.kind(handle)?, count: None };
-                layout.entry(binding).or_insert_with(|| (name.clone(), new)).1.visibility |= stage;
+                let known = layout.entry(binding).or_insert_with(|| (name.clone(), new));
+                if known.0 != *name {
+                    return Err(format!("{} and {name} have one number", known.0));
+                }
+                known.1.visibility |= stage;
             }
         }
         Ok(layout.into_values().collect())
@@ -82,17 +86,22 @@ impl Interface {
             (AddressSpace::Storage { access }, _) => {
                 Ok(buffer(wgpu::BufferBindingType::Storage { read_only: !access.contains(StorageAccess::STORE) }))
             }
-            (_, &TypeInner::Image { class: ImageClass::Sampled { kind, multi: false }, .. }) => {
-                Ok(wgpu::BindingType::Texture {
-                    sample_type: match kind {
-                        ScalarKind::Uint => wgpu::TextureSampleType::Uint,
-                        ScalarKind::Sint => wgpu::TextureSampleType::Sint,
-                        _ => wgpu::TextureSampleType::Float { filterable: false },
-                    },
-                    view_dimension: wgpu::TextureViewDimension::D2,
-                    multisampled: false,
-                })
-            }
+            (
+                _,
+                &TypeInner::Image {
+                    dim: ImageDimension::D2,
+                    arrayed: false,
+                    class: ImageClass::Sampled { kind, multi: false },
+                },
+            ) => Ok(wgpu::BindingType::Texture {
+                sample_type: match kind {
+                    ScalarKind::Uint => wgpu::TextureSampleType::Uint,
+                    ScalarKind::Sint => wgpu::TextureSampleType::Sint,
+                    _ => wgpu::TextureSampleType::Float { filterable: false },
+                },
+                view_dimension: wgpu::TextureViewDimension::D2,
+                multisampled: false,
+            }),
             _ => Err(format!("{} is neither a buffer nor a texture", variable.name.as_deref().unwrap_or("a variable"))),
         }
     }
@@ -100,7 +109,7 @@ impl Interface {
 
 /// Parses and validates a module; the names of its overrides and the bindings of its entry points.
 pub fn reflect(text: &str) -> Result<(Module, Bindings, Vec<String>), String> {
-    let interface = Interface::of(text)?;
+    let interface = Interface::of(text, Capabilities::all())?;
     let (bindings, overrides) = (interface.bindings(), interface.overrides());
     Ok((interface.module, bindings, overrides))
 }

@@ -1,5 +1,6 @@
 //! Pipelines of kernels: they are compiled, and dispatched with what they bind, by name.
 
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
@@ -8,7 +9,7 @@ use super::device::Gpu;
 use super::layout::WORKGROUP;
 use super::module::Module;
 use super::program::{Draw, Program, Programs};
-use super::sources::Sources;
+use super::sources::{Sources, Text};
 use crate::error::{Error, Result};
 
 impl Programs {
@@ -28,8 +29,7 @@ impl Programs {
         if let Some(program) = programs.get(&key) {
             return Ok(Arc::clone(program));
         }
-        let text = (sources.join(files), !sources.all_end(files));
-        let program = Arc::new(Program::compile(gpu, text, stages, draws, constants)?);
+        let program = Arc::new(Program::compile(gpu, sources.text(files), stages, draws, constants)?);
         programs.insert(key, Arc::clone(&program));
         Ok(program)
     }
@@ -38,29 +38,34 @@ impl Programs {
 /// The stack of a thread that compiles: that of a process's first thread, which compilers of drivers are tried on.
 const COMPILER_STACK: usize = 8 << 20;
 
-/// What `make` makes of each of `stages`, on threads of their own: a pool's would take up other work while they wait, on top of it on a stack
-/// a quarter as large, and some that waits for these very kernels.
-fn side_by_side<'a, T: Send>(
-    stages: &[&'a str],
-    make: impl Fn(&'a str) -> Result<T> + Sync,
-) -> Vec<(&'a str, Result<T>)> {
-    let next = AtomicUsize::new(0);
-    let made = Mutex::new(Vec::new());
+/// What `make` makes of each of `things`, in their order, on threads of their own. A thread of a pool would take up other work while it waits, on top of a driver's on a stack of
+/// 2 MiB, and some that waits for these very kernels.
+fn side_by_side<T: Sync, M: Send>(things: &[T], make: impl Fn(&T) -> M + Sync) -> Vec<M> {
+    let (next, made) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
     let work = || {
-        while let Some(&stage) = stages.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let result = make(stage);
-            made.lock().unwrap_or_else(PoisonError::into_inner).push((stage, result));
+        loop {
+            let place = next.fetch_add(1, Ordering::Relaxed);
+            let Some(thing) = things.get(place) else { return };
+            let result = make(thing);
+            made.lock().unwrap_or_else(PoisonError::into_inner).insert(place, result);
         }
     };
-    let threads = thread::available_parallelism().map_or(1, usize::from).min(stages.len());
+    let threads = thread::available_parallelism().map_or(1, usize::from).min(things.len());
     thread::scope(|scope| {
-        let starts = |_: &usize| thread::Builder::new().stack_size(COMPILER_STACK).spawn_scoped(scope, work).is_ok();
+        let spawned = |_| thread::Builder::new().stack_size(COMPILER_STACK).spawn_scoped(scope, work).ok();
+        let spawned: Vec<_> = (0..threads).filter_map(spawned).collect();
         // Where there can be no thread more, this one does it all.
-        if (0..threads).filter(starts).count() == 0 {
+        if spawned.is_empty() {
             work();
         }
+        // A scope does not wait for what threads drop at their ends, which may be the driver's; joining does.
+        for thread in spawned {
+            if let Err(panic) = thread.join() {
+                std::panic::resume_unwind(panic);
+            }
+        }
     });
-    made.into_inner().unwrap_or_else(PoisonError::into_inner)
+    made.into_inner().unwrap_or_else(PoisonError::into_inner).into_values().collect()
 }
 
 impl Draw {
@@ -103,11 +108,10 @@ impl Draw {
 }
 
 impl Program {
-    /// Compiles the entry points `stages` of the module of `text`, whose loops are counted if `counts_loops`, and `draws`. Of
-    /// `constants` those are set that it declares.
+    /// Compiles the entry points `stages` of a module, and `draws`. Of `constants` those are set that it declares.
     pub(crate) fn compile(
         gpu: &Gpu,
-        (text, counts_loops): (String, bool),
+        text: Text,
         stages: &[&str],
         draws: &[Draw],
         constants: &[(&str, f64)],
@@ -119,9 +123,11 @@ impl Program {
             None => Ok(()),
         };
         let guard = watched();
-        let module = Module::of(gpu, text, counts_loops)?;
+        let mut program = Self { counts_loops: text.counts_loops, ..Self::default() };
+        let module = Module::of(gpu, text, draws.is_empty())?;
+        passed(guard)?;
         // Half of a first frame's time would else go by here.
-        let compiled = side_by_side(stages, |stage| {
+        let compiled = side_by_side(stages, |&stage| {
             let guard = watched();
             let bound = module.bind(gpu, &[(wgpu::ShaderStages::COMPUTE, stage)])?;
             let entry = module.entry(gpu, (naga::ShaderStage::Compute, stage), &bound, constants)?;
@@ -135,18 +141,22 @@ impl Program {
             });
             passed(guard).map(|()| (pipeline, bound.variables))
         });
-        let mut program = Self { counts_loops, ..Self::default() };
-        for (stage, compiled) in compiled {
+        for (&stage, compiled) in stages.iter().zip(compiled) {
             let (pipeline, variables) = compiled?;
             program.pipelines.insert(stage.to_owned(), pipeline);
             program.bindings.insert(stage.to_owned(), variables);
         }
-        for draw in draws {
-            let (pipeline, variables) = draw.pipeline(gpu, &module, constants)?;
+        let drawn = side_by_side(draws, |draw| {
+            let guard = watched();
+            let made = draw.pipeline(gpu, &module, constants)?;
+            passed(guard).map(|()| made)
+        });
+        for (draw, made) in draws.iter().zip(drawn) {
+            let (pipeline, variables) = made?;
             program.draws.insert(draw.name.to_owned(), pipeline);
             program.bindings.insert(draw.name.to_owned(), variables);
         }
-        passed(guard).map(|()| program)
+        Ok(program)
     }
 
     /// What `stage` binds: each of its variables as `binding` says.

@@ -1,7 +1,10 @@
 //! Modules of WGSL, and their entry points as a device takes them.
 
+use naga::valid::Capabilities;
+
 use super::device::Gpu;
 use super::interface::Interface;
+use super::sources::Text;
 use super::spirv;
 use crate::error::Result;
 
@@ -37,10 +40,15 @@ impl Entry<'_> {
 }
 
 impl Module {
-    /// The module of `text`, whose loops are counted if `counts_loops`.
-    pub fn of(gpu: &Gpu, text: String, counts_loops: bool) -> Result<Self> {
-        let interface = Interface::of(&text).map_err(|e| gpu.error(format!("a kernel is not valid WGSL: {e}")))?;
-        let text = (!gpu.takes_spirv()).then(|| translated_by_wgpu(gpu, text, counts_loops));
+    /// The module of a text, whose kernels all compute, or which has some that draw.
+    pub fn of(gpu: &Gpu, text: Text, computes: bool) -> Result<Self> {
+        let Text { joined, counts_loops, built_in } = text;
+        // Whether what is drawn fits the stage after it is known of the built-in texts; wgpu looks at others.
+        let spirv = gpu.takes_spirv() && (computes || built_in);
+        let capabilities = if spirv { spirv::capabilities(gpu.device.features()) } else { Capabilities::all() };
+        let interface = Interface::of(&joined, capabilities);
+        let interface = interface.map_err(|e| gpu.error(format!("a kernel is not valid WGSL: {e}")))?;
+        let text = (!spirv).then(|| translated_by_wgpu(gpu, joined, counts_loops));
         Ok(Self { interface, counts_loops, text })
     }
 
@@ -83,7 +91,7 @@ impl Module {
         }
         let numbers = bound.of_text.iter().zip(&bound.entries).map(|(&of_text, entry)| (of_text, entry.binding));
         let options = spirv::options(gpu.device.features(), numbers, self.counts_loops);
-        let words = spirv::translate(&self.interface, (stage, name), &constants, &options)
+        let words = spirv::translate(&self.interface, (stage, name), &constants, (&options, &gpu.device.limits()))
             .map_err(|e| gpu.error(format!("the kernel {name} cannot be translated: {e}")))?;
         Ok(Entry { module: translated_here(gpu, name, &words), constants: Vec::new() })
     }
@@ -102,6 +110,7 @@ fn translated_by_wgpu(gpu: &Gpu, text: String, counts_loops: bool) -> wgpu::Shad
 }
 
 fn translated_here(gpu: &Gpu, name: &str, words: &[u32]) -> wgpu::ShaderModule {
+    // Metal alone asks for the workgroup's size.
     let entry = [wgpu::PassthroughShaderEntryPoint { name: name.into(), workgroup_size: (1, 1, 1) }];
     let descriptor = wgpu::ShaderModuleDescriptorPassthrough {
         label: Some(name),
@@ -110,14 +119,17 @@ fn translated_here(gpu: &Gpu, name: &str, words: &[u32]) -> wgpu::ShaderModule {
         ..Default::default()
     };
     // SAFETY: what wgpu checks of WGSL and not of SPIR-V holds without it.
-    // - The words are valid: `naga` wrote them, as it does for wgpu, of a module that it found valid, and was told to use what the
-    //   device's features allow and nothing else; the decorations beside them are of results of the kind that may have it.
-    // - They bind what the pipeline's layout says: both are made of the same module's variables (`Interface::layout`).
-    // - No access leaves its variable: indices are restricted, but for those of buffers, which wgpu has the device itself
-    //   bound (`robustBufferAccess`, which all of Vulkan has and wgpu asks for): what lies outside is another part of that buffer.
+    // - The words are valid: `naga` wrote them, as it does for wgpu, of a module that it found valid for what the device's features
+    //   allow and nothing else; the decorations beside them are of results of the kind that may have it.
+    // - They bind what the pipeline's layout says: both are made of the same module's variables (`Interface::layout`), and other variables that
+    //   the host sets are refused.
+    // - No access leaves its variable: indices are restricted, but for those of buffers, which wgpu has the device itself bound (`robustBufferAccess`,
+    //   which all of Vulkan has and wgpu asks for). What lies outside reads or writes another part of that buffer at worst, where wgpu's own translation holds the
+    //   index within it on devices without `robustBufferAccess2`.
     // - Memory is defined: workgroups' starts at zero, and buffers' is wgpu's.
     // - Loops end: they are counted, but for those that are known to (src/gpu/loops.rs). Integers are not divided by zero: checked.
-    // - Workgroups are within the device's limits: an adapter on which they are not is refused (`AdapterDescription::usable`).
+    // - Workgroups and their memory are within the device's limits: looked at (`spirv::translate`).
+    // - What is drawn hands on what the next stage takes, and fills the targets: the built-in texts do, and no others are handed over so.
     #[allow(unsafe_code)]
     unsafe {
         gpu.device.create_shader_module_passthrough(descriptor)

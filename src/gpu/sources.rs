@@ -9,6 +9,15 @@ use crate::error::{Error, Result};
 // `FILES`: each file of `wgsl/` by its name, as the build script found them.
 include!(concat!(env!("OUT_DIR"), "/kernels.rs"));
 
+/// A module's text.
+pub(crate) struct Text {
+    pub joined: String,
+    /// Every loop gets a counter that ends it.
+    pub counts_loops: bool,
+    /// No part of it was replaced.
+    pub built_in: bool,
+}
+
 /// The kernels' texts. The built-in ones, of which a researcher (or a test that must fail) may replace parts.
 #[derive(Clone, Debug)]
 pub struct Sources {
@@ -36,6 +45,12 @@ impl Sources {
     /// These texts, every loop of which is counted, those that are known to end too.
     pub(crate) fn with_counted_loops(self) -> Self {
         Self { counts_loops: true, ..self }
+    }
+
+    /// The module of `files`.
+    pub(super) fn text(&self, files: &[&str]) -> Text {
+        let built_in = files.iter().all(|file| matches!(self.texts.get(file), Some(Cow::Borrowed(_))));
+        Text { joined: self.join(files), counts_loops: !self.all_end(files), built_in }
     }
 
     /// Whether all loops of `files` are known to end, and so need not be counted.

@@ -3,18 +3,24 @@
 //! Vulkan lets a driver compute `a * b + c` with one rounding, and put `b` in place of `(a + b) - a`, and which it does depends on what
 //! stands around: the same lines give other bits in the tiles' kernel than in the one that scatters, and pages other ones than one buffer. NVIDIA's
 //! does both. The decoration `NoContraction` forbids it, and WGSL has no word for that; so kernels
-//! are translated here, by the translator that wgpu itself uses, and decorated. Then additions, subtractions and products have the same bits on
-//! every adapter of Vulkan; quotients, roots, powers and exponentials those that the driver gives them, wherever they stand.
+//! are translated here, by the translator that wgpu itself uses, and decorated. Then sums, differences and products are those of IEEE 754 on
+//! every adapter of Vulkan that rounds to nearest, but for numbers below the smallest normal one, which may be 0; quotients, roots, powers and exponentials are as
+//! exact as the driver makes them.
+
+use std::ops::RangeInclusive;
 
 use naga::back::spv;
 use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};
+use naga::valid::Capabilities;
 
 use super::interface::Interface;
 
 /// The words before the first instruction.
 const HEADER: usize = 5;
-/// OpDecorate, OpMemberDecorate.
-const ANNOTATIONS: [u32; 2] = [71, 72];
+/// OpDecorate.
+const DECORATE: u32 = 71;
+/// The first and last opcode of types, of which every module has one; annotations come before them.
+const TYPES: RangeInclusive<u32> = 19..=39;
 /// The decoration's number.
 const NO_CONTRACTION: u32 = 42;
 
@@ -29,16 +35,57 @@ pub(super) fn translate(
     interface: &Interface,
     entry: (naga::ShaderStage, &str),
     constants: &[(&str, f64)],
-    options: &spv::Options<'_>,
+    (options, limits): (&spv::Options<'_>, &wgpu::Limits),
 ) -> Result<Vec<u32>, String> {
     let constants = constants.iter().map(|&(name, value)| (name.to_owned(), value)).collect();
     let (module, info) =
         naga::back::pipeline_constants::process_overrides(&interface.module, &interface.info, Some(entry), &constants)
             .map_err(|e| e.to_string())?;
     let (shader_stage, name) = entry;
+    check_workgroup(&module, limits)?;
     let pipeline = spv::PipelineOptions { shader_stage, entry_point: name.to_owned() };
     let words = spv::write_vec(&module, &info, options, Some(&pipeline)).map_err(|e| e.to_string())?;
-    Ok(uncontracted(&words))
+    uncontracted(&words)
+}
+
+/// Fails if an entry point's workgroup, or the memory that one has, is larger than the device allows. Only what the entry point uses is left in `module`.
+fn check_workgroup(module: &naga::Module, limits: &wgpu::Limits) -> Result<(), String> {
+    let mut layouter = naga::proc::Layouter::default();
+    layouter.update(module.to_ctx()).map_err(|e| e.to_string())?;
+    let shared = module.global_variables.iter().filter(|(_, variable)| variable.space == naga::AddressSpace::WorkGroup);
+    let bytes: u64 = shared.map(|(_, variable)| u64::from(layouter[variable.ty].size)).sum();
+    let most = u64::from(limits.max_compute_workgroup_storage_size);
+    if bytes > most {
+        return Err(format!("a workgroup has {bytes} bytes of memory, and the device allows {most}"));
+    }
+    for entry in module.entry_points.iter().filter(|entry| entry.stage == naga::ShaderStage::Compute) {
+        let [x, y, z] = entry.workgroup_size;
+        let sides = [
+            (x, limits.max_compute_workgroup_size_x),
+            (y, limits.max_compute_workgroup_size_y),
+            (z, limits.max_compute_workgroup_size_z),
+        ];
+        let invocations = u64::from(x) * u64::from(y) * u64::from(z);
+        let most = u64::from(limits.max_compute_invocations_per_workgroup);
+        if invocations > most || sides.iter().any(|(side, most)| side > most) {
+            return Err(format!("a workgroup of {x}x{y}x{z} invocations is larger than the device allows"));
+        }
+    }
+    Ok(())
+}
+
+/// What a text may use on a device with `features`.
+pub(super) fn capabilities(features: wgpu::Features) -> Capabilities {
+    let granted = [
+        (wgpu::Features::SHADER_INT64, Capabilities::SHADER_INT64),
+        (
+            wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS,
+            Capabilities::SHADER_INT64_ATOMIC_ALL_OPS.union(Capabilities::SHADER_INT64_ATOMIC_MIN_MAX),
+        ),
+        (wgpu::Features::SHADER_FLOAT32_ATOMIC, Capabilities::SHADER_FLOAT32_ATOMIC),
+        (wgpu::Features::SUBGROUP, Capabilities::SUBGROUP),
+    ];
+    granted.iter().filter(|(feature, _)| features.contains(*feature)).map(|(_, granted)| *granted).collect()
 }
 
 /// How to translate for a device with `features`: what is allowed are its features, and all checks are on but those of buffers, and
@@ -91,22 +138,21 @@ pub(super) fn options(
 }
 
 /// Decorates every arithmetic instruction's result.
-fn uncontracted(words: &[u32]) -> Vec<u32> {
-    let (mut arithmetic, mut annotations) = (Vec::new(), None);
+fn uncontracted(words: &[u32]) -> Result<Vec<u32>, String> {
+    let (mut arithmetic, mut types) = (Vec::new(), None);
     let mut at = HEADER;
     while let Some(&word) = words.get(at) {
         let (opcode, length) = (word & 0xffff, (word >> 16) as usize);
-        if ANNOTATIONS.contains(&opcode) {
-            annotations.get_or_insert(at);
+        if TYPES.contains(&opcode) {
+            types.get_or_insert(at);
         } else if is_arithmetic(opcode) {
             arithmetic.extend(words.get(at + 2));
         }
         at += length.max(1);
     }
-    // A kernel binds something, and is decorated by that already.
-    let at = annotations.unwrap_or(words.len());
-    let decorations = arithmetic.iter().flat_map(|&result| [3 << 16 | ANNOTATIONS[0], result, NO_CONTRACTION]);
-    words[..at].iter().copied().chain(decorations).chain(words[at..].iter().copied()).collect()
+    let types = types.ok_or("a module without types")?;
+    let decorations = arithmetic.iter().flat_map(|&result| [3 << 16 | DECORATE, result, NO_CONTRACTION]);
+    Ok(words[..types].iter().copied().chain(decorations).chain(words[types..].iter().copied()).collect())
 }
 
 #[cfg(test)]
@@ -138,18 +184,26 @@ mod tests {
 
     #[test]
     fn every_arithmetic_result_is_decorated_and_nothing_else_is_changed() {
-        let interface = Interface::of(KERNEL).unwrap();
+        let interface = Interface::of(KERNEL, Capabilities::empty()).unwrap();
         let layout = interface.layout(&[(wgpu::ShaderStages::COMPUTE, "double")]).unwrap();
         assert_eq!(layout.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), ["by", "numbers"]);
         let options = options(wgpu::Features::empty(), [(3, 0), (7, 1)].into_iter(), false);
         let entry = (naga::ShaderStage::Compute, "double");
-        let words = translate(&interface, entry, &[("TWICE", 2.0)], &options).unwrap();
+        let words = translate(&interface, entry, &[("TWICE", 2.0)], (&options, &wgpu::Limits::default())).unwrap();
         let all = instructions(&words);
         let arithmetic: Vec<u32> = all.iter().filter(|(op, _)| is_arithmetic(*op)).map(|(_, of)| of[1]).collect();
-        let is_ours = |(op, of): &&(u32, &[u32])| *op == ANNOTATIONS[0] && of[1] == NO_CONTRACTION;
+        let is_ours = |(op, of): &&(u32, &[u32])| *op == DECORATE && of[1] == NO_CONTRACTION;
         let decorated: Vec<u32> = all.iter().filter(is_ours).map(|(_, of)| of[0]).collect();
-        // A negation, a quotient, two products of a vector and a number, a difference and two sums at least.
-        assert!(decorated == arithmetic && decorated.len() >= 6, "{decorated:?}");
+        assert_eq!(decorated, arithmetic);
+        // Two sums, a negation, a difference, a quotient and two products of a vector and a number.
+        let mut opcodes: Vec<u32> = all
+            .iter()
+            .filter(|(_, of)| of.get(1).is_some_and(|id| decorated.contains(id)))
+            .map(|(op, _)| *op)
+            .collect();
+        opcodes.retain(|op| *op != DECORATE);
+        opcodes.sort_unstable();
+        assert_eq!(opcodes, [127, 129, 129, 131, 136, 142, 142]);
         // Before the types, as the order of sections has it.
         let first_type = all.iter().position(|(op, _)| (19..=33).contains(op)).unwrap();
         assert!(all.iter().rposition(|instruction| is_ours(&instruction)).unwrap() < first_type);
@@ -169,19 +223,46 @@ mod tests {
         assert_eq!(rest, instructions(&plain));
         assert!(!instructions(&plain).iter().any(|instruction| is_ours(&instruction)), "the control");
         // The numbers it is told.
-        let bindings = all.iter().filter(|(op, of)| *op == ANNOTATIONS[0] && of[1] == 33).map(|(_, of)| of[2]);
+        let bindings = all.iter().filter(|(op, of)| *op == DECORATE && of[1] == 33).map(|(_, of)| of[2]);
         assert_eq!(bindings.collect::<std::collections::BTreeSet<_>>(), [0, 1].into());
     }
 
-    /// A kernel that needs what the device does not grant is refused, and not handed over.
+    fn translated(text: &str, features: wgpu::Features, limits: &wgpu::Limits) -> Result<Vec<u32>, String> {
+        let interface = Interface::of(text, capabilities(features))?;
+        let options = options(features, [(0, 0)].into_iter(), true);
+        translate(&interface, (naga::ShaderStage::Compute, "go"), &[], (&options, limits))
+    }
+
+    /// Kernels that need what the device does not grant are refused, and not handed over.
     #[test]
     fn what_is_not_granted_is_refused() {
-        let text = "@group(0) @binding(0) var<storage, read_write> n: array<atomic<u64>>;
+        let (core, limits) = (wgpu::Features::empty(), wgpu::Limits::default());
+        let wide = "@group(0) @binding(0) var<storage, read_write> n: array<atomic<u64>>;
             @compute @workgroup_size(1) fn go() { atomicMax(&n[0], 1lu); }";
-        let interface = Interface::of(text).unwrap();
-        let entry = (naga::ShaderStage::Compute, "go");
-        let with = |features| translate(&interface, entry, &[], &options(features, [(0, 0)].into_iter(), true));
         let both = wgpu::Features::SHADER_INT64 | wgpu::Features::SHADER_INT64_ATOMIC_ALL_OPS;
-        assert!(with(both).is_ok() && with(wgpu::Features::SHADER_INT64).is_err());
+        assert!(translated(wide, both, &limits).is_ok());
+        assert!(translated(wide, wgpu::Features::SHADER_INT64, &limits).is_err());
+        let workgroup = |size: &str| format!("@compute @workgroup_size({size}) fn go() {{}}");
+        assert!(translated(&workgroup("256"), core, &limits).is_ok());
+        assert!(translated(&workgroup("257"), core, &limits).is_err());
+        assert!(translated(&workgroup("16, 17"), core, &limits).is_err());
+        let shared = |words: u32| {
+            format!("var<workgroup> w: array<u32, {words}>; @compute @workgroup_size(1) fn go() {{ w[0] = 1u; }}")
+        };
+        assert!(translated(&shared(4096), core, &limits).is_ok());
+        assert!(translated(&shared(4097), core, &limits).is_err());
+        let immediate = "var<immediate> i: u32; @group(0) @binding(0) var<storage, read_write> n: array<u32>;
+            @compute @workgroup_size(1) fn go() { n[0] = i; }";
+        assert!(translated(immediate, core, &limits).is_err());
+    }
+
+    /// Of a kernel that binds nothing, too, decorations come before types.
+    #[test]
+    fn a_kernel_without_annotations_gets_them_in_their_place() {
+        let text = "@compute @workgroup_size(1) fn go() { var x = 1.0; x = x * x; }";
+        let words = translated(text, wgpu::Features::empty(), &wgpu::Limits::default()).unwrap();
+        let all = instructions(&words);
+        let decorated = all.iter().position(|(op, of)| *op == DECORATE && of[1] == NO_CONTRACTION).unwrap();
+        assert!(decorated < all.iter().position(|(op, _)| TYPES.contains(op)).unwrap());
     }
 }

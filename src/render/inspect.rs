@@ -11,9 +11,11 @@ use super::sums::Sums;
 use crate::error::{Error, Result};
 use crate::frame::Frame;
 use crate::gpu::buffers::Buffer;
+use crate::gpu::interface::reflect;
 use crate::gpu::kernel::{Grid, grid};
 use crate::gpu::layout::{Splat, View};
 use crate::gpu::program::Program;
+use crate::gpu::sources::Text;
 use crate::gpu::{Gpu, Sources};
 use crate::passes::upload::upload;
 use crate::plan::steps::{Stage, Step, Twin};
@@ -116,12 +118,20 @@ fn splats(gpu: &Gpu, needs: &SceneNeeds, order: &[u32], store: &Store) -> Result
 /// A module that is not valid, binds anything else, or fails on the device.
 pub fn evaluate<I: Pod, O: Pod>(gpu: &Gpu, text: &str, view: &View, inputs: &[I], output_len: u64) -> Result<Vec<O>> {
     const ENTRY: &str = "evaluate";
+    const NAMES: [&str; 3] = ["view", "inputs", "outputs"];
+    let (_, bindings, _) = reflect(text).map_err(|e| Error::Usage(format!("the kernel is not valid WGSL: {e}")))?;
+    let variables =
+        bindings.get(ENTRY).ok_or_else(|| Error::Usage(format!("the kernel has no entry point {ENTRY}")))?;
+    if let Some((name, _)) = variables.iter().find(|(name, _)| !NAMES.contains(&name.as_str())) {
+        return Err(Error::Usage(format!("the kernel binds {name}, which is none of view, inputs, outputs")));
+    }
+    let text = Text { joined: text.to_owned(), counts_loops: true, built_in: false };
+    let program = Program::compile(gpu, text, &[ENTRY], &[], &[])?;
     let view = Buffer::uniform(gpu, "view", view)?;
     let source = Buffer::storage(gpu, "inputs", inputs.len() as u64)?;
     source.write(gpu, inputs.len(), |range| inputs[range].into(), &())?;
     let target = Buffer::<O>::storage(gpu, "outputs", output_len)?;
     let buffers = [("view", &view.raw), ("inputs", &source.raw), ("outputs", &target.raw)];
-    let program = Program::compile(gpu, (text.to_owned(), true), &[ENTRY], &[], &[])?;
     let binding = |name: &str| {
         let (_, buffer) = buffers.iter().find(|(given, _)| *given == name)?;
         Some(buffer.as_entire_binding())

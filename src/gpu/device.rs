@@ -115,8 +115,12 @@ impl Gpu {
             memory_hints: wgpu::MemoryHints::MemoryUsage,
             ..Default::default()
         };
+        // NVIDIA's driver is in doubt where threads make devices beside each other, too (kvark/blade#336).
+        static OPENING: Mutex<()> = Mutex::new(());
+        let opening = OPENING.lock();
         let (device, queue) = pollster::block_on(handle.request_device(&descriptor))
             .map_err(|e| Error::Gpu { adapter: adapter.name.clone(), what: format!("cannot open the device: {e}") })?;
+        drop(opening);
         let failure = Arc::new(Mutex::new(None));
         let slot = Arc::clone(&failure);
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {

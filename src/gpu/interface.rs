@@ -77,6 +77,59 @@ impl Interface {
         Ok(layout.into_values().collect())
     }
 
+    /// Fails unless the fragment shader takes only what the vertex shader hands on, and its results are those of `targets`.
+    pub fn check_stages(
+        &self,
+        [vertex, fragment]: [&str; 2],
+        targets: &[wgpu::ColorTargetState],
+    ) -> Result<(), String> {
+        let function = |name: &str| {
+            let entry = self.module.entry_points.iter().find(|entry| entry.name == name);
+            entry.map(|entry| &entry.function).ok_or_else(|| format!("there is no entry point {name}"))
+        };
+        let (vertex, fragment) = (function(vertex)?, function(fragment)?);
+        let results = |function: &naga::Function| {
+            function
+                .result
+                .iter()
+                .flat_map(|result| self.places(result.ty, result.binding.as_ref()))
+                .collect::<Vec<_>>()
+        };
+        let handed = results(vertex);
+        for taken in fragment.arguments.iter().flat_map(|given| self.places(given.ty, given.binding.as_ref())) {
+            if !handed.contains(&taken) {
+                return Err(format!(
+                    "the fragment shader takes place {}, and the vertex shader does not hand it on",
+                    taken.0
+                ));
+            }
+        }
+        let kind = |target: &wgpu::ColorTargetState| match target.format.sample_type(None, None) {
+            Some(wgpu::TextureSampleType::Uint) => ScalarKind::Uint,
+            Some(wgpu::TextureSampleType::Sint) => ScalarKind::Sint,
+            _ => ScalarKind::Float,
+        };
+        let wanted: Vec<_> = (0..).zip(targets).map(|(place, target)| (place, Some(kind(target)))).collect();
+        let scalar = |ty: Handle<naga::Type>| self.module.types[ty].inner.scalar_kind();
+        let mut made: Vec<_> = results(fragment).into_iter().map(|(place, ty)| (place, scalar(ty))).collect();
+        made.sort_by_key(|(place, _)| *place);
+        if made == wanted { Ok(()) } else { Err("the fragment shader's results are not those of the targets".into()) }
+    }
+
+    /// The locations and types of what is handed from stage to stage, of a value or the members of a structure.
+    fn places(&self, ty: Handle<naga::Type>, binding: Option<&naga::Binding>) -> Vec<(u32, Handle<naga::Type>)> {
+        let place = |binding: Option<&naga::Binding>| match binding {
+            Some(naga::Binding::Location { location, .. }) => Some(*location),
+            _ => None,
+        };
+        match &self.module.types[ty].inner {
+            TypeInner::Struct { members, .. } => {
+                members.iter().filter_map(|member| Some((place(member.binding.as_ref())?, member.ty))).collect()
+            }
+            _ => place(binding).map(|place| (place, ty)).into_iter().collect(),
+        }
+    }
+
     /// What a variable binds.
     fn kind(&self, handle: Handle<naga::GlobalVariable>) -> Result<wgpu::BindingType, String> {
         let variable = &self.module.global_variables[handle];

@@ -79,6 +79,7 @@ impl Draw {
         let constants: Vec<_> = constants.iter().copied().chain(self.constant).collect();
         let bound = module
             .bind(gpu, &[(wgpu::ShaderStages::VERTEX, self.vertex), (wgpu::ShaderStages::FRAGMENT, self.fragment)])?;
+        module.check_stages(gpu, [self.vertex, self.fragment], &self.targets)?;
         let vertex = module.entry(gpu, (naga::ShaderStage::Vertex, self.vertex), &bound, &constants)?;
         let fragment = module.entry(gpu, (naga::ShaderStage::Fragment, self.fragment), &bound, &constants)?;
         let targets: Vec<_> = self.targets.iter().cloned().map(Some).collect();
@@ -124,7 +125,7 @@ impl Program {
         };
         let guard = watched();
         let mut program = Self { counts_loops: text.counts_loops, ..Self::default() };
-        let module = Module::of(gpu, text, draws.is_empty())?;
+        let module = Module::of(gpu, text)?;
         passed(guard)?;
         // Half of a first frame's time would else go by here.
         let compiled = side_by_side(stages, |&stage| {

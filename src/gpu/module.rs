@@ -40,16 +40,21 @@ impl Entry<'_> {
 }
 
 impl Module {
-    /// The module of a text, whose kernels all compute, or which has some that draw.
-    pub fn of(gpu: &Gpu, text: Text, computes: bool) -> Result<Self> {
-        let Text { joined, counts_loops, built_in } = text;
-        // Whether what is drawn fits the stage after it is known of the built-in texts; wgpu looks at others.
-        let spirv = gpu.takes_spirv() && (computes || built_in);
+    /// The module of a text.
+    pub fn of(gpu: &Gpu, text: Text) -> Result<Self> {
+        let Text { joined, counts_loops } = text;
+        let spirv = gpu.takes_spirv();
         let capabilities = if spirv { spirv::capabilities(gpu.device.features()) } else { Capabilities::all() };
         let interface = Interface::of(&joined, capabilities);
         let interface = interface.map_err(|e| gpu.error(format!("a kernel is not valid WGSL: {e}")))?;
         let text = (!spirv).then(|| translated_by_wgpu(gpu, joined, counts_loops));
         Ok(Self { interface, counts_loops, text })
+    }
+
+    /// Fails unless a pipeline's stages and targets fit each other.
+    pub fn check_stages(&self, gpu: &Gpu, stages: [&str; 2], targets: &[wgpu::ColorTargetState]) -> Result<()> {
+        let fits = self.interface.check_stages(stages, targets);
+        fits.map_err(|e| gpu.error(format!("what is drawn does not fit: {e}")))
     }
 
     /// What a pipeline of `entries` binds, each with the stage it is of.
@@ -129,7 +134,7 @@ fn translated_here(gpu: &Gpu, name: &str, words: &[u32]) -> wgpu::ShaderModule {
     // - Memory is defined: workgroups' starts at zero, and buffers' is wgpu's.
     // - Loops end: they are counted, but for those that are known to (src/gpu/loops.rs). Integers are not divided by zero: checked.
     // - Workgroups and their memory are within the device's limits: looked at (`spirv::translate`).
-    // - What is drawn hands on what the next stage takes, and fills the targets: the built-in texts do, and no others are handed over so.
+    // - What is drawn hands on what the next stage takes, and fills the targets: looked at (`check_stages`).
     #[allow(unsafe_code)]
     unsafe {
         gpu.device.create_shader_module_passthrough(descriptor)

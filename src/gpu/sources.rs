@@ -14,8 +14,6 @@ pub(crate) struct Text {
     pub joined: String,
     /// Every loop gets a counter that ends it.
     pub counts_loops: bool,
-    /// No part of it was replaced.
-    pub built_in: bool,
 }
 
 /// The kernels' texts. The built-in ones, of which a researcher (or a test that must fail) may replace parts.
@@ -49,8 +47,7 @@ impl Sources {
 
     /// The module of `files`.
     pub(super) fn text(&self, files: &[&str]) -> Text {
-        let built_in = files.iter().all(|file| matches!(self.texts.get(file), Some(Cow::Borrowed(_))));
-        Text { joined: self.join(files), counts_loops: !self.all_end(files), built_in }
+        Text { joined: self.join(files), counts_loops: !self.all_end(files) }
     }
 
     /// Whether all loops of `files` are known to end, and so need not be counted.

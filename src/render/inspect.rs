@@ -125,7 +125,7 @@ pub fn evaluate<I: Pod, O: Pod>(gpu: &Gpu, text: &str, view: &View, inputs: &[I]
     if let Some((name, _)) = variables.iter().find(|(name, _)| !NAMES.contains(&name.as_str())) {
         return Err(Error::Usage(format!("the kernel binds {name}, which is none of view, inputs, outputs")));
     }
-    let text = Text { joined: text.to_owned(), counts_loops: true, built_in: false };
+    let text = Text { joined: text.to_owned(), counts_loops: true };
     let program = Program::compile(gpu, text, &[ENTRY], &[], &[])?;
     let view = Buffer::uniform(gpu, "view", view)?;
     let source = Buffer::storage(gpu, "inputs", inputs.len() as u64)?;

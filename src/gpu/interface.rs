@@ -166,3 +166,50 @@ pub fn reflect(text: &str) -> Result<(Module, Bindings, Vec<String>), String> {
     let (bindings, overrides) = (interface.bindings(), interface.overrides());
     Ok((interface.module, bindings, overrides))
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    const DRAWN: &str = "
+        struct Corner { @builtin(position) place: vec4<f32>, @location(1) color: vec4<f32> }
+        @vertex fn corner() -> Corner { return Corner(vec4<f32>(0.0), vec4<f32>(1.0)); }
+        @fragment fn shown(@location(1) color: vec4<f32>) -> @location(0) vec4<f32> { return color; }";
+
+    #[test]
+    fn stages_that_do_not_fit_are_refused() {
+        let fits = |text: &str, targets: &[wgpu::TextureFormat]| {
+            let targets: Vec<wgpu::ColorTargetState> = targets.iter().map(|&format| format.into()).collect();
+            let interface = Interface::of(text, Capabilities::empty()).unwrap();
+            interface.check_stages(["corner", "shown"], &targets).is_ok()
+        };
+        use wgpu::TextureFormat::{R32Uint, Rgba16Float};
+        assert!(fits(DRAWN, &[Rgba16Float]));
+        for targets in [&[R32Uint][..], &[], &[Rgba16Float, Rgba16Float]] {
+            assert!(!fits(DRAWN, targets), "{targets:?}");
+        }
+        for (from, to) in [
+            ("shown(@location(1)", "shown(@location(2)"),
+            (
+                "shown(@location(1) color: vec4<f32>) -> @location(0) vec4<f32> { return color; }",
+                "shown(@location(1) color: vec2<f32>) -> @location(0) vec4<f32> { return color.xyxy; }",
+            ),
+            ("-> @location(0)", "-> @location(1)"),
+        ] {
+            assert!(DRAWN.contains(from) && !fits(&DRAWN.replace(from, to), &[Rgba16Float]), "{to}");
+        }
+    }
+
+    #[test]
+    fn two_variables_of_one_number_are_refused() {
+        let text = "
+            @group(0) @binding(2) var<uniform> one: vec4<f32>;
+            @group(0) @binding(2) var<uniform> other: vec4<f32>;
+            @vertex fn corner() -> @builtin(position) vec4<f32> { return one; }
+            @fragment fn shown() -> @location(0) vec4<f32> { return other; }";
+        let stages = [(wgpu::ShaderStages::VERTEX, "corner"), (wgpu::ShaderStages::FRAGMENT, "shown")];
+        let interface = Interface::of(text, Capabilities::empty()).unwrap();
+        assert!(interface.layout(&stages).is_err() && interface.layout(&stages[..1]).unwrap().len() == 1);
+    }
+}

@@ -112,3 +112,23 @@ fn a_view_of_nothing_is_told() {
     let damaged = folder.file("a.copc.laz", &std::fs::read(file()).unwrap()[..30_000]);
     fails(&["render", text(&damaged), "--lod", "4px", "-o", text(&output)], 1, &["a.copc.laz: a page of its octree"]);
 }
+
+/// The fewer points are read the larger are disks, but they end near where all points do.
+#[test]
+fn a_part_ends_where_the_cloud_does() {
+    let folder = Folder::new();
+    let cameras = cameras(&folder, "down.json", &[down("a", CENTER, 5000.0)]);
+    // Alpha outside of the box that the file tells, which is 60 pixels wide and 83 high at most.
+    let outside = |detail: &str| {
+        let output = folder.path(detail);
+        succeeds(&["render", &file(), "--lod", detail, "--cameras", text(&cameras), "-o", text(&output)]);
+        let picture = image::open(output.join("a.png")).unwrap().to_rgba8();
+        let is_inside = |x: u32, y: u32| (6..67).contains(&x) && (6..90).contains(&y);
+        let alpha =
+            |(x, y, pixel): (u32, u32, &image::Rgba<u8>)| if is_inside(x, y) { 0 } else { u64::from(pixel.0[3]) };
+        picture.enumerate_pixels().map(alpha).sum::<u64>() as f64
+    };
+    // Disks that were not cut would cover three times as much there.
+    let [all, part] = ["0", "30px"].map(outside);
+    assert!(all > 0.0 && part < 2.2 * all, "{all} {part}");
+}

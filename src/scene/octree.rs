@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 use glam::{DVec2, DVec3};
 
 use super::detail::finest;
-use super::{Camera, Detail, Projection};
+use super::{Bounds, Camera, Detail, Projection};
 
 /// The nodes of an octree, whose root is a cube.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,6 +21,8 @@ pub struct PointOctree {
     pub spacing: f64,
     /// In order of their keys.
     pub nodes: Vec<OctreeNode>,
+    /// The box of all points, world coordinates; that of nothing where nobody knows it.
+    pub bounds: Bounds,
 }
 
 /// A node, which may have no points but those of the nodes below it.
@@ -133,6 +135,53 @@ pub fn taken(octrees: &[PointOctree], camera: &Camera, detail: Detail) -> Vec<Ve
     }))
 }
 
+/// What was taken of an octree, beside all of it.
+pub struct Thinned<'a> {
+    octree: &'a PointOctree,
+    /// In order.
+    taken: &'a [usize],
+    /// Points of each node and of all below it.
+    points: Vec<u64>,
+}
+
+impl<'a> Thinned<'a> {
+    /// Of an octree these nodes, in order, each with the one above it.
+    pub fn new(octree: &'a PointOctree, taken: &'a [usize]) -> Self {
+        let mut points: Vec<u64> = octree.nodes.iter().map(|node| node.points).collect();
+        for (index, node) in octree.nodes.iter().enumerate().rev() {
+            let above =
+                node.level.checked_sub(1).and_then(|level| octree.find(level, node.place.map(|place| place >> 1)));
+            if let Some(above) = above {
+                points[above] += points[index];
+            }
+        }
+        Self { octree, taken, points }
+    }
+
+    /// How large the disks of all points would be, over those of what was taken, at a place of a surface in world coordinates: disks are as large
+    /// as points are far from each other. 1 where everything was taken, and None outside the octree.
+    pub fn size_of_all(&self, place: DVec3) -> Option<f64> {
+        let octree = self.octree;
+        let place = (place - octree.center) / octree.half;
+        if place.abs().max_element() > 1.0 {
+            return None;
+        }
+        let at_level = |level: u32| {
+            let side = f64::from(1u32 << level.min(MOST_LEVELS - 1));
+            let cube = ((place + 1.0) * 0.5 * side).floor().clamp(DVec3::ZERO, DVec3::splat(side - 1.0));
+            octree.find(level, cube.to_array().map(|place| place as u32))
+        };
+        let (mut own, mut all) = (1, 1);
+        for node in (0..octree.levels()).map_while(at_level) {
+            if self.taken.binary_search(&node).is_err() {
+                return Some((own as f64 / all as f64).sqrt());
+            }
+            (own, all) = (octree.nodes[node].points, self.points[node].max(1));
+        }
+        Some(1.0)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
@@ -147,7 +196,7 @@ mod tests {
             let all = (0..side).flat_map(|x| (0..side).flat_map(move |y| (0..side).map(move |z| [x, y, z])));
             nodes.extend(all.map(|place| OctreeNode { level, place, points }));
         }
-        PointOctree { center: DVec3::ZERO, half: 1.0, spacing: 0.25, nodes }
+        PointOctree { center: DVec3::ZERO, half: 1.0, spacing: 0.25, nodes, bounds: Bounds::EMPTY }
     }
 
     fn camera(eye: DVec3, lens: Lens) -> Camera {
@@ -193,6 +242,25 @@ mod tests {
             let points: u64 = octrees.iter().zip(&nodes).map(|(octree, nodes)| octree.points(nodes)).sum();
             // Nodes of a hundred points come one at a time, as their depths differ.
             assert!(points <= most && points + 1_000 >= most.min(all), "{most}: {points}");
+        }
+    }
+
+    #[test]
+    fn what_was_taken_has_larger_disks_than_all_where_there_is_more() {
+        let mut octree = full(3, 100);
+        // Of one corner's finest level nothing is there.
+        octree.nodes.retain(|node| node.level < 2 || node.place.iter().any(|place| *place > 1));
+        let [corner, other] = [DVec3::splat(-0.9), DVec3::splat(0.9)];
+        let all: Vec<usize> = (0..octree.nodes.len()).collect();
+        for (taken, at_corner, elsewhere) in [
+            (1, 100.0 / (100.0 + 800.0 + 5600.0), 100.0 / (100.0 + 800.0 + 5600.0)),
+            (9, 1.0, 100.0 / 900.0),
+            (all.len(), 1.0, 1.0),
+        ] {
+            let thinned = Thinned::new(&octree, &all[..taken]);
+            assert_eq!(thinned.size_of_all(corner), Some(f64::sqrt(at_corner)), "{taken}");
+            assert_eq!(thinned.size_of_all(other), Some(f64::sqrt(elsewhere)), "{taken}");
+            assert_eq!(thinned.size_of_all(DVec3::splat(7.0)), None);
         }
     }
 

@@ -1,6 +1,7 @@
 //! From points and meshes to surfels.
 
 pub mod analytic;
+pub mod borders;
 mod build;
 mod caps;
 mod colors;

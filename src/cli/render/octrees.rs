@@ -3,8 +3,9 @@
 use epsplat::io::Points;
 use epsplat::io::las::Copc;
 use epsplat::plan::RenderOptions;
-use epsplat::scene::octree::{PointOctree, taken};
-use epsplat::scene::{Camera, Detail, Scene};
+use epsplat::scene::octree::{PointOctree, Thinned, taken};
+use epsplat::scene::{Bounds, Camera, Detail, Scene};
+use epsplat::surfels::borders;
 use epsplat::{Error, Progress, Result, surfels};
 
 use super::super::progress::Bars;
@@ -55,10 +56,20 @@ impl Octrees {
         if self.octrees.iter().zip(&nodes).all(|(octree, nodes)| octree.points(nodes) == 0) {
             nodes = self.octrees.iter().map(PointOctree::overview).collect();
         }
-        let made = scene_of(arguments, read(arguments, &mut self.files, &nodes, progress)?, progress)?;
+        let mut made = scene_of(arguments, read(arguments, &mut self.files, &nodes, progress)?, progress)?;
+        self.end(&mut made.0, &nodes);
         // What was read is drawn whole.
         let options = RenderOptions { detail: Detail::FINEST, ..options.clone() };
         Ok(Part { made, options, read: read_of(&self.files, &nodes) })
+    }
+
+    /// Lets a scene of these nodes end where all points do: at the box of all files.
+    fn end(&self, scene: &mut Scene, nodes: &[Vec<usize>]) {
+        let bounds = self.octrees.iter().fold(Bounds::EMPTY, |all, octree| all.union(octree.bounds));
+        let thinned = self.octrees.iter().zip(nodes).map(|(octree, nodes)| Thinned::new(octree, nodes));
+        let thinned: Vec<Thinned> = thinned.collect();
+        let size_of_all = |place| thinned.iter().filter_map(|octree| octree.size_of_all(place)).fold(1.0, f64::min);
+        borders::end_at(scene, &bounds, size_of_all);
     }
 }
 
@@ -66,11 +77,12 @@ impl Octrees {
 fn read_of(files: &[Copc], nodes: &[Vec<usize>]) -> Read {
     let mut sum = Read { nodes: [0; 2], points: [0; 2], bytes: [0; 2] };
     for (file, taken) in files.iter().zip(nodes) {
-        let all: Vec<usize> = (0..file.octree.nodes.len()).collect();
-        for (at, nodes) in [taken, &all].into_iter().enumerate() {
-            sum.nodes[at] += nodes.len() as u64;
-            sum.points[at] += file.octree.points(nodes);
-            sum.bytes[at] += file.bytes(nodes);
+        let all = [file.octree.nodes.len() as u64, file.count(), file.bytes()];
+        let taken = [taken.len() as u64, file.octree.points(taken), file.bytes_read(taken)];
+        for (at, [nodes, points, bytes]) in [taken, all].into_iter().enumerate() {
+            sum.nodes[at] += nodes;
+            sum.points[at] += points;
+            sum.bytes[at] += bytes;
         }
     }
     sum

@@ -119,11 +119,13 @@ pub(super) struct Scheme {
     /// 1: one run of points, without chunks; 2: chunks; 3: chunks in layers.
     pub(super) compressor: u16,
     /// Points per chunk; `None` where the chunk table gives them.
-    chunk: Option<u32>,
+    pub(super) chunk: Option<u32>,
     /// Bytes per decoded point.
     pub(super) record: u64,
-    /// Layers per chunk, where chunks are in layers.
-    layers: u64,
+    /// Whether the decoder knows colours among the layers.
+    pub(super) has_color: bool,
+    /// Of each layer of a chunk, where chunks are in layers, whether anything is taken of it.
+    pub(super) needed: Vec<bool>,
 }
 
 impl Scheme {
@@ -131,21 +133,21 @@ impl Scheme {
         let u16_at = |at: usize| data.get(at..)?.first_chunk().copied().map(u16::from_le_bytes);
         let chunk = u32::from_le_bytes(data.get(CHUNK_SIZE..)?.first_chunk().copied()?);
         let (compressor, items) = (u16_at(0)?, u16_at(32)?);
-        let (mut record, mut layers) = (0, 0);
+        let (mut record, mut layers, mut has_color) = (0, Vec::new(), false);
         for item in 0..usize::from(items) {
             let (kind, size) = (u16_at(34 + 6 * item)?, u64::from(u16_at(36 + 6 * item)?));
             // Where a size is not the kind's own, the decoder would look for layers elsewhere than they are checked.
             let (own_size, own_layers) = match kind {
-                0 => (size, 0),     // extra bytes
-                6 => (20, 0),       // point of formats 0 to 5
-                7 => (8, 0),        // time
-                8 => (6, 0),        // colour
-                9 => (29, 0),       // wave packet
-                10 => (30, 9),      // coordinates, flags, intensity, angle, user data, source, time
-                11 => (6, 1),       // colour
-                12 => (8, 2),       // colour and near infrared
-                13 => (29, 1),      // wave packet
-                14 => (size, size), // extra bytes: one layer each
+                0 => (size, 0),              // extra bytes
+                6 => (20, 0),                // point of formats 0 to 5
+                7 => (8, 0),                 // time
+                8 => (6, 0),                 // colour
+                9 => (29, 0),                // wave packet
+                10 => (30, 9),               // x and y, z, class, flags, intensity, angle, user data, source, time
+                11 => (6, 1),                // colour
+                12 => (8, 2),                // colour, near infrared
+                13 => (29, 1),               // wave packet
+                14 => (size, size as usize), // extra bytes: one layer each
                 _ => return None,
             };
             // Nor are layers looked for outside chunks of layers, but the decoder would take their lengths for true.
@@ -153,15 +155,25 @@ impl Scheme {
                 return None;
             }
             record += size;
-            layers += own_layers;
+            has_color |= matches!(kind, 11 | 12);
+            // Of a point its place, class and flags, of colours the first layer.
+            let taken = match kind {
+                10 => 4,
+                11 | 12 => 1,
+                _ => 0,
+            };
+            layers.extend((0..own_layers).map(|layer| (kind, layer, layer < taken)));
         }
+        // Where nothing has a colour, intensities are taken for one.
+        let needed = |(kind, layer, taken)| taken || !has_color && (kind, layer) == (10, 4);
+        let needed = layers.into_iter().map(needed).collect();
         let chunk = Some(chunk).filter(|&chunk| chunk != 0 && chunk != u32::MAX);
-        Some(Self { compressor, chunk, record, layers })
+        Some(Self { compressor, chunk, record, has_color, needed })
     }
 
     /// Bytes of a chunk in layers before these: its first point, how many it has, and how long each layer is.
     pub(super) fn start(&self) -> u64 {
-        self.record + 4 + 4 * self.layers
+        self.record + 4 + 4 * self.needed.len() as u64
     }
 
     /// The points that a chunk of so many bytes, which begins with these, says that it has; None if its layers do not fit in it.
@@ -266,6 +278,7 @@ fn read_u64(file: &mut impl Read) -> Result<u64, Fault> {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
 
     /// The data of a LASzip record with these items: kinds and sizes.
@@ -279,9 +292,21 @@ mod tests {
     }
 
     #[test]
+    fn layers_are_needed_for_places_classes_and_colors() {
+        let needed = |items: &[(u16, u16)]| {
+            let scheme = Scheme::parse(&record(items)).unwrap();
+            let needed = scheme.needed.iter().enumerate().filter(|(_, needed)| **needed);
+            needed.map(|(layer, _)| layer).collect::<Vec<_>>()
+        };
+        assert_eq!(needed(&[(10, 30), (11, 6), (14, 2)]), [0, 1, 2, 3, 9]);
+        assert_eq!(needed(&[(10, 30), (12, 8), (13, 29)]), [0, 1, 2, 3, 9]);
+        assert_eq!(needed(&[(10, 30), (14, 6)]), [0, 1, 2, 3, 4]);
+    }
+
+    #[test]
     fn items_have_the_size_of_their_kind() {
         let scheme = Scheme::parse(&record(&[(10, 30), (12, 8), (14, 5)]));
-        assert!(scheme.is_some_and(|scheme| (scheme.record, scheme.layers) == (43, 16)));
+        assert!(scheme.is_some_and(|scheme| (scheme.record, scheme.needed.len()) == (43, 16)));
         assert!(Scheme::parse(&record(&[(6, 20), (7, 8), (8, 6), (0, 5)])).is_some());
         // Layers and chunks of layers go together.
         let mut without = record(&[(10, 30)]);

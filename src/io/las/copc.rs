@@ -1,10 +1,12 @@
 //! COPC 1.0: LAZ files whose chunks are the nodes of an octree, of which a picture takes few.
 
 use super::chunks::{MOST_A_BYTE, Scheme, laszip_record, malformed, promised};
+use super::layers::Layers;
 use super::shown::Shown;
 use super::{Meaning, early, of_las};
 use crate::io::fault::{Fault, surviving};
 use crate::io::{Format, Input};
+use crate::scene::Bounds;
 use crate::scene::octree::{MOST_LEVELS, OctreeNode, PointOctree};
 use crate::{Error, Result};
 use glam::DVec3;
@@ -32,6 +34,8 @@ pub struct Copc {
     pub octree: PointOctree,
     /// The chunk of each.
     pub(super) chunks: Vec<Chunk>,
+    /// What is needed of each, once it was looked at.
+    pub(super) layers: Vec<Option<Layers>>,
     pub(super) scheme: Scheme,
     /// The record that says how chunks are compressed.
     pub(super) laszip: Vec<u8>,
@@ -77,9 +81,14 @@ impl Copc {
         opened.map_err(|fault| fault.of(&path))
     }
 
-    /// Bytes of the chunks of these nodes.
-    pub fn bytes(&self, nodes: &[usize]) -> u64 {
-        nodes.iter().map(|&node| self.chunks[node].bytes).sum()
+    /// Bytes of the chunks of all nodes.
+    pub fn bytes(&self) -> u64 {
+        self.chunks.iter().map(|chunk| chunk.bytes).sum()
+    }
+
+    /// Bytes that [`read`](Self::read) takes of these nodes, which were read before.
+    pub fn bytes_read(&self, nodes: &[usize]) -> u64 {
+        nodes.iter().filter_map(|&node| self.layers[node].as_ref()).map(Layers::bytes).sum()
     }
 
     /// Points of all nodes.
@@ -112,7 +121,7 @@ fn opened(mut file: File, path: PathBuf, length: u64) -> Result<Copc, Fault> {
     let format = header.point_data_record_format & 0x3f;
     let laszip = laszip_record(&mut file, &header)?.map(|(_, data)| data);
     let scheme = laszip.as_deref().and_then(Scheme::parse);
-    let (Some(laszip), Some(scheme)) = (laszip, scheme.filter(|scheme| scheme.compressor == 3)) else {
+    let (Some(laszip), Some(mut scheme)) = (laszip, scheme.filter(|scheme| scheme.compressor == 3)) else {
         return malformed("it says that it is COPC, but its points are not compressed in layers");
     };
     let mut format = las::point::Format::new(format).map_err(of_las)?;
@@ -120,6 +129,10 @@ fn opened(mut file: File, path: PathBuf, length: u64) -> Result<Copc, Fault> {
         return malformed("its LASzip record does not describe its points");
     }
     format.extra_bytes = (record - u64::from(format.len())) as u16;
+    if scheme.has_color != format.has_color {
+        // The decoder takes for something else what colours are taken from.
+        scheme.needed.fill(true);
+    }
     let mut info = [0; INFO_SIZE];
     file.seek(SeekFrom::Start(INFO))?;
     file.read_exact(&mut info)?;
@@ -141,11 +154,15 @@ fn opened(mut file: File, path: PathBuf, length: u64) -> Result<Copc, Fault> {
         y: transform(header.y_scale_factor, header.y_offset),
         z: transform(header.z_scale_factor, header.z_offset),
     };
-    let octree = PointOctree { center, half, spacing, nodes };
+    let [min, max] =
+        [DVec3::new(header.min_x, header.min_y, header.min_z), DVec3::new(header.max_x, header.max_y, header.max_z)];
+    let bounds = if min.is_finite() && max.is_finite() { Bounds { min, max } } else { Bounds::EMPTY };
+    let octree = PointOctree { center, half, spacing, nodes, bounds };
     Ok(Copc {
         file: file.into_inner().into_file(),
         path,
         octree,
+        layers: vec![None; chunks.len()],
         chunks,
         scheme,
         laszip,

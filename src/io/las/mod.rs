@@ -4,6 +4,7 @@ mod arithmetic;
 mod chunks;
 mod color;
 mod copc;
+mod layers;
 mod nodes;
 mod shown;
 

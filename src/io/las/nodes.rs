@@ -1,7 +1,8 @@
-//! Nodes of a COPC file: their chunks are read in the order of the file, many at a time, and decoded by all threads.
+//! Nodes of a COPC file: what is needed of their chunks is read in the order of the file, many at a time, and decoded by all threads.
 
 use super::chunks::{CHUNK_LIMIT, malformed};
 use super::copc::Copc;
+use super::layers::Layers;
 use super::{Kept, deep, early, of_las};
 use crate::io::fault::{self, Fault, reserve, surviving};
 use crate::io::{Points, ReadOptions};
@@ -28,7 +29,8 @@ impl Copc {
     pub fn read(&mut self, nodes: &[usize], options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
         let mut nodes: Vec<usize> = nodes.iter().copied().filter(|&node| self.octree.nodes[node].points > 0).collect();
         nodes.sort_unstable_by_key(|&node| self.chunks[node].offset);
-        let bytes = self.bytes(&nodes);
+        self.look(&nodes).map_err(|fault| self.fault(fault))?;
+        let bytes = self.bytes_read(&nodes);
         progress.begin(&format!("reading {} MB of {}", bytes.div_ceil(1_000_000), fault::name(&self.path)), bytes);
         let points = deep(|| self.decoded(&nodes, options, progress));
         progress.end();
@@ -40,16 +42,20 @@ impl Copc {
         let count = self.octree.points(nodes);
         let mut kept = Kept::default();
         // No longer than the file, whatever it promises.
-        reserve(&mut kept.positions, count.min(self.bytes(nodes)))?;
+        reserve(&mut kept.positions, count.min(self.bytes_read(nodes)))?;
         for together in self.batches(nodes) {
-            let compressed = together.iter().map(|&node| self.compressed(node)).collect::<Result<Vec<_>, _>>()?;
+            let compressed = |&node: &usize| {
+                let layers = self.layers[node].as_ref();
+                layers.map_or_else(|| Ok(Vec::new()), |layers| layers.read(&self.file, self.chunks[node].offset))
+            };
+            let compressed = together.iter().map(compressed).collect::<Result<Vec<_>, _>>()?;
             let decode = |(&node, bytes): (&usize, Vec<u8>)| surviving(|| self.decode(node, &bytes, &vlr));
             let decoded: Vec<PointData> =
                 together.par_iter().zip(compressed).map(decode).collect::<Result<_, Fault>>()?;
             for (&node, block) in together.iter().zip(decoded) {
                 kept.take(&block, self.chunks[node].first, options);
             }
-            progress.advance(self.bytes(together));
+            progress.advance(self.bytes_read(together));
         }
         let numbers = || {
             let of_node =
@@ -85,21 +91,29 @@ impl Copc {
         batches
     }
 
-    /// The chunk of a node, whose lengths are checked.
-    fn compressed(&self, node: usize) -> Result<Vec<u8>, Fault> {
+    /// Finds what is needed of these nodes, whose lengths are checked.
+    fn look(&mut self, nodes: &[usize]) -> Result<(), Fault> {
+        for &node in nodes {
+            if self.layers[node].is_none() {
+                self.layers[node] = Some(self.layers_of(node)?);
+            }
+        }
+        Ok(())
+    }
+
+    fn layers_of(&self, node: usize) -> Result<Layers, Fault> {
         let (chunk, points) = (self.chunks[node], self.octree.nodes[node].points);
         if points * self.scheme.record > CHUNK_LIMIT {
             return malformed(format!(
                 "a node of its octree has {points} points, more than are decoded at once: leave --lod out to read the whole file"
             ));
         }
-        let mut bytes = Vec::new();
-        reserve(&mut bytes, chunk.bytes)?;
+        let mut start = Vec::new();
         let mut file = &self.file;
         file.seek(SeekFrom::Start(chunk.offset))?;
-        file.take(chunk.bytes).read_to_end(&mut bytes)?;
-        match self.scheme.points_in(&bytes, bytes.len() as u64) {
-            Some(count) if count == points => Ok(bytes),
+        file.take(self.scheme.start()).read_to_end(&mut start)?;
+        match self.scheme.points_in(&start, chunk.bytes) {
+            Some(count) if count == points => Ok(Layers::of(start, &self.scheme)),
             Some(count) => {
                 malformed(format!("a node of its octree has {count} points, not the {points} that it promises"))
             }

@@ -51,9 +51,8 @@ pub(super) fn node<B: Below>(of: B::Key, sums: &Sums, lattice: &Lattice, below: 
     let rounded = ((origin + top.as_vec3().as_dvec3()) - origin).as_vec3();
     let low = if known.low { top - rounded.as_dvec3() } else { DVec3::ZERO }.as_vec3();
     let center = rounded.as_dvec3() + low.as_dvec3();
-    let longer = shape.seen.map(DVec3::length);
     let curve = Curve::of(heights, plane);
-    let bounding = Bounding { center, normal: stored, shape, curve, scale: longer[0].hypot(longer[1]) };
+    let bounding = Bounding { center, normal: stored, shape, curve, scale: shape.scale() };
     let all = bound(&bounding, (of, sums.moments.count), below, sided);
     let factor = all.rim * ROUNDED_UP;
     let [s, t] = [shape.s, shape.t].map(|axis| (axis * factor).as_vec3().to_array());
@@ -97,23 +96,29 @@ fn bound_from<B: Below>(of: &Bounding, key: B::Key, below: &B, sided: bool) -> B
     };
     // What lies farthest away comes first: then most of the others are of no matter.
     let mut disks: Vec<(f64, Disk)> = Vec::new();
-    let mut look = |key: B::Key, all: &mut Bound| {
+    let mut look = |key: B::Key, most: &Bound, all: &mut Bound| {
+        if most.rim <= all.rim {
+            return below.disks(key, |disk| *all = all.both(of.of(&disk, all, most)));
+        }
         disks.clear();
         below.disks(key, |disk| disks.push((of.shape.seen(disk.center - of.center).length_squared(), disk)));
         if let Some(farthest) = (0..disks.len()).max_by(|a, b| disks[*a].0.total_cmp(&disks[*b].0)) {
             disks.swap(0, farthest);
         }
-        disks.iter().for_each(|(_, disk)| *all = all.both(of.of(disk, all)));
+        disks.iter().for_each(|(_, disk)| *all = all.both(of.of(disk, all, most)));
     };
+    // Where normals tell no sides nobody asks how far they turn.
+    let asked = |most: Bound| if sided { most } else { Bound { cosine: 1.0, ..most } };
     if below.is_leaf(key) {
-        look(key, &mut all)
+        look(key, &asked(Bound::ALL), &mut all)
     } else {
         push(key, &mut open)
     }
     while let Some((most, child)) = open.pop() {
-        let changes = most.rim > all.rim || most.radius > all.radius || (sided && most.cosine < all.cosine);
+        let most = asked(most);
+        let changes = most.rim > all.rim || most.radius > all.radius || most.cosine < all.cosine;
         match changes {
-            true if below.is_leaf(child) => look(child, &mut all),
+            true if below.is_leaf(child) => look(child, &most, &mut all),
             true => push(child, &mut open),
             false => {}
         }

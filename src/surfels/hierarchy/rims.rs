@@ -52,6 +52,13 @@ impl Shape {
         Self { s, t, seen: [s, t].map(|axis| axis / axis.length_squared()) }
     }
 
+    /// How many times as long a vector's (u, v) is, at most: as of a vector along the shorter half-axis, which the other one is across but for what f32
+    /// leaves out.
+    pub fn scale(&self) -> f64 {
+        let [s, t] = self.seen.map(DVec3::length);
+        s.max(t) * ROUNDED_UP
+    }
+
     /// (u, v) of a vector.
     pub fn seen(&self, vector: DVec3) -> DVec2 {
         DVec2::from_array(self.seen.map(|axis| vector.dot(axis)))
@@ -99,6 +106,8 @@ pub(super) struct Bound {
 
 impl Bound {
     pub const NOTHING: Self = Self { rim: 0.0, radius: 0.0, cosine: 1.0 };
+    /// What nothing lies beyond.
+    pub const ALL: Self = Self { rim: f64::INFINITY, radius: f64::INFINITY, cosine: -1.0 };
 
     pub fn both(self, other: Self) -> Self {
         Self {
@@ -160,11 +169,35 @@ pub(super) struct Bounding {
 }
 
 impl Bounding {
-    /// What bounds one surfel, where what is no more than `known` is of no matter.
-    pub fn of(&self, Disk { surfel, center, cap }: &Disk, known: &Bound) -> Bound {
+    /// What bounds one surfel, which lies within `most`, where what is no more than `known` is of no matter.
+    pub fn of(&self, disk: &Disk, known: &Bound, most: &Bound) -> Bound {
+        let Disk { surfel, center, cap } = disk;
+        let own = normal_of(surfel);
+        let mut bound = Bound::NOTHING;
+        if most.rim > known.rim {
+            bound.rim = self.rim(disk, own, known.rim);
+        }
+        if most.radius > known.radius {
+            let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
+            let products = [s.dot(s), s.dot(t), t.dot(t)];
+            let reach = |longest: f64| center.distance(self.center) + longest + cap.highest();
+            let matters = reach((products[0] + products[2]).sqrt() * ROUNDED) > known.radius;
+            bound.radius = if matters { reach(longest(products)) } else { 0.0 };
+        }
+        if most.cosine < known.cosine {
+            let cosine = own.dot(self.normal).clamp(-1.0, 1.0);
+            bound.cosine = match tilt(surfel, cap) {
+                0.0 => cosine,
+                tilt => (cosine.acos() + tilt).min(PI).cos(),
+            };
+        }
+        bound
+    }
+
+    /// [`Bound::rim`] of a surfel with this unit normal, where what is no more than `known` is of no matter.
+    fn rim(&self, Disk { surfel, center, cap }: &Disk, own: DVec3, known: f64) -> f64 {
         let offset = center - self.center;
         let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
-        let own = normal_of(surfel);
         let height = cap.highest();
         let across = self.leaning(own);
         let (over, slope) = self.curve.at(self.curve.in_plane(offset));
@@ -173,29 +206,18 @@ impl Bounding {
         let bend = 0.5 * self.curve.most * s.length_squared().max(t.length_squared());
         let places = [offset, s, t, own * height].map(|vector| self.shape.seen(vector));
         let above = [offset.dot(self.normal) - over, s.dot(higher), t.dot(higher), height * own.dot(higher)];
-        let rim = [DVec2::ZERO, across].into_iter().fold(0.0, |rim: f64, across| {
+        [DVec2::ZERO, across].into_iter().fold(0.0, |rim: f64, across| {
             let [at, u, v, lean] = [0, 1, 2, 3].map(|k| places[k] - across * above[k]);
             // A cap leans out as far as it is high.
             let lean = lean.length() + across.length() * bend;
-            let matters = |reach: f64| at.length() + reach + lean > known.rim.max(rim);
+            let matters = |reach: f64| at.length() + reach + lean > known.max(rim);
             let products = [u.dot(u), u.dot(v), v.dot(v)];
             // That of a circle around the disk is found sooner, and a larger one yet sooner.
             if !matters((products[0] + products[2]).sqrt() * ROUNDED) || !matters(longest(products)) {
                 return rim;
             }
             rim.max((at.length() + longest(products)).min(farthest(at, [u, v])) + lean)
-        });
-        let products = [s.dot(s), s.dot(t), t.dot(t)];
-        let reach = |longest: f64| offset.length() + longest + height;
-        let matters = reach((products[0] + products[2]).sqrt() * ROUNDED) > known.radius;
-        Bound {
-            rim,
-            radius: if matters { reach(longest(products)) } else { 0.0 },
-            cosine: match tilt(surfel, cap) {
-                0.0 => own.dot(self.normal).clamp(-1.0, 1.0),
-                tilt => (own.dot(self.normal).clamp(-1.0, 1.0).acos() + tilt).min(PI).cos(),
-            },
-        }
+        })
     }
 
     /// How far beside a point, in units of the half-axes, it is shown along a normal, by what it lies over the node's cap.
@@ -283,9 +305,8 @@ mod tests {
             let t = normal.cross(s) * 0.3;
             let seen = [s, t].map(|axis| axis / axis.length_squared());
             let shape = Shape { s, t, seen };
-            let scale = seen[0].length().hypot(seen[1].length());
             let curve = Curve::of(curved, [s, normal.cross(s), normal]);
-            let bounding = Bounding { center: DVec3::ZERO, normal, shape, curve, scale };
+            let bounding = Bounding { center: DVec3::ZERO, normal, shape, curve, scale: shape.scale() };
             let lean = vector();
             let (middle, own) = (vector() * 3.0, (normal + 1.5 * lean).normalize());
             let spread = 0.5 * number().abs().powi(2);
@@ -304,7 +325,10 @@ mod tests {
             let surfel = Surfel::ellipse(middle.as_vec3(), one.as_vec3(), own.cross(one).as_vec3());
             let middle = DVec3::from_array(surfel.center.map(f64::from));
             let around = Bounding { center: middle, normal: normal_of(&surfel), ..bounding };
-            let all = disks.iter().map(|disk| around.of(disk, &Bound::NOTHING)).fold(Bound::NOTHING, Bound::both);
+            let all = disks
+                .iter()
+                .map(|disk| around.of(disk, &Bound::NOTHING, &Bound::ALL))
+                .fold(Bound::NOTHING, Bound::both);
             let node = Node {
                 surfel,
                 cap: Cap::FLAT,
@@ -317,7 +341,7 @@ mod tests {
             };
             let told = bounding.of_node(&node, [0.0; 3]);
             for disk in &disks {
-                let own = bounding.of(disk, &Bound::NOTHING);
+                let own = bounding.of(disk, &Bound::NOTHING, &Bound::ALL);
                 assert!(own.rim <= told.rim && own.radius <= told.radius && own.cosine >= told.cosine);
                 tight += usize::from(own.rim > 0.5 * told.rim);
                 looked += 1;

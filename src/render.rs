@@ -192,7 +192,7 @@ mod tests {
         let options = RenderOptions { without: without.to_vec(), ..case.options };
         render(&case.scene, &case.camera, &options, &backend, &()).unwrap();
         let Backend::Gpu { gpu, .. } = &backend else { return None };
-        Some(gpu.programs.count_loops())
+        Some(gpu.compiled.count_loops())
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, OnceLock};
 
 use super::adapter::AdapterDescription;
-use super::program::Programs;
+use super::program::Compiled;
 use crate::error::{Error, Result};
 
 /// Features that are used where an adapter has them: GPU times, atomics of some accumulators, and a format of blending.
@@ -70,13 +70,14 @@ fn best(name: Option<&str>) -> Result<(AdapterDescription, wgpu::Adapter)> {
     })
 }
 
-/// An open device.
+/// An open device. A clone is the same one: what was compiled for either serves both.
+#[derive(Clone)]
 pub struct Gpu {
     /// The adapter behind it.
     pub adapter: AdapterDescription,
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
-    pub(crate) programs: Programs,
+    pub(crate) compiled: Arc<Compiled>,
     failure: Arc<Mutex<Option<String>>>,
 }
 
@@ -136,7 +137,7 @@ impl Gpu {
                 slot.get_or_insert_with(|| format!("the device was lost ({reason:?}): {message}"));
             }
         });
-        Ok(Self { adapter, device, queue, programs: Programs::default(), failure })
+        Ok(Self { adapter, device, queue, compiled: Arc::default(), failure })
     }
 
     /// This device with smaller buffers, of at most `bytes` each: scenes and images are cut into more pages and bands

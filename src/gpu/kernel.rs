@@ -8,11 +8,11 @@ use std::thread;
 use super::device::Gpu;
 use super::layout::WORKGROUP;
 use super::module::Module;
-use super::program::{Draw, Program, Programs};
+use super::program::{Compiled, Draw, PipelineKey, Program};
 use super::sources::{Sources, Text};
 use crate::error::{Error, Result};
 
-impl Programs {
+impl Compiled {
     /// The entry points `stages` of the module of `files`, and `draws`.
     pub(crate) fn get(
         &self,
@@ -24,14 +24,30 @@ impl Programs {
     ) -> Result<Arc<Program>> {
         let bits = constants.iter().map(|&(name, value)| (name, value.to_bits())).collect();
         let key = (sources.join(files), bits, format!("{stages:?} {draws:?} {}", sources.all_end(files)));
-        // A poisoned lock means that another thread panicked while it compiled; the map itself is whole.
-        let mut programs = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(program) = programs.get(&key) {
-            return Ok(Arc::clone(program));
+        // A poisoned lock means that another thread panicked while it looked; the list itself is whole.
+        let programs = || self.programs.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(program) = programs().get(&key) {
+            return Ok(program);
         }
+        // Others compile meanwhile, at worst the same.
         let program = Arc::new(Program::compile(gpu, sources.text(files), stages, draws, constants)?);
-        programs.insert(key, Arc::clone(&program));
+        programs().insert(key, Arc::clone(&program));
         Ok(program)
+    }
+
+    /// The pipeline of this key, or what `make` makes.
+    fn pipeline(
+        &self,
+        key: Option<PipelineKey>,
+        make: impl FnOnce() -> Result<wgpu::ComputePipeline>,
+    ) -> Result<wgpu::ComputePipeline> {
+        let pipelines = || self.pipelines.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = key.as_ref().and_then(|key| pipelines().get(key)) {
+            return Ok(known);
+        }
+        let made = make()?;
+        key.into_iter().for_each(|key| pipelines().insert(key, made.clone()));
+        Ok(made)
     }
 }
 
@@ -87,7 +103,7 @@ impl Draw {
             label: Some(self.name),
             layout: Some(&bound.layout),
             vertex: wgpu::VertexState {
-                module: &vertex.module,
+                module: &vertex.module(gpu),
                 entry_point: Some(self.vertex),
                 compilation_options: vertex.options(),
                 buffers: &[],
@@ -96,7 +112,7 @@ impl Draw {
             depth_stencil: self.depth.clone(),
             multisample: Default::default(),
             fragment: Some(wgpu::FragmentState {
-                module: &fragment.module,
+                module: &fragment.module(gpu),
                 entry_point: Some(self.fragment),
                 compilation_options: fragment.options(),
                 targets: &targets,
@@ -108,6 +124,39 @@ impl Draw {
     }
 }
 
+/// What `make` makes, or what the device says against it: errors are told to the thread that made them.
+fn watched<T>(gpu: &Gpu, make: impl FnOnce() -> Result<T>) -> Result<T> {
+    let guard = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
+    let made = make();
+    match pollster::block_on(guard.pop()) {
+        Some(error) => Err(gpu.error(format!("the driver refused a kernel: {error}"))),
+        None => made,
+    }
+}
+
+/// The pipeline of one of a module's kernels, and what it binds.
+fn compute(
+    gpu: &Gpu,
+    module: &Module,
+    stage: &str,
+    constants: &[(&str, f64)],
+) -> Result<(wgpu::ComputePipeline, Vec<(String, u32)>)> {
+    let bound = module.bind(gpu, &[(wgpu::ShaderStages::COMPUTE, stage)])?;
+    let entry = module.entry(gpu, (naga::ShaderStage::Compute, stage), &bound, constants)?;
+    let make = || {
+        Ok(gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(stage),
+            layout: Some(&bound.layout),
+            module: &entry.module(gpu),
+            entry_point: Some(stage),
+            compilation_options: entry.options(),
+            cache: None,
+        }))
+    };
+    let pipeline = gpu.compiled.pipeline(entry.key(&bound), || watched(gpu, make))?;
+    Ok((pipeline, bound.variables))
+}
+
 impl Program {
     /// Compiles the entry points `stages` of a module, and `draws`. Of `constants` those are set that it declares.
     pub(crate) fn compile(
@@ -117,41 +166,16 @@ impl Program {
         draws: &[Draw],
         constants: &[(&str, f64)],
     ) -> Result<Self> {
-        // Errors are told to the thread that made them.
-        let watched = || gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
-        let passed = |guard: wgpu::ErrorScopeGuard| match pollster::block_on(guard.pop()) {
-            Some(error) => Err(gpu.error(format!("the driver refused a kernel: {error}"))),
-            None => Ok(()),
-        };
-        let guard = watched();
         let mut program = Self { counts_loops: text.counts_loops, ..Self::default() };
-        let module = Module::of(gpu, text)?;
-        passed(guard)?;
+        let module = watched(gpu, || Module::of(gpu, text))?;
         // Half of a first frame's time would else go by here.
-        let compiled = side_by_side(stages, |&stage| {
-            let guard = watched();
-            let bound = module.bind(gpu, &[(wgpu::ShaderStages::COMPUTE, stage)])?;
-            let entry = module.entry(gpu, (naga::ShaderStage::Compute, stage), &bound, constants)?;
-            let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(stage),
-                layout: Some(&bound.layout),
-                module: &entry.module,
-                entry_point: Some(stage),
-                compilation_options: entry.options(),
-                cache: None,
-            });
-            passed(guard).map(|()| (pipeline, bound.variables))
-        });
+        let compiled = side_by_side(stages, |&stage| watched(gpu, || compute(gpu, &module, stage, constants)));
         for (&stage, compiled) in stages.iter().zip(compiled) {
             let (pipeline, variables) = compiled?;
             program.pipelines.insert(stage.to_owned(), pipeline);
             program.bindings.insert(stage.to_owned(), variables);
         }
-        let drawn = side_by_side(draws, |draw| {
-            let guard = watched();
-            let made = draw.pipeline(gpu, &module, constants)?;
-            passed(guard).map(|()| made)
-        });
+        let drawn = side_by_side(draws, |draw| watched(gpu, || draw.pipeline(gpu, &module, constants)));
         for (draw, made) in draws.iter().zip(drawn) {
             let (pipeline, variables) = made?;
             program.draws.insert(draw.name.to_owned(), pipeline);

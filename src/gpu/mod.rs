@@ -9,6 +9,7 @@ pub mod layout;
 mod loops;
 mod module;
 pub mod program;
+mod recent;
 pub mod sources;
 mod spirv;
 pub mod timing;

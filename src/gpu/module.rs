@@ -4,6 +4,7 @@ use naga::valid::Capabilities;
 
 use super::device::Gpu;
 use super::interface::Interface;
+use super::program::PipelineKey;
 use super::sources::Text;
 use super::spirv;
 use crate::error::Result;
@@ -28,11 +29,34 @@ pub(super) struct Bound {
 
 /// An entry point to compile.
 pub(super) struct Entry<'a> {
-    pub module: wgpu::ShaderModule,
+    name: &'a str,
+    told: Told,
     constants: Vec<(&'a str, f64)>,
 }
 
+/// What the device is told of an entry point.
+enum Told {
+    Words(Vec<u32>),
+    Text(wgpu::ShaderModule),
+}
+
 impl Entry<'_> {
+    /// What tells its pipeline from others, as far as it is known here.
+    pub fn key(&self, bound: &Bound) -> Option<PipelineKey> {
+        match &self.told {
+            Told::Words(words) => Some((words.clone(), bound.entries.clone())),
+            Told::Text(_) => None,
+        }
+    }
+
+    /// The module that has it.
+    pub fn module(&self, gpu: &Gpu) -> wgpu::ShaderModule {
+        match &self.told {
+            Told::Words(words) => translated_here(gpu, self.name, words),
+            Told::Text(text) => text.clone(),
+        }
+    }
+
     /// What remains to be set.
     pub fn options(&self) -> wgpu::PipelineCompilationOptions<'_> {
         wgpu::PipelineCompilationOptions { constants: &self.constants, ..Default::default() }
@@ -84,7 +108,7 @@ impl Module {
     pub fn entry<'a>(
         &self,
         gpu: &Gpu,
-        (stage, name): (naga::ShaderStage, &str),
+        (stage, name): (naga::ShaderStage, &'a str),
         bound: &Bound,
         constants: &[(&'a str, f64)],
     ) -> Result<Entry<'a>> {
@@ -92,13 +116,13 @@ impl Module {
         let constants: Vec<_> =
             constants.iter().copied().filter(|(name, _)| declared.iter().any(|d| d == name)).collect();
         if let Some(text) = &self.text {
-            return Ok(Entry { module: text.clone(), constants });
+            return Ok(Entry { name, told: Told::Text(text.clone()), constants });
         }
         let numbers = bound.of_text.iter().zip(&bound.entries).map(|(&of_text, entry)| (of_text, entry.binding));
         let options = spirv::options(gpu.device.features(), numbers, self.counts_loops);
         let words = spirv::translate(&self.interface, (stage, name), &constants, (&options, &gpu.device.limits()))
             .map_err(|e| gpu.error(format!("the kernel {name} cannot be translated: {e}")))?;
-        Ok(Entry { module: translated_here(gpu, name, &words), constants: Vec::new() })
+        Ok(Entry { name, told: Told::Words(words), constants: Vec::new() })
     }
 }
 

@@ -1,9 +1,10 @@
 //! Compiled kernels, and those that a device keeps.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
 use super::interface::Bindings;
+use super::recent::Recent;
 
 /// The compiled kernels of a render.
 #[derive(Default)]
@@ -27,21 +28,40 @@ impl Program {
     }
 }
 
-/// Programs by their text and constants: what was compiled once for a device is not compiled again.
-#[derive(Default)]
-pub(crate) struct Programs(pub(super) Mutex<HashMap<ProgramKey, Arc<Program>>>);
+/// Programs that are kept: a study has a few at a time.
+const MOST_PROGRAMS: usize = 32;
 
-impl Programs {
+/// Pipelines that are kept, of about 20 renders. Mesa's processors take 3 MB for each.
+const MOST_PIPELINES: usize = 256;
+
+/// What was compiled for a device is not compiled again, as long as it is asked for now and then.
+pub(crate) struct Compiled {
+    /// By their text and constants.
+    pub(super) programs: Mutex<Recent<ProgramKey, Arc<Program>>>,
+    /// Those of programs by what the device was told: many are the same in different programs.
+    pub(super) pipelines: Mutex<Recent<PipelineKey, wgpu::ComputePipeline>>,
+}
+
+impl Default for Compiled {
+    fn default() -> Self {
+        Self { programs: Mutex::new(Recent::of(MOST_PROGRAMS)), pipelines: Mutex::new(Recent::of(MOST_PIPELINES)) }
+    }
+}
+
+impl Compiled {
     /// Whether each program that was compiled counts its loops.
     #[cfg(test)]
     pub(crate) fn count_loops(&self) -> Vec<bool> {
-        let programs = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let programs = self.programs.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         programs.values().map(|program| program.counts_loops()).collect()
     }
 }
 
 /// A module's text, its constants by name as bits, and in words its entry points, draws and whether its loops end.
 pub(super) type ProgramKey = (String, Vec<(&'static str, u64)>, String);
+
+/// A kernel in SPIR-V, and what it binds.
+pub(super) type PipelineKey = (Vec<u32>, Vec<wgpu::BindGroupLayoutEntry>);
 
 /// A render pipeline to compile: the rasteriser's part of a program.
 #[derive(Debug)]

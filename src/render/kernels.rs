@@ -69,7 +69,7 @@ impl Kernels {
             _ => Vec::new(),
         };
         let stages: Vec<_> = module.kernels.iter().map(|kernel| kernel.name).collect();
-        let made = gpu.programs.get(gpu, (&self.sources, &module.files), &stages, &draws, &self.constants)?;
+        let made = gpu.compiled.get(gpu, (&self.sources, &module.files), &stages, &draws, &self.constants)?;
         Ok(program.get_or_init(|| made))
     }
 }

@@ -14,6 +14,8 @@ pub mod scenes;
 
 pub use random::Random;
 
+use std::sync::{Mutex, OnceLock, PoisonError};
+
 use epsplat::frame::Frame;
 use epsplat::gpu::Gpu;
 use epsplat::gpu::layout::{ONE, View};
@@ -34,7 +36,9 @@ pub fn gpu() -> Option<Gpu> {
 
 /// The same adapter with what every WebGPU implementation has, and no more.
 pub fn core_gpu() -> Option<Gpu> {
-    gpu().map(|_| Gpu::open_core(std::env::var("EPSPLAT_TEST_ADAPTER").ok().as_deref()).unwrap())
+    static CORE: OnceLock<Gpu> = OnceLock::new();
+    let open = || Gpu::open_core(std::env::var("EPSPLAT_TEST_ADAPTER").ok().as_deref()).unwrap();
+    gpu().map(|_| CORE.get_or_init(open).clone())
 }
 
 /// An adapter that is reached through OpenGL, whatever others there are; `None` as of [`gpu`].
@@ -42,9 +46,19 @@ pub fn opengl() -> Option<Gpu> {
     open(Some("gl"), "EPSPLAT_REQUIRE_OPENGL")
 }
 
+/// The device of this name, which all tests of a program share: most of their time would else go to compile the same kernels again.
 fn open(name: Option<&str>, required: &str) -> Option<Gpu> {
+    static OPENED: Mutex<Vec<(Option<String>, Gpu)>> = Mutex::new(Vec::new());
+    // A poisoned lock means that another test panicked while it opened one; the list is whole.
+    let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, gpu)) = opened.iter().find(|(known, _)| known.as_deref() == name) {
+        return Some(gpu.clone());
+    }
     match Gpu::open(name) {
-        Ok(gpu) => Some(gpu),
+        Ok(gpu) => {
+            opened.push((name.map(str::to_owned), gpu.clone()));
+            Some(gpu)
+        }
         Err(error) if std::env::var(required).is_ok_and(|v| v == "1") => panic!("{required}=1, but {error}"),
         Err(_) => {
             eprintln!("skipped: no adapter{}", name.map_or_else(String::new, |name| format!(" called {name}")));

@@ -70,7 +70,7 @@ fn best(name: Option<&str>) -> Result<(AdapterDescription, wgpu::Adapter)> {
     })
 }
 
-/// An open device. A clone is the same one: what was compiled for either serves both.
+/// An open device. A clone is the same one: what was compiled for either serves both, and of what the device reports, or if it is lost, whoever asks first is told.
 #[derive(Clone)]
 pub struct Gpu {
     /// The adapter behind it.

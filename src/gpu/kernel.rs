@@ -126,10 +126,12 @@ impl Draw {
 
 /// What `make` makes, or what the device says against it: errors are told to the thread that made them.
 fn watched<T>(gpu: &Gpu, make: impl FnOnce() -> Result<T>) -> Result<T> {
-    let guard = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
+    let kinds = [wgpu::ErrorFilter::Validation, wgpu::ErrorFilter::OutOfMemory, wgpu::ErrorFilter::Internal];
+    let scopes = kinds.map(|kind| gpu.device.push_error_scope(kind));
     let made = make();
-    match pollster::block_on(guard.pop()) {
-        Some(error) => Err(gpu.error(format!("the driver refused a kernel: {error}"))),
+    let told: Vec<_> = scopes.into_iter().rev().filter_map(|scope| pollster::block_on(scope.pop())).collect();
+    match told.first() {
+        Some(error) => Err(gpu.error(format!("a kernel was refused: {error}"))),
         None => made,
     }
 }

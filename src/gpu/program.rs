@@ -28,11 +28,11 @@ impl Program {
     }
 }
 
-/// Programs that are kept: a study has a few at a time.
-const MOST_PROGRAMS: usize = 32;
+/// Programs that are kept, with their pipelines, of which each has up to about 15: a study has a few at a time.
+const MOST_PROGRAMS: usize = 16;
 
-/// Pipelines that are kept, of about 20 renders. Mesa's processors take 3 MB for each.
-const MOST_PIPELINES: usize = 256;
+/// Pipelines that are kept beside them. Mesa takes about 3 MB for each where processors draw.
+const MOST_PIPELINES: usize = 128;
 
 /// What was compiled for a device is not compiled again, as long as it is asked for now and then.
 pub(crate) struct Compiled {

@@ -45,6 +45,9 @@ const OVERVIEW: u64 = 50_000;
 /// How far from a picture points still change it, in spacings: as neighbours of what is seen, from which its shape is estimated.
 const NEIGHBOURHOOD: f64 = 3.0;
 
+/// How far beside an octree a place may be that is of it, in halves of its edge.
+const PLACES_ROUNDED: f64 = 1e-6;
+
 impl OctreeNode {
     /// What its order among the nodes follows from.
     pub fn key(&self) -> (u32, [u32; 3]) {
@@ -158,25 +161,30 @@ impl<'a> Thinned<'a> {
         Self { octree, taken, points }
     }
 
-    /// How large the disks of all points would be, over those of what was taken, at a place of a surface in world coordinates: disks are as large
-    /// as points are far from each other. 1 where everything was taken, and None outside the octree.
-    pub fn size_of_all(&self, place: DVec3) -> Option<f64> {
+    /// About how large the disks of all points would be at a place of a surface, world coordinates, in the unit of those of what was taken: disks are
+    /// as large as points are far from each other. 1 where everything was taken, and None beside the octree.
+    pub fn part_of_size(&self, place: DVec3) -> Option<f64> {
         let octree = self.octree;
-        let place = (place - octree.center) / octree.half;
-        if place.abs().max_element() > 1.0 {
+        let within = (place - octree.center) / octree.half;
+        // Places are rounded, and those at the faces too.
+        if within.abs().max_element() > 1.0 + PLACES_ROUNDED {
             return None;
         }
         let at_level = |level: u32| {
-            let side = f64::from(1u32 << level.min(MOST_LEVELS - 1));
-            let cube = ((place + 1.0) * 0.5 * side).floor().clamp(DVec3::ZERO, DVec3::splat(side - 1.0));
+            let side = f64::from(1u32 << level);
+            let cube = ((within + 1.0) * 0.5 * side).floor().clamp(DVec3::ZERO, DVec3::splat(side - 1.0));
             octree.find(level, cube.to_array().map(|place| place as u32))
         };
-        let (mut own, mut all) = (1, 1);
+        // Points of the last node that was taken, with those of the nodes above it in its cube: of a surface a quarter of a cube's, each time.
+        let (mut taken, mut all) = (1.0, 1.0);
+        let mut above = 0.0;
         for node in (0..octree.levels()).map_while(at_level) {
             if self.taken.binary_search(&node).is_err() {
-                return Some((own as f64 / all as f64).sqrt());
+                return Some(f64::sqrt(taken / all));
             }
-            (own, all) = (octree.nodes[node].points, self.points[node].max(1));
+            let own = octree.nodes[node].points as f64;
+            (taken, all) = ((above + own).max(1.0), (above + self.points[node] as f64).max(1.0));
+            above = (above + own) / 4.0;
         }
         Some(1.0)
     }
@@ -254,13 +262,13 @@ mod tests {
         let all: Vec<usize> = (0..octree.nodes.len()).collect();
         for (taken, at_corner, elsewhere) in [
             (1, 100.0 / (100.0 + 800.0 + 5600.0), 100.0 / (100.0 + 800.0 + 5600.0)),
-            (9, 1.0, 100.0 / 900.0),
+            (9, 1.0, (25.0 + 100.0) / (25.0 + 900.0)),
             (all.len(), 1.0, 1.0),
         ] {
             let thinned = Thinned::new(&octree, &all[..taken]);
-            assert_eq!(thinned.size_of_all(corner), Some(f64::sqrt(at_corner)), "{taken}");
-            assert_eq!(thinned.size_of_all(other), Some(f64::sqrt(elsewhere)), "{taken}");
-            assert_eq!(thinned.size_of_all(DVec3::splat(7.0)), None);
+            assert_eq!(thinned.part_of_size(corner), Some(f64::sqrt(at_corner)), "{taken}");
+            assert_eq!(thinned.part_of_size(other), Some(f64::sqrt(elsewhere)), "{taken}");
+            assert_eq!(thinned.part_of_size(DVec3::splat(7.0)), None);
         }
     }
 

@@ -12,16 +12,18 @@ use crate::scene::{Bounds, Clip, Scene, Surfel};
 /// it does not end there.
 const MOST_ALONG: f64 = 0.5;
 
-/// Cuts the disks of a part of a cloud near the faces of the box of all its points, world coordinates: beyond a face they reach so many times as
-/// far as they would around a point in it, as `beyond` says of their centres: the size of the disks of all points over theirs.
-pub fn end_at(scene: &mut Scene, bounds: &Bounds, beyond: impl Fn(DVec3) -> f64 + Sync) {
-    if bounds.is_empty() {
+/// How far outside a face, in a disk's own reach across it, a centre may lie that is of the box: places are rounded, in files and in f32, but
+/// by less than disks show.
+const ROUNDED: f64 = 1.0 / 128.0;
+
+/// Cuts the disks of a part of a cloud near the faces of the box of all its points, world coordinates. Past a face they reach as far as disks of all points would around a
+/// point in it, of which `part` says, at their centres, how large they are in the unit of these. Lines are of disks' planes: caps end with them. Where disks end at edges
+/// already nothing is done.
+pub fn end_at(scene: &mut Scene, bounds: &Bounds, part: impl Fn(DVec3) -> f64 + Sync) {
+    if bounds.is_empty() || !scene.clips.is_empty() {
         return;
     }
-    let clip = |index: usize| match scene.clips.get(index) {
-        Some(clip) if !clip.is_none() => *clip,
-        _ => clip(&scene.surfels[index], scene.origin + scene.center(index), bounds, &beyond),
-    };
+    let clip = |index: usize| ending(&scene.surfels[index], scene.origin + scene.center(index), bounds, &part);
     let clips: Vec<Clip> = (0..scene.surfels.len()).into_par_iter().map(clip).collect();
     if !clips.iter().all(Clip::is_none) {
         scene.clips = clips;
@@ -29,26 +31,29 @@ pub fn end_at(scene: &mut Scene, bounds: &Bounds, beyond: impl Fn(DVec3) -> f64 
 }
 
 /// The lines of a disk at the faces that cut most of it.
-fn clip(surfel: &Surfel, center: DVec3, bounds: &Bounds, beyond: impl Fn(DVec3) -> f64) -> Clip {
+fn ending(surfel: &Surfel, center: DVec3, bounds: &Bounds, part: impl Fn(DVec3) -> f64) -> Clip {
     let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
     let normal = s.cross(t).normalize_or_zero();
-    let mut cuts: Vec<(f64, [f32; 3])> = Vec::new();
+    let mut near: Vec<(f64, DVec3)> = Vec::new();
     for axis in 0..3 {
         let reach = s[axis].hypot(t[axis]);
         for (side, inside) in [(1.0, bounds.max[axis] - center[axis]), (-1.0, center[axis] - bounds.min[axis])] {
-            if inside >= reach || normal[axis].abs() > MOST_ALONG {
-                continue;
+            if inside < -ROUNDED * reach {
+                // No point of the box.
+                return Clip::NONE;
             }
-            let kept = inside + beyond(center) * reach;
-            // A point that is outside is no point of the box.
-            if (0.0..reach).contains(&kept) && inside >= -f64::EPSILON * center[axis].abs() {
-                let line = [-side * s[axis], -side * t[axis], kept].map(|x| (x / reach) as f32);
-                cuts.push((kept / reach, line));
+            if inside < reach && normal[axis].abs() <= MOST_ALONG {
+                near.push((inside.max(0.0) / reach, DVec3::new(-side * s[axis], -side * t[axis], 0.0) / reach));
             }
         }
     }
-    cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let line = |which: usize| cuts.get(which).map_or(Clip::NONE.0[which], |cut| cut.1);
+    let part = if near.is_empty() { 1.0 } else { part(center) };
+    near.retain(|(inside, _)| inside + part < 1.0);
+    near.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let line = |which: usize| match near.get(which) {
+        Some((inside, across)) => (across + DVec3::Z * (inside + part)).to_array().map(|x| x as f32),
+        None => Clip::NONE.0[which],
+    };
     Clip([line(0), line(1)]).usable()
 }
 
@@ -77,6 +82,23 @@ mod tests {
         assert!(inside(1, 0.749, 0.6) > 0.0 && inside(1, 0.751, 0.0) < 0.0 && inside(1, -1.0, 0.0) > 0.0);
         // At a corner both lines cut: 0.5 and a half of 2 along x, 0.25 and a quarter of 1 along y.
         assert!(inside(2, -0.499, 0.499) > 0.0 && inside(2, -0.501, 0.0) < 0.0 && inside(2, 0.0, 0.501) < 0.0);
+    }
+
+    /// A row of points at a face lies on it, wherever f32 puts it; and where everything was taken nothing is cut.
+    #[test]
+    fn a_row_at_a_face_is_of_the_box() {
+        let face = 500.01;
+        let bounds = Bounds { min: DVec3::new(1e6 - face, -9.0, -1.0), max: DVec3::new(1e6 + face, 9.0, 1.0) };
+        for x in [face as f32, -face as f32] {
+            assert!(f64::from(x.abs()) > face);
+            let mut scene = scene(vec![Surfel::ellipse(Vec3::new(x, 0.0, 0.0), Vec3::X, Vec3::Y)]);
+            end_at(&mut scene, &bounds, |_| 1.0);
+            assert!(scene.clips.is_empty());
+            end_at(&mut scene, &bounds, |_| 0.5);
+            let clip = scene.clips[0];
+            assert!(clip.inside(f64::from(x.signum()) * 0.49, 0.0) > 0.0);
+            assert!(clip.inside(f64::from(x.signum()) * 0.51, 0.0) < 0.0);
+        }
     }
 
     #[test]

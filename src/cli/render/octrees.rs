@@ -63,13 +63,17 @@ impl Octrees {
         Ok(Part { made, options, read: read_of(&self.files, &nodes) })
     }
 
-    /// Lets a scene of these nodes end where all points do: at the box of all files.
+    /// Lets a scene of these nodes end where all points do: at the box of all files, where each tells its own.
     fn end(&self, scene: &mut Scene, nodes: &[Vec<usize>]) {
+        if self.octrees.iter().any(|octree| octree.bounds.is_empty()) {
+            return;
+        }
         let bounds = self.octrees.iter().fold(Bounds::EMPTY, |all, octree| all.union(octree.bounds));
         let thinned = self.octrees.iter().zip(nodes).map(|(octree, nodes)| Thinned::new(octree, nodes));
         let thinned: Vec<Thinned> = thinned.collect();
-        let size_of_all = |place| thinned.iter().filter_map(|octree| octree.size_of_all(place)).fold(1.0, f64::min);
-        borders::end_at(scene, &bounds, size_of_all);
+        // Where several files have a place their points lie between each other's.
+        let part = |place| thinned.iter().filter_map(|octree| octree.part_of_size(place)).reduce(f64::max);
+        borders::end_at(scene, &bounds, |place| part(place).unwrap_or(1.0));
     }
 }
 

@@ -133,7 +133,7 @@ impl Scheme {
         let u16_at = |at: usize| data.get(at..)?.first_chunk().copied().map(u16::from_le_bytes);
         let chunk = u32::from_le_bytes(data.get(CHUNK_SIZE..)?.first_chunk().copied()?);
         let (compressor, items) = (u16_at(0)?, u16_at(32)?);
-        let (mut record, mut layers, mut has_color) = (0, Vec::new(), false);
+        let (mut record, mut layers, mut kinds) = (0, Vec::new(), Vec::new());
         for item in 0..usize::from(items) {
             let (kind, size) = (u16_at(34 + 6 * item)?, u64::from(u16_at(36 + 6 * item)?));
             // Where a size is not the kind's own, the decoder would look for layers elsewhere than they are checked.
@@ -155,18 +155,23 @@ impl Scheme {
                 return None;
             }
             record += size;
-            has_color |= matches!(kind, 11 | 12);
-            // Of a point its place, class and flags, of colours the first layer.
-            let taken = match kind {
-                10 => 4,
-                11 | 12 => 1,
-                _ => 0,
-            };
-            layers.extend((0..own_layers).map(|layer| (kind, layer, layer < taken)));
+            // The header's own number is as long.
+            if record > u64::from(u16::MAX) {
+                return None;
+            }
+            kinds.push(kind);
+            layers.extend((0..own_layers).map(|layer| (kind, layer)));
         }
-        // Where nothing has a colour, intensities are taken for one.
-        let needed = |(kind, layer, taken)| taken || !has_color && (kind, layer) == (10, 4);
-        let needed = layers.into_iter().map(needed).collect();
+        let has_color = kinds.iter().any(|kind| matches!(kind, 11 | 12));
+        // As LAS has points in layers: what is behind a colour is of no matter.
+        let usual = kinds.first() == Some(&10) && (!has_color || matches!(kinds.get(1), Some(11 | 12)));
+        let needed = |(kind, layer): (u16, usize)| match kind {
+            // A point's place, class and flags; and where nothing has a colour intensities are taken for one.
+            10 => layer < 4 || !has_color && layer == 4,
+            11 | 12 => layer == 0,
+            _ => false,
+        };
+        let needed = layers.into_iter().map(|layer| !usual || needed(layer)).collect();
         let chunk = Some(chunk).filter(|&chunk| chunk != 0 && chunk != u32::MAX);
         Some(Self { compressor, chunk, record, has_color, needed })
     }
@@ -301,6 +306,9 @@ mod tests {
         assert_eq!(needed(&[(10, 30), (11, 6), (14, 2)]), [0, 1, 2, 3, 9]);
         assert_eq!(needed(&[(10, 30), (12, 8), (13, 29)]), [0, 1, 2, 3, 9]);
         assert_eq!(needed(&[(10, 30), (14, 6)]), [0, 1, 2, 3, 4]);
+        // In another order the decoder takes something else for what is asked for.
+        assert_eq!(needed(&[(10, 30), (14, 1), (11, 6)]).len(), 11);
+        assert_eq!(needed(&[(14, 1), (10, 30)]).len(), 10);
     }
 
     #[test]
@@ -312,6 +320,8 @@ mod tests {
         let mut without = record(&[(10, 30)]);
         without[0] = 1;
         assert!(Scheme::parse(&without).is_none());
+        // Longer than any record, with a layer for each byte.
+        assert!(Scheme::parse(&record(&[(14, u16::MAX); 10_000])).is_none());
         for item in [(11, 30), (10, 29), (6, 30), (12, 6), (5, 8), (15, 1)] {
             assert!(Scheme::parse(&record(&[item])).is_none(), "{item:?}");
         }

@@ -129,7 +129,7 @@ fn opened(mut file: File, path: PathBuf, length: u64) -> Result<Copc, Fault> {
         return malformed("its LASzip record does not describe its points");
     }
     format.extra_bytes = (record - u64::from(format.len())) as u16;
-    if scheme.has_color != format.has_color {
+    if !format.is_extended || scheme.has_color != format.has_color {
         // The decoder takes for something else what colours are taken from.
         scheme.needed.fill(true);
     }

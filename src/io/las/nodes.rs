@@ -29,7 +29,10 @@ impl Copc {
     pub fn read(&mut self, nodes: &[usize], options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
         let mut nodes: Vec<usize> = nodes.iter().copied().filter(|&node| self.octree.nodes[node].points > 0).collect();
         nodes.sort_unstable_by_key(|&node| self.chunks[node].offset);
-        self.look(&nodes).map_err(|fault| self.fault(fault))?;
+        progress.begin(&format!("looking at {} nodes of {}", nodes.len(), fault::name(&self.path)), nodes.len() as u64);
+        let looked = self.look(&nodes, progress);
+        progress.end();
+        looked.map_err(|fault| self.fault(fault))?;
         let bytes = self.bytes_read(&nodes);
         progress.begin(&format!("reading {} MB of {}", bytes.div_ceil(1_000_000), fault::name(&self.path)), bytes);
         let points = deep(|| self.decoded(&nodes, options, progress));
@@ -92,11 +95,12 @@ impl Copc {
     }
 
     /// Finds what is needed of these nodes, whose lengths are checked.
-    fn look(&mut self, nodes: &[usize]) -> Result<(), Fault> {
+    fn look(&mut self, nodes: &[usize], progress: &dyn Progress) -> Result<(), Fault> {
         for &node in nodes {
             if self.layers[node].is_none() {
                 self.layers[node] = Some(self.layers_of(node)?);
             }
+            progress.advance(1);
         }
         Ok(())
     }

@@ -301,8 +301,10 @@ mod tests {
             let curved = [0.3, 0.1, -0.2].map(|height| height * number());
             let mut vector = || DVec3::new(number(), number(), number());
             let normal = vector().normalize();
-            let s = normal.any_orthonormal_vector();
-            let t = normal.cross(s) * 0.3;
+            // As f32 has them.
+            let s = normal.any_orthonormal_vector().as_vec3().as_dvec3();
+            let t = (normal.cross(s) * 0.3).as_vec3().as_dvec3();
+            let normal = s.cross(t).normalize();
             let seen = [s, t].map(|axis| axis / axis.length_squared());
             let shape = Shape { s, t, seen };
             let curve = Curve::of(curved, [s, normal.cross(s), normal]);

@@ -72,7 +72,9 @@ fn parts(number: u32, node: &Node) -> impl Iterator<Item = Item> + use<> {
 pub fn branches(tree: &Hierarchy, most: u64) -> Vec<Branch> {
     let (rows, surfels) = rows_of(tree);
     if rows <= most {
-        return vec![as_it_is(tree, surfels).unwrap_or_else(|| in_one(tree, surfels))];
+        let mut items = Vec::with_capacity(tree.nodes.len());
+        items.push(Item::Node(0));
+        return vec![Branch { whole: true, ..laid_out(tree, items, 0..surfels, |_| None) }];
     }
     let subtrees = subtrees(tree, &sizes(tree), most);
     let mut roots: HashMap<u32, Elsewhere> = HashMap::new();
@@ -98,33 +100,6 @@ pub fn branches(tree: &Hierarchy, most: u64) -> Vec<Branch> {
         (first, surfel) = (end, surfel + surfels);
     }
     all
-}
-
-/// A tree as one branch, whose nodes keep their numbers, as those of a tree are level by level; None if some leaf comes in parts.
-fn as_it_is(tree: &Hierarchy, surfels: u32) -> Option<Branch> {
-    if tree.nodes.par_iter().any(|node| node.leaf && node.count > MOST_OF_LEAF) {
-        return None;
-    }
-    let row = |&Node { radius, cone, first, count, leaf, .. }: &Node| {
-        let kind = if leaf { LEAF } else { INNER };
-        TreeNode { radius, cone, first, below: count | kind << KIND_SHIFT }
-    };
-    Some(Branch {
-        surfels: 0..surfels,
-        nodes: tree.nodes.par_iter().map(row).collect(),
-        numbers: (0..tree.nodes.len() as u32).collect(),
-        roots: 1,
-        first_root: 0,
-        whole: true,
-        levels: tree.levels() as u32,
-    })
-}
-
-/// A tree as one branch.
-fn in_one(tree: &Hierarchy, surfels: u32) -> Branch {
-    let mut items = Vec::with_capacity(tree.nodes.len());
-    items.push(Item::Node(0));
-    Branch { whole: true, ..laid_out(tree, items, 0..surfels, |_| None) }
 }
 
 /// Rows and surfels of a tree.
@@ -287,10 +262,6 @@ mod tests {
         {
             let tree = tree(count, copies);
             let all = branches(&tree, most);
-            if let Some(one) = as_it_is(&tree, (count + copies) as u32) {
-                assert_eq!(one, in_one(&tree, (count + copies) as u32));
-            }
-            assert_eq!(as_it_is(&tree, 0).is_none(), copies > 0);
             assert!(all[0].whole && all.iter().skip(1).all(|branch| !branch.whole));
             assert!(all.len() == 1 || all[0].surfels.is_empty());
             let fits = |branch: &Branch| (branch.surfels.len() + branch.nodes.len()) as u64 <= most;

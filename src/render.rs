@@ -179,15 +179,20 @@ mod tests {
     #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
     use super::*;
     use crate::hardcases::cases;
+    use crate::scene::{Map, Maps};
 
-    /// Whether the programs of a render count their loops; none where there is no adapter and none is required.
-    fn counted(without: &[Optimisation]) -> Option<Vec<bool>> {
-        let gpu = match Gpu::open(None) {
-            Ok(gpu) => gpu,
+    /// A device of its own; none where there is no adapter and none is required.
+    fn opened() -> Option<Gpu> {
+        match Gpu::open(None) {
+            Ok(gpu) => Some(gpu),
             Err(error) if std::env::var("EPSPLAT_REQUIRE_ADAPTER").is_ok_and(|v| v == "1") => panic!("{error}"),
-            Err(_) => return None,
-        };
-        let backend = Backend::gpu(gpu);
+            Err(_) => None,
+        }
+    }
+
+    /// Whether the programs of a render count their loops.
+    fn counted(without: &[Optimisation]) -> Option<Vec<bool>> {
+        let backend = Backend::gpu(opened()?);
         let case = cases().unwrap().swap_remove(0);
         let options = RenderOptions { without: without.to_vec(), ..case.options };
         render(&case.scene, &case.camera, &options, &backend, &()).unwrap();
@@ -201,5 +206,22 @@ mod tests {
         let Some(by_counters) = counted(&[Optimisation::UncountedLoops]) else { return };
         assert!(!by_proof.is_empty() && by_proof.iter().all(|counted| !counted), "{by_proof:?}");
         assert!(!by_counters.is_empty() && by_counters.iter().all(|counted| *counted), "{by_counters:?}");
+    }
+
+    /// Another map changes some kernels and not others, which are compiled once, whoever asks.
+    #[test]
+    fn kernels_that_are_the_same_are_compiled_once() {
+        // Elsewhere kernels are told in WGSL, whose constants are set later.
+        let Some(gpu) = opened().filter(|gpu| gpu.adapter.api == "vulkan") else { return };
+        let case = cases().unwrap().swap_remove(0);
+        let after = |maps: &[Map]| {
+            let options = RenderOptions { maps: Maps::of(maps), ..case.options.clone() };
+            render(&case.scene, &case.camera, &options, &Backend::gpu(gpu.clone()), &()).unwrap();
+            gpu.compiled.count_pipelines()
+        };
+        let one = after(&[]);
+        let (again, with_another) = (after(&[]), after(&[Map::Count]));
+        assert!(one > 3 && again == one, "{one} {again}");
+        assert!((one + 1..2 * one).contains(&with_another), "{one} {with_another}");
     }
 }

@@ -49,6 +49,12 @@ impl Default for Compiled {
 }
 
 impl Compiled {
+    /// Pipelines that are kept by what the device was told.
+    #[cfg(test)]
+    pub(crate) fn count_pipelines(&self) -> usize {
+        self.pipelines.lock().unwrap_or_else(std::sync::PoisonError::into_inner).values().count()
+    }
+
     /// Whether each program that was compiled counts its loops.
     #[cfg(test)]
     pub(crate) fn count_loops(&self) -> Vec<bool> {

@@ -301,35 +301,78 @@ fn broken_kernels_are_noticed() {
     let Some(gpu) = common::gpu() else { return };
     let scene = levels(sphere(6000, 1.7));
     let camera = sphere_camera(50, Projection::Pinhole);
-    // Of which the first is culled by batches, and the second has several branches and pages.
+    // Of which the second has several branches and pages.
     let ways = [RenderOptions { cull: Cull::None, ..at(60.0) }, RenderOptions { cull: Cull::Back, ..at(1e-6) }];
     let whole = [Backend::gpu(gpu), Backend::gpu(small())];
     let right = [0, 1].map(|way| {
         let (shown, report) = render(&scene, &camera, &ways[way], &whole[way], &()).unwrap();
-        assert!(way > 0 || report.needs.contains(&"cull"));
-        bits(&shown)
+        (bits(&shown), report.cut)
     });
     for (file, from, to) in [
         ("select_fades_absent.wgsl", "size < held.levels.x", "size < 1.2 * held.levels.x"),
         ("select.wgsl", "if (away.x > away.y) {", "if (away.x > away.y - 0.5) {"),
-        ("select.wgsl", "let radius = node.radius * held.unit;", "let radius = 1.01 * node.radius * held.unit;"),
+        (
+            "select.wgsl",
+            "seen_disk(center.z, node.radius * held.unit);",
+            "seen_disk(center.z, 1.01 * node.radius * held.unit);",
+        ),
         ("select.wgsl", "return before;", "return before + counts;"),
         ("select.wgsl", "vec2<u32>(here, end);", "vec2<u32>(0u, end);"),
-        ("select.wgsl", "reached[node.first] = fate;", "reached[node.first] = 0u;"),
+        ("select.wgsl", "reached[node.first] = cuts;", "reached[node.first] = 0u;"),
         ("select.wgsl", "return drawn_at(place) < attributes", "return drawn_at(place) + 99u < attributes"),
         ("select.wgsl", "return page.first + select(run", "return select(run"),
         ("select.wgsl", "return page.surfels;", "return page.surfels - 1u;"),
-        ("select.wgsl", "let before = vec2<u32>(kept.x >> FATE_BITS, kept.y);", "let before = vec2<u32>(0u);"),
-        ("select_balls.wgsl", "* (1.0 + BALL_SLACK);", "* 0.1;"),
+        ("select.wgsl", "run_counts[run] = before;", "run_counts[run] = vec2<u32>(0u);"),
+        ("select.wgsl", "counts += left_by", "counts = left_by"),
+        ("select.wgsl", "cuts_that_divide(seen_disk(nearest, radius)) == 0u", "true"),
+        ("select.wgsl", "node.first + select(0u, branch.surfels, kind_of(node) == INNER);", "node.first;"),
+        ("select.wgsl", "record = select(record, child.first, is_surfel(child));", "record = below;"),
     ] {
         let sources = Sources::default().replace(file, from, to).unwrap();
         let noticed =
             [common::gpu().unwrap(), small()].into_iter().zip(&ways).zip(&right).any(|((gpu, way), right)| {
                 let backend = Backend::Gpu { gpu: Box::new(gpu), sources: sources.clone() };
-                render(&scene, &camera, way, &backend, &()).is_ok_and(|(shown, _)| bits(&shown) != *right)
+                let broken = render(&scene, &camera, way, &backend, &());
+                broken.is_ok_and(|(shown, report)| (bits(&shown), report.cut) != *right)
             });
         assert!(noticed, "{file}: {to}");
     }
+}
+
+/// Children that are drawn without being judged are those that would be, wherever nodes lie in the image and before it; and what tells so is needed.
+#[test]
+fn children_are_drawn_together_where_each_would_be() {
+    const TOGETHER: &str = "MEASURES_EXTENT && !CULL_BACK && draws_children(node, ball)";
+    const WITHIN: &str = "let within = !is_beside(ball.center, -ball.radius, 0.0);";
+    let Some(gpu) = common::gpu() else { return };
+    let backend = |from: &str, to: &str| {
+        let sources = Sources::default().replace("select.wgsl", from, to).unwrap();
+        Backend::Gpu { gpu: Box::new(gpu.clone()), sources }
+    };
+    let (together, alone) = (Backend::gpu(gpu.clone()), backend(TOGETHER, "false"));
+    let broken = [backend(WITHIN, "let within = true;"), backend("past && within", "within")];
+    let mut noticed = [false; 2];
+    for scene in all().into_iter().filter_map(|(name, scene)| (name == "plain" || name == "doubled").then_some(scene)) {
+        let scene = levels(scene);
+        for (eye, lens, near) in [
+            (DVec3::new(0.3, 0.8, 3.0), Lens::Fov(50.0), 2.4),
+            (DVec3::new(0.3, 0.2, 1.2), Lens::Fov(120.0), 1e-3),
+            (DVec3::new(0.1, 0.0, 0.3), Lens::Fov(150.0), 1e-3),
+            (DVec3::new(0.3, 0.8, 3.0), Lens::OrthographicHeight(1.2), 1e-3),
+        ] {
+            let camera = Camera::look_at((200, 140), lens, eye, DVec3::ZERO, None, Up::Y, near).unwrap();
+            for options in [at(900.0), fading(&at(1800.0))] {
+                let of = |backend: &Backend| {
+                    let (shown, report) = render(&scene, &camera, &options, backend, &()).unwrap();
+                    (bits(&shown), report.cut)
+                };
+                let right = of(&alone);
+                assert!(of(&together) == right, "{eye}, {options:?}");
+                noticed.iter_mut().zip(&broken).for_each(|(noticed, broken)| *noticed |= of(broken) != right);
+            }
+        }
+    }
+    assert_eq!(noticed, [true; 2]);
 }
 
 /// What `drawn_at` of a text of select.wgsl says of each (runs, stride, place, first).

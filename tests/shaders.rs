@@ -157,7 +157,7 @@ const PAINTLESS: &[&str] = &[
 
 /// Needs that no render has together (`src/plan/check.rs`, `src/plan/needs.rs`).
 const EXCLUSIVE: [(&str, &[&str]); 39] = [
-    ("levels", &["facing", "separate", "index", "color-textured", "color-harmonics", "copies", "texz-map"]),
+    ("levels", &["cull", "facing", "separate", "index", "color-textured", "color-harmonics", "copies", "texz-map"]),
     (
         "fades",
         &[

@@ -3,7 +3,7 @@
 // its fragments could be nearest or within epsilon of the nearest, so no image depends on it. The splats of the others are
 // stored one batch after the other, in slots: those that are left out take no room.
 // Host side and twin: src/passes/cull.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x008e3cc91354b9ec
+// All loops end, by 1 of src/gpu/loops.rs: 0x116791cebd55d876
 
 // A batch's bounding ball: centre and radius, world units relative to the scene's origin.
 @group(0) @binding(23) var<storage, read> balls: array<vec4<f32>>;
@@ -79,7 +79,7 @@ fn list(batch: u32) {
 }
 
 fn leave_out(batch: u32) {
-    atomicAdd(&queue[1], batch_size(batch));
+    atomicAdd(&queue[1], min(BATCH, surfels_held() - batch * BATCH));
 }
 
 // One invocation a batch.

@@ -116,8 +116,10 @@ struct TreeNode {
     cone: f32,
     // The first of its children in this branch, or of its surfels, or which root of another branch it is.
     first: u32,
-    // How many there are, and in the two highest bits of what kind.
+    // How many there are, and in the highest bits of what kind (select.wgsl).
     below: u32,
+    // No child that is no surfel has a larger sphere, and this one's holds the centres of all; -1 where children are to be judged one by one.
+    children: f32,
 }
 
 // Neighbouring subtrees, whose surfels and nodes fit a buffer: first the surfels, then the nodes level by level.
@@ -175,7 +177,7 @@ fn hold_view() {
 
 const WORKGROUP: u32 = 64u;
 
-// Surfels that are left out together (cull.wgsl), and of a cut bounded by one workgroup.
+// Surfels that are left out together (cull.wgsl).
 const BATCH: u32 = 64u;
 
 // The index of this invocation in a 2-D dispatch of 1-D workgroups.

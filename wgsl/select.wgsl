@@ -4,14 +4,16 @@
 // depends on tree and camera alone. Pages of surfels are drawn from where what was chosen lies.
 // Of cuts that fade into each other (select_fades.wgsl) all are made at once.
 // Host side and twin: src/passes/select.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x7943e729da183421
+// All loops end, by 1 of src/gpu/loops.rs: 0xf9efd67d4ac73264
 
 @group(0) @binding(72) var<uniform> branch: Branch;
 @group(0) @binding(73) var<storage, read> tree_nodes: array<TreeNode>;
-// Numbers of nodes that are come to, level after level, and what becomes of each with what those of its workgroup before it leave. Numbers have a second half where cuts fade (select_fades.wgsl).
+// Numbers of nodes that are come to, level after level, and what becomes of each. Numbers have a second half where cuts fade (select_fades.wgsl).
 @group(0) @binding(75) var<storage, read_write> frontier: array<u32>;
-@group(0) @binding(76) var<storage, read_write> fates: array<vec2<u32>>;
-// Of each workgroup: how many surfels its nodes leave, and how many children; then where these start.
+@group(0) @binding(76) var<storage, read_write> fates: array<u32>;
+// How many surfels and how many children the nodes leave that those of its workgroup before it judge, for each invocation of a level.
+@group(0) @binding(82) var<storage, read_write> run_counts: array<vec2<u32>>;
+// Of each workgroup: how many of both its nodes leave; then where these start.
 @group(0) @binding(77) var<storage, read_write> group_counts: array<vec2<u32>>;
 // The attributes of this branch, and from branch.chosen on how many of its surfels are drawn, its nodes' among them, and then which: no kernel
 // that draws them needs another buffer, of which core WebGPU has eight.
@@ -27,7 +29,7 @@ const LEVEL: u32 = 0u;
 const LEVEL_END: u32 = 1u;
 const NEXT: u32 = 2u;
 const NEXT_END: u32 = 3u;
-// Grids with an invocation for each node of the level that is judged, and of that which is spread.
+// Grids with an invocation for JUDGED nodes each of the level that is judged, and of that which is spread.
 const JUDGE_GRID: u32 = 4u;
 const SPREAD_GRID: u32 = 7u;
 
@@ -36,24 +38,30 @@ const RUN: u32 = 512u;
 
 // Kinds of nodes.
 const KIND_SHIFT: u32 = 30u;
-const COUNT_MASK: u32 = 0x3fffffffu;
+// Of an inner node: some of its children are one surfel, which is drawn for them.
+const WITH_SURFELS: u32 = 0x20000000u;
+const COUNT_MASK: u32 = 0x1fffffffu;
 const INNER: u32 = 0u;
 const LEAF: u32 = 1u;
 const OTHER_BRANCH: u32 = 2u;
 const PART_OF_LEAF: u32 = 3u;
 
+// Nodes that an invocation judges, one after the other: barriers are dear on processors, and cost one of so many nodes as much.
+const JUDGED: u32 = 8u;
+
 // What becomes of a node: in how many cuts, the first of those that come to it, it is divided; or nothing.
 const UNSEEN: u32 = 0x7fu;
-// Its bits beside a number of surfels that a workgroup leaves: of each node itself and at most 4096 below it.
-const FATE_BITS: u32 = 7u;
+// Beside that: its children are drawn, all of them, and not judged.
+const CHILDREN_DRAWN: u32 = 0x80u;
 
 // A node's size is that of the ball around it and all below it, as seen in the middle of the image, not that of its ellipse's image.
 override MEASURES_EXTENT: bool;
 
 const PI: f32 = 3.14159265;
 
-// Room for the rounding of a ball's place and size, of its distance; and of sines.
+// Room for the rounding of a ball's place and size, of its distance; of bounds of several balls; and of sines.
 const BALL_ROUNDING: f32 = 1e-6;
+const BOUND_SLACK: f32 = 1e-4;
 const SINE_SLACK: f32 = 1e-5;
 
 var<workgroup> counted: array<vec2<u32>, WORKGROUP>;
@@ -82,13 +90,6 @@ fn surfel_of(place: u32) -> u32 {
     return attributes[page.chosen + 1u + CHOSEN_WORDS * drawn_at(place)];
 }
 
-// How many of a batch are of the cut.
-fn batch_size(batch: u32) -> u32 {
-    let cut = attributes[page.chosen];
-    let first = min(drawn_at(batch * BATCH), cut);
-    return min(min(BATCH, cut - first), places_held() - batch * BATCH);
-}
-
 // Whether a place has a surfel of the cut.
 fn is_filled(place: u32) -> bool {
     return drawn_at(place) < attributes[page.chosen];
@@ -104,6 +105,11 @@ fn rank_of(index: u32) -> u32 {
 
 fn kind_of(node: TreeNode) -> u32 {
     return node.below >> KIND_SHIFT;
+}
+
+// Whether what is below it is one surfel, which is drawn for it.
+fn is_surfel(node: TreeNode) -> bool {
+    return kind_of(node) == LEAF && (node.below & COUNT_MASK) == 1u;
 }
 
 fn vector(parts: array<f32, 3>) -> vec3<f32> {
@@ -122,17 +128,32 @@ fn turned_away(node: TreeNode, surfel: Surfel, relative: vec3<f32>, radius: f32)
     return vec2<f32>(turned, select(1.0, cone * ball_cosine + node.cone * ball, narrow) + SINE_SLACK);
 }
 
+// Square pixels that a ball of this radius, device units, is seen as at a depth in the middle of the image.
+fn seen_disk(depth: f32, radius: f32) -> f32 {
+    let across = axis_image(vec3<f32>(0.0, 0.0, depth), vec3<f32>(radius, radius, 0.0)) * held.levels.yz;
+    let longest = max(across.x, across.y);
+    return PI * longest * longest;
+}
+
 // Square pixels of the image that a node is seen at.
 fn size_of(center: vec3<f32>, node: TreeNode, surfel: Surfel) -> f32 {
     if (MEASURES_EXTENT) {
-        let radius = node.radius * held.unit;
-        let across = axis_image(vec3<f32>(0.0, 0.0, center.z), vec3<f32>(radius, radius, 0.0)) * held.levels.yz;
-        let longest = max(across.x, across.y);
-        return PI * longest * longest;
+        return seen_disk(center.z, node.radius * held.unit);
     }
     let s = axis_image(center, rotate_plain(vector(surfel.s) * held.unit)) * held.levels.yz;
     let t = axis_image(center, rotate_plain(vector(surfel.t) * held.unit)) * held.levels.yz;
     return PI * abs(s.x * t.y - s.y * t.x);
+}
+
+// Whether the children of a node are drawn wherever it is divided, however they lie in the ball around it: all are in sight, past the near depth, and
+// in no cut is one divided. Of most nodes of a cut this is told.
+fn draws_children(node: TreeNode, ball: Ball) -> bool {
+    let radius = node.children * held.unit * (1.0 + BOUND_SLACK);
+    let nearest = ball.nearest - BOUND_SLACK * norm3(ball.center);
+    let past = nearest - radius - growth(ball.farthest + radius) > held.near * (1.0 + BOUND_SLACK);
+    // A ball of a negative radius lies beside the image where that of the positive one is not wholly within.
+    let within = !is_beside(ball.center, -ball.radius, 0.0);
+    return node.children >= 0.0 && past && within && cuts_that_divide(seen_disk(nearest, radius)) == 0u;
 }
 
 // What becomes of a node whose surfel's centre leaves out `low`, world units.
@@ -158,26 +179,34 @@ fn fate_of(node: TreeNode, surfel: Surfel, low: vec3<f32>) -> u32 {
         faces = away.x <= 0.0;
     }
     // One surfel is itself, with its lines and its cap; and where the surfels of a part of a tree are not there, no picture divides their leaf.
-    let held = select(2u, node.below & COUNT_MASK, kind_of(node) == LEAF);
-    let divided = reaches_near(ball) || !faces || held == 1u;
-    return select(select(cuts_that_divide(size_of(ball.center, node, surfel)), ALL_CUTS, divided), 0u, held == 0u);
+    let missing = kind_of(node) == LEAF && (node.below & COUNT_MASK) == 0u;
+    let divided = reaches_near(ball) || !faces || is_surfel(node);
+    let cuts = select(select(cuts_that_divide(size_of(ball.center, node, surfel)), ALL_CUTS, divided), 0u, missing);
+    // By its own place and size alone nothing is told of a child's area, or of its side.
+    let unjudged = MEASURES_EXTENT && !CULL_BACK && draws_children(node, ball);
+    return cuts | select(0u, CHILDREN_DRAWN, unjudged);
 }
 
-fn has_surfels(node: TreeNode) -> bool {
-    return kind_of(node) == LEAF || kind_of(node) == PART_OF_LEAF;
+// Of the cuts that come to a node, the number in which it is divided.
+fn cuts_of(fate: u32) -> u32 {
+    return fate & UNSEEN;
 }
 
-// How many surfels a node leaves that so many cuts come to, and how many children for the next level.
+// Whether what is below a node is drawn if it is divided: its surfels, or its children.
+fn is_last(node: TreeNode, fate: u32) -> bool {
+    let kind = kind_of(node);
+    return kind == LEAF || kind == PART_OF_LEAF || (kind == INNER && (fate & CHILDREN_DRAWN) != 0u);
+}
+
+// How many surfels and nodes are drawn of a node that so many cuts come to, and how many children it leaves for the next level.
 fn left_by(node: TreeNode, fate: u32, reached_in: u32) -> vec2<u32> {
-    if (fate == UNSEEN) {
+    let cuts = cuts_of(fate);
+    if (cuts == UNSEEN) {
         return vec2<u32>(0u);
     }
-    let below = select(0u, node.below & COUNT_MASK, fate > 0u);
-    let itself = select(0u, 1u, fate < reached_in);
-    return vec2<u32>(
-        itself + select(0u, below, has_surfels(node)),
-        select(0u, below, kind_of(node) == INNER),
-    );
+    let below = select(0u, node.below & COUNT_MASK, cuts > 0u && kind_of(node) != OTHER_BRANCH);
+    let itself = select(0u, 1u, cuts < reached_in);
+    return select(vec2<u32>(itself, below), vec2<u32>(itself + below, 0u), is_last(node, fate));
 }
 
 // The sum of the counts of the invocations before this one: in its own eight, and of those before. Few barriers, as each is dear on processors.
@@ -201,8 +230,13 @@ fn sum_before(counts: vec2<u32>, local: u32) -> vec2<u32> {
     return before;
 }
 
-fn set_grid(at: u32, invocations: u32) {
-    let grid = rows_of(groups_of(invocations));
+// Invocations that judge so many nodes.
+fn judges_of(nodes: u32) -> u32 {
+    return (nodes + JUDGED - 1u) / JUDGED;
+}
+
+fn set_grid(at: u32, nodes: u32) {
+    let grid = rows_of(groups_of(judges_of(nodes)));
     for (var k = 0u; k < 3u; k++) {
         selection[at + k] = grid[k];
     }
@@ -229,7 +263,7 @@ fn select_roots() {
     set_grid(JUDGE_GRID, end);
 }
 
-// One invocation a node of the next level.
+// One invocation for JUDGED nodes of the next level that follow each other.
 @compute @workgroup_size(WORKGROUP)
 fn select_judge(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -237,23 +271,25 @@ fn select_judge(
     @builtin(local_invocation_index) local: u32,
 ) {
     hold_view();
-    let place = selected[NEXT] + linear_index(workgroup, workgroups, local);
+    let run = linear_index(workgroup, workgroups, local);
+    let first = selected[NEXT] + run * JUDGED;
+    let end = min(first + JUDGED, selected[NEXT_END]);
     var counts = vec2<u32>(0u);
-    var fate = UNSEEN;
-    if (place < selected[NEXT_END]) {
+    for (var place = first; place < end; place++) {
         let index = frontier[place];
         let node = tree_nodes[index];
         let record = branch.surfels + index;
         let cuts = cuts_that_reach(place);
-        fate = fate_of(node, surfel_at(record), low_part(record));
-        if (fate != UNSEEN) {
-            fate = min(fate, cuts);
+        var fate = fate_of(node, surfel_at(record), low_part(record));
+        if (cuts_of(fate) != UNSEEN) {
+            fate = (fate & CHILDREN_DRAWN) | min(cuts_of(fate), cuts);
         }
-        counts = left_by(node, fate, cuts);
+        counts += left_by(node, fate, cuts);
+        fates[place] = fate;
     }
     let before = sum_before(counts, local);
-    if (place < selected[NEXT_END]) {
-        fates[place] = vec2<u32>(fate | before.x << FATE_BITS, before.y);
+    if (first < end) {
+        run_counts[run] = before;
     }
     if (local == WORKGROUP - 1u) {
         group_counts[workgroup.y * workgroups.x + workgroup.x] = before + counts;
@@ -266,7 +302,7 @@ fn select_sum(@builtin(local_invocation_index) local: u32) {
     let first = selection[NEXT];
     let end = selection[NEXT_END];
     let here = chosen[branch.chosen];
-    let groups = groups_of(end - first);
+    let groups = groups_of(judges_of(end - first));
     let each = (groups + WORKGROUP - 1u) / WORKGROUP;
     let stop = min((local + 1u) * each, groups);
     var own = vec2<u32>(0u);
@@ -293,42 +329,53 @@ fn select_sum(@builtin(local_invocation_index) local: u32) {
     }
 }
 
-// One invocation a node of the level that was judged.
+// One invocation for JUDGED nodes of the level that was judged.
 @compute @workgroup_size(WORKGROUP)
 fn select_spread(
     @builtin(workgroup_id) workgroup: vec3<u32>,
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
-    let place = selected[LEVEL] + linear_index(workgroup, workgroups, local);
-    if (place >= selected[LEVEL_END]) {
+    let run = linear_index(workgroup, workgroups, local);
+    let first = selected[LEVEL] + run * JUDGED;
+    let end = min(first + JUDGED, selected[LEVEL_END]);
+    if (first >= end) {
         return;
     }
-    let kept = fates[place];
-    let fate = kept.x & UNSEEN;
-    if (fate == UNSEEN) {
-        return;
+    var start = group_counts[workgroup.y * workgroups.x + workgroup.x] + run_counts[run];
+    for (var place = first; place < end; place++) {
+        let index = frontier[place];
+        start += spread(index, fates[place], cuts_that_reach(place), start);
     }
-    let index = frontier[place];
-    let cuts = cuts_that_reach(place);
+}
+
+// Writes what a node leaves from `start` on, and returns how much that is.
+fn spread(index: u32, fate: u32, reached_in: u32, start: vec2<u32>) -> vec2<u32> {
+    let cuts = cuts_of(fate);
     let node = tree_nodes[index];
-    let counts = left_by(node, fate, cuts);
-    let before = vec2<u32>(kept.x >> FATE_BITS, kept.y);
-    let start = group_counts[workgroup.y * workgroups.x + workgroup.x] + before;
+    let counts = left_by(node, fate, reached_in);
     var at = start.x;
-    if (fate < cuts) {
-        choose(at, branch.surfels + index, fate, cuts);
+    if (cuts < reached_in) {
+        choose(at, branch.surfels + index, cuts, reached_in);
         at++;
     }
-    if (kind_of(node) == OTHER_BRANCH) {
-        reached[node.first] = fate;
+    if (cuts != UNSEEN && kind_of(node) == OTHER_BRANCH) {
+        reached[node.first] = cuts;
     }
-    let surfels = start.x + counts.x - at;
-    for (var k = 0u; k < surfels; k++) {
-        choose(at + k, node.first + k, 0u, fate);
+    let below = node.first + select(0u, branch.surfels, kind_of(node) == INNER);
+    let drawn = start.x + counts.x - at;
+    let mixed = kind_of(node) == INNER && (node.below & WITH_SURFELS) != 0u;
+    for (var k = 0u; k < drawn; k++) {
+        var record = below + k;
+        if (mixed) {
+            let child = tree_nodes[node.first + k];
+            record = select(record, child.first, is_surfel(child));
+        }
+        choose(at + k, record, 0u, cuts);
     }
     for (var k = 0u; k < counts.y; k++) {
         frontier[start.y + k] = node.first + k;
-        set_cuts_that_reach(start.y + k, fate);
+        set_cuts_that_reach(start.y + k, cuts);
     }
+    return counts;
 }

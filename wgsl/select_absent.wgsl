@@ -12,10 +12,6 @@ fn is_filled(place: u32) -> bool {
     return true;
 }
 
-fn batch_size(batch: u32) -> u32 {
-    return min(BATCH, surfels_held() - batch * BATCH);
-}
-
 fn rank_of(index: u32) -> u32 {
     return page.first + index;
 }

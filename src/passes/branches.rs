@@ -7,16 +7,14 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
+use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::gpu::layout::{FATE_BITS, INNER, KIND_SHIFT, LEAF, OTHER_BRANCH, PART_OF_LEAF, TreeNode, WORKGROUP};
+use crate::gpu::layout::{INNER, KIND_SHIFT, LEAF, OTHER_BRANCH, PART_OF_LEAF, TreeNode, WITH_SURFELS};
 use crate::scene::hierarchy::{Hierarchy, Node};
 
 /// The most surfels that one invocation copies the numbers of.
 const MOST_OF_LEAF: u32 = 4096;
-
-// What a workgroup's nodes leave fits beside what becomes of one (`wgsl/select.wgsl`).
-const _: () = assert!(WORKGROUP * (1 + MOST_OF_LEAF) < 1 << (32 - FATE_BITS));
 
 /// Neighbouring subtrees.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,6 +64,29 @@ fn parts(number: u32, node: &Node) -> impl Iterator<Item = Item> + use<> {
         first,
         count: MOST_OF_LEAF.min(end - first),
     })
+}
+
+/// Of a node whose children are judged one by one ([`TreeNode::children`]).
+const ONE_BY_ONE: f32 = -1.0;
+
+/// The radius of the largest ball of an inner node's children but those that are one surfel, which is drawn for them, and whether there are such;
+/// if all have their centres in the node's ball.
+fn children_of(tree: &Hierarchy, number: u32) -> (f32, u32) {
+    let node = &tree.nodes[number as usize];
+    let center = |number: u32| {
+        let Node { surfel, .. } = &tree.nodes[number as usize];
+        DVec3::from_array(surfel.center.map(f64::from)) + tree.low(number)
+    };
+    let (middle, radius) = (center(number), f64::from(node.radius));
+    let (mut largest, mut mixed) = (0f32, 0);
+    for child in node.first..node.first + node.count {
+        if center(child).distance_squared(middle) > radius * radius {
+            return (ONE_BY_ONE, 0);
+        }
+        let Node { radius, count, leaf, .. } = tree.nodes[child as usize];
+        if leaf && count == 1 { mixed = WITH_SURFELS } else { largest = largest.max(radius) }
+    }
+    (largest, mixed)
 }
 
 /// The branches of a tree, each of at most `most` surfels and nodes together, if that is a few thousand or more.
@@ -175,6 +196,7 @@ fn laid_out(
         if nodes.len() == level_end {
             (levels, level_end) = (levels + 1, items.len());
         }
+        let (mut children, mut mixed) = (ONE_BY_ONE, 0);
         let (number, kind, first, count) = match items[nodes.len()] {
             Item::Part { leaf, first, count } => (leaf, PART_OF_LEAF, first - surfels.start, count),
             Item::Other { root, node } => (node, OTHER_BRANCH, root, 1),
@@ -195,14 +217,18 @@ fn laid_out(
                     }
                     (true, None) => (number, LEAF, node.first - surfels.start, node.count),
                     (false, None) => {
-                        items.extend((node.first..node.first + node.count).map(Item::Node));
+                        let all = node.first..node.first + node.count;
+                        if all.clone().all(|child| elsewhere(child).is_none()) {
+                            (children, mixed) = children_of(tree, number);
+                        }
+                        items.extend(all.map(Item::Node));
                         (number, INNER, below, node.count)
                     }
                 }
             }
         };
         let Node { radius, cone, .. } = tree.nodes[number as usize];
-        nodes.push(TreeNode { radius, cone, first, below: count | kind << KIND_SHIFT });
+        nodes.push(TreeNode { radius, cone, first, below: count | mixed | kind << KIND_SHIFT, children });
         numbers.push(number);
     }
     Branch { surfels, nodes, numbers, roots, first_root: 0, whole: false, levels }
@@ -230,7 +256,7 @@ mod tests {
     }
 
     fn kind(node: &TreeNode) -> (u32, u32) {
-        (node.below >> KIND_SHIFT, node.below & ((1 << KIND_SHIFT) - 1))
+        (node.below >> KIND_SHIFT, node.below & (WITH_SURFELS - 1))
     }
 
     /// The surfels below a row of a branch, by their places in the scene, and the numbers of the nodes that lead there.
@@ -276,6 +302,16 @@ mod tests {
                 .map(kind)
                 .filter(|(kind, _)| [LEAF, PART_OF_LEAF].contains(kind));
             assert!(leaves.map(|(_, count)| count).max().unwrap() <= MOST_OF_LEAF);
+            let families = all.iter().flat_map(|branch| branch.nodes.iter().map(move |node| (branch, node)));
+            for (branch, node) in families.filter(|(_, node)| node.children >= 0.0) {
+                assert_eq!(kind(node).0, INNER);
+                let children = &branch.nodes[node.first as usize..][..kind(node).1 as usize];
+                let single = |child: &&TreeNode| kind(child) == (LEAF, 1);
+                assert_eq!(children.iter().any(|child| single(&child)), node.below & WITH_SURFELS != 0);
+                let balls = children.iter().filter(|child| !single(child)).map(|child| child.radius);
+                assert_eq!(balls.fold(0.0, f32::max), node.children);
+                assert!(children.iter().all(|child| [INNER, LEAF].contains(&kind(child).0)));
+            }
             if most == 500 {
                 assert!(all.len() > 6 && all.len() < 30, "{}", all.len());
                 let nodes: usize = all.iter().map(|branch| branch.nodes.len()).sum();

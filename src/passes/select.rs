@@ -19,7 +19,7 @@ use super::cull;
 use super::lowpass::Design;
 use crate::plan::RenderOptions;
 use crate::plan::pass::Pass;
-use crate::plan::steps::{Kernel, Over, Run, Stage};
+use crate::plan::steps::{Kernel, Over, Run};
 use crate::scene::cut::Fate;
 use crate::scene::detail::finest;
 use crate::scene::fade::STEPS;
@@ -32,16 +32,9 @@ pub const PASS: Pass = Pass {
     files: |needs| {
         let low = if needs.doubled { "low_part.wgsl" } else { "low_part_absent.wgsl" };
         let fades = if needs.fades { "select_fades.wgsl" } else { "select_fades_absent.wgsl" };
-        match (needs.levels, needs.cull) {
-            (true, true) => vec!["select.wgsl", fades, low, "select_balls.wgsl"],
-            (true, false) => vec!["select.wgsl", fades, low],
-            (false, _) => vec!["select_absent.wgsl"],
-        }
+        if needs.levels { vec!["select.wgsl", fades, low] } else { vec!["select_absent.wgsl"] }
     },
-    kernels: |needs| match needs.levels {
-        true if needs.cull => vec![SELECT_BALLS],
-        _ => Vec::new(),
-    },
+    kernels: |_| Vec::new(),
     constants: |making| match making.needs.levels {
         true => {
             let extent = making.options.detail_measure == DetailMeasure::Extent;
@@ -55,7 +48,6 @@ const SELECT_ROOTS: Kernel = Kernel::of("select_roots", [1, 1, 1]);
 const SELECT_JUDGE: Kernel = Kernel::new("select_judge");
 const SELECT_SUM: Kernel = Kernel::new("select_sum");
 const SELECT_SPREAD: Kernel = Kernel::new("select_spread");
-const SELECT_BALLS: Kernel = Kernel::new("select_balls");
 
 /// The kernels that choose what is drawn: what follows depends on how much that is, so they are compiled before all others.
 pub const CHOOSING: [Kernel; 4] = [SELECT_ROOTS, SELECT_JUDGE, SELECT_SUM, SELECT_SPREAD];
@@ -70,11 +62,6 @@ pub fn choose(levels: u32) -> Vec<Run> {
     let mut runs = vec![Run { kernel: SELECT_ROOTS, over: Over::Once }];
     runs.extend((0..levels).flat_map(|_| level));
     runs
-}
-
-/// Bounds the batches of what was chosen, which are then culled.
-pub fn bound() -> Stage {
-    Stage::new("select", 0, vec![Run { kernel: SELECT_BALLS, over: Over::BatchParts }])
 }
 
 /// Which cut is wanted.

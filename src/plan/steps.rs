@@ -51,9 +51,7 @@ pub enum Over {
     Slots(Part),
     /// An invocation for each batch of a page.
     Batches,
-    /// An invocation for each [`BALL_PART`](crate::gpu::layout::BALL_PART) surfels of a batch of a page.
-    BatchParts,
-    /// An invocation for each node of a level of a branch that is come to, as the device counted them.
+    /// An invocation for [`JUDGED`](crate::gpu::layout::JUDGED) nodes each of a level of a branch that is come to, as the device counted them.
     Judged,
     /// The same, after the next level's are known.
     Spread,

@@ -6,7 +6,7 @@ use super::store::{Named, kept};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
-use crate::gpu::layout::{self, BATCH, LIST_START, QUEUE_START, SPREAD_GRID, WORKGROUP};
+use crate::gpu::layout::{self, BATCH, JUDGED, LIST_START, QUEUE_START, SPREAD_GRID, WORKGROUP};
 use crate::passes::order;
 use crate::passes::upload::{self, BranchBuffers};
 use crate::plan::{SceneNeeds, splat_words};
@@ -41,9 +41,7 @@ impl Page {
         (number, branch, first): (usize, &Branch, u64),
         needs: &SceneNeeds,
     ) -> Result<Self> {
-        let balls = Buffer::<[f32; 4]>::storage(gpu, "balls of a cut", surfels.div_ceil(BATCH.into()))?;
-        let buffers = Named::from([("balls", balls.words())]);
-        Self::with(gpu, buffers, (Some(number), 0), (order::dealt(surfels, (branch.chosen, first as u32)), needs))
+        Self::with(gpu, Named::new(), (Some(number), 0), (order::dealt(surfels, (branch.chosen, first as u32)), needs))
     }
 
     /// One with these buffers, and room for nothing yet of what is made of them.
@@ -112,13 +110,15 @@ pub struct Branch {
 pub(super) fn of_selection(gpu: &Gpu, branches: &[BranchBuffers], needs: &SceneNeeds) -> Result<Named> {
     let nodes = branches.iter().map(|branch| branch.nodes).max().unwrap_or(0);
     let roots = branches.iter().map(|branch| branch.roots).sum();
-    let groups = nodes.div_ceil(WORKGROUP.into());
+    let runs = nodes.div_ceil(JUDGED.into());
+    let groups = runs.div_ceil(WORKGROUP.into());
     // In the second one, by how many cuts what is in the first is come to.
     let halves = if needs.fades { 2 } else { 1 };
     Ok(Named::from([
         ("selection", Buffer::indirect(gpu, "state of a cut", u64::from(SPREAD_GRID) + 3)?),
         ("frontier", Buffer::storage(gpu, "nodes that a cut comes to", halves * nodes)?),
-        ("fates", Buffer::<[u32; 2]>::storage(gpu, "what becomes of nodes", nodes)?.words()),
+        ("fates", Buffer::storage(gpu, "what becomes of nodes", nodes)?),
+        ("run_counts", Buffer::<[u32; 2]>::storage(gpu, "counts of a level", runs)?.words()),
         ("group_counts", Buffer::<[u32; 2]>::storage(gpu, "counts of a cut", groups)?.words()),
         ("reached", Buffer::storage(gpu, "branches that a cut comes to", roots)?),
     ]))

@@ -8,8 +8,8 @@ use crate::gpu::Gpu;
 use crate::gpu::buffers::{Buffer, counts_at};
 use crate::gpu::kernel::{Grid, grid};
 use crate::gpu::layout::{
-    BALL_PART, BATCH, COVERED_GRID, COVERED_GRID_OF_EIGHTS, JUDGE_GRID, LIST_FAR, QUEUE_GRID, QUEUE_LISTING,
-    SPREAD_GRID, TILE_WIDTH,
+    BATCH, COVERED_GRID, COVERED_GRID_OF_EIGHTS, JUDGE_GRID, LIST_FAR, QUEUE_GRID, QUEUE_LISTING, SPREAD_GRID,
+    TILE_WIDTH,
 };
 use crate::gpu::timing::Timing;
 use crate::passes::tiles::{self, LONGEST, list_name};
@@ -336,7 +336,6 @@ pub(super) fn over<'a>(
         Over::Once => return Ok(Grid::Of((1, 1))),
         Over::Slots(_) => of_page.map_or(0, |page| page.slots),
         Over::Batches => of_page.map_or(0, |page| page.batches()),
-        Over::BatchParts => of_page.map_or(0, |page| page.batches() * u64::from(BATCH / BALL_PART)),
         Over::Occlusion => plan.bands[band].tiles,
         Over::Vertices => plan.mesh.vertices,
         Over::Triangles => plan.mesh.triangles,

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::passes::{
-    accumulate, cull, fragments, individuals, long_lists, of_maps, oit, peel, project, raster, resolve, select, tiles,
+    accumulate, cull, fragments, individuals, long_lists, of_maps, oit, peel, project, raster, resolve, tiles,
     triangles, veils, visibility,
 };
 use crate::plan::known::Listed;
@@ -20,9 +20,6 @@ pub fn steps(plan: &Plan) -> Vec<Step> {
         // Nothing else has room yet.
         steps.push(Step::Look(Look::Cut));
         return steps;
-    }
-    if plan.needs.levels && plan.needs.cull {
-        steps.push(Step::Stage(select::bound()));
     }
     if plan.needs.raster.is_some() {
         steps.push(Step::Stage(project::steps(plan, 0, Part::All)));

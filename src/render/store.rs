@@ -22,8 +22,7 @@ use crate::plan::{
 use crate::scene::Samples;
 
 /// Names in WGSL of buffers that have another one where kernels write them.
-const ALIASES: [(&str, &str); 20] = [
-    ("made_balls", "balls"),
+const ALIASES: [(&str, &str); 19] = [
     ("selected", "selection"),
     ("chosen", "attributes"),
     ("projected", "splats"),

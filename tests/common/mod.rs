@@ -306,7 +306,8 @@ fn cut(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
         let fades = step % 2 == 0 && needs.sums_by_compute() && needs.oit.is_none();
         // Fades may be given, too.
         let levels = !fades || step % 16 > 0;
-        SceneNeeds { levels, fades, node_caps: levels && needs.curved && step % 4 < 3, ..*needs }
+        let node_caps = levels && needs.curved && step % 4 < 3;
+        SceneNeeds { levels, fades, node_caps, cull: needs.cull && !levels, ..*needs }
     };
     let disks = all.iter().filter(of_disks).filter(with_colors).filter(|needs| !needs.copies);
     disks.step_by(3).enumerate().map(of).collect()

@@ -13,9 +13,9 @@ use common::modules;
 use epsplat::gpu::Sources;
 use epsplat::gpu::interface::reflect;
 use epsplat::gpu::layout::{
-    AWAY, BALL_PART, BATCH, BLOCK_SIDE, COVERED_GRID, COVERED_GRID_OF_EIGHTS, COVERED_LIST, FATE_BITS, INNER,
-    JUDGE_GRID, KIND_SHIFT, LEAF, LIST_ENDS, LIST_FAR, LIST_START, MOST_GROUPS, OCCLUSION_TILE, ONE, OTHER_BRANCH,
-    QUEUE_GRID, QUEUE_LISTING, QUEUE_START, RUN, SPREAD_GRID, TILE, TILE_WIDTH, WORKGROUP,
+    AWAY, BATCH, BLOCK_SIDE, COVERED_GRID, COVERED_GRID_OF_EIGHTS, COVERED_LIST, INNER, JUDGE_GRID, JUDGED, KIND_SHIFT,
+    LEAF, LIST_ENDS, LIST_FAR, LIST_START, MOST_GROUPS, OCCLUSION_TILE, ONE, OTHER_BRANCH, QUEUE_GRID, QUEUE_LISTING,
+    QUEUE_START, RUN, SPREAD_GRID, TILE, TILE_WIDTH, WITH_SURFELS, WORKGROUP,
 };
 use epsplat::gpu::sources::FILES;
 use epsplat::passes;
@@ -152,21 +152,16 @@ fn constants_agree() {
         let of_batches = [("LIST_START", LIST_START), ("LIST_FAR", LIST_FAR)];
         let of_cuts = [
             ("RUN", RUN),
-            ("FATE_BITS", FATE_BITS),
+            ("JUDGED", JUDGED),
             ("JUDGE_GRID", JUDGE_GRID),
             ("SPREAD_GRID", SPREAD_GRID),
             ("KIND_SHIFT", KIND_SHIFT),
+            ("WITH_SURFELS", WITH_SURFELS),
             ("INNER", INNER),
             ("LEAF", LEAF),
             ("OTHER_BRANCH", OTHER_BRANCH),
         ];
-        let of_balls = [("BALL_PART", BALL_PART)];
-        for (exists, constants) in [
-            (tiles, &of_tiles[..]),
-            (needs.cull, &of_batches),
-            (needs.levels, &of_cuts),
-            (needs.cull && needs.levels, &of_balls),
-        ] {
+        for (exists, constants) in [(tiles, &of_tiles[..]), (needs.cull, &of_batches), (needs.levels, &of_cuts)] {
             for &(name, value) in constants {
                 assert_eq!(constant(name), exists.then_some(f64::from(value)), "{name}");
             }

@@ -156,8 +156,9 @@ const PAINTLESS: &[&str] = &[
 ];
 
 /// Needs that no render has together (`src/plan/check.rs`, `src/plan/needs.rs`).
-const EXCLUSIVE: [(&str, &[&str]); 39] = [
+const EXCLUSIVE: [(&str, &[&str]); 40] = [
     ("levels", &["cull", "facing", "separate", "index", "color-textured", "color-harmonics", "copies", "texz-map"]),
+    ("node-caps", &["cull"]),
     (
         "fades",
         &[

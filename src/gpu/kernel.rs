@@ -84,6 +84,16 @@ fn side_by_side<T: Sync, M: Send>(things: &[T], make: impl Fn(&T) -> M + Sync) -
     made.into_inner().unwrap_or_else(PoisonError::into_inner).into_values().collect()
 }
 
+/// What `compile` makes on a thread of its own, and what `other` does meanwhile; `compile` first where there can be no thread more.
+pub(crate) fn beside<M: Send, O>(compile: impl Fn() -> M + Sync, other: impl FnOnce() -> O) -> (M, O) {
+    thread::scope(|scope| {
+        let compiling = thread::Builder::new().stack_size(COMPILER_STACK).spawn_scoped(scope, &compile);
+        let Ok(compiling) = compiling else { return (compile(), other()) };
+        let other = other();
+        (compiling.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), other)
+    })
+}
+
 impl Draw {
     /// The pipeline of `module`, with `constants` and its own, and what it binds.
     fn pipeline(

@@ -32,17 +32,20 @@ pub struct TreeRow {
 impl Tree {
     /// The nodes about `origin`; None if one has no place or no extent that is a number.
     pub fn hierarchy(&self, origin: glam::DVec3) -> Option<Hierarchy> {
-        let mut all = Hierarchy::default();
+        let count = self.rows.len();
+        let mut all = Hierarchy { nodes: Vec::with_capacity(count), low: Vec::with_capacity(count) };
         let (axes, radii) = (self.nodes.axes.as_ref()?, self.nodes.radii.as_ref()?);
         for (index, row) in self.rows.iter().enumerate() {
             let center = glam::DVec3::from_array(*self.nodes.positions.get(index)?) - origin;
             let rounded = center.as_vec3();
             let ([s, t], radius) = (*axes.get(index)?, *radii.get(index)?);
             let color = self.nodes.colors.as_ref().map_or([1.0; 4], |colors| colors.linear(index));
-            let numbers = [rounded.to_array(), s, t].into_iter().flatten().chain(color).chain([radius, row.cone]);
+            let numbers = |numbers: &[f32]| numbers.iter().all(|number| number.abs() <= LARGEST);
+            let usable = [rounded.as_ref(), &s, &t].into_iter().all(|vector| numbers(vector));
+            let usable = usable && numbers(&color) && numbers(&[radius, row.cone]);
             let [along, across] = [s, t].map(|axis| glam::DVec3::from_array(axis.map(f64::from)));
-            let spans = along.cross(across).length() > 0.0;
-            if !numbers.into_iter().all(|number| number.abs() <= LARGEST) || radius < 0.0 || !spans || color[3] > 1.0 {
+            let spans = along.cross(across).length_squared() > 0.0;
+            if !usable || radius < 0.0 || !spans || color[3] > 1.0 {
                 return None;
             }
             let TreeRow { cone, first, count, leaf } = *row;

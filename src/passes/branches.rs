@@ -77,13 +77,13 @@ fn children_of(tree: &Hierarchy, number: u32) -> (f32, u32) {
         let Node { surfel, .. } = &tree.nodes[number as usize];
         DVec3::from_array(surfel.center.map(f64::from)) + tree.low(number)
     };
-    let (middle, radius) = (center(number), f64::from(node.radius));
+    let (middle, all) = (center(number), f64::from(node.radius));
     let (mut largest, mut mixed) = (0f32, 0);
     for child in node.first..node.first + node.count {
-        if center(child).distance_squared(middle) > radius * radius {
+        let Node { radius, count, leaf, .. } = tree.nodes[child as usize];
+        if center(child).distance_squared(middle) > all * all {
             return (ONE_BY_ONE, 0);
         }
-        let Node { radius, count, leaf, .. } = tree.nodes[child as usize];
         if leaf && count == 1 { mixed = WITH_SURFELS } else { largest = largest.max(radius) }
     }
     (largest, mixed)

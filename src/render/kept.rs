@@ -10,6 +10,7 @@ use super::sequence;
 use super::store::Store;
 use crate::error::Result;
 use crate::frame::Frame;
+use crate::gpu::kernel::beside;
 use crate::gpu::layout::View;
 use crate::gpu::{Gpu, Sources};
 use crate::passes::source::Source;
@@ -61,7 +62,7 @@ impl Kept {
             let plan = Plan::of(&self.facts, &gpu.adapter, camera, &self.options, &self.known)?;
             // A second try adds nothing to the bar.
             let progress = if first { bar } else { &() };
-            self.prepare((gpu, sources), source, &plan, progress)?;
+            self.prepare((gpu, sources), source, (&plan, camera), progress)?;
             let (Some(kernels), Some(store)) = (&self.kernels, &mut self.store) else { continue };
             if first {
                 progress.begin("rendering rows", camera.height.into());
@@ -110,28 +111,49 @@ impl Kept {
         &mut self,
         (gpu, sources): (&Gpu, &Sources),
         source: &dyn Source,
-        plan: &Plan,
+        (plan, camera): (&Plan, &Camera),
         progress: &dyn Progress,
     ) -> Result<()> {
         let surfels = self.facts.surfels;
         let kernels = self.kernels.take().filter(|kernels| kernels.serve(plan, &self.options, surfels));
         let kernels = kernels.unwrap_or_else(|| Kernels::new(sources, plan, &self.options, surfels));
-        kernels.compile(gpu, plan)?;
-        self.kernels = Some(kernels);
         if self.store.as_ref().is_some_and(|store| !store.serves(&plan.needs)) {
             // The old ones make room first.
             self.store = None;
             self.known.forget_buffers();
         }
-        let store = match &mut self.store {
-            Some(store) => store,
-            empty => {
+        let store = match self.store.take() {
+            Some(store) => {
+                kernels.compile(gpu, plan)?;
+                store
+            }
+            None => {
                 let ordered = self.options.has(Optimisation::Order) || asks_for_order(&plan.needs);
-                let uploaded = upload(gpu, source, &plan.needs, (&self.facts, ordered), progress)?;
-                empty.insert(Store::new(gpu, uploaded, &plan.needs)?)
+                let next = self.plan_of_cut(gpu, plan, camera)?;
+                let compile = || {
+                    kernels.compile(gpu, plan)?;
+                    let next = next.as_ref().map(|next| Kernels::new(sources, next, &self.options, surfels));
+                    next.map_or(Ok(()), |next| next.first(gpu).map(drop))
+                };
+                let stored = || {
+                    let uploaded = upload(gpu, source, &plan.needs, (&self.facts, ordered), progress)?;
+                    Store::new(gpu, uploaded, &plan.needs)
+                };
+                let (compiled, stored) = beside(compile, stored);
+                compiled?;
+                stored?
             }
         };
-        store.fit(gpu, plan, &self.known)
+        self.kernels = Some(kernels);
+        self.store.insert(store).fit(gpu, plan, &self.known)
+    }
+
+    /// The plan that most likely follows `plan`, if that one looks for a cut: of one that a page has room for. What it takes is compiled for the device
+    /// meanwhile.
+    fn plan_of_cut(&self, gpu: &Gpu, plan: &Plan, camera: &Camera) -> Result<Option<Plan>> {
+        let known = Known { cut: Some(vec![1]), ..self.known.clone() };
+        let next = || Plan::of(&self.facts, &gpu.adapter, camera, &self.options, &known);
+        plan.looks_for_cut().then(next).transpose()
     }
 
     fn report(

@@ -1,8 +1,7 @@
 //! The compiled kernels of a frame: a module for all passes, one for the tiles, which is compiled when something is drawn by them, and one that
 //! chooses a cut.
 
-use std::cell::OnceCell;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::error::Result;
 use crate::gpu::program::Program;
@@ -19,14 +18,14 @@ pub struct Kernels {
     made: (SceneNeeds, Vec<(&'static str, u64)>),
     sources: Sources,
     constants: Vec<(&'static str, f64)>,
-    modules: Vec<(Module, OnceCell<Arc<Program>>)>,
+    modules: Vec<(Module, OnceLock<Arc<Program>>)>,
 }
 
 impl Kernels {
     /// Those of `plan`, of which none is compiled yet.
     pub fn new(sources: &Sources, plan: &Plan, options: &RenderOptions, surfels: u64) -> Self {
         let constants = constants(&Making { needs: &plan.needs, options, surfels });
-        let modules = modules(&plan.needs).into_iter().map(|module| (module, OnceCell::new())).collect();
+        let modules = modules(&plan.needs).into_iter().map(|module| (module, OnceLock::new())).collect();
         let made = (plan.needs, bits(&constants));
         Self { made, sources: sources.clone(), constants, modules }
     }

@@ -50,17 +50,26 @@ pub struct LevelFacts {
 impl LevelFacts {
     /// Those of `hierarchy`.
     pub fn of(hierarchy: &Hierarchy) -> Self {
-        Self::of_nodes(hierarchy.nodes.par_iter())
+        Self::of_nodes(hierarchy.nodes.par_iter().with_min_len(4096))
     }
 
     /// Those of some nodes.
     pub fn of_nodes<'a>(nodes: impl ParallelIterator<Item = &'a Node>) -> Self {
-        let own = |node: &Node| Self {
-            largest_radius: node.surfel.radius() + node.cap.highest() as f32,
+        nodes.fold(Self::default, Self::with).reduce(Self::default, Self::both)
+    }
+
+    /// Those of these nodes and of one more.
+    fn with(self, node: &Node) -> Self {
+        let radius = node.surfel.radius();
+        // What no cap with such heights is higher than: few are looked at closely.
+        let most = f64::from(radius) + 0.500_001 * node.cap.0.iter().map(|height| f64::from(height.abs())).sum::<f64>();
+        let may_be_largest = most > f64::from(self.largest_radius);
+        let highest = if may_be_largest { node.cap.highest() as f32 } else { 0.0 };
+        self.both(Self {
+            largest_radius: radius + highest,
             largest_shorter: node.surfel.shorter(),
             caps: !node.cap.is_flat(),
-        };
-        nodes.map(own).reduce(Self::default, Self::both)
+        })
     }
 
     /// Those of these nodes and of others.
@@ -123,16 +132,13 @@ impl Whole {
         })
     }
 
-    /// Whether the surfels and nodes of a scene, which is not known to be a part of another, are within what this says of all.
-    pub fn holds(&self, part: &Scene) -> bool {
+    /// Whether the surfels of a scene, which is not known to be a part of another, and its nodes, of which `levels` tells, are within what this says of all.
+    pub fn holds(&self, part: &Scene, levels: LevelFacts) -> bool {
         let (own, (low, high)) = (part.bounds(), part.color_range());
         let least = |all: [f32; 4], own: [f32; 4]| all.iter().zip(own).all(|(all, own)| *all <= own);
-        let levels = part.hierarchy.as_deref().map(LevelFacts::of);
-        let nodes = levels.is_none_or(|own| {
-            own.largest_radius <= self.levels.largest_radius
-                && own.largest_shorter <= self.levels.largest_shorter
-                && (self.levels.caps || !own.caps)
-        });
+        let nodes = levels.largest_radius <= self.levels.largest_radius
+            && levels.largest_shorter <= self.levels.largest_shorter
+            && (self.levels.caps || !levels.caps);
         let surfels = part.surfels.is_empty() || least(self.color.0, low) && least(high, self.color.1);
         nodes
             && surfels

@@ -11,6 +11,7 @@ use crate::io::Points;
 use crate::io::ply::Levels;
 use crate::scene::Scene;
 use crate::scene::hierarchy::{DEEPEST, FAN_OUT, Hierarchy, Node};
+use crate::scene::whole::LevelFacts;
 use crate::{Progress, Result};
 
 /// Nodes or points that are read at once: what is made of them on the way takes no more memory, but of nodes three times as much, as one block is read
@@ -57,35 +58,38 @@ pub fn part(
     progress.begin("reading levels of detail", 0);
     let grown = grown(levels, may_be_divided, fits, progress);
     progress.end();
-    let (mut tree, taken) = grown?;
+    let (mut tree, taken, facts) = grown?;
     let numbers = in_order(&mut tree)
         .ok_or_else(|| levels.malformed("the points of its levels of detail do not follow each other"))?;
     progress.begin("reading surfels", taken.surfels);
-    let scene = scene(levels, &numbers, tree, progress);
+    let scene = scene(levels, &numbers, (tree, facts), progress);
     progress.end();
     Ok((scene?, taken))
 }
 
-/// The nodes of a part, of which leaves name surfels of the file, and how much it is.
+/// The nodes of a part, of which leaves name surfels of the file, how much it is, and what all nodes say together.
 fn grown(
     levels: &Levels,
     may_be_divided: impl Fn(&Hierarchy, u32) -> bool + Sync,
     fits: impl Fn(&Taken) -> Result<()> + Sync,
     progress: &dyn Progress,
-) -> Result<(Hierarchy, Taken)> {
+) -> Result<(Hierarchy, Taken, LevelFacts)> {
     let judged = |nodes: Hierarchy| {
         let divided: Vec<bool> = (0..nodes.nodes.len() as u32).map(|index| may_be_divided(&nodes, index)).collect();
-        (nodes, divided)
+        let facts = LevelFacts::of(&nodes);
+        (nodes, divided, facts)
     };
     let (mut tree, mut taken) = (Hierarchy::default(), Taken { nodes: 0, surfels: 0, bytes: 0 });
+    let mut facts = LevelFacts::default();
     // Those of a level, by their numbers in the file, which ascend.
     let mut numbers: Vec<Range<u32>> = std::iter::once(0..1).collect();
     for _ in 0..=DEEPEST {
         let Some(last) = numbers.last() else { break };
         let place = tree.nodes.len() + numbers.iter().map(Range::len).sum::<usize>();
         let mut below = Below { numbers: Vec::new(), reached: last.end, place: place as u32, surfels: 0 };
-        let append = |parts: Vec<(Hierarchy, Vec<bool>)>| {
-            for (nodes, divided) in parts {
+        let append = |parts: Vec<(Hierarchy, Vec<bool>, LevelFacts)>| {
+            for (nodes, divided, of_part) in parts {
+                facts = facts.both(of_part);
                 progress.advance(divided.len() as u64);
                 taken.nodes += divided.len() as u64;
                 let added = below.append(&mut tree, nodes, &divided);
@@ -101,7 +105,7 @@ fn grown(
         return Err(levels.malformed("its levels of detail (element node) are no tree: it is too deep"));
     }
     taken.bytes = levels.bytes(taken.surfels, taken.nodes);
-    Ok((tree, taken))
+    Ok((tree, taken, facts))
 }
 
 /// Hands what `made` makes of the nodes of these numbers to `append`, block by block: while one is decoded the one before it is appended, and the next
@@ -221,7 +225,12 @@ fn in_order(tree: &mut Hierarchy) -> Option<Vec<Range<u32>>> {
 }
 
 /// The surfels of these numbers and the tree over them.
-fn scene(levels: &Levels, numbers: &[Range<u32>], tree: Hierarchy, progress: &dyn Progress) -> Result<Scene> {
+fn scene(
+    levels: &Levels,
+    numbers: &[Range<u32>],
+    (tree, facts): (Hierarchy, LevelFacts),
+    progress: &dyn Progress,
+) -> Result<Scene> {
     let whole = levels.whole;
     let empty = Scene { part_of: None, colors: levels.no_colors(), ..nothing(levels) };
     let mut scene = Scene { hierarchy: Some(Arc::new(tree)), ..empty.clone() };
@@ -236,7 +245,7 @@ fn scene(levels: &Levels, numbers: &[Range<u32>], tree: Hierarchy, progress: &dy
     for block in blocks(numbers) {
         levels.points(&block, made)?.into_iter().for_each(|part| complete::append(&mut scene, part));
     }
-    if !whole.holds(&scene) {
+    if !whole.holds(&scene, facts) {
         return Err(levels.malformed("its element 'scene' leaves out points or nodes that it has"));
     }
     Ok(Scene { part_of: Some(Box::new(whole)), ..scene })

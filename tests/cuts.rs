@@ -217,20 +217,20 @@ fn crowded_leaves_are_drawn_whole() {
     let Some(gpu) = common::gpu() else { return };
     let mut scene = sphere(2000, 1.7);
     let (surfel, color) = (scene.surfels[77], [200, 10, 10, 255]);
-    scene.surfels.extend([surfel; 9000]);
+    scene.surfels.extend([surfel; 40_000]);
     if let Colors::Srgb8(codes) = &mut scene.colors {
-        codes.extend([color; 9000]);
+        codes.extend([color; 40_000]);
     }
     let scene = levels(scene);
-    assert!(tree(&scene).nodes.iter().any(|node| node.leaf && node.count > 9000));
+    assert!(tree(&scene).nodes.iter().any(|node| node.leaf && node.count > 40_000));
     let camera = sphere_camera(90, Projection::Pinhole);
     // Copies of one surfel are one where all are drawn.
     let options = RenderOptions { without: vec![epsplat::plan::Optimisation::Copies], ..at(1e-6) };
     let (twins, flat) = cut(&scene, &camera, &options);
-    assert_eq!(twins.scene.surfels.len(), 11_000);
+    assert_eq!(twins.scene.surfels.len(), 42_000);
     for backend in [Backend::gpu(gpu), Backend::gpu(common::gpu().unwrap().with_buffer_limit(200_000))] {
         let (shown, report) = render(&scene, &camera, &options, &backend, &()).unwrap();
-        assert_eq!(report.cut, Some(11_000));
+        assert_eq!(report.cut, Some(42_000));
         assert!(bits(&shown) == bits(&frame(&twins, &camera, &flat, &backend)));
         // In some of the cuts the leaf is divided, in others not.
         let both =
@@ -336,6 +336,34 @@ fn broken_kernels_are_noticed() {
                 broken.is_ok_and(|(shown, report)| (bits(&shown), report.cut) != *right)
             });
         assert!(noticed, "{file}: {to}");
+    }
+}
+
+/// Of levels with so many nodes that an invocation sums the counts of several workgroups.
+#[test]
+fn large_levels_are_summed() {
+    let Some(gpu) = common::gpu() else { return };
+    let scene = levels(sphere(400_000, 1.7));
+    let camera = sphere_camera(90, Projection::Pinhole);
+    // By area each is judged.
+    let options = RenderOptions { detail_measure: DetailMeasure::Area, maps: Maps::NONE, ..at(1e-3) };
+    let (twins, _) = cut(&scene, &camera, &options);
+    let right = Some(twins.scene.surfels.len() as u64);
+    let of = |backend: &Backend| {
+        let (shown, report) = render(&scene, &camera, &options, backend, &()).unwrap();
+        (bits(&shown), report.cut)
+    };
+    let whole = of(&Backend::gpu(gpu.clone()));
+    assert_eq!(whole.1, right);
+    // In branches levels are smaller.
+    let branches = Backend::gpu(gpu.clone().with_buffer_limit(2_000_000));
+    assert!(of(&branches) == whole);
+    for (from, to) in [
+        ("start += counts;", "start = counts;"),
+        ("local * each; group < stop; group++) {\n        own", "0u; group < stop; group++) {\n        own"),
+    ] {
+        let sources = Sources::default().replace("select.wgsl", from, to).unwrap();
+        assert!(of(&Backend::Gpu { gpu: Box::new(gpu.clone()), sources }) != whole, "{to}");
     }
 }
 

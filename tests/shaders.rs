@@ -156,9 +156,8 @@ const PAINTLESS: &[&str] = &[
 ];
 
 /// Needs that no render has together (`src/plan/check.rs`, `src/plan/needs.rs`).
-const EXCLUSIVE: [(&str, &[&str]); 40] = [
+const EXCLUSIVE: [(&str, &[&str]); 39] = [
     ("levels", &["cull", "facing", "separate", "index", "color-textured", "color-harmonics", "copies", "texz-map"]),
-    ("node-caps", &["cull"]),
     (
         "fades",
         &[
@@ -175,7 +174,7 @@ const EXCLUSIVE: [(&str, &[&str]); 40] = [
     ),
     ("fades", &["lists-layers", "lists-sorted", "long-lists", "veils", "oit-weighted", "oit-moments", "peels"]),
     ("fades", &["raster-exact", "raster-offset"]),
-    ("node-caps", &["facing", "separate", "index", "color-textured", "color-harmonics", "copies", "texz-map"]),
+    ("node-caps", &["cull", "facing", "separate", "index", "color-textured", "color-harmonics", "copies", "texz-map"]),
     ("painted-triangles", MESHLESS),
     ("triangles", MESHLESS),
     ("join", MESHLESS),

@@ -41,12 +41,6 @@ fn world_heights(index: u32) -> vec3<f32> {
     );
 }
 
-// The largest distance from the plane, world units.
-fn cap_height(index: u32) -> f32 {
-    let ends = extremes(world_heights(index));
-    return max(ends.y, -ends.x);
-}
-
 // The least and largest height over the unit disk.
 fn extremes(heights: vec3<f32>) -> vec2<f32> {
     let mean = 0.25 * (heights.x + heights.z);

@@ -18,10 +18,6 @@ override SQUARE: bool;
 
 const FACES: bool = true;
 
-fn cap_height(index: u32) -> f32 {
-    return 0.0;
-}
-
 fn curve(h: ptr<function, Homography>, index: u32, center: array<Double, 3>, s: vec3<f32>, t: vec3<f32>) -> Cap {
     return Cap(0u);
 }

@@ -118,7 +118,8 @@ struct TreeNode {
     first: u32,
     // How many there are, and in the highest bits of what kind (select.wgsl).
     below: u32,
-    // No child that is no surfel has a larger sphere, and this one's holds the centres of all; -1 where children are to be judged one by one.
+    // The largest radius of a child, world units, but of those that are one surfel, where this sphere holds the centres of all; -1 where children are to
+    // be judged one by one.
     children: f32,
 }
 

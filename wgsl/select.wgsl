@@ -4,14 +4,14 @@
 // depends on tree and camera alone. Pages of surfels are drawn from where what was chosen lies.
 // Of cuts that fade into each other (select_fades.wgsl) all are made at once.
 // Host side and twin: src/passes/select.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0xf9efd67d4ac73264
+// All loops end, by 1 of src/gpu/loops.rs: 0x5471baa82c262e83
 
 @group(0) @binding(72) var<uniform> branch: Branch;
 @group(0) @binding(73) var<storage, read> tree_nodes: array<TreeNode>;
 // Numbers of nodes that are come to, level after level, and what becomes of each. Numbers have a second half where cuts fade (select_fades.wgsl).
 @group(0) @binding(75) var<storage, read_write> frontier: array<u32>;
 @group(0) @binding(76) var<storage, read_write> fates: array<u32>;
-// How many surfels and how many children the nodes leave that those of its workgroup before it judge, for each invocation of a level.
+// For each invocation of a level: how many surfels and how many children are left by what those before it in its workgroup judge.
 @group(0) @binding(82) var<storage, read_write> run_counts: array<vec2<u32>>;
 // Of each workgroup: how many of both its nodes leave; then where these start.
 @group(0) @binding(77) var<storage, read_write> group_counts: array<vec2<u32>>;
@@ -38,19 +38,20 @@ const RUN: u32 = 512u;
 
 // Kinds of nodes.
 const KIND_SHIFT: u32 = 30u;
-// Of an inner node: some of its children are one surfel, which is drawn for them.
+// Of an inner node whose children may be drawn unjudged: some of them are one surfel, which is drawn for them.
 const WITH_SURFELS: u32 = 0x20000000u;
-const COUNT_MASK: u32 = 0x1fffffffu;
+const COUNT_MASK: u32 = WITH_SURFELS - 1u;
 const INNER: u32 = 0u;
 const LEAF: u32 = 1u;
 const OTHER_BRANCH: u32 = 2u;
 const PART_OF_LEAF: u32 = 3u;
 
-// Nodes that an invocation judges, one after the other: barriers are dear on processors, and cost one of so many nodes as much.
+// Nodes that an invocation judges, one after the other: barriers are dear on processors, and one costs the same however many nodes there are.
 const JUDGED: u32 = 8u;
 
 // What becomes of a node: in how many cuts, the first of those that come to it, it is divided; or nothing.
 const UNSEEN: u32 = 0x7fu;
+const CUTS_MASK: u32 = 0x7fu;
 // Beside that: its children are drawn, all of them, and not judged.
 const CHILDREN_DRAWN: u32 = 0x80u;
 
@@ -189,7 +190,7 @@ fn fate_of(node: TreeNode, surfel: Surfel, low: vec3<f32>) -> u32 {
 
 // Of the cuts that come to a node, the number in which it is divided.
 fn cuts_of(fate: u32) -> u32 {
-    return fate & UNSEEN;
+    return fate & CUTS_MASK;
 }
 
 // Whether what is below a node is drawn if it is divided: its surfels, or its children.

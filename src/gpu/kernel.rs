@@ -84,8 +84,12 @@ fn side_by_side<T: Sync, M: Send>(things: &[T], make: impl Fn(&T) -> M + Sync) -
     made.into_inner().unwrap_or_else(PoisonError::into_inner).into_values().collect()
 }
 
-/// What `compile` makes on a thread of its own, and what `other` does meanwhile; `compile` first where there can be no thread more.
-pub(crate) fn beside<M: Send, O>(compile: impl Fn() -> M + Sync, other: impl FnOnce() -> O) -> (M, O) {
+/// What `compile` makes on a thread of its own, and what `other` does with the device meanwhile; `compile` first where there can be no thread more.
+pub(crate) fn beside<M: Send, O>(gpu: &Gpu, compile: impl Fn() -> M + Sync, other: impl FnOnce() -> O) -> (M, O) {
+    // The context of OpenGL is one thread's as long as it compiles a kernel, and others do not wait for it for long.
+    if gpu.adapter.api == "gl" {
+        return (compile(), other());
+    }
     thread::scope(|scope| {
         let compiling = thread::Builder::new().stack_size(COMPILER_STACK).spawn_scoped(scope, &compile);
         let Ok(compiling) = compiling else { return (compile(), other()) };

@@ -71,7 +71,8 @@ pub const JUDGED: u32 = 8;
 /// The lowest bit of [`TreeNode::below`] that says of what kind a node is.
 pub const KIND_SHIFT: u32 = 30;
 
-/// The bit of a node with children that says that some are one surfel, which is drawn for them. A node has fewer children and surfels than this.
+/// The bit of a node whose children may be drawn unjudged that says that some are one surfel, which is drawn for them. A node has fewer children and
+/// surfels than this.
 pub const WITH_SURFELS: u32 = 1 << 29;
 
 /// A node with children.

@@ -10,6 +10,7 @@
 //!    ([`Camera`](crate::scene::Camera) refuses larger ones), and cells and tiles of it; and lengths of lists, of which each is a
 //!    range within a binding (`column_of` holds it below `arrayLength`, and its end is its start plus what was placed), thus
 //!    shorter than 2^30 words, and a tile has two.
+//!    Where it grows by 1 as long as it is below its limit any limit will do: it comes there before it wraps.
 //! 2. A **rectangle** is passed in rows by a pixel that grows by a step in each round: `at.x` grows, and where it passes the last
 //!    column it starts again with `at.y` grown. Columns and rows come from a splat's bounds, whose numbers have 15 and 16 bits, so
 //!    each of at most 2^16 rows has at most 2^16 rounds.

@@ -123,8 +123,8 @@ fn gathers(needs: &SceneNeeds, options: &RenderOptions, known: &Known) -> bool {
     needs.may_gather() && pays && !known.crowded && options.has(Optimisation::Gathering)
 }
 
-/// Whether batches that are hidden or out of view are left out. Of cuts none is: what is out of view is none of them, and to bound their batches
-/// anew for each frame takes longer than drawing what is hidden, but where most is.
+/// Whether batches that are hidden or out of view are left out. Of cuts none is: what is out of view is in none, and to bound their batches
+/// anew for each frame takes longer than drawing what is hidden, except where most is.
 fn culls(drawn: u64, needs: &SceneNeeds, camera: &Camera, options: &RenderOptions) -> bool {
     // The rasteriser draws every splat.
     options.has(Optimisation::Culling)

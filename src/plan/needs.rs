@@ -36,7 +36,7 @@ pub struct SceneNeeds {
     pub node_caps: bool,
     /// There is less than all of some surfel, as cuts fade into each other.
     pub fades: bool,
-    /// Batches of surfels that are out of view or hidden are left out: there are enough surfels for the image's pixels, all of which are looked at for what hides ([`tuning::PIXELS_A_CULLED_SURFEL`]).
+    /// Batches of surfels that are out of view or hidden are left out: no cut is drawn, and there are enough surfels for the image's pixels, all of which are looked at for what hides ([`tuning::PIXELS_A_CULLED_SURFEL`]).
     pub cull: bool,
     /// Large splats, at least, are drawn by tiles: the accumulator is `fixed`, and the options do not say scatter.
     pub tiles: bool,

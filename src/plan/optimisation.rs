@@ -7,7 +7,7 @@ use crate::error::Error;
 /// Something that no image depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Optimisation {
-    /// Batches of surfels that are out of view or hidden are not projected (`passes/cull.rs`).
+    /// Batches of surfels that are out of view or hidden are not projected, but of cuts (`passes/cull.rs`).
     Culling,
     /// Surfels are stored along a Morton curve, in runs that are dealt out (`passes/order.rs`).
     Order,

@@ -64,7 +64,7 @@ impl Run<'_> {
         if let (true, Some(first)) = (rooms.iter().all(|room| *room == 0), rooms.first_mut()) {
             *first = 1;
         }
-        (self.known.cut, self.known.slots) = (Some(rooms), false);
+        self.known.cut = Some(rooms);
     }
 }
 

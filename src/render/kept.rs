@@ -106,7 +106,8 @@ impl Kept {
         }
     }
 
-    /// Compiles the kernels and makes the buffers of `plan`, as far as they are not there.
+    /// Compiles the kernels and makes the buffers of `plan`, as far as they are not there: kernels while the scene is uploaded. Of two errors that of the
+    /// kernels is told.
     fn prepare(
         &mut self,
         (gpu, sources): (&Gpu, &Sources),
@@ -122,38 +123,40 @@ impl Kept {
             self.store = None;
             self.known.forget_buffers();
         }
-        let store = match self.store.take() {
+        let store = match &mut self.store {
             Some(store) => {
                 kernels.compile(gpu, plan)?;
                 store
             }
             None => {
                 let ordered = self.options.has(Optimisation::Order) || asks_for_order(&plan.needs);
-                let next = self.plan_of_cut(gpu, plan, camera)?;
+                let next = self.plan_of_cut(gpu, plan, camera);
                 let compile = || {
                     kernels.compile(gpu, plan)?;
-                    let next = next.as_ref().map(|next| Kernels::new(sources, next, &self.options, surfels));
-                    next.map_or(Ok(()), |next| next.first(gpu).map(drop))
+                    if let Some(next) = &next {
+                        // What is wrong with kernels that a guess takes is told if they are needed.
+                        let _ = Kernels::new(sources, next, &self.options, surfels).first(gpu);
+                    }
+                    Ok(())
                 };
                 let stored = || {
                     let uploaded = upload(gpu, source, &plan.needs, (&self.facts, ordered), progress)?;
                     Store::new(gpu, uploaded, &plan.needs)
                 };
-                let (compiled, stored) = beside(compile, stored);
+                let (compiled, stored): (Result<()>, _) = beside(gpu, compile, stored);
                 compiled?;
-                stored?
+                self.store.insert(stored?)
             }
         };
         self.kernels = Some(kernels);
-        self.store.insert(store).fit(gpu, plan, &self.known)
+        store.fit(gpu, plan, &self.known)
     }
 
-    /// The plan that most likely follows `plan`, if that one looks for a cut: of one that a page has room for. What it takes is compiled for the device
-    /// meanwhile.
-    fn plan_of_cut(&self, gpu: &Gpu, plan: &Plan, camera: &Camera) -> Result<Option<Plan>> {
+    /// A guess at the plan that follows `plan`, if that one looks for a cut: that of a cut that a page has room for.
+    fn plan_of_cut(&self, gpu: &Gpu, plan: &Plan, camera: &Camera) -> Option<Plan> {
         let known = Known { cut: Some(vec![1]), ..self.known.clone() };
-        let next = || Plan::of(&self.facts, &gpu.adapter, camera, &self.options, &known);
-        plan.looks_for_cut().then(next).transpose()
+        let next = || Plan::of(&self.facts, &gpu.adapter, camera, &self.options, &known).ok();
+        plan.looks_for_cut().then(next)?
     }
 
     fn report(

@@ -53,7 +53,8 @@ impl Page {
     ) -> Result<Self> {
         let surfels = u64::from(own.surfels);
         buffers.insert("page", Buffer::uniform(gpu, "page", &own)?.words());
-        let batches = surfels.div_ceil(BATCH.into());
+        // Those of cuts are drawn one and all.
+        let batches = if branch.is_some() { 0 } else { surfels.div_ceil(BATCH.into()) };
         let drawn = Buffer::indirect(gpu, "batches that are drawn", batches + u64::from(LIST_START))?;
         // A row of a grid is a batch.
         gpu.queue.write_buffer(&drawn.raw, 0, bytemuck::cast_slice(&[[BATCH / WORKGROUP, 0, 1]; 2]));

@@ -61,7 +61,7 @@ impl LevelFacts {
     /// Those of these nodes and of one more.
     fn with(self, node: &Node) -> Self {
         let radius = node.surfel.radius();
-        // What no cap with such heights is higher than: few are looked at closely.
+        // A cap is no higher than half the sum of its heights (and what rounding to f32 may add), so few are looked at closely.
         let most = f64::from(radius) + 0.500_001 * node.cap.0.iter().map(|height| f64::from(height.abs())).sum::<f64>();
         let may_be_largest = most > f64::from(self.largest_radius);
         let highest = if may_be_largest { node.cap.highest() as f32 } else { 0.0 };
@@ -153,5 +153,35 @@ impl Whole {
         let most = 4.0 * (max - min).max_element();
         let finite = self.origin.is_finite() && min.is_finite() && max.is_finite() && min.cmple(max).all();
         finite && (most == 0.0 || min.abs().max(max.abs()).max_element() <= most)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+    use crate::scene::{Cap, Surfel};
+
+    /// Nodes that are passed over are none of the largest, whatever their heights are and wherever threads begin.
+    #[test]
+    fn the_largest_node_is_found() {
+        let mut random = Random::stream(7, 0);
+        let mut number = |most: f32| (random.number() as f32 - 0.5) * most;
+        let nodes: Vec<Node> = (0..20_000)
+            .map(|k| {
+                let scale = [1e-30, 1.0, 1e-3, 1e12][k % 4];
+                let [s, t] = [0, 1].map(|_| [0; 3].map(|_| number(scale)));
+                let cap = Cap([0; 3].map(|_| number(scale * [0.0, 1e-6, 1.0, 5.0][k / 4 % 4])));
+                let surfel = Surfel { center: [0.0; 3], s, t };
+                Node { surfel, cap, color: [1.0; 4], radius: 1.0, cone: 1.0, first: 0, count: 1, leaf: true }
+            })
+            .collect();
+        for first in 0..4 {
+            let nodes: Vec<Node> = nodes.iter().skip(first).step_by(4).copied().collect();
+            let largest = nodes.iter().map(|node| node.surfel.radius() + node.cap.highest() as f32).fold(0.0, f32::max);
+            let shorter = nodes.iter().map(|node| node.surfel.shorter()).fold(0.0, f32::max);
+            let facts = LevelFacts::of_nodes(nodes.par_iter());
+            assert_eq!(facts, LevelFacts { largest_radius: largest, largest_shorter: shorter, caps: true });
+        }
     }
 }

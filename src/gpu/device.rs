@@ -26,6 +26,14 @@ const SOFTWARE_FEATURES: wgpu::Features = wgpu::Features::MAPPABLE_PRIMARY_BUFFE
 pub const INSTALL_HINT: &str = "install a Vulkan driver (on Debian or Ubuntu without a GPU: \
     apt-get install mesa-vulkan-drivers libvulkan1) or render with --backend reference";
 
+/// Whether wgpu checks the counts of workgroups that a device tells itself: by a dispatch before each such one, which takes a fifth of the time of
+/// small cuts of levels of detail (1.9 ms and not 1.5). Here none is too large: all are grids of `rows_of` (`wgsl/project.wgsl`) for lists that are shorter than 2^30, thus have
+/// 65,535 groups a row and 2^14 rows at most, or have a row for each batch of a page, of which there are no more than
+/// [`MOST_GROUPS`](super::layout::MOST_GROUPS). Direct3D 12 tells kernels these counts only where they are checked.
+fn counts_are_checked() -> bool {
+    cfg!(windows) || std::env::var_os("WGPU_VALIDATION_INDIRECT_CALL").is_some_and(|value| value != "0")
+}
+
 /// The adapters that OpenGL reaches, or those of all other interfaces.
 fn enumerate(of_gl: bool) -> Vec<(AdapterDescription, wgpu::Adapter)> {
     // One instance for the whole run: NVIDIA's driver crashes where threads make and drop instances beside each other (gfx-rs/wgpu#5930).
@@ -34,6 +42,9 @@ fn enumerate(of_gl: bool) -> Vec<(AdapterDescription, wgpu::Adapter)> {
     let instance = INSTANCES[usize::from(of_gl)].get_or_init(|| {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
         descriptor.backends &= backends;
+        if !counts_are_checked() {
+            descriptor.flags.remove(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
+        }
         wgpu::Instance::new(descriptor)
     });
     let adapters = pollster::block_on(instance.enumerate_adapters(backends));

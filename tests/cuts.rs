@@ -378,9 +378,15 @@ fn children_are_drawn_together_where_each_would_be() {
         Backend::Gpu { gpu: Box::new(gpu.clone()), sources }
     };
     let (together, alone) = (Backend::gpu(gpu.clone()), backend(TOGETHER, "false"));
-    let broken = [backend(WITHIN, "let within = true;"), backend("past && within", "within")];
-    let mut noticed = [false; 2];
-    for scene in all().into_iter().filter_map(|(name, scene)| (name == "plain" || name == "doubled").then_some(scene)) {
+    let broken = [
+        backend(WITHIN, "let within = true;"),
+        backend("past && within", "within"),
+        backend("(node.below & WITH_SURFELS) != 0u;", "false;"),
+    ];
+    let mut noticed = [false; 3];
+    // Of one that has lines a surfel is another than its node.
+    let some = |name: &str| name == "clipped, normals" || name == "doubled";
+    for scene in all().into_iter().filter_map(|(name, scene)| some(name).then_some(scene)) {
         let scene = levels(scene);
         for (eye, lens, near) in [
             (DVec3::new(0.3, 0.8, 3.0), Lens::Fov(50.0), 2.4),
@@ -389,7 +395,7 @@ fn children_are_drawn_together_where_each_would_be() {
             (DVec3::new(0.3, 0.8, 3.0), Lens::OrthographicHeight(1.2), 1e-3),
         ] {
             let camera = Camera::look_at((200, 140), lens, eye, DVec3::ZERO, None, Up::Y, near).unwrap();
-            for options in [at(900.0), fading(&at(1800.0))] {
+            for options in [at(900.0), at(200.0), fading(&at(1800.0))] {
                 let of = |backend: &Backend| {
                     let (shown, report) = render(&scene, &camera, &options, backend, &()).unwrap();
                     (bits(&shown), report.cut)
@@ -400,7 +406,7 @@ fn children_are_drawn_together_where_each_would_be() {
             }
         }
     }
-    assert_eq!(noticed, [true; 2]);
+    assert_eq!(noticed, [true; 3]);
 }
 
 /// What `drawn_at` of a text of select.wgsl says of each (runs, stride, place, first).

@@ -60,7 +60,8 @@ override MEASURES_EXTENT: bool;
 
 const PI: f32 = 3.14159265;
 
-// Room for the rounding of a ball's place and size, of its distance; of bounds of several balls; and of sines.
+// Room for the rounding of a ball's place and size, of its distance; of bounds of children's balls, which lie off by 2e-6 of that distance, as a child is
+// less than twice as far as its parent where both are past the near depth, and whose sizes err by six roundings of 6e-8; and of sines.
 const BALL_ROUNDING: f32 = 1e-6;
 const BOUND_SLACK: f32 = 1e-4;
 const SINE_SLACK: f32 = 1e-5;

@@ -16,7 +16,8 @@ use crate::scene::hierarchy::{Hierarchy, Node};
 /// The most surfels of one node that an invocation copies the numbers of.
 const MOST_OF_LEAF: u32 = 4096;
 
-// What an invocation spreads takes fewer rounds than llvmpipe ends loops after.
+// What an invocation spreads takes fewer rounds than llvmpipe ends loops after: of each node its surfels or its children, one more in which it is come to,
+// and one in which each of its two loops ends.
 const _: () = assert!(JUDGED * (MOST_OF_LEAF + 4) < 65_535);
 
 /// Neighbouring subtrees.

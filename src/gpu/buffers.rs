@@ -136,9 +136,12 @@ impl<T: Pod> Buffer<T> {
         &self,
         gpu: &Gpu,
         len: usize,
-        values: impl Fn(Range<usize>) -> Cow<'a, [T]>,
+        values: impl Fn(Range<usize>) -> Cow<'a, [T]> + Sync,
         progress: &dyn Progress,
-    ) -> Result<()> {
+    ) -> Result<()>
+    where
+        T: Send + Sync,
+    {
         if len > 0 && self.raw.usage().contains(wgpu::BufferUsages::MAP_WRITE) {
             return self.write_where_it_lies(gpu, len, values, progress);
         }
@@ -154,24 +157,33 @@ impl<T: Pod> Buffer<T> {
         Ok(())
     }
 
+    /// While a piece is copied, which takes as long as the device's memory is touched for the first time, the next one is made.
     fn write_where_it_lies<'a>(
         &self,
         gpu: &Gpu,
         len: usize,
-        values: impl Fn(Range<usize>) -> Cow<'a, [T]>,
+        values: impl Fn(Range<usize>) -> Cow<'a, [T]> + Sync,
         progress: &dyn Progress,
-    ) -> Result<()> {
+    ) -> Result<()>
+    where
+        T: Send + Sync,
+    {
         let size = size_of::<T>();
         let per_piece = (OPEN_PIECE / size).max(1);
         let slice = self.raw.slice(..((len * size) as u64).next_multiple_of(4));
         slice.map_async(wgpu::MapMode::Write, |_| {});
         gpu.wait()?;
         let mut view = slice.get_mapped_range_mut().map_err(|e| gpu.error(format!("writing failed: {e}")))?;
+        let piece = |first: usize| values(first.min(len)..len.min(first + per_piece));
+        let mut next = piece(0);
         for first in (0..len).step_by(per_piece) {
-            let values = values(first..len.min(first + per_piece));
-            let bytes: &[u8] = bytemuck::cast_slice(&values);
-            view.slice(first * size..first * size + bytes.len()).copy_from_slice(bytes);
-            progress.advance(values.len() as u64);
+            let these = std::mem::take(&mut next);
+            rayon::in_place_scope(|scope| {
+                scope.spawn(|_| next = piece(first + per_piece));
+                let bytes: &[u8] = bytemuck::cast_slice(&these);
+                view.slice(first * size..first * size + bytes.len()).copy_from_slice(bytes);
+            });
+            progress.advance(these.len() as u64);
         }
         drop(view);
         self.raw.unmap();

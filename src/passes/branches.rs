@@ -73,6 +73,9 @@ fn parts(number: u32, node: &Node) -> impl Iterator<Item = Item> + use<> {
 /// Of a node whose children are judged one by one ([`TreeNode::children`]).
 const ONE_BY_ONE: f32 = -1.0;
 
+/// Of a row that is not known to be one by one yet.
+const TOGETHER: f32 = 0.0;
+
 /// Of an inner node that has the centres of all its children in its ball: the largest radius of a child, but of those that are one surfel, which is drawn
 /// for them; and [`WITH_SURFELS`] if there are such. Of another one its children are judged one by one.
 fn children_of(tree: &Hierarchy, number: u32) -> (f32, u32) {
@@ -186,6 +189,16 @@ fn surfels_of(tree: &Hierarchy, index: u32) -> u32 {
     last.first + last.count - first.first
 }
 
+/// Gives the row of a node what is told of the node alone.
+fn fill(row: &mut TreeNode, tree: &Hierarchy, number: u32) {
+    let Node { radius, cone, .. } = tree.nodes[number as usize];
+    (row.radius, row.cone) = (radius, cone);
+    if row.children == TOGETHER {
+        let (children, mixed) = children_of(tree, number);
+        (row.children, row.below) = (children, row.below | mixed);
+    }
+}
+
 /// The branch of some subtrees, whose surfels are a range; nodes that are `elsewhere` lead to roots of other branches.
 fn laid_out(
     tree: &Hierarchy,
@@ -200,7 +213,7 @@ fn laid_out(
         if nodes.len() == level_end {
             (levels, level_end) = (levels + 1, items.len());
         }
-        let (mut children, mut mixed) = (ONE_BY_ONE, 0);
+        let mut children = ONE_BY_ONE;
         let (number, kind, first, count) = match items[nodes.len()] {
             Item::Part { leaf, first, count } => (leaf, PART_OF_LEAF, first - surfels.start, count),
             Item::Other { root, node } => (node, OTHER_BRANCH, root, 1),
@@ -223,7 +236,7 @@ fn laid_out(
                     (false, None) => {
                         let all = node.first..node.first + node.count;
                         if all.clone().all(|child| elsewhere(child).is_none()) {
-                            (children, mixed) = children_of(tree, number);
+                            children = TOGETHER;
                         }
                         items.extend(all.map(Item::Node));
                         (number, INNER, below, node.count)
@@ -231,10 +244,12 @@ fn laid_out(
                 }
             }
         };
-        let Node { radius, cone, .. } = tree.nodes[number as usize];
-        nodes.push(TreeNode { radius, cone, first, below: count | mixed | kind << KIND_SHIFT, children });
+        nodes.push(TreeNode { radius: 0.0, cone: 0.0, first, below: count | kind << KIND_SHIFT, children });
         numbers.push(number);
     }
+    // Where rows lie is found one after the other, and what is in them by all threads.
+    let rows = nodes.par_iter_mut().zip(&numbers).with_min_len(4096);
+    rows.for_each(|(row, &number)| fill(row, tree, number));
     Branch { surfels, nodes, numbers, roots, first_root: 0, whole: false, levels }
 }
 

@@ -51,7 +51,7 @@ pub trait Source: Send + Sync {
 }
 
 /// Consecutive surfels of a [`Source`].
-pub trait Page {
+pub trait Page: Sync {
     /// The number of each in the source.
     fn numbers(&self) -> Cow<'_, [u32]>;
 

@@ -73,7 +73,7 @@ fn parts(number: u32, node: &Node) -> impl Iterator<Item = Item> + use<> {
 /// Of a node whose children are judged one by one ([`TreeNode::children`]).
 const ONE_BY_ONE: f32 = -1.0;
 
-/// Of a row that is not known to be one by one yet.
+/// Of one whose children may be judged together.
 const TOGETHER: f32 = 0.0;
 
 /// Of an inner node that has the centres of all its children in its ball: the largest radius of a child, but of those that are one surfel, which is drawn
@@ -100,9 +100,10 @@ fn children_of(tree: &Hierarchy, number: u32) -> (f32, u32) {
 pub fn branches(tree: &Hierarchy, most: u64) -> Vec<Branch> {
     let (rows, surfels) = rows_of(tree);
     if rows <= most {
-        let mut items = Vec::with_capacity(tree.nodes.len());
-        items.push(Item::Node(0));
-        return vec![Branch { whole: true, ..laid_out(tree, items, 0..surfels, |_| None) }];
+        return vec![Branch {
+            whole: true,
+            ..laid_out(tree, (&[Item::Node(0)], tree.nodes.len()), 0..surfels, |_| None)
+        }];
     }
     let subtrees = subtrees(tree, &sizes(tree), most);
     let mut roots: HashMap<u32, Elsewhere> = HashMap::new();
@@ -113,7 +114,7 @@ pub fn branches(tree: &Hierarchy, most: u64) -> Vec<Branch> {
         };
         roots.entry(node).or_insert(Elsewhere { root, in_parts });
     }
-    let top = Branch { whole: true, ..laid_out(tree, vec![Item::Node(0)], 0..0, |node| roots.get(&node).copied()) };
+    let top = Branch { whole: true, ..laid_out(tree, (&[Item::Node(0)], 0), 0..0, |node| roots.get(&node).copied()) };
     let mut all = vec![top];
     let (mut first, mut surfel) = (0, 0);
     while first < subtrees.len() {
@@ -122,8 +123,8 @@ pub fn branches(tree: &Hierarchy, most: u64) -> Vec<Branch> {
             (size, surfels) = (size + subtrees[end].1, surfels + subtrees[end].2);
             end += 1;
         }
-        let items = subtrees[first..end].iter().map(|(item, ..)| *item).collect();
-        let branch = laid_out(tree, items, surfel..surfel + surfels, |_| None);
+        let items: Vec<Item> = subtrees[first..end].iter().map(|(item, ..)| *item).collect();
+        let branch = laid_out(tree, (&items, (size - u64::from(surfels)) as usize), surfel..surfel + surfels, |_| None);
         all.push(Branch { first_root: first as u32, ..branch });
         (first, surfel) = (end, surfel + surfels);
     }
@@ -189,6 +190,87 @@ fn surfels_of(tree: &Hierarchy, index: u32) -> u32 {
     last.first + last.count - first.first
 }
 
+/// The branch of some subtrees of so many nodes or a few more, whose surfels are a range; nodes that are `elsewhere` lead to roots of other branches.
+fn laid_out(
+    tree: &Hierarchy,
+    (roots, room): (&[Item], usize),
+    surfels: Range<u32>,
+    elsewhere: impl Fn(u32) -> Option<Elsewhere>,
+) -> Branch {
+    let (nodes, numbers) = (Vec::with_capacity(room), Vec::with_capacity(room));
+    let mut rows = Rows { tree, elsewhere, surfels, nodes, numbers };
+    roots.iter().for_each(|root| rows.push(*root));
+    let (mut row, mut levels, mut level_end) = (0, 0, 0);
+    while row < rows.nodes.len() {
+        if row == level_end {
+            (levels, level_end) = (levels + 1, rows.nodes.len());
+        }
+        rows.push_below(row);
+        row += 1;
+    }
+    let Rows { surfels, mut nodes, numbers, .. } = rows;
+    // Where rows lie is found one after the other, and what is in them by all threads.
+    let all = nodes.par_iter_mut().zip(&numbers).with_min_len(4096);
+    all.for_each(|(row, &number)| fill(row, tree, number));
+    Branch { surfels, nodes, numbers, roots: roots.len() as u32, first_root: 0, whole: false, levels }
+}
+
+/// Rows of a branch, of which those below are not all there yet.
+struct Rows<'a, E> {
+    tree: &'a Hierarchy,
+    elsewhere: E,
+    surfels: Range<u32>,
+    nodes: Vec<TreeNode>,
+    numbers: Vec<u32>,
+}
+
+impl<E: Fn(u32) -> Option<Elsewhere>> Rows<'_, E> {
+    /// Adds the row of an item, without what is below it.
+    fn push(&mut self, item: Item) {
+        let (number, kind, first, count) = match item {
+            Item::Part { leaf, first, count } => (leaf, PART_OF_LEAF, first - self.surfels.start, count),
+            Item::Other { root, node } => (node, OTHER_BRANCH, root, 1),
+            Item::Node(number) => {
+                let node = &self.tree.nodes[number as usize];
+                match (self.elsewhere)(number) {
+                    Some(Elsewhere { root, in_parts: false }) => (number, OTHER_BRANCH, root, 1),
+                    None if node.leaf && node.count <= MOST_OF_LEAF => {
+                        (number, LEAF, node.first - self.surfels.start, node.count)
+                    }
+                    // A leaf in parts is a node above them.
+                    _ => (number, INNER, 0, 0),
+                }
+            }
+        };
+        let below = count | kind << KIND_SHIFT;
+        self.nodes.push(TreeNode { radius: 0.0, cone: 0.0, first, below, children: ONE_BY_ONE });
+        self.numbers.push(number);
+    }
+
+    /// Adds what is right below an inner node.
+    fn push_below(&mut self, row: usize) {
+        if self.nodes[row].below >> KIND_SHIFT != INNER {
+            return;
+        }
+        let (number, tree, first) = (self.numbers[row], self.tree, self.nodes.len());
+        let node = &tree.nodes[number as usize];
+        let all = node.first..node.first + node.count;
+        if !node.leaf {
+            if all.clone().all(|child| (self.elsewhere)(child).is_none()) {
+                self.nodes[row].children = TOGETHER;
+            }
+            all.for_each(|child| self.push(Item::Node(child)));
+        } else if let Some(Elsewhere { root, .. }) = (self.elsewhere)(number) {
+            (root..).zip(parts(number, node)).for_each(|(root, _)| self.push(Item::Other { root, node: number }));
+        } else {
+            parts(number, node).for_each(|part| self.push(part));
+        }
+        let count = (self.nodes.len() - first) as u32;
+        let own = &mut self.nodes[row];
+        (own.first, own.below) = (first as u32, own.below | count);
+    }
+}
+
 /// Gives the row of a node what is told of the node alone.
 fn fill(row: &mut TreeNode, tree: &Hierarchy, number: u32) {
     let Node { radius, cone, .. } = tree.nodes[number as usize];
@@ -197,60 +279,6 @@ fn fill(row: &mut TreeNode, tree: &Hierarchy, number: u32) {
         let (children, mixed) = children_of(tree, number);
         (row.children, row.below) = (children, row.below | mixed);
     }
-}
-
-/// The branch of some subtrees, whose surfels are a range; nodes that are `elsewhere` lead to roots of other branches.
-fn laid_out(
-    tree: &Hierarchy,
-    mut items: Vec<Item>,
-    surfels: Range<u32>,
-    elsewhere: impl Fn(u32) -> Option<Elsewhere>,
-) -> Branch {
-    let roots = items.len() as u32;
-    let (mut nodes, mut numbers) = (Vec::with_capacity(items.capacity()), Vec::with_capacity(items.capacity()));
-    let (mut levels, mut level_end) = (0, 0);
-    while nodes.len() < items.len() {
-        if nodes.len() == level_end {
-            (levels, level_end) = (levels + 1, items.len());
-        }
-        let mut children = ONE_BY_ONE;
-        let (number, kind, first, count) = match items[nodes.len()] {
-            Item::Part { leaf, first, count } => (leaf, PART_OF_LEAF, first - surfels.start, count),
-            Item::Other { root, node } => (node, OTHER_BRANCH, root, 1),
-            Item::Node(number) => {
-                let node = &tree.nodes[number as usize];
-                let below = items.len() as u32;
-                match (node.leaf, elsewhere(number)) {
-                    // A leaf in parts is a node above them.
-                    (_, Some(Elsewhere { root, in_parts: true })) => {
-                        let parts = (root..).zip(parts(number, node));
-                        items.extend(parts.map(|(root, _)| Item::Other { root, node: number }));
-                        (number, INNER, below, items.len() as u32 - below)
-                    }
-                    (_, Some(Elsewhere { root, .. })) => (number, OTHER_BRANCH, root, 1),
-                    (true, None) if node.count > MOST_OF_LEAF => {
-                        items.extend(parts(number, node));
-                        (number, INNER, below, items.len() as u32 - below)
-                    }
-                    (true, None) => (number, LEAF, node.first - surfels.start, node.count),
-                    (false, None) => {
-                        let all = node.first..node.first + node.count;
-                        if all.clone().all(|child| elsewhere(child).is_none()) {
-                            children = TOGETHER;
-                        }
-                        items.extend(all.map(Item::Node));
-                        (number, INNER, below, node.count)
-                    }
-                }
-            }
-        };
-        nodes.push(TreeNode { radius: 0.0, cone: 0.0, first, below: count | kind << KIND_SHIFT, children });
-        numbers.push(number);
-    }
-    // Where rows lie is found one after the other, and what is in them by all threads.
-    let rows = nodes.par_iter_mut().zip(&numbers).with_min_len(4096);
-    rows.for_each(|(row, &number)| fill(row, tree, number));
-    Branch { surfels, nodes, numbers, roots, first_root: 0, whole: false, levels }
 }
 
 #[cfg(test)]

@@ -11,8 +11,6 @@
 //! On a device the tree lies in [`branches`](super::branches), which are gone through one after the other. What was chosen of each is drawn from where it
 //! lies, page by page: nothing that follows knows of trees.
 
-use std::f64::consts::FRAC_PI_2;
-
 use glam::{DVec2, DVec3};
 
 use super::cull;
@@ -176,13 +174,17 @@ fn turned_away(node: &Node, (center, radius): (DVec3, f64), camera: &Camera) -> 
     let (toward, ball) = match camera.projection {
         Projection::Pinhole => {
             let distance = center.length();
-            (-center / distance, (radius / distance).min(1.0).asin())
+            (-center / distance, (radius / distance).min(1.0))
         }
         Projection::Orthographic => (-camera.rotation.row(2), 0.0),
     };
-    let spread = f64::from(node.cone).clamp(-1.0, 1.0).acos() + ball;
+    // Cosine and sine of each angle, of the ball up to a right one, and of both together.
+    let across = |one: f64| (1.0 - one * one).sqrt();
+    let cone = f64::from(node.cone).clamp(-1.0, 1.0);
+    let cone = DVec2::new(cone, across(cone));
+    let spread = cone.rotate(DVec2::new(across(ball), ball));
     let [s, t] = [node.surfel.s, node.surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
-    [-toward.dot(s.cross(t).normalize_or_zero()), if spread < FRAC_PI_2 { spread.sin() } else { 1.0 }]
+    [-toward.dot(s.cross(t).normalize_or_zero()), if spread.x > 0.0 { spread.y } else { 1.0 }]
 }
 
 #[cfg(test)]

@@ -116,7 +116,13 @@ fn splats(gpu: &Gpu, needs: &SceneNeeds, order: &[u32], store: &Store) -> Result
 ///
 /// # Errors
 /// A module that is not valid, binds anything else, or fails on the device.
-pub fn evaluate<I: Pod + Send + Sync, O: Pod>(gpu: &Gpu, text: &str, view: &View, inputs: &[I], output_len: u64) -> Result<Vec<O>> {
+pub fn evaluate<I: Pod + Send + Sync, O: Pod>(
+    gpu: &Gpu,
+    text: &str,
+    view: &View,
+    inputs: &[I],
+    output_len: u64,
+) -> Result<Vec<O>> {
     const ENTRY: &str = "evaluate";
     const NAMES: [&str; 3] = ["view", "inputs", "outputs"];
     let (_, bindings, _) = reflect(text).map_err(|e| Error::Usage(format!("the kernel is not valid WGSL: {e}")))?;

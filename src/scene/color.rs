@@ -26,8 +26,8 @@ pub const DEFAULT_COLOR: [f32; 4] = [0.7, 0.7, 0.7, 1.0];
 
 /// The nearest 8-bit sRGB codes of a linear colour, alpha straight; what lies outside of [0, 1] is clamped.
 pub fn srgb8([r, g, b, a]: [f32; 4]) -> [u8; 4] {
-    // A cast takes what is larger for 255.
-    [srgb8_of(r), srgb8_of(g), srgb8_of(b), (f64::from(a) * 255.0).round() as u8]
+    // A cast leaves out what is behind the point, takes what is larger for 255 and what is less for 0.
+    [srgb8_of(r), srgb8_of(g), srgb8_of(b), (f64::from(a) * 255.0 + 0.5) as u8]
 }
 
 impl Default for Colors {

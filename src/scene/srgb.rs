@@ -19,14 +19,35 @@ pub static SRGB8_TO_LINEAR: LazyLock<[f32; 256]> =
 
 /// The nearest 8-bit sRGB code of linear light, 0 of what is no number.
 pub fn srgb8_of(linear: f32) -> u8 {
-    // At most 255 of them.
-    LEAST.partition_point(|least| *least <= linear) as u8
+    let Codes { least, of_bits } = &*CODES;
+    if linear >= least[254] {
+        return 255;
+    }
+    if linear >= least[0] {
+        let mut code = of_bits[((linear.to_bits() - least[0].to_bits()) >> BUCKET) as usize];
+        // This ends, as the least of the last code is larger.
+        while least[code as usize] <= linear {
+            code += 1;
+        }
+        return code;
+    }
+    0
 }
 
-/// The least linear light of each code from 1 on, as [`linear_to_srgb`] says: the power that it takes is much slower than to look that up.
-static LEAST: LazyLock<[f32; 255]> = LazyLock::new(|| {
+/// So many bits below the upper ones: within 1/256 of a power of two there are at most two codes.
+const BUCKET: u32 = 15;
+
+/// What codes are looked up in: the power that they follow from is much slower.
+struct Codes {
+    /// The least linear light of each code from 1 on, as [`linear_to_srgb`] says.
+    least: [f32; 255],
+    /// The code of each `1 << BUCKET`th number from the first of these on.
+    of_bits: Vec<u8>,
+}
+
+static CODES: LazyLock<Codes> = LazyLock::new(|| {
     let code = |linear: f32| (linear_to_srgb(linear.into()) * 255.0).round() as usize;
-    std::array::from_fn(|index| {
+    let least = std::array::from_fn(|index| {
         // Numbers from 0 on are in the order of their bits.
         let (mut below, mut least) = (0, 1f32.to_bits());
         while least - below > 1 {
@@ -34,7 +55,10 @@ static LEAST: LazyLock<[f32; 255]> = LazyLock::new(|| {
             *if code(f32::from_bits(middle)) > index { &mut least } else { &mut below } = middle;
         }
         f32::from_bits(least)
-    })
+    });
+    let bits = (least[0].to_bits()..=least[254].to_bits()).step_by(1 << BUCKET);
+    let of_bits = bits.map(|bits| least.partition_point(|least| *least <= f32::from_bits(bits)) as u8);
+    Codes { least, of_bits: of_bits.collect() }
 });
 
 #[cfg(test)]
@@ -44,13 +68,21 @@ mod tests {
     #[test]
     fn codes_that_are_looked_up_are_the_nearest() {
         let plain = |linear: f32| (linear_to_srgb(linear.into()) * 255.0).round() as u8;
-        let at_ends = LEAST.iter().flat_map(|least| (-4i32..5).map(|step| least.to_bits().wrapping_add_signed(step)));
+        let at_ends =
+            CODES.least.iter().flat_map(|least| (-4i32..5).map(|step| least.to_bits().wrapping_add_signed(step)));
         let spread = (0..1 << 16).map(|k| 0x3000_0000 + k * 0x1100);
         for linear in
             at_ends.chain(spread).map(f32::from_bits).chain([-1.0, -0.0, 0.0, 1e-40, 7.0, f32::NAN, f32::INFINITY])
         {
             assert_eq!(srgb8_of(linear), plain(linear), "{linear}");
         }
+    }
+
+    #[test]
+    fn few_codes_are_passed_over() {
+        assert!(CODES.of_bits.len() < 4096);
+        assert!(CODES.of_bits.windows(2).all(|next| (0..=1).contains(&(next[1] - next[0]))));
+        assert_eq!((CODES.of_bits[0], CODES.of_bits.last()), (1, Some(&254)));
     }
 
     #[test]

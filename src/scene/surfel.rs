@@ -31,11 +31,13 @@ impl Surfel {
 
     /// The ellipse `center + u s + v t`, `u² + v² <= 1`, for any s and t that are not parallel. Those that are not
     /// perpendicular are turned, within the ellipse, into the half-axes that are.
+    #[inline] // A call would wait for vectors that were just written.
     pub fn ellipse(center: Vec3, s: Vec3, t: Vec3) -> Self {
         // What f32 half-axes that were meant to be perpendicular miss it by.
         const ROUNDING: f64 = 1e-6;
         let (mut s, mut t) = (s.as_dvec3(), t.as_dvec3());
-        if s.dot(t).abs() > ROUNDING * s.length() * t.length() {
+        // Squares of what is made of f32 neither overflow nor vanish here.
+        if s.dot(t).powi(2) > ROUNDING * ROUNDING * s.length_squared() * t.length_squared() {
             // (cos a, sin a) and (-sin a, cos a) are perpendicular in (u, v) too, so they give the same ellipse with the same
             // s x t; their images are perpendicular for this a, the first of them the longer. The second follows from
             // s x t: as t cos a - s sin a it would be lost to rounding where it is much the shorter.

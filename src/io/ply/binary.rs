@@ -65,18 +65,29 @@ pub(super) fn vertices_in<const BIG: bool>(
     let mut vertices = Vertices::with_capacity(layout, vertex.count.min(possible))?;
     let has_lists = vertex.properties.iter().any(|property| matches!(property.kind, Kind::List { .. }));
     let block_rows = (BLOCK / layout.row_size).clamp(1, usize::try_from(vertex.count).unwrap_or(usize::MAX).max(1));
-    let mut block = vec![0; block_rows * layout.row_size];
+    let mut block = Vec::new();
     let mut columns = vec![Vec::with_capacity(block_rows); layout.columns.len()];
     while vertices.len() < vertex.count {
         let wanted = (vertex.count - vertices.len()).min(block_rows as u64) as usize;
-        let rows = if has_lists {
+        let size = wanted * layout.row_size;
+        // Rows that are in memory are decoded where they lie.
+        let lie_there = !has_lists && reader.fill_buf().is_ok_and(|bytes| bytes.len() >= size);
+        if !lie_there {
+            block.resize(size, 0);
+        }
+        let rows = if lie_there {
+            wanted
+        } else if has_lists {
             compact_rows::<BIG>(&mut reader, vertex, vertices.len(), &mut block, wanted, layout.row_size)?
         } else {
-            read_until_end(&mut reader, &mut block[..wanted * layout.row_size])? / layout.row_size
+            read_until_end(&mut reader, &mut block)? / layout.row_size
         };
-        let decoded = &block[..rows * layout.row_size];
+        let decoded = if lie_there { &reader.fill_buf()?[..size] } else { &block[..rows * layout.row_size] };
         for (values, column) in columns.iter_mut().zip(&layout.columns) {
             decode::<BIG>(decoded, layout.row_size, column.offset, column.scalar, values);
+        }
+        if lie_there {
+            reader.consume(size);
         }
         vertices.extend(rows, |column, row| columns[column][row]);
         progress.advance(rows as u64);
@@ -90,7 +101,9 @@ pub(super) fn vertices_in<const BIG: bool>(
 /// The numbers of one column of a block, in place of what `values` held.
 fn decode<const BIG: bool>(block: &[u8], row_size: usize, offset: usize, scalar: Scalar, values: &mut Vec<f64>) {
     fn strided<const N: usize>(block: &[u8], row_size: usize, offset: usize) -> impl Iterator<Item = [u8; N]> {
-        block.chunks_exact(row_size).filter_map(move |row| row.get(offset..)?.first_chunk().copied())
+        // Columns lie within their rows; of an iterator that might pass some over, rooms would be made one by one.
+        let number = move |row: &[u8]| row.get(offset..).and_then(|rest| rest.first_chunk().copied()).unwrap_or([0; N]);
+        block.chunks_exact(row_size).map(number)
     }
     macro_rules! numbers {
         ($type:ty) => {

@@ -4,7 +4,7 @@
 //! Pajarola 2003 (section 5.2) tilts the normals at a coarse splat's corners outward by the angle of its cone, as if all surfaces were convex and curved
 //! as much in any direction. Here a symmetric matrix is fitted, which tells hollows, saddles and cylinders.
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DMat2, DMat3, DVec2, DVec3};
 
 use super::below::Below;
 use super::sums::normal_of;
@@ -64,11 +64,33 @@ fn fitted(below: impl Iterator<Item = (DVec3, DVec3, f64)>, [along, across, norm
 
 /// The mean of these heights over points with this covariance about the centre, world units, and no more than half of how far these are spread: normals of
 /// what is far from flat tell no heights.
-pub(super) fn mean_height([xx, xy, yy]: Heights, covariance: Symmetric3, [along, across, _]: [DVec3; 3]) -> f64 {
+pub(super) fn mean_height(heights: Heights, covariance: Symmetric3, plane: [DVec3; 3]) -> f64 {
+    let spread = in_plane(covariance, plane);
+    let most = 0.5 * trace(spread).max(0.0).sqrt();
+    (0.5 * trace(matrix(heights) * spread)).clamp(-most, most)
+}
+
+/// How far points lie from a cap with these heights along its normal, world units, root mean square: by the covariance of `all` of them less what the cap's
+/// heights would vary over places with that of the `centers`, were these spread as a normal distribution is (1/2 tr (H C)²: more than over a disk or a
+/// square, so that of what a cap shows nothing is left).
+pub(super) fn off_cap(heights: Heights, [all, centers]: [Symmetric3; 2], plane: [DVec3; 3]) -> f64 {
+    let [.., normal] = plane;
+    let shown = matrix(heights) * in_plane(centers, plane);
+    (normal.dot(all.times(normal)) - 0.5 * trace(shown * shown)).max(0.0).sqrt()
+}
+
+fn matrix([xx, xy, yy]: Heights) -> DMat2 {
+    DMat2::from_cols_array(&[xx, xy, xy, yy])
+}
+
+/// The part of a covariance along the plane's directions.
+fn in_plane(covariance: Symmetric3, [along, across, _]: [DVec3; 3]) -> DMat2 {
     let of = |a: DVec3, b: DVec3| a.dot(covariance.times(b));
-    let (a, b, c) = (of(along, along), of(along, across), of(across, across));
-    let most = 0.5 * (a + c).max(0.0).sqrt();
-    (0.5 * (xx * a + 2.0 * xy * b + yy * c)).clamp(-most, most)
+    matrix([of(along, along), of(along, across), of(across, across)])
+}
+
+fn trace(m: DMat2) -> f64 {
+    m.x_axis.x + m.y_axis.y
 }
 
 /// The cap of a disk with half-axes of these lengths along the plane's directions.
@@ -132,6 +154,24 @@ mod tests {
                 assert!(looked_at > 50, "{looked_at}");
             }
         }
+    }
+
+    /// What lies off its cap makes a node count as larger than its ball; what curves as its cap does, or not at all, does not.
+    #[test]
+    fn what_lies_off_a_cap_counts() {
+        let root = |height: &dyn Fn(f64, f64) -> (f64, DVec2)| build(field(height, true), &()).unwrap().1.nodes[0];
+        let plane = root(&|_, _| (0.0, DVec2::ZERO));
+        assert!(f64::from(plane.radius) < 1.6, "{}", plane.radius);
+        let bowl = root(&|x, y| (0.1 * (x * x + y * y), 0.2 * DVec2::new(x, y)));
+        assert!(f64::from(bowl.radius) < 1.8, "{}", bowl.radius);
+        // Two sheets, of which the node between them is as far from either, and twice as large at most.
+        let sheets = |off: f64| {
+            let height = move |x: f64, _| (if ((x + 1.0) * 25.0) as i32 % 2 == 0 { off } else { -off }, DVec2::ZERO);
+            f64::from(root(&height).radius / plane.radius)
+        };
+        let off = 16.0 * 0.05 / f64::from(plane.radius);
+        assert!((sheets(0.05) / 1f64.hypot(off) - 1.0).abs() < 0.02, "{} {off}", sheets(0.05));
+        assert!((sheets(0.4) / 2.0 - 1.0).abs() < 0.1, "{}", sheets(0.4));
     }
 
     /// Normals that are far from the node's, or none, leave numbers.

@@ -54,7 +54,10 @@ fn all() -> Vec<(&'static str, Scene)> {
     let unsided = Scene { oriented: false, colors: linear, ..plain.clone() };
     vec![
         ("plain", plain.clone()),
-        ("one colour", Scene { colors: Colors::Constant([0.3, 0.5, 0.9, 1.0]), ..plain.clone() }),
+        (
+            "one colour, rough",
+            common::scenes::roughened(Scene { colors: Colors::Constant([0.3, 0.5, 0.9, 1.0]), ..plain.clone() }),
+        ),
         ("linear, without sides", unsided),
         ("clipped, normals", Scene { clips: clipped.collect(), normals, ..plain.clone() }),
         ("doubled", far),

@@ -59,7 +59,10 @@ fn all() -> Vec<(&'static str, Scene)> {
     vec![
         ("plain", plain.clone()),
         ("in map coordinates", Scene { origin: DVec3::new(6e5, 5.3e6, 0.0), up: Up::Z, ..plain.clone() }),
-        ("one colour", Scene { colors: Colors::Constant([0.3, 0.5, 0.9, 1.0]), ..plain.clone() }),
+        (
+            "one colour, rough",
+            common::scenes::roughened(Scene { colors: Colors::Constant([0.3, 0.5, 0.9, 1.0]), ..plain.clone() }),
+        ),
         ("linear, without sides", Scene { oriented: false, closed: false, colors: linear, ..plain.clone() }),
         ("rounded about another origin", rounded()),
         ("lines, normals", Scene { clips: clips.collect(), normals, ..plain.clone() }),

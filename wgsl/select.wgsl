@@ -55,7 +55,7 @@ const CUTS_MASK: u32 = 0x7fu;
 // Beside that: its children are drawn, all of them, and not judged.
 const CHILDREN_DRAWN: u32 = 0x80u;
 
-// A node's size is that of the ball around it and all below it, as seen in the middle of the image, not that of its ellipse's image.
+// A node's size is that of the ball by which it is in sight, as seen in the middle of the image, not that of its ellipse's image.
 override MEASURES_EXTENT: bool;
 
 const PI: f32 = 3.14159265;

@@ -33,7 +33,8 @@ pub struct Arguments {
     output: PathBuf,
     #[command(flatten)]
     limits: LimitArguments,
-    /// Write no tree, but a cut of it: nodes that fit with all below them into a ball of this radius, world units, in place of the surfels below them
+    /// Write no tree, but a cut of it: nodes that fit with all below them into a ball of this radius, world units, in place of the surfels below them. Where these lie off a
+    /// node's cap it counts as larger, up to twice
     #[arg(long, value_name = "LENGTH", value_parser = parse_length)]
     cut: Option<f64>,
     /// The most memory to take, 4GiB: the points, of binary PLY files with normals and radii, or half-axes, are sorted in temporary files beside the output, of up to twice

@@ -217,7 +217,7 @@ pub struct Arguments {
     /// camera's plane is always drawn by its surfels; of COPC files whole nodes are read, the root at least
     #[arg(long, value_name = "N", group = "cut")]
     splats: Option<NonZeroU64>,
-    /// How nodes are measured: extent, by the balls around them and all below them, or area, by their images, as in Pajarola 2003
+    /// How nodes are measured: extent, by the balls around them and all below them, and as larger where these lie off their caps, or area, by their images, as in Pajarola 2003
     #[arg(long, value_enum, default_value_t = MeasureName::Extent, requires = "cut")]
     lod_measure: MeasureName,
     /// What nodes are: cap (curved as the surface is below them, or but for that of the rasteriser and of --lowpass ewa) or disk (in their planes)

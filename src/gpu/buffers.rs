@@ -13,7 +13,7 @@ use crate::progress::Progress;
 /// Bytes copied per submission, up and down: bounds the staging memory.
 const PIECE: u64 = 32 << 20;
 
-/// Bytes that are made at once to be written where a buffer lies: what memory they take is taken again for the next ones.
+/// Bytes that are made at once to be written where a buffer lies, of which two pieces are in memory: what they take is taken again for the next ones.
 const OPEN_PIECE: usize = 1 << 20;
 
 /// A buffer of `T`.
@@ -157,7 +157,7 @@ impl<T: Pod> Buffer<T> {
         Ok(())
     }
 
-    /// While a piece is copied, which takes as long as the device's memory is touched for the first time, the next one is made.
+    /// While a piece is copied, which is slow where the device's memory is touched for the first time, the next one is made.
     fn write_where_it_lies<'a>(
         &self,
         gpu: &Gpu,
@@ -174,12 +174,14 @@ impl<T: Pod> Buffer<T> {
         slice.map_async(wgpu::MapMode::Write, |_| {});
         gpu.wait()?;
         let mut view = slice.get_mapped_range_mut().map_err(|e| gpu.error(format!("writing failed: {e}")))?;
-        let piece = |first: usize| values(first.min(len)..len.min(first + per_piece));
+        let piece = |first: usize| values(first..len.min(first + per_piece));
         let mut next = piece(0);
         for first in (0..len).step_by(per_piece) {
             let these = std::mem::take(&mut next);
             rayon::in_place_scope(|scope| {
-                scope.spawn(|_| next = piece(first + per_piece));
+                if first + per_piece < len {
+                    scope.spawn(|_| next = piece(first + per_piece));
+                }
                 let bytes: &[u8] = bytemuck::cast_slice(&these);
                 view.slice(first * size..first * size + bytes.len()).copy_from_slice(bytes);
             });

@@ -7,6 +7,9 @@ use crate::scene::hierarchy::{Fault, Hierarchy, Node};
 /// The largest number of a node, as for coordinates of points.
 const LARGEST: f32 = 1e18;
 
+/// The largest radius of a node: twice that of a ball around points of a cube of [`LARGEST`] coordinates.
+const LARGEST_RADIUS: f32 = 8.0 * LARGEST;
+
 /// The nodes of a tree over points that are in its order ([`Hierarchy`]).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tree {
@@ -42,7 +45,7 @@ impl Tree {
             let color = self.nodes.colors.as_ref().map_or([1.0; 4], |colors| colors.linear(index));
             let numbers = |numbers: &[f32]| numbers.iter().all(|number| number.abs() <= LARGEST);
             let usable = [rounded.as_ref(), &s, &t].into_iter().all(|vector| numbers(vector));
-            let usable = usable && numbers(&color) && numbers(&[radius, row.cone]);
+            let usable = usable && numbers(&color) && numbers(&[row.cone]) && radius <= LARGEST_RADIUS;
             let [along, across] = [s, t].map(|axis| glam::DVec3::from_array(axis.map(f64::from)));
             let spans = along.cross(across).length_squared() > 0.0;
             if !usable || radius < 0.0 || !spans || color[3] > 1.0 {
@@ -85,5 +88,23 @@ impl Tree {
             }
         };
         Some(what)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The radius of a node may be several times as large as a coordinate.
+    #[test]
+    fn radii_may_be_larger_than_coordinates() {
+        let of = |x: f64, radius: f32| {
+            let axes = Some(vec![[[1e17, 0.0, 0.0], [0.0, 1e17, 0.0]]]);
+            let nodes = Points { positions: vec![[x, 0.0, 0.0]], axes, radii: Some(vec![radius]), ..Points::default() };
+            let rows = vec![TreeRow { cone: 1.0, first: 0, count: 1, leaf: true }];
+            Tree { nodes: Box::new(nodes), rows }.hierarchy(glam::DVec3::ZERO).is_some()
+        };
+        assert!(of(1e18, 6.9e18));
+        assert!(!of(1e18, 9e18) && !of(2e18, 1.0) && !of(0.0, f32::NAN) && !of(0.0, -1.0));
     }
 }

@@ -193,7 +193,7 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::scene::{Colors, Fade, Lens, Scene, Surfel, Up};
+    use crate::scene::{Cap, Colors, Fade, Lens, Scene, Surfel, Up};
     use crate::surfels::analytic::{Shape, generate};
     use crate::surfels::hierarchy;
 
@@ -302,6 +302,25 @@ mod tests {
 
     fn tree_center(tree: &Hierarchy, index: u32) -> DVec3 {
         DVec3::from_array(tree.nodes[index as usize].surfel.center.map(f64::from))
+    }
+
+    /// Angles of cones and balls add up, whatever they are.
+    #[test]
+    fn a_cone_and_a_ball_turn_by_their_angles_together() {
+        let camera = camera(DVec3::new(0.0, 0.0, 3.0), Lens::Fov(50.0));
+        let surfel = Surfel { center: [0.0; 3], s: [1.0, 0.0, 0.0], t: [0.0, 0.8, 0.6] };
+        for cone in [-1.0, -0.7, -0.01, 0.0, 0.01, 0.5, 0.99, 1.0] {
+            for (center, radius) in [(0.5, 0.0), (2.0, 0.1), (2.0, 1.0), (2.0, 1.99), (2.0, 2.0), (1.0, 5.0)] {
+                let node =
+                    Node { surfel, cap: Cap::FLAT, color: [1.0; 4], radius, cone, first: 0, count: 1, leaf: true };
+                let radius = f64::from(radius);
+                let angle = f64::from(cone).acos() + (radius / center).min(1.0).asin();
+                let expected = if angle < std::f64::consts::FRAC_PI_2 { angle.sin() } else { 1.0 };
+                let [turned, spread] = turned_away(&node, (DVec3::NEG_Z * center, radius), &camera);
+                assert!((spread - expected).abs() < 1e-12, "{cone} {center} {radius}: {spread} {expected}");
+                assert!((turned + 0.8).abs() < 1e-7, "{turned}");
+            }
+        }
     }
 
     /// What is passed over is out of view, or faces away; and some is.

@@ -72,7 +72,7 @@ impl Cut {
         Some(cut)
     }
 
-    /// Nodes with balls around them and all below them that are smaller than `length`, the radius in world units, wherever they are seen from, and the surfels
+    /// Nodes whose [`radius`](super::hierarchy::Node::radius) is smaller than `length`, world units, wherever they are seen from, and the surfels
     /// of leaves that are not.
     pub fn by_length(hierarchy: &Hierarchy, length: f64) -> Self {
         let fate = |index: u32| {

@@ -68,7 +68,8 @@ pub enum DetailMeasure {
     /// The area of its ellipse's image, as in Pajarola 2003: seen from its edge it has none, so outlines get the coarsest nodes.
     Area,
     /// The area of the disk that the ball around it and all below it is seen as in the middle of an image: an outline is as fine as a surface that is
-    /// seen from the front, and a node that is as high as it is long, as at a ridge, is divided sooner.
+    /// seen from the front, and a node that is as high as it is long, as at a ridge, is divided sooner. Where what is below lies off a node's cap the ball is
+    /// larger than what it holds ([`Node::radius`]).
     #[default]
     Extent,
 }
@@ -86,7 +87,7 @@ impl DetailMeasure {
     /// All of them, by name and what they measure.
     pub const ALL: [(Self, &'static str, &'static str); 2] = [
         (Self::Area, "area", "the area of a node's image, as in Pajarola 2003"),
-        (Self::Extent, "extent", "that of the ball around it and all below it"),
+        (Self::Extent, "extent", "that of the ball around it and all below it, larger where these lie off its cap"),
     ];
 
     /// Square pixels of a node at the centre `center`, relative to the eye, as seen there; infinite at the eye's plane.

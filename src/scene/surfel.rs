@@ -31,7 +31,7 @@ impl Surfel {
 
     /// The ellipse `center + u s + v t`, `u² + v² <= 1`, for any s and t that are not parallel. Those that are not
     /// perpendicular are turned, within the ellipse, into the half-axes that are.
-    #[inline] // A call would wait for vectors that were just written.
+    #[inline] // Else a caller's vectors are read from memory before they have come there.
     pub fn ellipse(center: Vec3, s: Vec3, t: Vec3) -> Self {
         // What f32 half-axes that were meant to be perpendicular miss it by.
         const ROUNDING: f64 = 1e-6;

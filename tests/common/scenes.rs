@@ -290,3 +290,11 @@ pub fn painted(pictures: u32) -> Scene {
     };
     build_textured(vec![points], (0..pictures).map(picture).collect(), &()).unwrap().0
 }
+
+/// The scene with each surfel moved to or from its middle, so that nodes of levels of detail lie off what is below them and count as larger.
+pub fn roughened(mut scene: Scene) -> Scene {
+    for (k, surfel) in scene.surfels.iter_mut().enumerate() {
+        surfel.center = surfel.center.map(|c| c * (0.95 + 0.1 * (k * 37 % 97) as f32 / 97.0));
+    }
+    scene
+}

@@ -50,58 +50,70 @@ pub(super) fn vertices<const BIG: bool>(
     length: u64,
     progress: &dyn Progress,
 ) -> Result<(Points, Vec<TreeRow>), Fault> {
-    vertices_in::<BIG>(&mut reader, vertex, &Layout::of(vertex)?, length, progress)
-}
-
-/// The same of rows with a layout that is known.
-pub(super) fn vertices_in<const BIG: bool>(
-    mut reader: impl BufRead,
-    vertex: &Element,
-    layout: &Layout,
-    length: u64,
-    progress: &dyn Progress,
-) -> Result<(Points, Vec<TreeRow>), Fault> {
+    let layout = &Layout::of(vertex)?;
     let possible = length / layout.row_size.max(1) as u64;
-    let mut vertices = Vertices::with_capacity(layout, vertex.count.min(possible))?;
+    let mut decoder = Decoder::new(layout, vertex.count.min(possible))?;
     let has_lists = vertex.properties.iter().any(|property| matches!(property.kind, Kind::List { .. }));
-    let block_rows = (BLOCK / layout.row_size).clamp(1, usize::try_from(vertex.count).unwrap_or(usize::MAX).max(1));
-    let mut block = Vec::new();
-    let mut columns = vec![Vec::with_capacity(block_rows); layout.columns.len()];
-    while vertices.len() < vertex.count {
-        let wanted = (vertex.count - vertices.len()).min(block_rows as u64) as usize;
-        let size = wanted * layout.row_size;
-        // Rows that are in memory are decoded where they lie.
-        let lie_there = !has_lists && reader.fill_buf().is_ok_and(|bytes| bytes.len() >= size);
-        if !lie_there {
-            block.resize(size, 0);
-        }
-        let rows = if lie_there {
-            wanted
-        } else if has_lists {
-            compact_rows::<BIG>(&mut reader, vertex, vertices.len(), &mut block, wanted, layout.row_size)?
+    let block_rows = layout.block_rows().min(usize::try_from(vertex.count).unwrap_or(usize::MAX).max(1));
+    let mut block = vec![0; block_rows * layout.row_size];
+    while decoder.vertices.len() < vertex.count {
+        let wanted = (vertex.count - decoder.vertices.len()).min(block_rows as u64) as usize;
+        let rows = if has_lists {
+            compact_rows::<BIG>(&mut reader, vertex, decoder.vertices.len(), &mut block, wanted, layout.row_size)?
         } else {
-            read_until_end(&mut reader, &mut block)? / layout.row_size
+            read_until_end(&mut reader, &mut block[..wanted * layout.row_size])? / layout.row_size
         };
-        let decoded = if lie_there { &reader.fill_buf()?[..size] } else { &block[..rows * layout.row_size] };
-        for (values, column) in columns.iter_mut().zip(&layout.columns) {
-            decode::<BIG>(decoded, layout.row_size, column.offset, column.scalar, values);
-        }
-        if lie_there {
-            reader.consume(size);
-        }
-        vertices.extend(rows, |column, row| columns[column][row]);
+        decoder.take::<BIG>(&block[..rows * layout.row_size]);
         progress.advance(rows as u64);
         if rows < wanted {
-            return Err(ends_early(vertex, vertices.len()));
+            return Err(ends_early(vertex, decoder.vertices.len()));
         }
     }
-    Ok(vertices.into_points())
+    Ok(decoder.vertices.into_points())
+}
+
+/// The same of rows without lists that are in memory.
+pub(super) fn vertices_in<const BIG: bool>(rows: &[u8], layout: &Layout) -> Result<(Points, Vec<TreeRow>), Fault> {
+    let mut decoder = Decoder::new(layout, (rows.len() / layout.row_size.max(1)) as u64)?;
+    rows.chunks(layout.block_rows() * layout.row_size.max(1)).for_each(|block| decoder.take::<BIG>(block));
+    Ok(decoder.vertices.into_points())
+}
+
+impl Layout {
+    /// How many rows are decoded together.
+    fn block_rows(&self) -> usize {
+        (BLOCK / self.row_size.max(1)).max(1)
+    }
+}
+
+/// What is made of blocks of rows.
+struct Decoder<'a> {
+    layout: &'a Layout,
+    vertices: Vertices<'a>,
+    /// The numbers of each column of a block.
+    columns: Vec<Vec<f64>>,
+}
+
+impl<'a> Decoder<'a> {
+    fn new(layout: &'a Layout, rows: u64) -> Result<Self, Fault> {
+        let vertices = Vertices::with_capacity(layout, rows)?;
+        Ok(Self { layout, vertices, columns: vec![Vec::new(); layout.columns.len()] })
+    }
+
+    /// Adds whole rows.
+    fn take<const BIG: bool>(&mut self, block: &[u8]) {
+        let Self { layout, vertices, columns } = self;
+        for (values, column) in columns.iter_mut().zip(&layout.columns) {
+            decode::<BIG>(block, layout.row_size, column.offset, column.scalar, values);
+        }
+        vertices.extend(block.len() / layout.row_size.max(1), |column, row| columns[column][row]);
+    }
 }
 
 /// The numbers of one column of a block, in place of what `values` held.
 fn decode<const BIG: bool>(block: &[u8], row_size: usize, offset: usize, scalar: Scalar, values: &mut Vec<f64>) {
     fn strided<const N: usize>(block: &[u8], row_size: usize, offset: usize) -> impl Iterator<Item = [u8; N]> {
-        // Columns lie within their rows; of an iterator that might pass some over, rooms would be made one by one.
+        // Columns lie within their rows. `filter_map` has no exact size, by which `extend` makes room once.
         let number = move |row: &[u8]| row.get(offset..).and_then(|rest| rest.first_chunk().copied()).unwrap_or([0; N]);
         block.chunks_exact(row_size).map(number)
     }
@@ -276,4 +288,35 @@ fn read_until_end(reader: &mut impl Read, bytes: &mut [u8]) -> io::Result<usize>
         }
     }
     Ok(filled)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::io::BufReader;
+
+    use super::*;
+    use crate::io::ply::header;
+
+    /// In either order of bytes, and of more rows than a block has.
+    #[test]
+    fn rows_in_memory_are_those_of_a_stream() {
+        let text = "ply\nformat binary_little_endian 1.0\nelement vertex 90000\nproperty double x\nproperty float y\nproperty short z\n\
+                    property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n";
+        let header = header::read(&mut text.as_bytes()).unwrap();
+        let vertex = &header.elements[0];
+        let layout = Layout::of(vertex).unwrap();
+        let bytes: Vec<u8> =
+            (0..90_000 * layout.row_size as u32).map(|k| (k.wrapping_mul(2_654_435_761) >> 26) as u8).collect();
+        assert!(bytes.len() > 2 * BLOCK);
+        fn both<const BIG: bool>(bytes: &[u8], vertex: &Element, layout: &Layout) -> [Points; 2] {
+            let stream = BufReader::with_capacity(7, bytes);
+            let streamed = vertices::<BIG>(stream, vertex, bytes.len() as u64, &()).unwrap().0;
+            [streamed, vertices_in::<BIG>(bytes, layout).unwrap().0]
+        }
+        let ([streamed, lying], [big, lying_big]) =
+            (both::<false>(&bytes, vertex, &layout), both::<true>(&bytes, vertex, &layout));
+        assert_eq!(streamed.positions.len(), 90_000);
+        assert!(streamed == lying && big == lying_big && streamed != big);
+    }
 }

@@ -152,9 +152,7 @@ impl Levels {
     ) -> Result<Vec<T>> {
         let layout = Layout::of(element).map_err(|fault| fault.of(&self.path))?;
         let made = |bytes: &[u8]| {
-            let length = bytes.len() as u64;
-            let element = Element { count: length / size, ..element.clone() };
-            let (points, rows) = binary::vertices_in::<false>(bytes, &element, &layout, length, &())?;
+            let (points, rows) = binary::vertices_in::<false>(bytes, &layout)?;
             of(points, rows).map_err(|what| Fault::Malformed(what.into()))
         };
         let parts: Result<Vec<T>, Fault> = rows.par_chunks(TOGETHER * *size as usize).map(made).collect();

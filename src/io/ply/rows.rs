@@ -151,11 +151,9 @@ impl Rows {
     ///
     /// [`Error::Malformed`] if these are none.
     pub fn points(&self, bytes: &[u8]) -> Result<Points> {
-        let (count, length) = (bytes.len() as u64 / self.size.max(1), bytes.len() as u64);
-        let element = Element { count, ..self.element.clone() };
         let read = match self.big {
-            true => binary::vertices_in::<true>(bytes, &element, &self.layout, length, &()),
-            false => binary::vertices_in::<false>(bytes, &element, &self.layout, length, &()),
+            true => binary::vertices_in::<true>(bytes, &self.layout),
+            false => binary::vertices_in::<false>(bytes, &self.layout),
         };
         let (points, _) = read.map_err(|fault| fault.of(&self.path))?;
         let Comments { up, closed, unsided, .. } = self.comments;

@@ -20,8 +20,8 @@ const MANY: u64 = 1 << 16;
 /// is what its picture errs by. Of 10 to 30 that by which the Dragon's, igea's and autzen's points are nearest to all surfels for as many splats, taken together.
 const OFF_CAP: f64 = 16.0;
 
-/// The most that a node may count as larger than the ball around it, by which it is found to be out of view, too: it is divided about a level sooner.
-const LARGEST: f64 = 2.0;
+/// The most that a node may count as larger than the ball around it, by which it is found to be out of view, too: it is divided a level sooner at most.
+const MOST_LARGER: f64 = 2.0;
 
 /// The node of one surfel of `scene`, with its sums; what its f32 centre leaves out comes second.
 pub(super) fn of_one(scene: &Scene, index: usize, sums: &Sums, known: &Known) -> Made {
@@ -69,7 +69,7 @@ pub(super) fn node<B: Below>(of: B::Key, sums: &Sums, lattice: &Lattice, below: 
     let cap = curvature::cap(heights, lengths);
     let ball = all.radius.max(factor + cap.highest());
     let off = OFF_CAP * curvature::off_cap(heights, [covariance, centers], plane);
-    let size = ball.hypot(off).min(LARGEST * ball);
+    let size = ball.hypot(off).min(MOST_LARGER * ball);
     let node = Node {
         surfel: Surfel { center: rounded.to_array(), s, t },
         cap,

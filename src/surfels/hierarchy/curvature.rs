@@ -70,9 +70,9 @@ pub(super) fn mean_height(heights: Heights, covariance: Symmetric3, plane: [DVec
     (0.5 * trace(matrix(heights) * spread)).clamp(-most, most)
 }
 
-/// How far points lie from a cap with these heights along its normal, world units, root mean square: by the covariance of `all` of them less what the cap's
-/// heights would vary over places with that of the `centers`, were these spread as a normal distribution is (1/2 tr (H C)²: more than over a disk or a
-/// square, so that of what a cap shows nothing is left).
+/// How far points lie from a cap with these heights along its normal at least, world units, root mean square: by the covariance of `all` of them less what the
+/// cap's heights would vary over places with that of the `centers`, were these spread as a normal distribution is (1/2 tr (H C)²: more than over a disk or
+/// a square, so that of what a cap shows nothing is left). A cap that leaves points which lie in a plane is not told.
 pub(super) fn off_cap(heights: Heights, [all, centers]: [Symmetric3; 2], plane: [DVec3; 3]) -> f64 {
     let [.., normal] = plane;
     let shown = matrix(heights) * in_plane(centers, plane);

@@ -101,6 +101,7 @@ fn nodes_hold_what_is_below_them() {
             let smaller =
                 Surfel { s: node.surfel.s.map(|c| 0.99 * c), t: node.surfel.t.map(|c| 0.99 * c), ..node.surfel };
             let mut on_the_rim = false;
+            let mut farthest = f64::from(node.surfel.radius()) + node.cap.highest();
             for k in own.clone() {
                 let surfel = &scene.surfels[k];
                 let [s, t] = [surfel.s, surfel.t].map(|axis| DVec3::from_array(axis.map(f64::from)));
@@ -108,6 +109,7 @@ fn nodes_hold_what_is_below_them() {
                 let height = scene.caps.get(k).map_or(0.0, Cap::highest);
                 let reach = offset.length() + s.length().max(t.length()) + height;
                 assert!(reach <= f64::from(node.radius), "{index}");
+                farthest = farthest.max(reach);
                 let cosine = sums::normal_of(surfel).dot(normal);
                 assert!(cosine >= f64::from(node.cone), "{index}: {cosine} {}", node.cone);
                 if own.len() == 1 {
@@ -131,6 +133,9 @@ fn nodes_hold_what_is_below_them() {
                     on_the_rim |= !shown.iter().all(|point| holds(&smaller, *point));
                 }
             }
+            // What lies off the cap makes it twice as large at most, and one surfel is itself.
+            let most = if own.len() == 1 { 1.0 } else { 2.0 } * farthest * (1.0 + 1e-5);
+            assert!(f64::from(node.radius) <= most, "{index}: {} {most}", node.radius);
             // Of a flat node over flat disks nothing is added to what is shown.
             assert!(curved || own.len() == 1 || !node.cap.is_flat() || on_the_rim, "{index}");
             looked += usize::from(own.len() > 1);

@@ -19,7 +19,8 @@ pub struct Node {
     pub cap: Cap,
     /// Their mean colour, linear, straight alpha.
     pub color: [f32; 4],
-    /// A sphere of this radius around the centre holds them and the node itself, world units. It is larger than that where they do not lie on the node's cap, as cuts measure by it.
+    /// A sphere of this radius around the centre holds them and the node itself, world units. It is larger than that where they do not lie on the node's
+    /// cap, as cuts measure by it.
     pub radius: f32,
     /// The smallest cosine of the angle between a normal of theirs and its own; -1 where normals have no side.
     pub cone: f32,

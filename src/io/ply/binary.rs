@@ -74,15 +74,15 @@ pub(super) fn vertices<const BIG: bool>(
 
 /// The same of rows without lists that are in memory.
 pub(super) fn vertices_in<const BIG: bool>(rows: &[u8], layout: &Layout) -> Result<(Points, Vec<TreeRow>), Fault> {
-    let mut decoder = Decoder::new(layout, (rows.len() / layout.row_size.max(1)) as u64)?;
-    rows.chunks(layout.block_rows() * layout.row_size.max(1)).for_each(|block| decoder.take::<BIG>(block));
+    let mut decoder = Decoder::new(layout, (rows.len() / layout.row_size) as u64)?;
+    rows.chunks(layout.block_rows() * layout.row_size).for_each(|block| decoder.take::<BIG>(block));
     Ok(decoder.vertices.into_points())
 }
 
 impl Layout {
-    /// How many rows are decoded together.
+    /// How many rows, which have a place at least, are decoded together.
     fn block_rows(&self) -> usize {
-        (BLOCK / self.row_size.max(1)).max(1)
+        (BLOCK / self.row_size).max(1)
     }
 }
 
@@ -106,7 +106,7 @@ impl<'a> Decoder<'a> {
         for (values, column) in columns.iter_mut().zip(&layout.columns) {
             decode::<BIG>(block, layout.row_size, column.offset, column.scalar, values);
         }
-        vertices.extend(block.len() / layout.row_size.max(1), |column, row| columns[column][row]);
+        vertices.extend(block.len() / layout.row_size, |column, row| columns[column][row]);
     }
 }
 

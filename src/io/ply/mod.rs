@@ -15,8 +15,8 @@
 //! | `texture_u_x texture_u_y texture_u_z texture_v_x texture_v_y texture_v_z` | `float` | what they gain for a world unit along x, y and z |
 //!
 //! Levels of detail are another element `node` after the vertices, which are in the order of the tree: `x y z`, `radius` of a sphere around what is
-//! below, larger where that does not lie on the node's cap, half-axes, caps and colour as above, `cone`, the smallest cosine of the angle between a normal below and its own (-1: normals have no
-//! side), and `first`, `count` and `leaf`, which nodes, or of a leaf which vertices, are below it ([`Hierarchy`](crate::scene::Hierarchy)). A third
+//! below, larger where that does not lie on the node's cap, half-axes, caps and colour as above, `cone`, the smallest cosine of the angle between a
+//! normal below and its own (-1: normals have no side), and `first`, `count` and `leaf`, which nodes, or of a leaf which vertices, are below it ([`Hierarchy`](crate::scene::Hierarchy)). A third
 //! element `scene` says of all vertices together what one who reads a part must know: origin, bounds, ranges ([`Whole`](crate::scene::Whole)).
 //!
 //! The header has a comment `up y` or `up z` where that is known, `closed` for surfels that cover a closed surface, `unsided` where normals tell no sides, and `triangles NAME`

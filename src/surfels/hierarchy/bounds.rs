@@ -17,7 +17,8 @@ use crate::scene::{Scene, Surfel};
 const MANY: u64 = 1 << 16;
 
 /// By so many times how far its points lie from a node's cap, root mean square, does a node count as larger than the ball around it, in quadrature: what lies off its cap
-/// is what its picture errs by. Of 10 to 30 that by which the Dragon's, igea's and autzen's points are nearest to all surfels for as many splats, taken together.
+/// is what its picture errs by. For as many splats the Dragon's, igea's and autzen's points come nearer to all surfels by 1.1, 0.8 and 0.2 dB with 10, 1.5, 1.2 and 0.0 with
+/// this, and 1.9, 2.0 and -0.4 with 30: it is about the largest by which none gets farther.
 const OFF_CAP: f64 = 16.0;
 
 /// The most that a node may count as larger than the ball around it, by which it is found to be out of view, too: it is divided a level sooner at most.

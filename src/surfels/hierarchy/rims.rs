@@ -76,9 +76,10 @@ pub(super) struct Curve {
 }
 
 impl Curve {
-    pub fn of([xx, xy, yy]: curvature::Heights, [along, across, _]: [DVec3; 3]) -> Self {
-        let heights = DMat2::from_cols_array(&[xx, xy, xy, yy]);
-        Self { along, across, heights, most: 0.5 * (xx + yy).abs() + length(0.5 * (xx - yy), xy) }
+    pub fn of(heights: curvature::Heights, [along, across, _]: [DVec3; 3]) -> Self {
+        let [xx, xy, yy] = heights;
+        let most = 0.5 * (xx + yy).abs() + length(0.5 * (xx - yy), xy);
+        Self { along, across, heights: curvature::matrix(heights), most }
     }
 
     /// The vector along these directions.

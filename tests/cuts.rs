@@ -329,7 +329,6 @@ fn broken_kernels_are_noticed() {
         ("select.wgsl", "counts += left_by", "counts = left_by"),
         ("select.wgsl", "cuts_that_divide(seen_disk(nearest, radius)) == 0u", "true"),
         ("select.wgsl", "node.first + select(0u, branch.surfels, kind_of(node) == INNER);", "node.first;"),
-        ("select.wgsl", "record = select(record, child.first, is_surfel(child));", "record = below;"),
     ] {
         let sources = Sources::default().replace(file, from, to).unwrap();
         let noticed =
@@ -342,7 +341,7 @@ fn broken_kernels_are_noticed() {
     }
 }
 
-/// Of levels with so many nodes that an invocation sums the counts of several workgroups.
+/// Of the first levels, which are a workgroup's, and of levels with so many nodes that an invocation sums the counts of several.
 #[test]
 fn large_levels_are_summed() {
     let Some(gpu) = common::gpu() else { return };
@@ -363,6 +362,8 @@ fn large_levels_are_summed() {
     assert!(of(&branches) == whole);
     for (from, to) in [
         ("start += counts;", "start = counts;"),
+        ("start += eights[k];", "start = eights[k];"),
+        ("level < branch.small_levels", "level < 1u"),
         ("local * each; group < stop; group++) {\n        own", "0u; group < stop; group++) {\n        own"),
     ] {
         let sources = Sources::default().replace("select.wgsl", from, to).unwrap();
@@ -381,12 +382,8 @@ fn children_are_drawn_together_where_each_would_be() {
         Backend::Gpu { gpu: Box::new(gpu.clone()), sources }
     };
     let (together, alone) = (Backend::gpu(gpu.clone()), backend(TOGETHER, "false"));
-    let broken = [
-        backend(WITHIN, "let within = true;"),
-        backend("past && within", "within"),
-        backend("(node.below & WITH_SURFELS) != 0u;", "false;"),
-    ];
-    let mut noticed = [false; 3];
+    let broken = [backend(WITHIN, "let within = true;"), backend("past && within", "within")];
+    let mut noticed = [false; 2];
     // Of one that has lines a surfel is another than its node.
     let some = |name: &str| name == "clipped, normals" || name == "doubled";
     for scene in all().into_iter().filter_map(|(name, scene)| some(name).then_some(scene)) {
@@ -409,7 +406,7 @@ fn children_are_drawn_together_where_each_would_be() {
             }
         }
     }
-    assert_eq!(noticed, [true; 3]);
+    assert_eq!(noticed, [true; 2]);
 }
 
 /// What `drawn_at` of a text of select.wgsl says of each (runs, stride, place, first).

@@ -110,10 +110,10 @@ struct Page {
 
 // A node of a tree, or one that has a part of a leaf's surfels.
 struct TreeNode {
-    // A sphere of this radius around the centre of its surfel holds all below it, world units.
+    // A sphere of this radius around this centre holds all below it, world units. The centre is its surfel's once more: what a node is mostly judged by
+    // is in a line of a cache.
+    center: array<f32, 3>,
     radius: f32,
-    // The smallest cosine between its normal and those below it; -1 where they have no side.
-    cone: f32,
     // The first of its children in this branch, or of its surfels, or which root of another branch it is.
     first: u32,
     // How many there are, and in the highest bits of what kind (select.wgsl).
@@ -121,6 +121,8 @@ struct TreeNode {
     // The largest radius of a child, world units, but of those that are one surfel, where this sphere holds the centres of all; -1 where children are to
     // be judged one by one.
     children: f32,
+    // The smallest cosine between its normal and those below it; -1 where they have no side.
+    cone: f32,
 }
 
 // Neighbouring subtrees, whose surfels and nodes fit a buffer: first the surfels, then the nodes level by level.
@@ -134,9 +136,10 @@ struct Branch {
     whole: u32,
     // Where behind its attributes what is chosen starts.
     chosen: u32,
+    // So many levels, its roots the first, have no more nodes than one workgroup judges.
+    small_levels: u32,
     padding_0: u32,
     padding_1: u32,
-    padding_2: u32,
 }
 
 const AWAY: u32 = 0x80000000u;

@@ -1,10 +1,10 @@
 // Stage 0 of scenes with levels of detail: the cut that is drawn in place of all surfels (Pajarola 2003, section 5.1, step 1), branch by
 // branch of the tree, and in each level by level from its roots down. The nodes of a level that are come to are a stretch of `frontier`: they
 // are judged, what they leave is counted by workgroups, and from these counts follows where each puts what it leaves. So the order of the cut, too,
-// depends on tree and camera alone. Pages of surfels are drawn from where what was chosen lies.
+// depends on tree and camera alone. The first levels, which are small, are one workgroup's. Pages of surfels are drawn from where what was chosen lies.
 // Of cuts that fade into each other (select_fades.wgsl) all are made at once.
 // Host side and twin: src/passes/select.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x5471baa82c262e83
+// All loops end, by 1 of src/gpu/loops.rs: 0x737976e37d84fa2b
 
 @group(0) @binding(72) var<uniform> branch: Branch;
 @group(0) @binding(73) var<storage, read> tree_nodes: array<TreeNode>;
@@ -38,9 +38,7 @@ const RUN: u32 = 512u;
 
 // Kinds of nodes.
 const KIND_SHIFT: u32 = 30u;
-// Of an inner node whose children may be drawn unjudged: some of them are one surfel, which is drawn for them.
-const WITH_SURFELS: u32 = 0x20000000u;
-const COUNT_MASK: u32 = WITH_SURFELS - 1u;
+const COUNT_MASK: u32 = (1u << KIND_SHIFT) - 1u;
 const INNER: u32 = 0u;
 const LEAF: u32 = 1u;
 const OTHER_BRANCH: u32 = 2u;
@@ -67,7 +65,8 @@ const BOUND_SLACK: f32 = 1e-4;
 const SINE_SLACK: f32 = 1e-5;
 
 var<workgroup> counted: array<vec2<u32>, WORKGROUP>;
-var<workgroup> eights: array<vec2<u32>, 8>;
+var<workgroup> eights: array<vec2<u32>, WORKGROUP / 8u>;
+var<workgroup> first_end: u32;
 
 // Which of those that are chosen has a place of the page. Neighbours in a cut are neighbours in the image, and what is in work at the same time
 // should not be: atomics would wait for each other (src/passes/order.rs).
@@ -109,9 +108,10 @@ fn kind_of(node: TreeNode) -> u32 {
     return node.below >> KIND_SHIFT;
 }
 
-// Whether what is below it is one surfel, which is drawn for it.
-fn is_surfel(node: TreeNode) -> bool {
-    return kind_of(node) == LEAF && (node.below & COUNT_MASK) == 1u;
+// Whether it is never divided: one surfel is itself, with its lines and its cap, which are the node's too (src/passes/source.rs); and where the surfels of
+// a part of a tree are not there, no picture comes to them.
+fn is_whole(node: TreeNode) -> bool {
+    return kind_of(node) == LEAF && (node.below & COUNT_MASK) <= 1u;
 }
 
 fn vector(parts: array<f32, 3>) -> vec3<f32> {
@@ -158,14 +158,14 @@ fn draws_children(node: TreeNode, ball: Ball) -> bool {
     return node.children >= 0.0 && past && within && cuts_that_divide(seen_disk(nearest, radius)) == 0u;
 }
 
-// What becomes of a node whose surfel's centre leaves out `low`, world units.
+// What becomes of a node whose centre leaves out `low`, world units.
 fn fate_of(node: TreeNode, surfel: Surfel, low: vec3<f32>) -> u32 {
     // In its own branch it is judged, or the whole leaf was.
     if (kind_of(node) == OTHER_BRANCH || kind_of(node) == PART_OF_LEAF) {
         return ALL_CUTS;
     }
     // Leading parts cancel, and what is left is as exact as the trailing ones.
-    let relative = (vector(surfel.center) * held.unit - held.eye.xyz) + (low * held.unit - held.eye_low.xyz);
+    let relative = (vector(node.center) * held.unit - held.eye.xyz) + (low * held.unit - held.eye_low.xyz);
     // Ten roundings of f32 in this length.
     let ball = ball_at(relative, node.radius * held.unit + BALL_ROUNDING * norm3(relative));
     if (ball.farthest < held.near || is_beside(ball.center, ball.radius, FILTER_REACH + 2.0)) {
@@ -180,10 +180,8 @@ fn fate_of(node: TreeNode, surfel: Surfel, low: vec3<f32>) -> u32 {
         // The plane of one that faces away is left out, whatever is below it.
         faces = away.x <= 0.0;
     }
-    // One surfel is itself, with its lines and its cap; and where the surfels of a part of a tree are not there, no picture divides their leaf.
-    let missing = kind_of(node) == LEAF && (node.below & COUNT_MASK) == 0u;
-    let divided = reaches_near(ball) || !faces || is_surfel(node);
-    let cuts = select(select(cuts_that_divide(size_of(ball.center, node, surfel)), ALL_CUTS, divided), 0u, missing);
+    let divided = reaches_near(ball) || !faces;
+    let cuts = select(select(cuts_that_divide(size_of(ball.center, node, surfel)), ALL_CUTS, divided), 0u, is_whole(node));
     // By its own place and size alone nothing is told of a child's area, or of its side.
     let unjudged = MEASURES_EXTENT && !CULL_BACK && draws_children(node, ball);
     return cuts | select(0u, CHILDREN_DRAWN, unjudged);
@@ -215,7 +213,7 @@ fn left_by(node: TreeNode, fate: u32, reached_in: u32) -> vec2<u32> {
 fn sum_before(counts: vec2<u32>, local: u32) -> vec2<u32> {
     counted[local] = counts;
     workgroupBarrier();
-    if (local < 8u) {
+    if (local < WORKGROUP / 8u) {
         var sum = vec2<u32>(0u);
         for (var k = 8u * local; k < 8u * local + 8u; k++) {
             let own = counted[k];
@@ -244,9 +242,62 @@ fn set_grid(at: u32, nodes: u32) {
     }
 }
 
-// The roots of a branch that are come to are its first level.
-@compute @workgroup_size(1)
-fn select_roots() {
+// What becomes of a node in so many cuts that come to it.
+fn judged(node: TreeNode, index: u32, reached_in: u32) -> u32 {
+    let record = branch.surfels + index;
+    let fate = fate_of(node, surfel_at(record), low_part(record));
+    return select((fate & CHILDREN_DRAWN) | min(cuts_of(fate), reached_in), UNSEEN, cuts_of(fate) == UNSEEN);
+}
+
+// Judges the nodes of a stretch of the frontier, and returns how much they leave.
+fn judge_run(first: u32, end: u32) -> vec2<u32> {
+    var counts = vec2<u32>(0u);
+    for (var place = first; place < end; place++) {
+        let index = frontier[place];
+        let node = tree_nodes[index];
+        let cuts = cuts_that_reach(place);
+        let fate = judged(node, index, cuts);
+        counts += left_by(node, fate, cuts);
+        fates[place] = fate;
+    }
+    return counts;
+}
+
+// Writes what a node leaves from `start` on, and returns how much that is.
+fn spread(index: u32, fate: u32, reached_in: u32, start: vec2<u32>) -> vec2<u32> {
+    let cuts = cuts_of(fate);
+    let node = tree_nodes[index];
+    let counts = left_by(node, fate, reached_in);
+    var at = start.x;
+    if (cuts < reached_in) {
+        choose(at, branch.surfels + index, cuts, reached_in);
+        at++;
+    }
+    if (cuts != UNSEEN && kind_of(node) == OTHER_BRANCH) {
+        reached[node.first] = cuts;
+    }
+    let below = node.first + select(0u, branch.surfels, kind_of(node) == INNER);
+    let drawn = start.x + counts.x - at;
+    for (var k = 0u; k < drawn; k++) {
+        choose(at + k, below + k, 0u, cuts);
+    }
+    for (var k = 0u; k < counts.y; k++) {
+        frontier[start.y + k] = node.first + k;
+        set_cuts_that_reach(start.y + k, cuts);
+    }
+    return counts;
+}
+
+// Writes what they leave from `start` on.
+fn spread_run(first: u32, end: u32, start: vec2<u32>) {
+    var at = start;
+    for (var place = first; place < end; place++) {
+        at += spread(frontier[place], fates[place], cuts_that_reach(place), at);
+    }
+}
+
+// The roots of a branch that are come to are its first level; how many they are.
+fn reach_roots() -> u32 {
     var end = 0u;
     for (var root = 0u; root < branch.roots; root++) {
         var cuts = ALL_CUTS;
@@ -259,10 +310,39 @@ fn select_roots() {
             end++;
         }
     }
-    chosen[branch.chosen] = 0u;
-    selection[NEXT] = 0u;
-    selection[NEXT_END] = end;
-    set_grid(JUDGE_GRID, end);
+    return end;
+}
+
+// One workgroup: roots, and the levels that are small.
+@compute @workgroup_size(WORKGROUP)
+fn select_top(@builtin(local_invocation_index) local: u32) {
+    hold_view();
+    if (local == 0u) {
+        first_end = reach_roots();
+    }
+    storageBarrier();
+    var first = 0u;
+    var start = vec2<u32>(0u, workgroupUniformLoad(&first_end));
+    for (var level = 0u; level < branch.small_levels; level++) {
+        let end = start.y;
+        let own_first = first + local * JUDGED;
+        let own_end = min(own_first + JUDGED, end);
+        let before = sum_before(judge_run(own_first, own_end), local);
+        spread_run(own_first, own_end, start + before);
+        first = end;
+        for (var k = 0u; k < WORKGROUP / 8u; k++) {
+            start += eights[k];
+        }
+        // What was spread is seen by all, and all have seen the sums.
+        storageBarrier();
+        workgroupBarrier();
+    }
+    if (local == 0u) {
+        chosen[branch.chosen] = start.x;
+        selection[NEXT] = first;
+        selection[NEXT_END] = start.y;
+        set_grid(JUDGE_GRID, start.y - first);
+    }
 }
 
 // One invocation for JUDGED nodes of the next level that follow each other.
@@ -276,19 +356,7 @@ fn select_judge(
     let run = linear_index(workgroup, workgroups, local);
     let first = selected[NEXT] + run * JUDGED;
     let end = min(first + JUDGED, selected[NEXT_END]);
-    var counts = vec2<u32>(0u);
-    for (var place = first; place < end; place++) {
-        let index = frontier[place];
-        let node = tree_nodes[index];
-        let record = branch.surfels + index;
-        let cuts = cuts_that_reach(place);
-        var fate = fate_of(node, surfel_at(record), low_part(record));
-        if (cuts_of(fate) != UNSEEN) {
-            fate = (fate & CHILDREN_DRAWN) | min(cuts_of(fate), cuts);
-        }
-        counts += left_by(node, fate, cuts);
-        fates[place] = fate;
-    }
+    let counts = judge_run(first, end);
     let before = sum_before(counts, local);
     if (first < end) {
         run_counts[run] = before;
@@ -344,40 +412,5 @@ fn select_spread(
     if (first >= end) {
         return;
     }
-    var start = group_counts[workgroup.y * workgroups.x + workgroup.x] + run_counts[run];
-    for (var place = first; place < end; place++) {
-        let index = frontier[place];
-        start += spread(index, fates[place], cuts_that_reach(place), start);
-    }
-}
-
-// Writes what a node leaves from `start` on, and returns how much that is.
-fn spread(index: u32, fate: u32, reached_in: u32, start: vec2<u32>) -> vec2<u32> {
-    let cuts = cuts_of(fate);
-    let node = tree_nodes[index];
-    let counts = left_by(node, fate, reached_in);
-    var at = start.x;
-    if (cuts < reached_in) {
-        choose(at, branch.surfels + index, cuts, reached_in);
-        at++;
-    }
-    if (cuts != UNSEEN && kind_of(node) == OTHER_BRANCH) {
-        reached[node.first] = cuts;
-    }
-    let below = node.first + select(0u, branch.surfels, kind_of(node) == INNER);
-    let drawn = start.x + counts.x - at;
-    let mixed = kind_of(node) == INNER && (node.below & WITH_SURFELS) != 0u;
-    for (var k = 0u; k < drawn; k++) {
-        var record = below + k;
-        if (mixed) {
-            let child = tree_nodes[node.first + k];
-            record = select(record, child.first, is_surfel(child));
-        }
-        choose(at + k, record, 0u, cuts);
-    }
-    for (var k = 0u; k < counts.y; k++) {
-        frontier[start.y + k] = node.first + k;
-        set_cuts_that_reach(start.y + k, cuts);
-    }
-    return counts;
+    spread_run(first, end, group_counts[workgroup.y * workgroups.x + workgroup.x] + run_counts[run]);
 }

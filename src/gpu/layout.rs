@@ -71,10 +71,6 @@ pub const JUDGED: u32 = 8;
 /// The lowest bit of [`TreeNode::below`] that says of what kind a node is.
 pub const KIND_SHIFT: u32 = 30;
 
-/// The bit of a node whose children may be drawn unjudged that says that some are one surfel, which is drawn for them. A node has fewer children and
-/// surfels than this.
-pub const WITH_SURFELS: u32 = 1 << 29;
-
 /// A node with children.
 pub const INNER: u32 = 0;
 
@@ -189,11 +185,12 @@ pub struct Page {
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[allow(missing_docs)]
 pub struct TreeNode {
+    pub center: [f32; 3],
     pub radius: f32,
-    pub cone: f32,
     pub first: u32,
     pub below: u32,
     pub children: f32,
+    pub cone: f32,
 }
 
 /// Neighbouring subtrees of a tree; see the WGSL.
@@ -206,9 +203,9 @@ pub struct Branch {
     pub first_root: u32,
     pub whole: u32,
     pub chosen: u32,
+    pub small_levels: u32,
     pub padding_0: u32,
     pub padding_1: u32,
-    pub padding_2: u32,
 }
 
 /// What a low-pass needs of a splat; see `wgsl/filter.wgsl`.

@@ -7,10 +7,11 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
+use bytemuck::Zeroable;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::gpu::layout::{INNER, JUDGED, KIND_SHIFT, LEAF, OTHER_BRANCH, PART_OF_LEAF, TreeNode, WITH_SURFELS};
+use crate::gpu::layout::{INNER, JUDGED, KIND_SHIFT, LEAF, OTHER_BRANCH, PART_OF_LEAF, TreeNode, WORKGROUP};
 use crate::scene::hierarchy::{Hierarchy, Node};
 
 /// The most surfels of one node that an invocation copies the numbers of.
@@ -37,6 +38,8 @@ pub struct Branch {
     pub whole: bool,
     /// How many levels it has.
     pub levels: u32,
+    /// How many of the first ones one workgroup judges.
+    pub small_levels: u32,
 }
 
 /// What a row of a branch is made of.
@@ -76,24 +79,26 @@ const ONE_BY_ONE: f32 = -1.0;
 /// Of one whose children may be judged together.
 const TOGETHER: f32 = 0.0;
 
-/// Of an inner node that has the centres of all its children in its ball: the largest radius of a child, but of those that are one surfel, which is drawn
-/// for them; and [`WITH_SURFELS`] if there are such. Of another one its children are judged one by one.
-fn children_of(tree: &Hierarchy, number: u32) -> (f32, u32) {
+/// Of an inner node that has the centres of all its children in its ball: the largest radius of a child, but of those that are one surfel. Of another
+/// one its children are judged one by one.
+fn children_of(tree: &Hierarchy, number: u32) -> f32 {
     let node = &tree.nodes[number as usize];
     let center = |number: u32| {
         let Node { surfel, .. } = &tree.nodes[number as usize];
         DVec3::from_array(surfel.center.map(f64::from)) + tree.low(number)
     };
     let (middle, all) = (center(number), f64::from(node.radius));
-    let (mut largest, mut mixed) = (0f32, 0);
+    let mut largest = 0f32;
     for child in node.first..node.first + node.count {
         let Node { radius, count, leaf, .. } = tree.nodes[child as usize];
         if center(child).distance_squared(middle) > all * all {
-            return (ONE_BY_ONE, 0);
+            return ONE_BY_ONE;
         }
-        if leaf && count == 1 { mixed = WITH_SURFELS } else { largest = largest.max(radius) }
+        if !(leaf && count == 1) {
+            largest = largest.max(radius);
+        }
     }
-    (largest, mixed)
+    largest
 }
 
 /// The branches of a tree, each of at most `most` surfels and nodes together, if that is a few thousand or more.
@@ -200,9 +205,11 @@ fn laid_out(
     let (nodes, numbers) = (Vec::with_capacity(room), Vec::with_capacity(room));
     let mut rows = Rows { tree, elsewhere, surfels, nodes, numbers };
     roots.iter().for_each(|root| rows.push(*root));
-    let (mut row, mut levels, mut level_end) = (0, 0, 0);
+    let (mut row, mut levels, mut small_levels, mut level_end) = (0, 0, 0, 0);
     while row < rows.nodes.len() {
         if row == level_end {
+            let small = small_levels == levels && rows.nodes.len() - row <= (JUDGED * WORKGROUP) as usize;
+            small_levels += u32::from(small);
             (levels, level_end) = (levels + 1, rows.nodes.len());
         }
         rows.push_below(row);
@@ -212,7 +219,7 @@ fn laid_out(
     // Where rows lie is found one after the other, and what is in them by all threads.
     let all = nodes.par_iter_mut().zip(&numbers).with_min_len(4096);
     all.for_each(|(row, &number)| fill(row, tree, number));
-    Branch { surfels, nodes, numbers, roots: roots.len() as u32, first_root: 0, whole: false, levels }
+    Branch { surfels, nodes, numbers, roots: roots.len() as u32, first_root: 0, whole: false, levels, small_levels }
 }
 
 /// Rows of a branch, of which those below are not all there yet.
@@ -243,7 +250,7 @@ impl<E: Fn(u32) -> Option<Elsewhere>> Rows<'_, E> {
             }
         };
         let below = count | kind << KIND_SHIFT;
-        self.nodes.push(TreeNode { radius: 0.0, cone: 0.0, first, below, children: ONE_BY_ONE });
+        self.nodes.push(TreeNode { first, below, children: ONE_BY_ONE, ..Zeroable::zeroed() });
         self.numbers.push(number);
     }
 
@@ -273,11 +280,10 @@ impl<E: Fn(u32) -> Option<Elsewhere>> Rows<'_, E> {
 
 /// Gives the row of a node what is told of the node alone.
 fn fill(row: &mut TreeNode, tree: &Hierarchy, number: u32) {
-    let Node { radius, cone, .. } = tree.nodes[number as usize];
-    (row.radius, row.cone) = (radius, cone);
+    let Node { surfel, radius, cone, .. } = tree.nodes[number as usize];
+    (row.center, row.radius, row.cone) = (surfel.center, radius, cone);
     if row.children == TOGETHER {
-        let (children, mixed) = children_of(tree, number);
-        (row.children, row.below) = (children, row.below | mixed);
+        row.children = children_of(tree, number);
     }
 }
 
@@ -303,7 +309,7 @@ mod tests {
     }
 
     fn kind(node: &TreeNode) -> (u32, u32) {
-        (node.below >> KIND_SHIFT, node.below & (WITH_SURFELS - 1))
+        (node.below >> KIND_SHIFT, node.below & ((1 << KIND_SHIFT) - 1))
     }
 
     /// The surfels below a row of a branch, by their places in the scene, and the numbers of the nodes that lead there.
@@ -328,6 +334,17 @@ mod tests {
         }
     }
 
+    /// How many nodes each level of a branch has.
+    fn levels_of(branch: &Branch) -> Vec<usize> {
+        let (mut levels, mut level) = (Vec::new(), 0..branch.roots as usize);
+        while !level.is_empty() {
+            levels.push(level.len());
+            let children = |node: &TreeNode| if kind(node).0 == INNER { kind(node).1 as usize } else { 0 };
+            level = level.end..level.end + branch.nodes[level].iter().map(children).sum::<usize>();
+        }
+        levels
+    }
+
     /// What an inner node says of its children is so, and it says it unless some lead elsewhere.
     fn family(branch: &Branch, node: &TreeNode) {
         let children = &branch.nodes[node.first as usize..][..kind(node).1 as usize];
@@ -335,7 +352,6 @@ mod tests {
         let single = |child: &&TreeNode| kind(child) == (LEAF, 1);
         let balls = children.iter().filter(|child| !single(child)).map(|child| child.radius);
         assert_eq!(node.children, if here { balls.fold(0.0, f32::max) } else { ONE_BY_ONE });
-        assert_eq!(node.below & WITH_SURFELS != 0, here && children.iter().any(|child| single(&child)));
     }
 
     /// Of a file that somebody else wrote.
@@ -358,13 +374,14 @@ mod tests {
             children_of(&tree, 0)
         };
         // Large balls may stand out, centres may not.
-        assert_eq!(of(1.0, 0.0), (9.0, WITH_SURFELS));
-        assert_eq!(of(1.0, 1e-9), (ONE_BY_ONE, 0));
-        assert_eq!(of(-1.1, 0.0), (ONE_BY_ONE, 0));
+        assert_eq!(of(1.0, 0.0), 9.0);
+        assert_eq!(of(1.0, 1e-9), ONE_BY_ONE);
+        assert_eq!(of(-1.1, 0.0), ONE_BY_ONE);
     }
 
     #[test]
     fn branches_have_every_surfel_once_and_fit() {
+        let mut large = false;
         for (count, copies, most) in
             [(1, 0, 10_000), (3000, 0, 10_000), (3000, 0, 500), (3000, 20_000, 6000), (50, 9000, 1 << 20)]
         {
@@ -386,6 +403,10 @@ mod tests {
             assert!(leaves.map(|(_, count)| count).max().unwrap() <= MOST_OF_LEAF);
             for branch in &all {
                 branch.nodes.iter().filter(|node| kind(node).0 == INNER).for_each(|node| family(branch, node));
+                let levels = levels_of(branch);
+                let small = levels.iter().take_while(|nodes| **nodes <= (JUDGED * WORKGROUP) as usize).count();
+                assert_eq!((branch.levels as usize, branch.small_levels as usize), (levels.len(), small));
+                large |= small < levels.len();
             }
             if most == 500 {
                 assert!(all.len() > 6 && all.len() < 30, "{}", all.len());
@@ -394,5 +415,6 @@ mod tests {
                 assert_eq!(nodes - others, tree.nodes.len());
             }
         }
+        assert!(large);
     }
 }

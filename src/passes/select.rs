@@ -42,23 +42,23 @@ pub const PASS: Pass = Pass {
     },
 };
 
-const SELECT_ROOTS: Kernel = Kernel::of("select_roots", [1, 1, 1]);
+const SELECT_TOP: Kernel = Kernel::new("select_top");
 const SELECT_JUDGE: Kernel = Kernel::new("select_judge");
 const SELECT_SUM: Kernel = Kernel::new("select_sum");
 const SELECT_SPREAD: Kernel = Kernel::new("select_spread");
 
 /// The kernels that choose what is drawn: what follows depends on how much that is, so they are compiled before all others.
-pub const CHOOSING: [Kernel; 4] = [SELECT_ROOTS, SELECT_JUDGE, SELECT_SUM, SELECT_SPREAD];
+pub const CHOOSING: [Kernel; 4] = [SELECT_TOP, SELECT_JUDGE, SELECT_SUM, SELECT_SPREAD];
 
-/// The dispatches that choose what of a branch with so many levels is drawn.
-pub fn choose(levels: u32) -> Vec<Run> {
+/// The dispatches that choose what of a branch is drawn: one for the levels that a workgroup can judge, and those for so many others.
+pub fn choose(large_levels: u32) -> Vec<Run> {
     let level = [
         Run { kernel: SELECT_JUDGE, over: Over::Judged },
         Run { kernel: SELECT_SUM, over: Over::Once },
         Run { kernel: SELECT_SPREAD, over: Over::Spread },
     ];
-    let mut runs = vec![Run { kernel: SELECT_ROOTS, over: Over::Once }];
-    runs.extend((0..levels).flat_map(|_| level));
+    let mut runs = vec![Run { kernel: SELECT_TOP, over: Over::Once }];
+    runs.extend((0..large_levels).flat_map(|_| level));
     runs
 }
 

@@ -155,10 +155,16 @@ impl Source for Scene {
 
     fn branch<'a>(&'a self, needs: &SceneNeeds, branch: &Branch) -> Option<Box<dyn Page + 'a>> {
         let first = self.surfels.len() as u32;
-        let nodes = branch.numbers.iter().map(|number| first + number);
+        let levels = self.levels();
+        let of_node = |&number: &u32| match levels.and_then(|levels| levels.nodes.get(number as usize)) {
+            // One surfel is itself, with its lines and its cap.
+            Some(&Node { leaf: true, count: 1, first: surfel, .. }) => surfel,
+            _ => first + number,
+        };
+        let nodes = branch.numbers.iter().map(of_node);
         Some(Box::new(ScenePage {
             scene: self,
-            nodes: self.levels(),
+            nodes: levels,
             needs: *needs,
             layout: SurfelLayout::of(needs),
             indices: branch.surfels.clone().chain(nodes).collect(),

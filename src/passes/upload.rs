@@ -33,8 +33,8 @@ pub struct Uploaded {
 pub struct BranchBuffers {
     /// Its surfels and nodes, with their attributes as far as the render needs them.
     pub buffers: Named,
-    /// How many levels it has.
-    pub levels: u32,
+    /// How many levels it has that one workgroup cannot judge.
+    pub large_levels: u32,
     /// How many nodes.
     pub nodes: u64,
     /// Where in the attributes what is chosen starts, words.
@@ -84,11 +84,11 @@ fn branches(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds, progress: &dyn P
     let tree = branches::branches(tree, most);
     let of = |branch: Branch| {
         let page = source.branch(needs, &branch).ok_or_else(|| gpu.error("a scene has no levels of detail"))?;
-        let Branch { surfels, nodes, roots, first_root, whole, levels, .. } = branch;
+        let Branch { surfels, nodes, roots, first_root, whole, levels, small_levels, .. } = branch;
         let (surfels, records) = (surfels.len() as u32, surfels.len() + nodes.len());
         let chosen = (records * words) as u32;
         let whole = whole.into();
-        let own = layout::Branch { surfels, roots, first_root, whole, chosen, ..Zeroable::zeroed() };
+        let own = layout::Branch { surfels, roots, first_root, whole, chosen, small_levels, ..Zeroable::zeroed() };
         let mut buffers = vec![
             ("branch", Buffer::uniform(gpu, "branch", &own)?.words()),
             ("tree_nodes", filled(gpu, "nodes", bytemuck::cast_slice(&nodes))?),
@@ -99,7 +99,13 @@ fn branches(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds, progress: &dyn P
             (words, 1 + of_chosen * records),
             progress,
         )?));
-        Ok(BranchBuffers { buffers, levels, nodes: nodes.len() as u64, chosen, roots: roots.into() })
+        Ok(BranchBuffers {
+            buffers,
+            large_levels: levels - small_levels,
+            nodes: nodes.len() as u64,
+            chosen,
+            roots: roots.into(),
+        })
     };
     tree.into_iter().map(of).collect()
 }

@@ -21,7 +21,7 @@ impl Run<'_> {
                 of_all.into_iter().for_each(|buffer| encoder.clear_buffer(&buffer.raw, 0, None));
             };
             self.timing.pass(gpu, "select", clears, |pass| {
-                for run in select::choose(branch.levels) {
+                for run in select::choose(branch.large_levels) {
                     let program = kernels.of(gpu, &run.kernel)?;
                     let grid = over(gpu, plan, store, (0, 0), run.over)?;
                     let binding = |name: &str| store.binding_of_branch(name, number);

@@ -101,8 +101,8 @@ impl Page {
 /// A branch of a tree ([`branches`](crate::passes::branches)).
 pub struct Branch {
     pub(super) buffers: Named,
-    /// How many levels it has.
-    pub levels: u32,
+    /// How many levels it has that one workgroup cannot judge.
+    pub large_levels: u32,
     /// Where in its attributes what is chosen starts, words.
     pub(super) chosen: u32,
 }

@@ -141,7 +141,7 @@ impl Store {
             shared.extend(of_selection(gpu, &uploaded.branches, needs)?);
         }
         let branches = uploaded.branches.into_iter().map(|branch| Branch {
-            levels: branch.levels,
+            large_levels: branch.large_levels,
             chosen: branch.chosen,
             buffers: Named::from_iter(branch.buffers),
         });

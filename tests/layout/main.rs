@@ -15,7 +15,7 @@ use epsplat::gpu::interface::reflect;
 use epsplat::gpu::layout::{
     AWAY, BATCH, BLOCK_SIDE, COVERED_GRID, COVERED_GRID_OF_EIGHTS, COVERED_LIST, INNER, JUDGE_GRID, JUDGED, KIND_SHIFT,
     LEAF, LIST_ENDS, LIST_FAR, LIST_START, MOST_GROUPS, OCCLUSION_TILE, ONE, OTHER_BRANCH, QUEUE_GRID, QUEUE_LISTING,
-    QUEUE_START, RUN, SPREAD_GRID, TILE, TILE_WIDTH, WITH_SURFELS, WORKGROUP,
+    QUEUE_START, RUN, SPREAD_GRID, TILE, TILE_WIDTH, WORKGROUP,
 };
 use epsplat::gpu::sources::FILES;
 use epsplat::passes;
@@ -156,7 +156,6 @@ fn constants_agree() {
             ("JUDGE_GRID", JUDGE_GRID),
             ("SPREAD_GRID", SPREAD_GRID),
             ("KIND_SHIFT", KIND_SHIFT),
-            ("WITH_SURFELS", WITH_SURFELS),
             ("INNER", INNER),
             ("LEAF", LEAF),
             ("OTHER_BRANCH", OTHER_BRANCH),

@@ -106,8 +106,8 @@ pub fn mirrors() -> BTreeMap<&'static str, Struct> {
         mirror!(Splat { anchor_x, anchor_y, bounds_first, bounds_last, a, b, c, a_low }),
         mirror!(Surfel { center, s, t }),
         mirror!(Page { first, surfels, runs, stride, chosen, padding_0, padding_1, padding_2 }),
-        mirror!(TreeNode { radius, cone, first, below, children }),
-        mirror!(Branch { surfels, roots, first_root, whole, chosen, padding_0, padding_1, padding_2 }),
+        mirror!(TreeNode { center, radius, first, below, children, cone }),
+        mirror!(Branch { surfels, roots, first_root, whole, chosen, small_levels, padding_0, padding_1 }),
         mirror!(Filter { center_x, center_y, depth_low, depth_high, r_xx, r_xy, r_yy, gain }),
     ])
 }

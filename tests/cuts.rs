@@ -17,9 +17,9 @@ use epsplat::plan::{Raster, RasterDepth, RenderOptions};
 use epsplat::render::{Backend, Renderer, render};
 use epsplat::scene::{
     Camera, Clip, Colors, Composite, Cull, Detail, DetailMeasure, Epsilon, Lens, Map, Maps, Projection, Samples, Scene,
-    Up,
+    Surfel, Up,
 };
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 /// One whose buffers hold 1,900 surfels and nodes, so that a tree has several branches.
 fn small() -> Gpu {
@@ -252,6 +252,26 @@ fn crowded_leaves_are_drawn_whole() {
     }
 }
 
+/// Several such leaves at depths of their own: loops of one invocation would take more rounds than llvmpipe ends them after.
+#[test]
+fn crowds_at_several_depths_are_drawn_whole() {
+    const COPIES: usize = 33_000;
+    let Some(gpu) = common::gpu() else { return };
+    // Means divide off the farthest first.
+    let crowd = |k: i32| vec![Surfel::disk(Vec3::X * 2f32.powi(-2 * k), Vec3::Z, 0.05); COPIES];
+    let surfels: Vec<Surfel> = (0..4).flat_map(crowd).collect();
+    let colors = Colors::Srgb8((0..surfels.len()).map(|k| [(k / COPIES * 60) as u8, 90, 20, 255]).collect());
+    let scene = levels(Scene { surfels, colors, ..Scene::default() });
+    let (lens, eye) = (Lens::OrthographicHeight(2.2), DVec3::new(0.4, 0.0, 3.0));
+    let camera = Camera::look_at((60, 60), lens, eye, DVec3::X * 0.4, None, Up::Y, 1e-3).unwrap();
+    let options = RenderOptions { without: vec![epsplat::plan::Optimisation::Copies], ..at(1e-6) };
+    let (twins, flat) = cut(&scene, &camera, &options);
+    let backend = Backend::gpu(gpu);
+    let (shown, report) = render(&scene, &camera, &options, &backend, &()).unwrap();
+    assert_eq!(report.cut, Some(4 * COPIES as u64));
+    assert!(bits(&shown) == bits(&frame(&twins, &camera, &flat, &backend)));
+}
+
 /// Views through which the camera's plane goes, in samples, far from the origin and of a number of splats: the twin's cut.
 #[test]
 fn odd_views_have_the_cut_of_the_twin() {
@@ -357,9 +377,18 @@ fn large_levels_are_summed() {
     };
     let whole = of(&Backend::gpu(gpu.clone()));
     assert_eq!(whole.1, right);
-    // In branches levels are smaller.
+    // In branches levels are smaller, but of some larger than what a workgroup judges.
     let branches = Backend::gpu(gpu.clone().with_buffer_limit(2_000_000));
     assert!(of(&branches) == whole);
+    // Of cuts that fade into each other not all come to a node.
+    let fading = fading(&at(4.0));
+    let right = Some(cut(&scene, &camera, &fading).0.scene.surfels.len() as u64);
+    let [one, other] = [Backend::gpu(gpu.clone()), branches].map(|backend| {
+        let (shown, report) = render(&scene, &camera, &fading, &backend, &()).unwrap();
+        assert_eq!(report.cut, right);
+        bits(&shown)
+    });
+    assert!(one == other);
     for (from, to) in [
         ("start += counts;", "start = counts;"),
         ("start += eights[k];", "start = eights[k];"),
@@ -384,7 +413,6 @@ fn children_are_drawn_together_where_each_would_be() {
     let (together, alone) = (Backend::gpu(gpu.clone()), backend(TOGETHER, "false"));
     let broken = [backend(WITHIN, "let within = true;"), backend("past && within", "within")];
     let mut noticed = [false; 2];
-    // Of one that has lines a surfel is another than its node.
     let some = |name: &str| name == "clipped, normals" || name == "doubled";
     for scene in all().into_iter().filter_map(|(name, scene)| some(name).then_some(scene)) {
         let scene = levels(scene);

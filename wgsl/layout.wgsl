@@ -110,8 +110,8 @@ struct Page {
 
 // A node of a tree, or one that has a part of a leaf's surfels.
 struct TreeNode {
-    // A sphere of this radius around this centre holds all below it, world units. The centre is its surfel's once more: what a node is mostly judged by
-    // is in a line of a cache.
+    // A sphere of this radius around this centre holds all below it, world units. The centre is that of its ellipse once more: what a node is mostly judged
+    // by is in a line of a cache.
     center: array<f32, 3>,
     radius: f32,
     // The first of its children in this branch, or of its surfels, or which root of another branch it is.

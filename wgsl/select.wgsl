@@ -108,7 +108,7 @@ fn kind_of(node: TreeNode) -> u32 {
     return node.below >> KIND_SHIFT;
 }
 
-// Whether it is never divided: one surfel is itself, with its lines and its cap, which are the node's too (src/passes/source.rs); and where the surfels of
+// Whether it is never divided: one surfel is itself, with its lines and its cap, which are the node's too (src/scene/hierarchy.rs, `settle`; src/passes/source.rs); and where the surfels of
 // a part of a tree are not there, no picture comes to them.
 fn is_whole(node: TreeNode) -> bool {
     return kind_of(node) == LEAF && (node.below & COUNT_MASK) <= 1u;

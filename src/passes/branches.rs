@@ -17,9 +17,19 @@ use crate::scene::hierarchy::{Hierarchy, Node};
 /// The most surfels of one node that an invocation copies the numbers of.
 const MOST_OF_LEAF: u32 = 4096;
 
-// What an invocation spreads takes fewer rounds than llvmpipe ends loops after: of each node its surfels or its children, one more in which it is come to,
-// and one in which each of its two loops ends.
-const _: () = assert!(JUDGED * (MOST_OF_LEAF + 4) < 65_535);
+/// The bits of [`TreeNode::below`] that say how many surfels or children there are.
+const COUNT_MASK: u32 = (1 << KIND_SHIFT) - 1;
+
+/// Rounds of all its loops after which llvmpipe ends an invocation, whatever is left to do.
+const MOST_ROUNDS: u64 = 65_535;
+
+/// The most rounds in which an invocation judges and spreads its nodes of a level, of which none has more than so many surfels or children: of each node
+/// one for each of these, and no more than nine in which it is come to, loops end, and sums are made.
+const fn rounds_of(below: u32) -> u64 {
+    JUDGED as u64 * (below as u64 + 9)
+}
+
+const _: () = assert!(rounds_of(MOST_OF_LEAF) < MOST_ROUNDS);
 
 /// Neighbouring subtrees.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,7 +48,7 @@ pub struct Branch {
     pub whole: bool,
     /// How many levels it has.
     pub levels: u32,
-    /// How many of the first ones one workgroup judges.
+    /// How many of the first ones one workgroup judges: no more nodes than it can, of which no more is left than its loops end for.
     pub small_levels: u32,
 }
 
@@ -205,15 +215,16 @@ fn laid_out(
     let (nodes, numbers) = (Vec::with_capacity(room), Vec::with_capacity(room));
     let mut rows = Rows { tree, elsewhere, surfels, nodes, numbers };
     roots.iter().for_each(|root| rows.push(*root));
-    let (mut row, mut levels, mut small_levels, mut level_end) = (0, 0, 0, 0);
-    while row < rows.nodes.len() {
-        if row == level_end {
-            let small = small_levels == levels && rows.nodes.len() - row <= (JUDGED * WORKGROUP) as usize;
-            small_levels += u32::from(small);
-            (levels, level_end) = (levels + 1, rows.nodes.len());
-        }
-        rows.push_below(row);
-        row += 1;
+    let (mut level, mut levels, mut small_levels) = (0..rows.nodes.len(), 0, 0);
+    // To which one invocation comes.
+    let mut rounds = roots.len() as u64;
+    while !level.is_empty() {
+        level.clone().for_each(|row| rows.push_below(row));
+        let most = rows.nodes[level.clone()].iter().map(|node| node.below & COUNT_MASK).max().unwrap_or(0);
+        rounds += rounds_of(most);
+        let small = level.len() <= (JUDGED * WORKGROUP) as usize && rounds < MOST_ROUNDS;
+        small_levels += u32::from(small && small_levels == levels);
+        (level, levels) = (level.end..rows.nodes.len(), levels + 1);
     }
     let Rows { surfels, mut nodes, numbers, .. } = rows;
     // Where rows lie is found one after the other, and what is in them by all threads.
@@ -296,20 +307,24 @@ mod tests {
     use crate::scene::{Scene, Surfel};
     use crate::surfels::hierarchy;
 
-    /// Surfels on a spiral, and `copies` more of the first.
+    /// Those of which there are many.
+    const CROWDED: [usize; 5] = [0, 1, 2, 20, 40];
+
+    /// Surfels on a spiral, and so many `copies` more of some.
     fn tree(count: usize, copies: usize) -> Hierarchy {
         let at = |k: usize| {
             let (sine, cosine) = (k as f32 * 2.4).sin_cos();
             Vec3::new(cosine, sine, 1.0) * (k as f32).sqrt()
         };
-        let places = (0..count).map(at).chain(vec![at(0); copies]);
+        let crowds = CROWDED.into_iter().flat_map(|k| vec![at(k); copies]);
+        let places = (0..count).map(at).chain(crowds);
         let surfels = places.map(|place| Surfel::disk(place, Vec3::Z, 0.5)).collect();
         let scene = Scene { surfels, ..Scene::default() };
         hierarchy::build(scene, &()).unwrap().1.as_ref().clone()
     }
 
     fn kind(node: &TreeNode) -> (u32, u32) {
-        (node.below >> KIND_SHIFT, node.below & ((1 << KIND_SHIFT) - 1))
+        (node.below >> KIND_SHIFT, node.below & COUNT_MASK)
     }
 
     /// The surfels below a row of a branch, by their places in the scene, and the numbers of the nodes that lead there.
@@ -334,21 +349,31 @@ mod tests {
         }
     }
 
-    /// How many nodes each level of a branch has.
-    fn levels_of(branch: &Branch) -> Vec<usize> {
-        let (mut levels, mut level) = (Vec::new(), 0..branch.roots as usize);
+    /// How many nodes each level of a branch has, and the most surfels or children of one.
+    fn levels_of(branch: &Branch) -> Vec<(usize, u32)> {
+        let (mut levels, mut level) = (Vec::new(), &branch.nodes[..branch.roots as usize]);
+        let mut end = level.len();
         while !level.is_empty() {
-            levels.push(level.len());
+            levels.push((level.len(), level.iter().map(|node| kind(node).1).max().unwrap()));
             let children = |node: &TreeNode| if kind(node).0 == INNER { kind(node).1 as usize } else { 0 };
-            level = level.end..level.end + branch.nodes[level].iter().map(children).sum::<usize>();
+            let next = level.iter().map(children).sum::<usize>();
+            (level, end) = (&branch.nodes[end..end + next], end + next);
         }
         levels
     }
 
     /// What an inner node says of its children is so, and it says it unless some lead elsewhere.
-    fn family(branch: &Branch, node: &TreeNode) {
+    fn family(tree: &Hierarchy, branch: &Branch, node: &TreeNode) {
         let children = &branch.nodes[node.first as usize..][..kind(node).1 as usize];
-        let here = children.iter().all(|child| [INNER, LEAF].contains(&kind(child).0));
+        let is_elsewhere = |child: &TreeNode| kind(child).0 == OTHER_BRANCH;
+        // A crowded leaf whose parts are roots is above them.
+        let crowds = |row: usize| {
+            let TreeNode { first, .. } = branch.nodes[row];
+            let leaf = tree.nodes[branch.numbers[row] as usize].leaf;
+            leaf && kind(&branch.nodes[row]).0 == INNER && is_elsewhere(&branch.nodes[first as usize])
+        };
+        let rows = node.first as usize..node.first as usize + children.len();
+        let here = children.iter().all(|child| [INNER, LEAF].contains(&kind(child).0)) && !rows.into_iter().any(crowds);
         let single = |child: &&TreeNode| kind(child) == (LEAF, 1);
         let balls = children.iter().filter(|child| !single(child)).map(|child| child.radius);
         assert_eq!(node.children, if here { balls.fold(0.0, f32::max) } else { ONE_BY_ONE });
@@ -381,12 +406,18 @@ mod tests {
 
     #[test]
     fn branches_have_every_surfel_once_and_fit() {
-        let mut large = false;
-        for (count, copies, most) in
-            [(1, 0, 10_000), (3000, 0, 10_000), (3000, 0, 500), (3000, 20_000, 6000), (50, 9000, 1 << 20)]
-        {
+        let (mut large, mut crowded) = (false, false);
+        for (count, copies, most) in [
+            (1, 0, 10_000),
+            (3000, 0, 10_000),
+            (3000, 0, 500),
+            (3000, 20_000, 6000),
+            (50, 9000, 1 << 20),
+            (20_000, 0, 1 << 20),
+        ] {
             let tree = tree(count, copies);
             let all = branches(&tree, most);
+            let surfels = count + CROWDED.len() * copies;
             assert!(all[0].whole && all.iter().skip(1).all(|branch| !branch.whole));
             assert!(all.len() == 1 || all[0].surfels.is_empty());
             let fits = |branch: &Branch| (branch.surfels.len() + branch.nodes.len()) as u64 <= most;
@@ -394,7 +425,7 @@ mod tests {
             assert!(all.iter().all(fits), "{count} {copies}");
             let mut found = Vec::new();
             below(&all, (0, 0), 0, &mut found);
-            assert!(found.iter().copied().eq(0..(count + copies) as u32), "{count} {copies}");
+            assert!(found.iter().copied().eq(0..surfels as u32), "{count} {copies}");
             let leaves = all
                 .iter()
                 .flat_map(|branch| &branch.nodes)
@@ -402,11 +433,22 @@ mod tests {
                 .filter(|(kind, _)| [LEAF, PART_OF_LEAF].contains(kind));
             assert!(leaves.map(|(_, count)| count).max().unwrap() <= MOST_OF_LEAF);
             for branch in &all {
-                branch.nodes.iter().filter(|node| kind(node).0 == INNER).for_each(|node| family(branch, node));
+                branch.nodes.iter().filter(|node| kind(node).0 == INNER).for_each(|node| family(&tree, branch, node));
                 let levels = levels_of(branch);
-                let small = levels.iter().take_while(|nodes| **nodes <= (JUDGED * WORKGROUP) as usize).count();
-                assert_eq!((branch.levels as usize, branch.small_levels as usize), (levels.len(), small));
-                large |= small < levels.len();
+                assert_eq!(branch.levels as usize, levels.len());
+                let (small, others) = levels.split_at(branch.small_levels as usize);
+                assert!(small.iter().all(|(nodes, _)| *nodes <= (JUDGED * WORKGROUP) as usize));
+                let rounds = |levels: &[(usize, u32)]| levels.iter().map(|(_, below)| rounds_of(*below)).sum::<u64>();
+                assert!(rounds(small) + u64::from(branch.roots) < MOST_ROUNDS);
+                // And no more levels are.
+                match others.first() {
+                    Some((nodes, _)) if *nodes > (JUDGED * WORKGROUP) as usize => large = true,
+                    Some((_, below)) => {
+                        assert!(rounds(small) + rounds_of(*below) + u64::from(branch.roots) >= MOST_ROUNDS);
+                        crowded = true;
+                    }
+                    None => {}
+                }
             }
             if most == 500 {
                 assert!(all.len() > 6 && all.len() < 30, "{}", all.len());
@@ -415,6 +457,6 @@ mod tests {
                 assert_eq!(nodes - others, tree.nodes.len());
             }
         }
-        assert!(large);
+        assert!(large && crowded);
     }
 }

@@ -38,7 +38,8 @@ pub trait Source: Send + Sync {
         None
     }
 
-    /// The surfels of a branch of these levels, and behind them those of its nodes, as a render with `needs` draws them.
+    /// The surfels of a branch of these levels, and behind them those of its nodes, as a render with `needs` draws them: of a leaf of one surfel once more
+    /// that one, which is drawn for it.
     fn branch<'a>(&'a self, _needs: &SceneNeeds, _branch: &Branch) -> Option<Box<dyn Page + 'a>> {
         None
     }
@@ -157,7 +158,7 @@ impl Source for Scene {
         let first = self.surfels.len() as u32;
         let levels = self.levels();
         let of_node = |&number: &u32| match levels.and_then(|levels| levels.nodes.get(number as usize)) {
-            // One surfel is itself, with its lines and its cap.
+            // With its lines and its cap.
             Some(&Node { leaf: true, count: 1, first: surfel, .. }) => surfel,
             _ => first + number,
         };

@@ -111,6 +111,20 @@ impl Hierarchy {
         if reached == elements { Ok(()) } else { Err(Fault::Loose) }
     }
 
+    /// Gives each leaf of one surfel that surfel's ellipse: it is drawn for it, and other programs may have written another one.
+    pub(crate) fn settle(&mut self, surfels: &[Surfel], low: &[[f32; 3]]) {
+        let of_one = |node: &Node| (node.leaf && node.count == 1).then_some(node.first as usize);
+        for (index, node) in self.nodes.iter_mut().enumerate() {
+            let Some((place, &surfel)) = of_one(node).and_then(|place| Some((place, surfels.get(place)?))) else {
+                continue;
+            };
+            node.surfel = surfel;
+            if let Some(own) = self.low.get_mut(index) {
+                *own = low.get(place).copied().unwrap_or_default();
+            }
+        }
+    }
+
     /// What the f32 centre of a node leaves out, world units.
     pub fn low(&self, index: u32) -> DVec3 {
         self.low.get(index as usize).map_or(DVec3::ZERO, |low| DVec3::from_array(low.map(f64::from)))
@@ -136,6 +150,23 @@ mod tests {
     fn node(leaf: bool, first: u32, count: u32) -> Node {
         let surfel = Surfel { center: [0.0; 3], s: [1.0, 0.0, 0.0], t: [0.0, 1.0, 0.0] };
         Node { surfel, cap: Cap::FLAT, color: [1.0; 4], radius: 1.0, cone: 1.0, first, count, leaf }
+    }
+
+    #[test]
+    fn leaves_of_one_surfel_are_settled() {
+        let at = |x: f32| Surfel { center: [x, 2.0, 3.0], s: [0.0, 1.0, 0.0], t: [0.0, 0.0, x] };
+        let nodes = vec![node(false, 1, 3), node(true, 0, 2), node(true, 2, 1), node(true, 0, 0)];
+        let mut tree = Hierarchy { nodes: nodes.clone(), low: vec![[7.0; 3]; 4] };
+        tree.settle(&[1.0, 2.0, 3.0].map(at), &[[0.1; 3], [0.2; 3], [0.3; 3]]);
+        let settled = Node { surfel: at(3.0), ..nodes[2] };
+        assert_eq!(tree.nodes, [nodes[0], nodes[1], settled, nodes[3]]);
+        assert_eq!(tree.low, [[7.0; 3], [7.0; 3], [0.3; 3], [7.0; 3]]);
+        // Where surfels leave out nothing nodes do not either, and what has no surfels has none.
+        let mut tree = Hierarchy { nodes: nodes.clone(), low: vec![[7.0; 3]; 4] };
+        tree.settle(&[at(1.0)], &[]);
+        assert_eq!(tree.nodes, nodes);
+        tree.settle(&[1.0, 2.0, 3.0].map(at), &[]);
+        assert_eq!((tree.nodes[2], tree.low[2]), (settled, [0.0; 3]));
     }
 
     #[test]

@@ -198,7 +198,9 @@ pub(super) fn built(mut gathered: Gathered, limits: &Limits, progress: &dyn Prog
     let clips: Vec<Clip> = clips.unwrap_or_default().into_iter().map(Clip::usable).collect();
     let clips = if clips.iter().all(Clip::is_none) { Vec::new() } else { clips };
     let of_disks = Scene { low, clips, caps, normals, ..Scene::default() };
-    let hierarchy = tree.filter(|_| !encoded).and_then(|tree| tree.hierarchy(origin)).map(Arc::new);
+    let mut hierarchy = tree.filter(|_| !encoded).and_then(|tree| tree.hierarchy(origin));
+    hierarchy.iter_mut().for_each(|tree| tree.settle(&surfels, &of_disks.low));
+    let hierarchy = hierarchy.map(Arc::new);
     let scene = Scene { origin, surfels, colors, encoded, oriented, closed, up, provenance, hierarchy, ..of_disks };
     // As the default view sees it.
     preparation.strays = scene.framed().1;

@@ -228,12 +228,12 @@ fn in_order(tree: &mut Hierarchy) -> Option<Vec<Range<u32>>> {
 fn scene(
     levels: &Levels,
     numbers: &[Range<u32>],
-    (tree, facts): (Hierarchy, LevelFacts),
+    (mut tree, facts): (Hierarchy, LevelFacts),
     progress: &dyn Progress,
 ) -> Result<Scene> {
     let whole = levels.whole;
     let empty = Scene { part_of: None, colors: levels.no_colors(), ..nothing(levels) };
-    let mut scene = Scene { hierarchy: Some(Arc::new(tree)), ..empty.clone() };
+    let mut scene = empty.clone();
     let made = |points: Points| {
         let (mut scene, count) = (empty.clone(), points.positions.len());
         complete::add(&mut scene, vec![points], whole.has)
@@ -245,6 +245,8 @@ fn scene(
     for block in blocks(numbers) {
         levels.points(&block, made)?.into_iter().for_each(|part| complete::append(&mut scene, part));
     }
+    tree.settle(&scene.surfels, &scene.low);
+    scene.hierarchy = Some(Arc::new(tree));
     if !whole.holds(&scene, facts) {
         return Err(levels.malformed("its element 'scene' leaves out points or nodes that it has"));
     }

@@ -7,7 +7,6 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use bytemuck::Zeroable;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -36,8 +35,8 @@ const _: () = assert!(rounds_of(MOST_OF_LEAF) < MOST_ROUNDS);
 pub struct Branch {
     /// Its surfels, by their places in the scene.
     pub surfels: Range<u32>,
-    /// Its nodes as the device sees them, roots first and level by level.
-    pub nodes: Vec<TreeNode>,
+    /// Its rows, roots first and level by level.
+    pub nodes: Vec<Row>,
     /// The number in the tree of each of them.
     pub numbers: Vec<u32>,
     /// How many are roots.
@@ -50,6 +49,33 @@ pub struct Branch {
     pub levels: u32,
     /// How many of the first ones one workgroup judges: no more nodes than it can, of which no more is left than its loops end for.
     pub small_levels: u32,
+}
+
+/// What is below a row of a branch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    /// [`TreeNode::first`].
+    first: u32,
+    /// [`TreeNode::below`].
+    below: u32,
+    /// Its node's children are in this branch, so that they may be judged together ([`TreeNode::children`]).
+    together: bool,
+}
+
+impl Branch {
+    /// A row as the device sees it, of a branch of `tree`.
+    pub fn row(&self, tree: &Hierarchy, index: usize) -> TreeNode {
+        let (Row { first, below, together }, number) = (self.nodes[index], self.numbers[index]);
+        let Node { surfel, radius, cone, .. } = tree.nodes[number as usize];
+        let children = if together { children_of(tree, number) } else { ONE_BY_ONE };
+        TreeNode { center: surfel.center, radius, first, below, children, cone }
+    }
+
+    /// The place in the scene of the surfel that is all of a row's node, if it is a leaf of one.
+    pub fn only_surfel(&self, row: usize) -> Option<u32> {
+        let Row { first, below, .. } = self.nodes[row];
+        (below == LEAF << KIND_SHIFT | 1).then(|| self.surfels.start + first)
+    }
 }
 
 /// What a row of a branch is made of.
@@ -86,9 +112,6 @@ fn parts(number: u32, node: &Node) -> impl Iterator<Item = Item> + use<> {
 /// Of a node whose children are judged one by one ([`TreeNode::children`]).
 const ONE_BY_ONE: f32 = -1.0;
 
-/// Of one whose children may be judged together.
-const TOGETHER: f32 = 0.0;
-
 /// Of an inner node that has the centres of all its children in its ball: the largest radius of a child, but of those that are one surfel. Of another
 /// one its children are judged one by one.
 fn children_of(tree: &Hierarchy, number: u32) -> f32 {
@@ -115,10 +138,8 @@ fn children_of(tree: &Hierarchy, number: u32) -> f32 {
 pub fn branches(tree: &Hierarchy, most: u64) -> Vec<Branch> {
     let (rows, surfels) = rows_of(tree);
     if rows <= most {
-        return vec![Branch {
-            whole: true,
-            ..laid_out(tree, (&[Item::Node(0)], tree.nodes.len()), 0..surfels, |_| None)
-        }];
+        let crowded = rows > tree.nodes.len() as u64 + u64::from(surfels);
+        return vec![if crowded { of_root(tree, surfels) } else { as_it_is(tree, surfels) }];
     }
     let subtrees = subtrees(tree, &sizes(tree), most);
     let mut roots: HashMap<u32, Elsewhere> = HashMap::new();
@@ -144,6 +165,57 @@ pub fn branches(tree: &Hierarchy, most: u64) -> Vec<Branch> {
         (first, surfel) = (end, surfel + surfels);
     }
     all
+}
+
+/// The branch of all of a tree.
+fn of_root(tree: &Hierarchy, surfels: u32) -> Branch {
+    Branch { whole: true, ..laid_out(tree, (&[Item::Node(0)], tree.nodes.len()), 0..surfels, |_| None) }
+}
+
+/// The same of a tree without crowded leaves, whose rows are its nodes, as these lie level by level, too.
+fn as_it_is(tree: &Hierarchy, surfels: u32) -> Branch {
+    let row = |node: &Node| {
+        let kind = if node.leaf { LEAF } else { INNER };
+        Row { first: node.first, below: node.count | kind << KIND_SHIFT, together: !node.leaf }
+    };
+    let nodes: Vec<Row> = tree.nodes.par_iter().with_min_len(4096).map(row).collect();
+    let (mut level, mut levels, mut small) = (0..1.min(nodes.len()), 0, Small::of(1));
+    while !level.is_empty() {
+        small.add(&nodes[level.clone()]);
+        // The children of the last node that has some are the last of the next level.
+        let last = nodes[level.clone()].iter().rfind(|row| row.together);
+        let end = last.map_or(level.end, |row| (row.first + (row.below & COUNT_MASK)) as usize);
+        (level, levels) = (level.end..end, levels + 1);
+    }
+    let numbers = (0..nodes.len() as u32).collect();
+    let small_levels = small.levels;
+    Branch { surfels: 0..surfels, nodes, numbers, roots: 1, first_root: 0, whole: true, levels, small_levels }
+}
+
+/// The first levels of a branch that are small ([`Branch::small_levels`]).
+struct Small {
+    levels: u32,
+    rounds: u64,
+    ended: bool,
+}
+
+impl Small {
+    /// Of a branch with so many roots, to which one invocation comes.
+    fn of(roots: u64) -> Self {
+        Self { levels: 0, rounds: roots, ended: false }
+    }
+
+    /// Adds the next level.
+    fn add(&mut self, level: &[Row]) {
+        if self.ended || level.len() > (JUDGED * WORKGROUP) as usize {
+            self.ended = true;
+            return;
+        }
+        let below = level.iter().map(|row| row.below & COUNT_MASK).max().unwrap_or(0);
+        self.rounds += rounds_of(below);
+        self.ended = self.rounds >= MOST_ROUNDS;
+        self.levels += u32::from(!self.ended);
+    }
 }
 
 /// Rows and surfels of a tree.
@@ -215,21 +287,14 @@ fn laid_out(
     let (nodes, numbers) = (Vec::with_capacity(room), Vec::with_capacity(room));
     let mut rows = Rows { tree, elsewhere, surfels, nodes, numbers };
     roots.iter().for_each(|root| rows.push(*root));
-    let (mut level, mut levels, mut small_levels) = (0..rows.nodes.len(), 0, 0);
-    // To which one invocation comes.
-    let mut rounds = roots.len() as u64;
+    let (mut level, mut levels, mut small) = (0..rows.nodes.len(), 0, Small::of(roots.len() as u64));
     while !level.is_empty() {
         level.clone().for_each(|row| rows.push_below(row));
-        let most = rows.nodes[level.clone()].iter().map(|node| node.below & COUNT_MASK).max().unwrap_or(0);
-        rounds += rounds_of(most);
-        let small = level.len() <= (JUDGED * WORKGROUP) as usize && rounds < MOST_ROUNDS;
-        small_levels += u32::from(small && small_levels == levels);
+        small.add(&rows.nodes[level.clone()]);
         (level, levels) = (level.end..rows.nodes.len(), levels + 1);
     }
-    let Rows { surfels, mut nodes, numbers, .. } = rows;
-    // Where rows lie is found one after the other, and what is in them by all threads.
-    let all = nodes.par_iter_mut().zip(&numbers).with_min_len(4096);
-    all.for_each(|(row, &number)| fill(row, tree, number));
+    let small_levels = small.levels;
+    let Rows { surfels, nodes, numbers, .. } = rows;
     Branch { surfels, nodes, numbers, roots: roots.len() as u32, first_root: 0, whole: false, levels, small_levels }
 }
 
@@ -238,7 +303,7 @@ struct Rows<'a, E> {
     tree: &'a Hierarchy,
     elsewhere: E,
     surfels: Range<u32>,
-    nodes: Vec<TreeNode>,
+    nodes: Vec<Row>,
     numbers: Vec<u32>,
 }
 
@@ -261,7 +326,7 @@ impl<E: Fn(u32) -> Option<Elsewhere>> Rows<'_, E> {
             }
         };
         let below = count | kind << KIND_SHIFT;
-        self.nodes.push(TreeNode { first, below, children: ONE_BY_ONE, ..Zeroable::zeroed() });
+        self.nodes.push(Row { first, below, together: false });
         self.numbers.push(number);
     }
 
@@ -275,7 +340,7 @@ impl<E: Fn(u32) -> Option<Elsewhere>> Rows<'_, E> {
         let all = node.first..node.first + node.count;
         if !node.leaf {
             if all.clone().all(|child| (self.elsewhere)(child).is_none()) {
-                self.nodes[row].children = TOGETHER;
+                self.nodes[row].together = true;
             }
             all.for_each(|child| self.push(Item::Node(child)));
         } else if let Some(Elsewhere { root, .. }) = (self.elsewhere)(number) {
@@ -286,15 +351,6 @@ impl<E: Fn(u32) -> Option<Elsewhere>> Rows<'_, E> {
         let count = (self.nodes.len() - first) as u32;
         let own = &mut self.nodes[row];
         (own.first, own.below) = (first as u32, own.below | count);
-    }
-}
-
-/// Gives the row of a node what is told of the node alone.
-fn fill(row: &mut TreeNode, tree: &Hierarchy, number: u32) {
-    let Node { surfel, radius, cone, .. } = tree.nodes[number as usize];
-    (row.center, row.radius, row.cone) = (surfel.center, radius, cone);
-    if row.children == TOGETHER {
-        row.children = children_of(tree, number);
     }
 }
 
@@ -323,7 +379,7 @@ mod tests {
         hierarchy::build(scene, &()).unwrap().1.as_ref().clone()
     }
 
-    fn kind(node: &TreeNode) -> (u32, u32) {
+    fn kind(node: &Row) -> (u32, u32) {
         (node.below >> KIND_SHIFT, node.below & COUNT_MASK)
     }
 
@@ -355,7 +411,7 @@ mod tests {
         let mut end = level.len();
         while !level.is_empty() {
             levels.push((level.len(), level.iter().map(|node| kind(node).1).max().unwrap()));
-            let children = |node: &TreeNode| if kind(node).0 == INNER { kind(node).1 as usize } else { 0 };
+            let children = |node: &Row| if kind(node).0 == INNER { kind(node).1 as usize } else { 0 };
             let next = level.iter().map(children).sum::<usize>();
             (level, end) = (&branch.nodes[end..end + next], end + next);
         }
@@ -363,20 +419,18 @@ mod tests {
     }
 
     /// What an inner node says of its children is so, and it says it unless some lead elsewhere.
-    fn family(tree: &Hierarchy, branch: &Branch, node: &TreeNode) {
-        let children = &branch.nodes[node.first as usize..][..kind(node).1 as usize];
-        let is_elsewhere = |child: &TreeNode| kind(child).0 == OTHER_BRANCH;
+    fn family(tree: &Hierarchy, branch: &Branch, index: usize) {
+        let (node, children) = (branch.nodes[index], branch.row(tree, index).children);
+        let rows = node.first as usize..(node.first + kind(&node).1) as usize;
+        let of = |row: usize| kind(&branch.nodes[row]);
         // A crowded leaf whose parts are roots is above them.
         let crowds = |row: usize| {
-            let TreeNode { first, .. } = branch.nodes[row];
             let leaf = tree.nodes[branch.numbers[row] as usize].leaf;
-            leaf && kind(&branch.nodes[row]).0 == INNER && is_elsewhere(&branch.nodes[first as usize])
+            leaf && of(row).0 == INNER && of(branch.nodes[row].first as usize).0 == OTHER_BRANCH
         };
-        let rows = node.first as usize..node.first as usize + children.len();
-        let here = children.iter().all(|child| [INNER, LEAF].contains(&kind(child).0)) && !rows.into_iter().any(crowds);
-        let single = |child: &&TreeNode| kind(child) == (LEAF, 1);
-        let balls = children.iter().filter(|child| !single(child)).map(|child| child.radius);
-        assert_eq!(node.children, if here { balls.fold(0.0, f32::max) } else { ONE_BY_ONE });
+        let here = rows.clone().all(|row| [INNER, LEAF].contains(&of(row).0) && !crowds(row));
+        let balls = rows.filter(|row| of(*row) != (LEAF, 1)).map(|row| branch.row(tree, row).radius);
+        assert_eq!(children, if here { balls.fold(0.0, f32::max) } else { ONE_BY_ONE });
     }
 
     /// Of a file that somebody else wrote.
@@ -418,6 +472,8 @@ mod tests {
             let tree = tree(count, copies);
             let all = branches(&tree, most);
             let surfels = count + CROWDED.len() * copies;
+            let alone = all.len() == 1 && copies == 0;
+            assert!(!alone || all[0] == of_root(&tree, surfels as u32));
             assert!(all[0].whole && all.iter().skip(1).all(|branch| !branch.whole));
             assert!(all.len() == 1 || all[0].surfels.is_empty());
             let fits = |branch: &Branch| (branch.surfels.len() + branch.nodes.len()) as u64 <= most;
@@ -433,7 +489,8 @@ mod tests {
                 .filter(|(kind, _)| [LEAF, PART_OF_LEAF].contains(kind));
             assert!(leaves.map(|(_, count)| count).max().unwrap() <= MOST_OF_LEAF);
             for branch in &all {
-                branch.nodes.iter().filter(|node| kind(node).0 == INNER).for_each(|node| family(&tree, branch, node));
+                let inner = (0..branch.nodes.len()).filter(|row| kind(&branch.nodes[*row]).0 == INNER);
+                inner.for_each(|row| family(&tree, branch, row));
                 let levels = levels_of(branch);
                 assert_eq!(branch.levels as usize, levels.len());
                 let (small, others) = levels.split_at(branch.small_levels as usize);

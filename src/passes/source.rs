@@ -156,19 +156,21 @@ impl Source for Scene {
 
     fn branch<'a>(&'a self, needs: &SceneNeeds, branch: &Branch) -> Option<Box<dyn Page + 'a>> {
         let first = self.surfels.len() as u32;
-        let levels = self.levels();
-        let of_node = |&number: &u32| match levels.and_then(|levels| levels.nodes.get(number as usize)) {
-            // With its lines and its cap.
-            Some(&Node { leaf: true, count: 1, first: surfel, .. }) => surfel,
-            _ => first + number,
+        // One surfel has its lines and its cap.
+        let of_node = |index: usize| branch.only_surfel(index).unwrap_or(first + branch.numbers[index]);
+        let records = branch.surfels.len() + branch.numbers.len();
+        let surfels = branch.surfels.clone();
+        let of = |record: usize| match record.checked_sub(surfels.len()) {
+            Some(node) => of_node(node),
+            None => surfels.start + record as u32,
         };
-        let nodes = branch.numbers.iter().map(of_node);
+        let indices: Vec<u32> = (0..records).into_par_iter().with_min_len(4096).map(of).collect();
         Some(Box::new(ScenePage {
             scene: self,
-            nodes: levels,
+            nodes: self.levels(),
             needs: *needs,
             layout: SurfelLayout::of(needs),
-            indices: branch.surfels.clone().chain(nodes).collect(),
+            indices: indices.into(),
             copies: None,
         }))
     }

@@ -3,13 +3,14 @@
 use std::ops::Range;
 
 use bytemuck::Zeroable;
+use rayon::prelude::*;
 
 use super::branches::{self, Branch};
 use super::source::{self, Source};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
-use crate::gpu::layout::{self, QUEUE_START};
+use crate::gpu::layout::{self, QUEUE_START, TreeNode};
 use crate::passes::triangles::CORNER_WORDS;
 use crate::plan::{ColorNeed, Facts, MeshNeeds, SceneNeeds, SurfelLayout, page_surfels, texture_words};
 use crate::progress::Progress;
@@ -81,18 +82,20 @@ fn branches(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds, progress: &dyn P
     let of_chosen = if needs.fades { 2 } else { 1 };
     let most = gpu.adapter.page_len(size_of::<Surfel>().max(4 * (words + of_chosen))).saturating_sub(1);
     let tree = source.levels().ok_or_else(|| gpu.error("a scene has no levels of detail"))?;
-    let tree = branches::branches(tree, most);
     let of = |branch: Branch| {
         let page = source.branch(needs, &branch).ok_or_else(|| gpu.error("a scene has no levels of detail"))?;
+        // Made as they are written, as all of them at once take time to have room for.
+        let row = |index: usize| branch.row(tree, index);
+        let rows = |range: Range<usize>| range.into_par_iter().with_min_len(4096).map(row).collect::<Vec<_>>().into();
+        let rows_written = Buffer::<TreeNode>::writable(gpu, "nodes", branch.nodes.len() as u64)?;
+        rows_written.write(gpu, branch.nodes.len(), rows, &())?;
         let Branch { surfels, nodes, roots, first_root, whole, levels, small_levels, .. } = branch;
         let (surfels, records) = (surfels.len() as u32, surfels.len() + nodes.len());
         let chosen = (records * words) as u32;
         let whole = whole.into();
         let own = layout::Branch { surfels, roots, first_root, whole, chosen, small_levels, ..Zeroable::zeroed() };
-        let mut buffers = vec![
-            ("branch", Buffer::uniform(gpu, "branch", &own)?.words()),
-            ("tree_nodes", filled(gpu, "nodes", bytemuck::cast_slice(&nodes))?),
-        ];
+        let mut buffers =
+            vec![("branch", Buffer::uniform(gpu, "branch", &own)?.words()), ("tree_nodes", rows_written.words())];
         buffers.extend(RECORDS.into_iter().zip(records_of(
             gpu,
             (&*page, records),
@@ -107,7 +110,7 @@ fn branches(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds, progress: &dyn P
             roots: roots.into(),
         })
     };
-    tree.into_iter().map(of).collect()
+    branches::branches(tree, most).into_iter().map(of).collect()
 }
 
 fn page(gpu: &Gpu, of: &dyn source::Page, needs: &SceneNeeds, progress: &dyn Progress) -> Result<Page> {

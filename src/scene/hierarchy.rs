@@ -1,6 +1,7 @@
 //! Levels of detail: a tree of surfels, each of which stands for all below it.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::{Cap, Surfel};
 
@@ -113,16 +114,16 @@ impl Hierarchy {
 
     /// Gives each leaf of one surfel that surfel's ellipse: it is drawn for it, and other programs may have written another one.
     pub(crate) fn settle(&mut self, surfels: &[Surfel], low: &[[f32; 3]]) {
-        let of_one = |node: &Node| (node.leaf && node.count == 1).then_some(node.first as usize);
-        for (index, node) in self.nodes.iter_mut().enumerate() {
-            let Some((place, &surfel)) = of_one(node).and_then(|place| Some((place, surfels.get(place)?))) else {
-                continue;
-            };
-            node.surfel = surfel;
-            if let Some(own) = self.low.get_mut(index) {
-                *own = low.get(place).copied().unwrap_or_default();
-            }
+        let settled = |node: &mut Node| -> Option<[f32; 3]> {
+            let place = (node.leaf && node.count == 1).then_some(node.first as usize)?;
+            node.surfel = *surfels.get(place)?;
+            Some(low.get(place).copied().unwrap_or_default())
+        };
+        let nodes = self.nodes.par_iter_mut().with_min_len(4096);
+        if self.low.is_empty() {
+            return nodes.for_each(|node| _ = settled(node));
         }
+        nodes.zip(&mut self.low).for_each(|(node, low)| *low = settled(node).unwrap_or(*low));
     }
 
     /// What the f32 centre of a node leaves out, world units.

@@ -15,6 +15,7 @@ use crate::passes::triangles::CORNER_WORDS;
 use crate::plan::{ColorNeed, Facts, MeshNeeds, SceneNeeds, SurfelLayout, page_surfels, texture_words};
 use crate::progress::Progress;
 use crate::scene::color::SRGB8_TO_LINEAR;
+use crate::scene::hierarchy::Hierarchy;
 use crate::scene::{Mipmap, Surfel, Triangles};
 
 /// Buffers by their names in WGSL.
@@ -84,18 +85,13 @@ fn branches(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds, progress: &dyn P
     let tree = source.levels().ok_or_else(|| gpu.error("a scene has no levels of detail"))?;
     let of = |branch: Branch| {
         let page = source.branch(needs, &branch).ok_or_else(|| gpu.error("a scene has no levels of detail"))?;
-        // Made as they are written, as all of them at once take time to have room for.
-        let row = |index: usize| branch.row(tree, index);
-        let rows = |range: Range<usize>| range.into_par_iter().with_min_len(4096).map(row).collect::<Vec<_>>().into();
-        let rows_written = Buffer::<TreeNode>::writable(gpu, "nodes", branch.nodes.len() as u64)?;
-        rows_written.write(gpu, branch.nodes.len(), rows, &())?;
+        let tree_nodes = rows_of(gpu, tree, &branch)?;
         let Branch { surfels, nodes, roots, first_root, whole, levels, small_levels, .. } = branch;
         let (surfels, records) = (surfels.len() as u32, surfels.len() + nodes.len());
         let chosen = (records * words) as u32;
         let whole = whole.into();
         let own = layout::Branch { surfels, roots, first_root, whole, chosen, small_levels, ..Zeroable::zeroed() };
-        let mut buffers =
-            vec![("branch", Buffer::uniform(gpu, "branch", &own)?.words()), ("tree_nodes", rows_written.words())];
+        let mut buffers = vec![("branch", Buffer::uniform(gpu, "branch", &own)?.words()), ("tree_nodes", tree_nodes)];
         buffers.extend(RECORDS.into_iter().zip(records_of(
             gpu,
             (&*page, records),
@@ -111,6 +107,16 @@ fn branches(gpu: &Gpu, source: &dyn Source, needs: &SceneNeeds, progress: &dyn P
         })
     };
     branches::branches(tree, most).into_iter().map(of).collect()
+}
+
+/// The rows of a branch of `tree`, which are made as they are written: all of them at once take time to have room for.
+fn rows_of(gpu: &Gpu, tree: &Hierarchy, branch: &Branch) -> Result<Buffer<u32>> {
+    let count = branch.nodes.len();
+    let row = |index: usize| branch.row(tree, index);
+    let rows = |range: Range<usize>| range.into_par_iter().with_min_len(4096).map(row).collect::<Vec<_>>().into();
+    let buffer = Buffer::<TreeNode>::writable(gpu, "nodes", count as u64)?;
+    buffer.write(gpu, count, rows, &())?;
+    Ok(buffer.words())
 }
 
 fn page(gpu: &Gpu, of: &dyn source::Page, needs: &SceneNeeds, progress: &dyn Progress) -> Result<Page> {

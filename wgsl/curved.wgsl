@@ -113,12 +113,24 @@ fn curve(h: ptr<function, Homography>, index: u32, center: array<Double, 3>, s: 
     return Cap(heights, spread_of(r, depth), r, depth, max(depths.x, held.near) * (1.0 - 1e-5));
 }
 
-// The first and last point of the image (xy, zw) of the sheared box about a cap, for which see the twin: of the disk p, s, t whose
-// centre moves between two heights along the normal, at these depths.
+// The first and last point of the image (xy, zw) that sheared boxes about a cap have in common, for which see the twin: of the disk p, s,
+// t whose centre moves between two heights along the normal, at these depths.
 fn box_extent(h: Homography, disk: array<vec3<f32>, 5>, depths: vec2<f32>) -> vec4<f32> {
+    let along_ray = sheared_extent(h, disk, depths, shear(disk[0]), h.centered);
+    let straight = sheared_extent(h, disk, depths, vec2<f32>(0.0), false);
+    return vec4<f32>(max(along_ray.xy, straight.xy), min(along_ray.zw, straight.zw));
+}
+
+// The extent of the box that is sheared along the ray (ratio, 1), which is the `centered` one's through its centre.
+fn sheared_extent(
+    h: Homography,
+    disk: array<vec3<f32>, 5>,
+    depths: vec2<f32>,
+    ratio: vec2<f32>,
+    centered: bool,
+) -> vec4<f32> {
     let p = disk[0];
-    let ratio = shear(p);
-    let rest = select(p.xy - ratio * p.z, vec2<f32>(0.0), h.centered);
+    let rest = select(p.xy - ratio * p.z, vec2<f32>(0.0), centered);
     let s = disk[1].xy - ratio * disk[1].z;
     let t = disk[2].xy - ratio * disk[2].z;
     let low = disk[3].xy - ratio * disk[3].z;
@@ -131,9 +143,9 @@ fn box_extent(h: Homography, disk: array<vec3<f32>, 5>, depths: vec2<f32>) -> ve
     let middle = select(
         ratio * held.intrinsics.xy + held.intrinsics.zw,
         vec2<f32>(h.anchor) + 0.5 + h.offset,
-        h.centered,
+        centered,
     );
-    let margin = select(1.0, 0.0, h.centered);
+    let margin = select(1.0, 0.0, centered);
     return vec4<f32>(
         middle + image_step(first, select(before.yy, before.xx, first < vec2<f32>(0.0))) - margin,
         middle + image_step(last, select(before.yy, before.xx, last > vec2<f32>(0.0))) + margin,
@@ -253,7 +265,27 @@ fn is_away(splat: Splat, fragment: Fragment) -> bool {
     return fragment.spot.away;
 }
 
-// A depth in front of every fragment of the splat itself.
+// A depth in front of every fragment of the splat itself between the pixels `first` and `last`, from the anchor. A ray meets the plane of a
+// height h over the disk's plane at sigma = (h - W) / (D_w + spread W), which grows or falls with W, and with h, wherever the divisor keeps
+// its sign: so one of the four ends is the nearest.
 fn nearest_on(splat: Splat, first: vec2<f32>, last: vec2<f32>) -> f32 {
-    return splat.cap.nearest;
+    let cap = splat.cap;
+    let row = vec2<f32>(splat.c[0], splat.c[1]);
+    let low = min(row * first, row * last);
+    let high = max(row * first, row * last);
+    let most = max(abs(low), abs(high));
+    let slack = 4e-6 * (most.x + most.y + abs(splat.c[2]));
+    let w = vec2<f32>(low.x + low.y - slack, high.x + high.y + slack) + splat.c[2];
+    let along = splat.a_low[2];
+    let divisor = along + cap.spread * w;
+    // Where a divisor has lost its digits to cancellation, nothing is known.
+    if (min(abs(divisor.x), abs(divisor.y)) < 1e-4 * abs(along) || divisor.x * divisor.y <= 0.0) {
+        return cap.nearest;
+    }
+    // A thousandth is left for what a ray that touches the cap is off.
+    let heights = 1.001 * extremes(cap.heights);
+    let sigma = min((heights.x - w) / divisor, (heights.y - w) / divisor);
+    let nearest_sigma = min(sigma.x, sigma.y);
+    let depth = cap.depth + cap.radius * (nearest_sigma - 1e-4 - 1e-2 * abs(nearest_sigma));
+    return max(depth, cap.nearest);
 }

@@ -17,12 +17,21 @@ fn span(x: vec2<f32>, y: vec2<f32>, rest: vec2<f32>, low: vec2<f32>, high: vec2<
     return Span(x * middle.x + y * middle.y + rest, x * half.x, y * half.y, 4e-6 * (magnitude.x + magnitude.y));
 }
 
-// Whether the map's values are nowhere as short as `length`: its least is at least that of the middle less the longer of the
-// ways to two corners, as the map is affine.
-fn exceeds(s: Span, length: f32) -> bool {
+// The longer of the ways from the middle to two corners: no value is farther from that of the middle, as the map is affine.
+fn half_width(s: Span) -> f32 {
     let one = s.right + s.down;
     let other = s.right - s.down;
-    let shortest = length + s.slack + sqrt(max(dot2(one, one), dot2(other, other)));
+    return s.slack + sqrt(max(dot2(one, one), dot2(other, other)));
+}
+
+// No value of the map is longer.
+fn longest(s: Span) -> f32 {
+    return (sqrt(dot2(s.middle, s.middle)) + half_width(s)) * (1.0 + 2e-6);
+}
+
+// Whether the map's values are nowhere as short as `length`.
+fn exceeds(s: Span, length: f32) -> bool {
+    let shortest = length + half_width(s);
     return dot2(s.middle, s.middle) * (1.0 - 2e-6) > shortest * shortest;
 }
 

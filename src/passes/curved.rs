@@ -73,35 +73,47 @@ impl Seen {
         self.cap.extremes().map(|height| normal * height)
     }
 
-    /// The first and last point of the image that the cap can touch past the near depth: those of a sheared box around it, pixels.
+    /// The first and last point of the image that the cap can touch past the near depth, pixels: what boxes around it, each sheared along
+    /// a ray, have in common. Along the ray through the centre a box is tight, but beside the eye that ray is nearly across the axis, and
+    /// such a box fills the image. Along the axis it does not.
     pub fn extent(&self, camera: &Camera) -> [DVec2; 2] {
-        let shifts = self.shifts();
         let focal = DVec2::new(camera.fx, camera.fy);
         let image = |point: DVec2| point * focal + DVec2::new(camera.cx, camera.cy);
-        let around = |x: fn(DVec3) -> f64, ratio: f64| {
-            let of = |v: DVec3| x(v) - ratio * v.z;
-            let half = of(self.s).hypot(of(self.t));
-            let [a, b] = shifts.map(of);
-            [of(self.p) - half + a.min(b), of(self.p) + half + a.max(b)]
-        };
-        match camera.projection {
+        let [low, high] = match camera.projection {
             Projection::Orthographic => {
-                let ([x0, x1], [y0, y1]) = (around(|v| v.x, 0.0), around(|v| v.y, 0.0));
-                [DVec2::new(x0, y0), DVec2::new(x1, y1)].map(image)
+                let ([x0, x1], [y0, y1]) = (self.around(|v| v.x, 0.0), self.around(|v| v.y, 0.0));
+                [DVec2::new(x0, y0), DVec2::new(x1, y1)]
             }
             Projection::Pinhole => {
                 let depths = self.depths().map(|depth| depth.max(camera.near));
-                // Sheared along the ray through the centre, where there is one.
-                let ratio = if self.p.z > camera.near { self.p.truncate() / self.p.z } else { DVec2::ZERO };
-                let along = |[low, high]: [f64; 2], ratio: f64| {
-                    let of = |x: f64, nearest: bool| x / depths[usize::from(!nearest)] + ratio;
-                    [of(low, low < 0.0), of(high, high > 0.0)]
-                };
-                let ([x0, x1], [y0, y1]) =
-                    (along(around(|v| v.x, ratio.x), ratio.x), along(around(|v| v.y, ratio.y), ratio.y));
-                [DVec2::new(x0, y0), DVec2::new(x1, y1)].map(image)
+                let straight = self.seen_around(DVec2::ZERO, depths);
+                if self.p.z > camera.near {
+                    let sheared = self.seen_around(self.p.truncate() / self.p.z, depths);
+                    [straight[0].max(sheared[0]), straight[1].min(sheared[1])]
+                } else {
+                    straight
+                }
             }
-        }
+        };
+        [image(low), image(high)]
+    }
+
+    /// The least and the largest `x - ratio z` of the box of the cap.
+    fn around(&self, x: fn(DVec3) -> f64, ratio: f64) -> [f64; 2] {
+        let of = |v: DVec3| x(v) - ratio * v.z;
+        let half = of(self.s).hypot(of(self.t));
+        let [a, b] = self.shifts().map(of);
+        [of(self.p) - half + a.min(b), of(self.p) + half + a.max(b)]
+    }
+
+    /// The least and the largest (X/Z, Y/Z) of the box that is sheared along the ray (`ratio`, 1), at these depths.
+    fn seen_around(&self, ratio: DVec2, [near, far]: [f64; 2]) -> [DVec2; 2] {
+        let seen = |[low, high]: [f64; 2], ratio: f64| {
+            [low / if low < 0.0 { near } else { far } + ratio, high / if high > 0.0 { near } else { far } + ratio]
+        };
+        let [x0, x1] = seen(self.around(|v| v.x, ratio.x), ratio.x);
+        let [y0, y1] = seen(self.around(|v| v.y, ratio.y), ratio.y);
+        [DVec2::new(x0, y0), DVec2::new(x1, y1)]
     }
 }
 
@@ -216,4 +228,51 @@ fn outside(curve: &Curve, camera: &Camera, at: &Intersection) -> f64 {
     let never = curve.culls && at.away || at.rho2.is_nan();
     let margins = [at.rho2.sqrt() - 1.0, -at.inside, 1.0 - at.depth / camera.near];
     if never { f64::INFINITY } else { margins.into_iter().fold(f64::NEG_INFINITY, f64::max) }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::passes::{footprint::footprint, lowpass::Design, project};
+    use crate::plan::RenderOptions;
+    use crate::random::Random;
+    use crate::scene::{Lens, LowPass, Surfel};
+    use glam::{DMat3, Vec3};
+
+    /// Pixels within the bounds of caps all around an eye, of all heights or flat; each that shows the cap lies within them.
+    fn pixels_in_bounds(height: f64) -> u64 {
+        let size = 48;
+        let camera = Camera::posed((size, size), Lens::Fov(75.0), DVec3::ZERO, DMat3::IDENTITY, 1e-3).unwrap();
+        let design = Design::of(&RenderOptions { low_pass: LowPass::None, ..RenderOptions::default() });
+        let mut random = Random::stream(5, 0);
+        let mut within = 0;
+        for _ in 0..2000 {
+            let mut around = |least: f64| {
+                let v = DVec3::from_array(std::array::from_fn(|_| 2.0 * random.number() - 1.0)).normalize_or(DVec3::X);
+                v * (least + random.number())
+            };
+            let (center, normal) = (around(0.3) * 3.0, around(1.0).normalize());
+            let disk = Surfel::disk(Vec3::ZERO, normal.as_vec3(), 0.3);
+            let cap = Cap(std::array::from_fn(|_| (0.3 * height * (2.0 * random.number() - 1.0)) as f32));
+            let Some(splat) = project::reference((0, &disk, Some(cap)), center, &camera, &design) else { continue };
+            let ([left, top], [right, bottom]) = (splat.first, splat.last);
+            within += u64::from(right - left + 1) * u64::from(bottom - top + 1);
+            for (x, y) in (0..size).flat_map(|y| (0..size).map(move |x| (x, y))) {
+                let hit = footprint(&splat, &camera, LowPass::None, x, y).is_some_and(|(at, _)| at.hit(&camera));
+                let inside = (left..=right).contains(&x) && (top..=bottom).contains(&y);
+                assert!(inside || !hit, "{center} {normal} {cap:?} shows at {x}, {y}");
+            }
+        }
+        within
+    }
+
+    #[test]
+    fn bounds_of_caps_around_the_eye_hold_little_more_than_those_of_disks() {
+        let flat = pixels_in_bounds(0.0);
+        let slight = pixels_in_bounds(0.1);
+        assert!(flat > 0 && slight < flat * 5 / 4, "{slight} of {flat}");
+        let high = pixels_in_bounds(0.6);
+        assert!(high < flat * 3, "{high} of {flat}");
+    }
 }

@@ -273,7 +273,7 @@ fn map_parser() -> impl TypedValueParser<Value = Map> {
 enum LowPassName {
     /// A pixel's centre lies in a disk or not
     None,
-    /// Every splat reaches a pixel: no holes
+    /// Every splat reaches a pixel, however small it is: gaps between splats stay
     Max,
     /// Convolved with the pixel: no aliasing either
     Ewa,

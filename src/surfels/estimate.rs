@@ -7,7 +7,7 @@ use super::eigen::Symmetric3;
 use super::graph::NeighbourGraph;
 use super::neighbours::Neighbour;
 use super::positions::DistinctPositions;
-use super::sizes::{RADIUS_NEIGHBOURS, cell_ellipse, local_limits};
+use super::sizes::{Rough, cell_ellipse, grown, local_limits, lone_radius};
 use crate::Progress;
 
 /// How many neighbours a plane is fitted to. Few follow edges and curvature, many average noise. Measured on spheres of
@@ -32,6 +32,8 @@ pub(crate) struct Estimate {
     pub axes: [[f32; 3]; 2],
     /// Distance to the nearest neighbour, world units; zero where there is none.
     spacing: f32,
+    /// How far neighbours lie off the plane, the unit of positions.
+    rough: Rough,
 }
 
 impl Estimate {
@@ -81,7 +83,7 @@ pub(crate) fn estimate(
     progress.begin("estimating normals and radii", distinct.len() as u64);
     let mut of_position = vec![Estimate::default(); distinct.len()];
     let graph = NeighbourGraph::visit(
-        (distinct, NORMAL_NEIGHBOURS, RADIUS_NEIGHBOURS),
+        (distinct, NORMAL_NEIGHBOURS, NORMAL_NEIGHBOURS),
         wanted,
         &mut of_position,
         progress,
@@ -92,8 +94,25 @@ pub(crate) fn estimate(
         let limited = vec![false; distinct.len()];
         return Estimates { of_position, median_spacing: None, limited, graph };
     }
+    let growth = (0..distinct.len() as u32).into_par_iter().map(|index| {
+        let growth = Rough::growth(&graph, index, |other| of_position[other as usize].rough);
+        // Axes are in world units.
+        if wanted(index as usize) { growth / distinct.scale() } else { 0.0 }
+    });
+    let growth: Vec<f64> = growth.collect();
+    of_position.par_iter_mut().zip(growth).for_each(|(e, growth)| {
+        let axes = e.axes.map(|axis| DVec3::from_array(axis.map(f64::from)));
+        e.axes = grown(axes, growth).map(|axis| axis.as_vec3().to_array());
+    });
     let radii: Vec<f64> = of_position.par_iter().map(Estimate::radius).collect();
-    let limits = local_limits(&graph, &radii, largest_ratio);
+    let limits = local_limits(&graph, &radii, largest_ratio, |position| {
+        let normal = |position: u32| {
+            let [s, t] = of_position[position as usize].axes.map(|axis| DVec3::from_array(axis.map(f64::from)));
+            s.cross(t).normalize_or_zero()
+        };
+        // Radii are in world units.
+        lone_radius((distinct, &graph), position, normal).map(|radius| radius / distinct.scale())
+    });
     let limited = limits.par_iter().zip(&radii).map(|(limit, radius)| radius > limit).collect();
     of_position.par_iter_mut().zip(limits).for_each(|(e, limit)| e.axes = e.axes.map(|axis| at_most(axis, limit)));
     let spacings = of_position.par_iter().enumerate().filter(|(index, _)| wanted(*index));
@@ -114,12 +133,18 @@ fn estimate_at(distinct: &DistinctPositions, index: u32, neighbours: &[Neighbour
     let world = |length: f64| (length / distinct.scale()).clamp(RADIUS_RANGE.0, RADIUS_RANGE.1);
     let Some(nearest) = neighbours.first() else {
         let (s, t) = up.any_orthonormal_pair();
-        return Estimate { axes: [s, t].map(|axis| (axis * LONE_RADIUS).as_vec3().to_array()), spacing: 0.0 };
+        return Estimate {
+            axes: [s, t].map(|axis| (axis * LONE_RADIUS).as_vec3().to_array()),
+            spacing: 0.0,
+            rough: Rough::default(),
+        };
     };
-    let axes = cell_ellipse(&offsets[1..], fitted_normal(offsets, up));
+    let normal = fitted_normal(offsets, up);
+    let axes = cell_ellipse(&offsets[1..], normal);
     Estimate {
         axes: axes.map(|axis| (axis.normalize() * world(axis.length())).as_vec3().to_array()),
         spacing: world(nearest.squared_distance.sqrt()) as f32,
+        rough: Rough::of(&offsets[1..], normal),
     }
 }
 

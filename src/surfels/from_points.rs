@@ -13,8 +13,8 @@ use super::outliers::drop_outliers;
 use super::positions::DistinctPositions;
 use super::sheets;
 use super::sizes::{
-    RADIUS_NEIGHBOURS, Size, bsp_radii, common_radius, half_axes_at, local_limits, measure_triangles, offsets,
-    open_radius,
+    RADIUS_NEIGHBOURS, Rough, Size, bsp_radii, common_radius, grown, half_axes_at, local_limits, lone_radius,
+    measure_triangles, offsets, open_radius,
 };
 use super::{Limits, Preparation, guess_up, origin_for, painting, unit, usable_axes};
 use crate::io::Points;
@@ -296,10 +296,19 @@ impl Sizes {
                 let at =
                     |(normal, position): (&[f32; 3], u32)| half_axes_at(size, (distinct, graph), position, *normal);
                 ellipses = own.map(at).collect();
+                if size == Size::Knn {
+                    ellipses = roughened((distinct, graph), normals, ellipses);
+                }
                 ellipses.par_iter().map(|[s, _]| s.length()).collect()
             }
         };
-        let limits = local_limits(graph, &radii, options.limits.largest_ratio);
+        let lone = |position: u32| {
+            let normal = |position: u32| DVec3::from_array(normals[position as usize].map(f64::from));
+            Some(position)
+                .filter(|_| options.size == Size::Knn)
+                .and_then(|at| lone_radius((distinct, graph), at, normal))
+        };
+        let limits = local_limits(graph, &radii, options.limits.largest_ratio, lone);
         Self { size: options.size, radii, limits, ellipses, collinear, scale: distinct.scale() }
     }
 
@@ -357,6 +366,21 @@ impl Sizes {
         };
         axes.map(|axis| axis.as_vec3().to_array())
     }
+}
+
+/// The half-axes of all positions, longer where the surface is rough.
+fn roughened(
+    (distinct, graph): (&DistinctPositions, &NeighbourGraph),
+    normals: &[[f32; 3]],
+    axes: Vec<[DVec3; 2]>,
+) -> Vec<[DVec3; 2]> {
+    let at = |index: u32| {
+        let near: Vec<DVec3> = offsets(distinct, graph, index, RADIUS_NEIGHBOURS).collect();
+        Rough::of(&near, DVec3::from_array(normals[index as usize].map(f64::from)).normalize())
+    };
+    let rough: Vec<Rough> = (0..distinct.len() as u32).into_par_iter().map(at).collect();
+    let own = axes.into_par_iter().zip(0..distinct.len() as u32);
+    own.map(|(axes, index)| grown(axes, Rough::growth(graph, index, |other| rough[other as usize]))).collect()
 }
 
 /// The largest radius, scaled units, of the points at each position, whose own are in world units.

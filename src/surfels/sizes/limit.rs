@@ -10,9 +10,16 @@ use crate::surfels::graph::NeighbourGraph;
 /// than [`LARGEST_MEDIAN_RATIO`] times that of all, in the unit of `radii`. Where a radius is zero, the position has none, and says
 /// nothing of others.
 ///
+/// No disk is larger than what `lone` says of its position.
+///
 /// At a boundary and around an outlier, points have neighbours on one side only, or far away, and so large radii; their
 /// neighbours' do not, wherever those have points around them. Densities that differ from place to place do not matter.
-pub(crate) fn local_limits(graph: &NeighbourGraph, radii: &[f64], factor: f64) -> Vec<f64> {
+pub(crate) fn local_limits(
+    graph: &NeighbourGraph,
+    radii: &[f64],
+    factor: f64,
+    lone: impl Fn(u32) -> Option<f64> + Sync,
+) -> Vec<f64> {
     let mut any: Vec<f64> = radii.par_iter().copied().filter(|radius| *radius > 0.0).collect();
     let ratio = if factor.is_finite() { LARGEST_MEDIAN_RATIO } else { factor };
     let global = median(&mut any).map_or(f64::INFINITY, |median| median * ratio);
@@ -24,7 +31,8 @@ pub(crate) fn local_limits(graph: &NeighbourGraph, radii: &[f64], factor: f64) -
                 let of_near = graph.of(index).iter().take(RADIUS_NEIGHBOURS).map(|&other| radii[other as usize]);
                 near.extend(of_near.filter(|radius| *radius > 0.0));
             }
-            median(near).map_or(f64::INFINITY, |median| median * factor).min(global)
+            let own = if radii[index as usize] > 0.0 { lone(index) } else { None };
+            median(near).map_or(f64::INFINITY, |median| median * factor).min(global).min(own.unwrap_or(f64::INFINITY))
         })
         .collect()
 }

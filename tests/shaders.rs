@@ -156,7 +156,7 @@ const PAINTLESS: &[&str] = &[
 ];
 
 /// Needs that no render has together (`src/plan/check.rs`, `src/plan/needs.rs`).
-const EXCLUSIVE: [(&str, &[&str]); 39] = [
+const EXCLUSIVE: [(&str, &[&str]); 40] = [
     ("levels", &["cull", "facing", "separate", "index", "color-textured", "color-harmonics", "copies", "texz-map"]),
     (
         "fades",
@@ -176,6 +176,7 @@ const EXCLUSIVE: [(&str, &[&str]); 39] = [
     ("fades", &["raster-exact", "raster-offset"]),
     ("node-caps", &["cull", "facing", "separate", "index", "color-textured", "color-harmonics", "copies", "texz-map"]),
     ("painted-triangles", MESHLESS),
+    ("doubled-triangles", MESHLESS),
     ("triangles", MESHLESS),
     ("join", MESHLESS),
     ("separate", MESHLESS),

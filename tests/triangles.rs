@@ -113,7 +113,7 @@ fn what_lies_on_an_edge_belongs_to_one_triangle() {
     let Some(backend) = gpu() else { return };
     // A plane of squares, halved either way, whose corners are centres of pixels.
     let mut all = Vec::new();
-    let corner = |i: i32, j: i32| [i as f32 * 4.0 - 15.5, j as f32 * 4.0 - 15.5, 8.0];
+    let corner = |i: i32, j: i32| [f64::from(i) * 4.0 - 15.5, f64::from(j) * 4.0 - 15.5, 8.0];
     for (i, j) in (0..7).flat_map(|i| (0..7).map(move |j| (i, j))) {
         let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
         let halves = if (i + j) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] };
@@ -142,7 +142,12 @@ fn what_lies_on_an_edge_belongs_to_one_triangle() {
 /// A triangle whose corners are red, green and blue: a pixel's colour is what parts of them it has.
 fn painted(corners: [[f64; 3]; 3]) -> Triangle {
     let colors = [[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0], [0.0, 0.0, 1.0, 1.0]];
-    Triangle { corners: corners.map(|corner| corner.map(|x| x as f32)), normals: None, colors, texture: None }
+    Triangle {
+        corners: corners.map(|corner| corner.map(|x| f64::from(x as f32))),
+        normals: None,
+        colors,
+        texture: None,
+    }
 }
 
 /// What is hard to draw, by name; the camera looks along +z from the origin, down y.
@@ -183,8 +188,9 @@ fn hard() -> Vec<(&'static str, Vec<Triangle>)> {
     let small: Vec<Triangle> = many([2.0, 2.1], 1000)
         .iter()
         .map(|large| {
-            let [a, b, c] = large.corners.map(Vec3::from_array);
-            Triangle { corners: [a, a + (b - a) * 4e-3, a + (c - a) * 4e-3].map(Vec3::into), ..*large }
+            let [a, b, c] = large.corners.map(|corner| Vec3::from_array(corner.map(|x| x as f32)));
+            let corners = [a, a + (b - a) * 4e-3, a + (c - a) * 4e-3];
+            Triangle { corners: corners.map(|corner| corner.to_array().map(f64::from)), ..*large }
         })
         .collect();
     all.push(("a part of a pixel", small));
@@ -350,7 +356,8 @@ fn the_same_bits_however_it_is_drawn() {
     let mut shuffled = common::scenes::shuffled(&scene, 5);
     let mut all: Vec<Triangle> = (0..scene.triangles.len())
         .map(|number| {
-            let corners = scene.triangles.corners()[number].map(|vertex| scene.triangles.vertices()[vertex as usize]);
+            let corners =
+                scene.triangles.corners()[number].map(|vertex| scene.triangles.place(vertex as usize).to_array());
             Triangle { corners, normals: None, colors: scene.triangles.colors()[number], texture: None }
         })
         .collect();
@@ -444,7 +451,7 @@ fn kernels_and_twins_paint_alike() {
 /// Few corners may be far from many surfels; their triangles are part of what the default view shows.
 #[test]
 fn a_floor_of_four_corners_is_framed() {
-    let corner = |x: f32, z: f32| [x, -1.0, z];
+    let corner = |x: f64, z: f64| [x, -1.0, z];
     let [a, b, c, d] = [corner(-3.0, -3.0), corner(-3.0, 3.0), corner(3.0, 3.0), corner(3.0, -3.0)];
     let of = |corners| Triangle { corners, normals: None, colors: [[1.0; 4]; 3], texture: None };
     let scene = Scene { triangles: Triangles::new(&[of([a, b, c]), of([a, c, d])]), ..sphere(20_000, 1.0) };

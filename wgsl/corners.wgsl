@@ -1,8 +1,8 @@
 // Triangles, their first stage: every vertex becomes a corner, once, whichever triangles it is of. One invocation a vertex.
 // Twin: src/passes/triangles.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x38f1bf0a5f9b4d6d
 
-// Three words a vertex, world units relative to the scene's origin.
+// World units relative to the scene's origin: three words a vertex (vertex.wgsl), or six
+// (vertex_doubled.wgsl).
 @group(0) @binding(52) var<storage, read> vertices: array<f32>;
 // The numbers of a Corner, in their order.
 @group(0) @binding(53) var<storage, read_write> corners_seen: array<array<f32, 9>>;
@@ -29,12 +29,7 @@ fn see_corners(
     if (vertex >= arrayLength(&corners_seen)) {
         return;
     }
-    var relative: array<Double, 3>;
-    for (var i = 0u; i < 3u; i++) {
-        let d = two_sum(vertices[3u * vertex + i] * held.unit, -held.eye[i]);
-        relative[i] = quick_two_sum(d.high, d.low - held.eye_low[i]);
-    }
-    let c = corner_of(rotate(relative));
+    let c = corner_of(rotate(relative_vertex(vertex)));
     corners_seen[vertex] =
         array<f32, 9>(c.x.high, c.x.low, c.y.high, c.y.low, c.w.high, c.w.low, c.depth.high, c.depth.low, c.share);
 }

@@ -1,5 +1,5 @@
 // Triangles, their attribute pass: what the nearest one of each pixel shows there. One workgroup a tile in which any shows. Twin: src/passes/triangles.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x90b41a6bc9bc43a3
+// All loops end, by 1 of src/gpu/loops.rs: 0xccb9f67a456abcdd
 
 // A record a triangle: its corners' normals, if it has some, then their premultiplied colours, then their places in a texture and its number. If all
 // have one colour, that is before the
@@ -16,10 +16,6 @@ override TRIANGLE_RECORDS: u32;
 override TRIANGLE_NORMALS: bool;
 override TRIANGLE_COLORED: bool;
 
-fn vertex_at(number: u32) -> vec3<f32> {
-    return vec3<f32>(vertices[3u * number], vertices[3u * number + 1u], vertices[3u * number + 2u]);
-}
-
 fn triangle_vector(word: u32) -> vec3<f32> {
     return vec3<f32>(triangle_attributes[word], triangle_attributes[word + 1u], triangle_attributes[word + 2u]);
 }
@@ -27,8 +23,7 @@ fn triangle_vector(word: u32) -> vec3<f32> {
 // World space, as long as it comes.
 fn normal_of_triangle(number: u32, triangle: Triangle, parts: vec3<f32>) -> vec3<f32> {
     if (!TRIANGLE_NORMALS) {
-        let a = vertex_at(triangle.numbers.x);
-        return cross3((vertex_at(triangle.numbers.y) - a) * held.unit, (vertex_at(triangle.numbers.z) - a) * held.unit);
+        return facet_of(triangle.numbers);
     }
     let first = TRIANGLE_RECORDS + number * TRIANGLE_WORDS;
     let mean = parts.x * triangle_vector(first) + parts.y * triangle_vector(first + 3u);

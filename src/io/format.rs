@@ -51,6 +51,23 @@ impl Format {
         }
     }
 
+    /// Names a known format that is not read, by the file's name or its first bytes.
+    pub(super) fn unread(path: &Path, start: &[u8]) -> Option<String> {
+        let extension = path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase);
+        let named = |name: &str| extension.as_deref() == Some(name);
+        let what = match start {
+            [b'N', b'G', b'S', b'P', ..] => "an SPZ file of Gaussians",
+            [0x1f, 0x8b, ..] if named("spz") => "an SPZ file of Gaussians",
+            [0x1f, 0x8b, ..] => return Some("it is compressed by gzip: unpack it first".into()),
+            _ if named("spz") => "an SPZ file of Gaussians",
+            _ if named("splat") => "a .splat file of Gaussians",
+            _ if named("ksplat") => "a .ksplat file of Gaussians",
+            _ if named("sog") => "a SOG file of Gaussians",
+            _ => return None,
+        };
+        Some(format!("it is {what}, which is not read: SuperSplat or splat-transform make a PLY file of it, which is"))
+    }
+
     /// What a file's first bytes say. OBJ files begin with anything.
     pub(super) fn of_start(start: &[u8]) -> Option<Self> {
         if start.starts_with(b"LASF") {
@@ -75,5 +92,29 @@ impl FromStr for Format {
     fn from_str(text: &str) -> Result<Self, String> {
         let known = Self::READ.iter().find(|(name, _)| *name == text);
         known.map(|(_, format)| *format).ok_or_else(|| format!("{} files are read, not `{text}`", Self::sentence()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_of_gaussians_that_are_not_read_are_named() {
+        let unread = |name: &str, start: &[u8]| Format::unread(Path::new(name), start).unwrap_or_default();
+        for (name, start, word) in [
+            ("a.spz", &b"\x1f\x8b\x08\x00"[..], "SPZ"),
+            ("a.SPZ", b"NGSP\x04\0\0\0", "SPZ"),
+            ("a.bin", b"NGSP\x02\0\0\0", "SPZ"),
+            ("-", b"NGSP\x03\0\0\0", "SPZ"),
+            ("a.splat", b"\0\0\x80\x3f", ".splat"),
+            ("a.Splat", b"", ".splat"),
+            ("a.ksplat", b"\0\x01", ".ksplat"),
+            ("a.sog", b"PK\x03\x04", "SOG"),
+            ("a.ply.gz", b"\x1f\x8b\x08", "gzip"),
+        ] {
+            assert!(unread(name, start).contains(word), "{name}: {}", unread(name, start));
+        }
+        assert_eq!(unread("a.bin", b"1 2 3"), "");
     }
 }

@@ -68,7 +68,7 @@ impl Opened {
                     None => {
                         (&mut file).take(START).read_to_end(&mut start).map_err(failed)?;
                         file.rewind().map_err(failed)?;
-                        Format::of_start(&start).ok_or_else(|| unknown(path))?
+                        Format::of_start(&start).ok_or_else(|| unknown(path, &start))?
                     }
                 };
                 (file, length, format)
@@ -76,7 +76,7 @@ impl Opened {
             Self::Stream(mut stream) => {
                 // The format is told first: what is no cloud may have no end.
                 (&mut stream).take(START).read_to_end(&mut start).map_err(failed)?;
-                let format = named.or_else(|| Format::of_start(&start)).ok_or_else(|| unknown(path))?;
+                let format = named.or_else(|| Format::of_start(&start)).ok_or_else(|| unknown(path, &start))?;
                 let (file, length) = copied(&start, stream).map_err(failed)?;
                 (file, length, format)
             }
@@ -85,8 +85,11 @@ impl Opened {
     }
 }
 
-/// Neither its name nor its first bytes say what it is.
-fn unknown(path: &Path) -> Error {
+/// Neither its name nor its first bytes say that it is of a format that is read.
+fn unknown(path: &Path, start: &[u8]) -> Error {
+    if let Some(what) = Format::unread(path, start) {
+        return Error::malformed(path, what);
+    }
     let formats = Format::sentence();
     Error::malformed(
         path,

@@ -23,6 +23,9 @@
 //! other ends than above, and those that are long for their area and their depths, `L^2 / 2A (z_max - z_min) / z_min > 4`, as parts err
 //! by `2^-23 L^2 / 2A`; and those for which that is an eighth or more, `2A < 1e-6 L^2`, whose parts would be anybody's. So do those of the attribute pass, which is as exact for all.
 //!
+//! **Far corners**: f32 relative to the scene's origin has too few digits for a mesh far from it. Such
+//! scenes keep two f32 a coordinate (`vertex_doubled.wgsl`); others have neither the words nor the code.
+//!
 //! **The nearest** one is an atomic maximum of its depth, as what its bits lack to those of +inf, and of its number: the order of
 //! [`Triangles`](crate::scene::Triangles) depends on no order in files, so neither does any bit of the image. By the rasteriser, for
 //! comparison, it is the first that is drawn of those that are nearest by its own depths, at the points that it covers.
@@ -281,13 +284,21 @@ pub const PASS: Pass = Pass {
             (None, true) => &["triangles_visibility.wgsl", "triangles_named.wgsl", "triangles_once.wgsl"],
             (None, false) => &["triangles_visibility.wgsl", "triangles_named.wgsl", "triangles_twice.wgsl"],
         };
+        let vertex = if mesh.doubled { "vertex_doubled.wgsl" } else { "vertex.wgsl" };
         let texture = if mesh.textured { "triangles_texture.wgsl" } else { "triangles_texture_absent.wgsl" };
         // Else surfels' colours need them.
         let looks_up = mesh.textured && needs.color != ColorNeed::Textured;
         let decodes = looks_up && needs.color != ColorNeed::Srgb8;
         let own = looks_up.then_some("textures.wgsl").into_iter().chain(decodes.then_some("srgb.wgsl"));
-        let all =
-            ["corners.wgsl", "triangles.wgsl", "triangles_tiles.wgsl", "triangles_attributes.wgsl", corner, texture];
+        let all = [
+            "corners.wgsl",
+            vertex,
+            "triangles.wgsl",
+            "triangles_tiles.wgsl",
+            "triangles_attributes.wgsl",
+            corner,
+            texture,
+        ];
         all.into_iter().chain(visibility.iter().copied()).chain(own).collect()
     },
     kernels: |needs| match needs.mesh {

@@ -186,7 +186,7 @@ fn of_triangles(gpu: &Gpu, triangles: &Triangles, mesh: &MeshNeeds, textures: u3
     let queue = corners.len() as u64 + u64::from(QUEUE_START);
     let seen = vertices.len() as u64 * u64::from(CORNER_WORDS);
     Ok(vec![
-        ("vertices", filled(gpu, "vertices of triangles", bytemuck::cast_slice(vertices))?),
+        ("vertices", filled(gpu, "vertices of triangles", bytemuck::cast_slice(&mesh.places(triangles)))?),
         ("triangles", filled(gpu, "triangles", bytemuck::cast_slice(corners))?),
         (
             "triangle_attributes",

@@ -1,5 +1,7 @@
 //! What a renderer must know of the triangles of a scene, and what they need.
 
+use std::borrow::Cow;
+
 use crate::scene::{Join, Mipmap, Triangles};
 
 /// The counts of a scene's triangles, and what they have.
@@ -15,6 +17,8 @@ pub struct MeshFacts {
     pub colored: bool,
     /// Triangles are painted with textures.
     pub textured: bool,
+    /// Corners have trailing parts, [`Triangles::low`].
+    pub doubled: bool,
 }
 
 impl MeshFacts {
@@ -26,6 +30,7 @@ impl MeshFacts {
             normals: !triangles.normals().is_empty(),
             colored: triangles.colors().len() > 1,
             textured: !triangles.paint().is_empty(),
+            doubled: !triangles.low().is_empty(),
         }
     }
 }
@@ -41,6 +46,8 @@ pub struct MeshNeeds {
     pub colored: bool,
     /// Triangles are painted with textures.
     pub textured: bool,
+    /// The f32 places of corners leave out digits that show, so trailing parts are stored too.
+    pub doubled: bool,
     /// The nearest one is found in one pass, by 64-bit atomics.
     pub once: bool,
 }
@@ -59,6 +66,15 @@ impl MeshNeeds {
     /// Words of a triangle's attributes: normals, then colours, then places in a texture and its number.
     pub fn words(&self) -> u32 {
         self.places_at() + if self.textured { 7 } else { 0 }
+    }
+
+    /// The places of corners: three words a vertex, or six with trailing parts behind.
+    pub fn places<'a>(&self, triangles: &'a Triangles) -> Cow<'a, [f32]> {
+        let vertices = triangles.vertices();
+        if !self.doubled {
+            return vertices.as_flattened().into();
+        }
+        vertices.iter().zip(triangles.low()).flat_map(|(high, low)| high.iter().chain(low).copied()).collect()
     }
 
     /// The attributes of `triangles`, a record each; before them, if all have one colour, the twelve words of that. Before their textures

@@ -146,6 +146,7 @@ fn mesh(facts: &Facts, options: &RenderOptions) -> Option<MeshNeeds> {
         normals: of.normals,
         colored: of.colored,
         textured: of.textured,
+        doubled: of.doubled,
         once: false,
     })
 }
@@ -407,6 +408,7 @@ impl SceneNeeds {
             (self.peels.is_some(), "peels"),
             (self.mesh.is_some(), "triangles"),
             (self.mesh.is_some_and(|mesh| mesh.textured), "painted-triangles"),
+            (self.mesh.is_some_and(|mesh| mesh.doubled), "doubled-triangles"),
             (self.separate, "separate"),
             (joins(Join::Corrected), "join-corrected"),
             (joins(Join::Blended), "join-blended"),

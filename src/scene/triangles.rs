@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 use std::sync::Arc;
 
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::{Bounds, Mipmap, Texture};
@@ -13,7 +13,7 @@ use crate::morton;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Triangle {
     /// World units relative to the scene's origin, counter-clockwise seen from the front.
-    pub corners: [[f32; 3]; 3],
+    pub corners: [[f64; 3]; 3],
     /// Unit normals of the corners; none for those of the triangle's plane.
     pub normals: Option<[[f32; 3]; 3]>,
     /// Premultiplied linear colours of the corners.
@@ -27,6 +27,7 @@ pub struct Triangle {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Triangles {
     vertices: Vec<[f32; 3]>,
+    low: Vec<[f32; 3]>,
     reaches: Vec<f32>,
     corners: Vec<[u32; 3]>,
     normals: Vec<[[f32; 3]; 3]>,
@@ -54,25 +55,33 @@ impl Triangles {
     /// Those of `triangles` that have an area, and finite corners.
     ///
     /// Vertices at one place are one, whichever triangles they are of: what is computed of a vertex is the same number for all of them.
-    /// Normals are kept if any has some; who has none takes those of its plane.
+    /// Normals are kept if any has some; who has none takes those of its plane. Places are f32, or
+    /// two f32 each where one would show ([`Triangles::low`]).
     pub fn new(triangles: &[Triangle]) -> Self {
         Self::textured(triangles, &[])
     }
 
     /// The same with textures, by whose places triangles have their numbers.
     pub fn textured(triangles: &[Triangle], textures: &[Arc<Texture>]) -> Self {
-        // Adding +0 makes the two zeros one.
-        let placed = |triangle: &Triangle| triangle.corners.map(|corner| corner.map(|x| x + 0.0));
+        match triangles.par_iter().any(|triangle| shown_error(triangle.corners, single, LEAST_WIDTH).is_some()) {
+            true => Self::kept(triangles, textures, doubled),
+            false => Self::kept(triangles, textures, single),
+        }
+    }
+
+    /// The same, of places that are kept as `stored` numbers.
+    fn kept<P: Place>(triangles: &[Triangle], textures: &[Arc<Texture>], stored: fn([f64; 3]) -> P) -> Self {
+        let placed = |triangle: &Triangle| triangle.corners.map(stored);
         let places = triangles.par_iter().flat_map_iter(placed);
-        let bounds = Bounds::of(places.clone().map(|place| DVec3::from_array(place.map(f64::from))));
-        let mut keyed: Vec<(u64, [u32; 3])> = places
-            .filter(|place| place.iter().all(|x| x.is_finite()))
-            .map(|place| (cell(place, &bounds), place.map(f32::to_bits)))
+        let bounds = Bounds::of(places.clone().map(Place::exact));
+        let mut keyed: Vec<(u64, P)> = places
+            .filter(|place| place.exact().is_finite())
+            .map(|place| (cell(place.exact(), &bounds), place))
             .collect();
         keyed.par_sort_unstable();
         keyed.dedup();
-        let number = |place: [f32; 3]| {
-            let found = keyed.binary_search(&(cell(place, &bounds), place.map(f32::to_bits)));
+        let number = |place: P| {
+            let found = keyed.binary_search(&(cell(place.exact(), &bounds), place));
             found.ok().and_then(|number| u32::try_from(number).ok())
         };
         let has_normals = triangles.par_iter().any(|triangle| triangle.normals.is_some());
@@ -88,17 +97,17 @@ impl Triangles {
                     .unwrap_or((UNPAINTED, [[0.0; 2]; 3]));
                 let painted = Painted { texture, places };
                 let record = Record { corners: [a, b, c], normals, colors: triangle.colors, painted };
-                has_area(placed(triangle)).then(|| record.turned())
+                has_area(placed(triangle).map(Place::exact)).then(|| record.turned())
             })
             .collect();
         all.par_sort_unstable_by(Record::order);
         let colored = all.par_iter().any(|record| record.colors.iter().any(|color| *color != all[0].colors[0]));
         let mut reaches = vec![0.0; keyed.len()];
         for record in &all {
-            let places = record.corners.map(|vertex| Vec3::from_array(keyed[vertex as usize].1.map(f32::from_bits)));
+            let places = record.corners.map(|vertex| keyed[vertex as usize].1.exact());
             for k in 0..3 {
                 let (from, to) = (record.corners[k] as usize, record.corners[(k + 1) % 3] as usize);
-                let length = places[k].distance(places[(k + 1) % 3]);
+                let length = places[k].distance(places[(k + 1) % 3]) as f32;
                 reaches[from] = length.max(reaches[from]);
                 reaches[to] = length.max(reaches[to]);
             }
@@ -106,13 +115,21 @@ impl Triangles {
         let is_painted = all.par_iter().any(|record| record.painted.texture != UNPAINTED);
         Self {
             reaches,
-            vertices: keyed.iter().map(|(_, bits)| bits.map(f32::from_bits)).collect(),
+            vertices: keyed.iter().map(|(_, place)| place.high()).collect(),
+            low: keyed.iter().filter_map(|(_, place)| place.low()).collect(),
             corners: all.iter().map(|record| record.corners).collect(),
             normals: if has_normals { all.iter().map(|record| record.normals).collect() } else { Vec::new() },
             colors: all.iter().take(if colored { all.len() } else { 1 }).map(|record| record.colors).collect(),
             painted: if is_painted { all.iter().map(|record| record.painted).collect() } else { Vec::new() },
             textures: textures.iter().filter(|_| is_painted).map(|texture| Mipmap::new(texture.clone())).collect(),
         }
+    }
+
+    /// The largest error of a coordinate that is kept as two f32, world units, among triangles of
+    /// which it is more than 1/256 of the width.
+    pub fn rounding(triangles: &[Triangle]) -> Option<f64> {
+        let error = |triangle: &Triangle| shown_error(triangle.corners, doubled, LEAST_TOLD);
+        triangles.par_iter().filter_map(error).reduce_with(f64::max)
     }
 
     /// The same triangles in one colour, linear and premultiplied.
@@ -131,9 +148,15 @@ impl Triangles {
         self.corners.is_empty()
     }
 
-    /// The different places of corners, world units relative to the scene's origin.
+    /// The different places of corners, world units relative to the scene's origin, rounded to f32.
     pub fn vertices(&self) -> &[[f32; 3]] {
         &self.vertices
+    }
+
+    /// The rest of each place after rounding; empty if the rounding is less than 1/256 of the width
+    /// of every triangle.
+    pub fn low(&self) -> &[[f32; 3]] {
+        &self.low
     }
 
     /// The vertices of each triangle, of which the first has the lowest number.
@@ -179,7 +202,8 @@ impl Triangles {
 
     /// The place of a vertex, world units relative to the scene's origin.
     pub fn place(&self, vertex: usize) -> DVec3 {
-        DVec3::from_array(self.vertices[vertex].map(f64::from))
+        let low = self.low.get(vertex).map_or(DVec3::ZERO, |low| DVec3::from_array(low.map(f64::from)));
+        DVec3::from_array(self.vertices[vertex].map(f64::from)) + low
     }
 
     /// The unit normals at the corners of a triangle.
@@ -200,24 +224,109 @@ impl Triangles {
     }
 }
 
+/// The numbers that a place is kept as, which tell it from others.
+trait Place: Copy + Ord + Send + Sync {
+    /// The place.
+    fn exact(self) -> DVec3;
+
+    /// The nearest f32.
+    fn high(self) -> [f32; 3];
+
+    /// The rest after rounding, if it is kept.
+    fn low(self) -> Option<[f32; 3]>;
+}
+
+/// Bits of f32.
+type Bits = [u32; 3];
+
+impl Place for Bits {
+    fn exact(self) -> DVec3 {
+        DVec3::from_array(self.high().map(f64::from))
+    }
+
+    fn high(self) -> [f32; 3] {
+        self.map(f32::from_bits)
+    }
+
+    fn low(self) -> Option<[f32; 3]> {
+        None
+    }
+}
+
+impl Place for [Bits; 2] {
+    fn exact(self) -> DVec3 {
+        self[0].exact() + self[1].exact()
+    }
+
+    fn high(self) -> [f32; 3] {
+        self[0].high()
+    }
+
+    fn low(self) -> Option<[f32; 3]> {
+        Some(self[1].high())
+    }
+}
+
+/// A place as f32. Adding +0 makes the two zeros one.
+fn single(place: [f64; 3]) -> Bits {
+    place.map(|x| (x as f32 + 0.0).to_bits())
+}
+
+/// A place as two f32 each.
+fn doubled(place: [f64; 3]) -> [Bits; 2] {
+    let high = single(place);
+    let low = DVec3::from_array(place) - high.exact();
+    [high, single(low.to_array())]
+}
+
+/// Rounding that is less than this part of a triangle's width does not show, as with surfels.
+const LEAST_PART: f64 = 1.0 / 256.0;
+
+/// A triangle narrower than this part of its coordinates may be a line whose corners are rounded.
+const LEAST_WIDTH: f64 = 1.0 / (1u64 << 50) as f64;
+
+/// Rounding is not reported for triangles narrower than this part of their coordinates: most were
+/// meant to be lines.
+const LEAST_TOLD: f64 = 1.0 / (1u64 << 46) as f64;
+
+/// The largest error of a corner's coordinate as it is kept, if it may show at the triangle's width
+/// and the triangle is wider than the part `narrowest` of its coordinates.
+fn shown_error<P: Place>(corners: [[f64; 3]; 3], stored: fn([f64; 3]) -> P, narrowest: f64) -> Option<f64> {
+    let places = corners.map(DVec3::from_array);
+    let error = corners.map(|corner| (DVec3::from_array(corner) - stored(corner).exact()).abs().max_element());
+    let error = error.into_iter().fold(0.0, f64::max);
+    if error == 0.0 || !error.is_finite() {
+        return None;
+    }
+    let [a, b, c] = places;
+    let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+    let width = (b - a).cross(c - a).length() / longest;
+    let size = places.into_iter().fold(0.0, |size: f64, place| size.max(place.abs().max_element()));
+    (width > narrowest * size && error > LEAST_PART * width).then_some(error)
+}
+
 /// The Morton code of where `place` lies in `bounds`.
-fn cell(place: [f32; 3], bounds: &Bounds) -> u64 {
+fn cell(place: DVec3, bounds: &Bounds) -> u64 {
     let extent = bounds.extent().max_element();
     let scale = if extent > 0.0 { CELLS / extent } else { 0.0 };
-    let at = (DVec3::from_array(place.map(f64::from)) - bounds.min) * scale;
+    let at = (place - bounds.min) * scale;
     morton::code(at.to_array().map(|x| x as u64))
 }
 
-/// Whether the corners are no line: the area, of differences that f64 has exactly but in a scene of many scales, is more than its rounding.
-fn has_area(corners: [[f32; 3]; 3]) -> bool {
-    let [a, b, c] = corners.map(|corner| DVec3::from_array(corner.map(f64::from)));
+/// Whether the corners are no line: along some axis, the area exceeds the rounding of its products.
+fn has_area(corners: [DVec3; 3]) -> bool {
+    let [a, b, c] = corners;
     let (ab, ac) = (b - a, c - a);
-    ab.cross(ac).length() > 4.0 * f64::EPSILON * ab.length() * ac.length()
+    let along = |i: usize, k: usize| {
+        let (first, second) = (ab[i] * ac[k], ab[k] * ac[i]);
+        (first - second).abs() > 4.0 * f64::EPSILON * (first.abs() + second.abs())
+    };
+    along(0, 1) || along(1, 2) || along(2, 0)
 }
 
 /// The normal of the triangle's plane at all its corners.
 fn facet(triangle: &Triangle) -> [[f32; 3]; 3] {
-    let [a, b, c] = triangle.corners.map(|corner| DVec3::from_array(corner.map(f64::from)));
+    let [a, b, c] = triangle.corners.map(DVec3::from_array);
     [(b - a).cross(c - a).normalize_or_zero().as_vec3().to_array(); 3]
 }
 
@@ -259,7 +368,7 @@ mod tests {
     use super::*;
 
     fn triangle(k: usize) -> Triangle {
-        let at = |n: usize| [n % 5, n / 5 % 5, n % 3].map(|x| x as f32);
+        let at = |n: usize| [n % 5, n / 5 % 5, n % 3].map(|x| x as f64);
         Triangle {
             corners: [at(k), at(k + 1), at(k + 7)],
             normals: None,
@@ -292,10 +401,58 @@ mod tests {
             of(line),
             of([a, b, a]),
             of([a, [0.0; 3], c]),
-            of([a, b, [f32::NAN, 0.0, 0.0]]),
+            of([a, b, [f64::NAN, 0.0, 0.0]]),
         ]);
         assert_eq!(made.len(), 1);
         assert_eq!(made.normals_of(0), [DVec3::Z; 3]);
         assert!(Triangles::new(&[]).is_empty());
+    }
+
+    /// The places of one triangle, from its lowest vertex on, and whether they have trailing parts.
+    fn kept(corners: [[f64; 3]; 3]) -> (Vec<DVec3>, bool) {
+        let made = Triangles::new(&[Triangle { corners, ..triangle(0) }]);
+        let places = made.corners().iter().flatten().map(|vertex| made.place(*vertex as usize));
+        (places.collect(), !made.low().is_empty())
+    }
+
+    #[test]
+    fn places_have_trailing_parts_where_their_rounding_shows() {
+        let near = [[0.1, 0.2, 0.3], [1.1, 0.2, 0.3], [0.1, 1.3, 0.3]];
+        for (far, doubled) in [(0.0, false), (1e3, false), (1e6, true), (1e9, true)] {
+            let corners = near.map(|[x, y, z]| [x + far, y - far, z]);
+            let (places, low) = kept(corners);
+            assert_eq!((places.len(), low), (3, doubled), "{far}");
+            let error = corners.map(|corner| {
+                let place = DVec3::from_array(corner);
+                places.iter().map(|other| place.distance(*other)).fold(f64::INFINITY, f64::min)
+            });
+            let most = error.into_iter().fold(0.0, f64::max);
+            assert!(most <= if doubled { 2e-15 } else { 6e-8 } * (far + 1.0), "{far} {most}");
+        }
+        // One that f32 have, and one among many that they do not serve.
+        assert!(!kept([[16_777_216.0, 0.0, 0.0], [16_777_218.0, 0.0, 0.0], [16_777_216.0, 1.0, 0.0]]).1);
+        let far = Triangle { corners: near.map(|corner| corner.map(|x| x + 1e7)), ..triangle(0) };
+        let all: Vec<_> = (0..100).map(triangle).chain([far]).collect();
+        assert_eq!(Triangles::new(&all).low().len(), Triangles::new(&all).vertices().len());
+    }
+
+    #[test]
+    fn a_needle_has_an_area() {
+        for long in [1.0, 1e4, 1e8, 1e12] {
+            let tip = [[0.0, 0.0, 0.0], [long, 0.0, 0.0], [long, 1.0 / long, 0.0]];
+            assert_eq!(kept(tip).0.len(), 3, "{long}");
+            assert_eq!(kept(tip.map(|[x, y, z]| [z, x, y])).0.len(), 3, "{long}");
+        }
+        // Aslant: two f32 resolve the first, a line is none, and the last is resolved in part.
+        let aslant = |width: f64| kept([[0.0, 0.0, 0.0], [1e6, 1e6, 1e6], [1e6, 1e6 + width, 1e6]]);
+        assert_eq!([aslant(1e-6), aslant(0.0)].map(|(places, _)| places.len()), [3, 0]);
+        let rounding = |width: f64| {
+            let far = 1e8 + 3.3;
+            let corners = [[0.1, 0.0, 0.0], [far, far, far], [far, far + width, far]];
+            Triangles::rounding(&[Triangle { corners, ..triangle(0) }])
+        };
+        assert!(rounding(1.0).is_none() && rounding(5e-6).is_some_and(|error| error < 2.4e-7), "{:?}", rounding(5e-6));
+        // A line whose decimals are rounded asks for no trailing parts.
+        assert!(!kept([[0.1, 0.2, 0.3], [0.2, 0.4, 0.6], [0.3, 0.6, 0.9]]).1);
     }
 }

@@ -13,6 +13,8 @@ mod eigen;
 mod ellipse;
 mod estimate;
 mod facing;
+#[cfg(test)]
+mod few;
 mod forest;
 mod from_points;
 mod gaps;

@@ -8,6 +8,9 @@ use super::graph::NeighbourGraph;
 use super::positions::DistinctPositions;
 use crate::Progress;
 
+/// More than the rounding of a mean of as many distances as there may be, as a part of it.
+const ROUNDING: f64 = 1e-9;
+
 /// Leaves out the points that lie farther from their neighbours than so many `deviations`, and says how many.
 pub(crate) fn drop_outliers(
     gathered: &mut Gathered,
@@ -37,12 +40,32 @@ pub(crate) fn drop_outliers(
 
 /// Which positions are no outliers: those whose mean distance to their neighbours is at most the mean of that over all
 /// positions plus `deviations` of its standard deviations (Rusu et al. 2008, "Towards 3D point cloud based object maps
-/// for household environments", section 3.1).
+/// for household environments", section 3.1). The mean of equal distances may be rounded below them:
+/// none of them is an outlier.
 fn inliers(distances: &[f64], deviations: f64) -> Vec<bool> {
     // One after the other, so that the sums' rounding is the same for any number of threads.
     let count = distances.len() as f64;
     let mean = distances.iter().sum::<f64>() / count;
     let variance = distances.iter().map(|distance| (distance - mean) * (distance - mean)).sum::<f64>() / count;
-    let limit = mean + deviations * variance.sqrt();
+    let limit = (mean + deviations * variance.sqrt()) * (1.0 + ROUNDING);
     distances.par_iter().map(|distance| *distance <= limit).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_distances_are_no_outliers() {
+        for count in 1..=200usize {
+            for distance in [0.1, 0.3, 1.0 / 3.0, 1e-30, 1e30] {
+                for deviations in [0.0, 0.5, 3.0] {
+                    assert!(inliers(&vec![distance; count], deviations).into_iter().all(|inside| inside));
+                }
+            }
+        }
+        let mut distances = vec![1.0; 50];
+        distances.push(20.0);
+        assert_eq!(inliers(&distances, 3.0).iter().filter(|inside| !**inside).count(), 1);
+    }
 }

@@ -3,6 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::estimate::median;
 use crate::morton::code;
 use crate::random::mixed;
 use crate::scene::Bounds;
@@ -19,9 +20,18 @@ const PASSED: f64 = 1.5;
 /// Bits of a cell's coordinate.
 const BITS: u32 = 21;
 
-/// The square root of the area that a point stands for, in the units of `positions`, most of which lie in `body`: the side of the squares
-/// that would tile the surface. None where all lie at one place. It does not depend on the order of the points.
+/// A cloud of at most this many positions has too few cells: its spacing is measured between them.
+const FEW: usize = HELD * HELD;
+
+/// The square root of the area that a position stands for, in the units of `positions`, most of
+/// which lie in `body`: the side of the squares that would tile the surface. For a few positions it
+/// is the median distance to the nearest other one. Points at one place are one position. None where
+/// all lie at one place. It does not depend on the order of the points.
 pub(super) fn spacing(positions: &[[f64; 3]], body: &Bounds) -> Option<f64> {
+    let few = few_distinct(positions);
+    if !few.is_empty() {
+        return median_nearest(&few);
+    }
     let extent = body.extent().max_element();
     if extent <= 0.0 {
         return None;
@@ -32,22 +42,55 @@ pub(super) fn spacing(positions: &[[f64; 3]], body: &Bounds) -> Option<f64> {
         let hash = position.iter().fold(0, |hash, x| mixed(hash ^ x.to_bits()));
         let place = (DVec3::from_array(*position) - body.min) / extent * cells;
         let inside = place.min_element() >= 0.0 && place.max_element() <= cells;
-        (inside && hash.is_multiple_of(every)).then(|| code(place.to_array().map(|x| (x as u64).min((1 << BITS) - 1))))
+        let code = || code(place.to_array().map(|x| (x as u64).min((1 << BITS) - 1)));
+        hash.is_multiple_of(every).then(|| (inside.then(code), hash))
     };
-    let mut codes: Vec<u64> = positions.par_iter().filter_map(cell).collect();
-    codes.par_sort_unstable();
+    let mut distinct: Vec<(Option<u64>, u64)> = positions.par_iter().filter_map(cell).collect();
+    distinct.par_sort_unstable();
+    distinct.dedup();
+    let looked_at = distinct.len() as f64;
+    let mut codes: Vec<u64> = distinct.into_iter().filter_map(|(code, _)| code).collect();
     // From the finest grid on: a cell of the next one has eight of this one's.
     for level in 0..=BITS {
         codes.dedup();
         let passed = codes.len();
-        let looked_at = positions.len() as f64 / every as f64;
-        if passed as f64 * HELD as f64 <= looked_at || level == BITS || passed <= HELD {
+        if passed as f64 * HELD as f64 <= looked_at || level == BITS {
             let side = extent * f64::from(1u32 << level) / cells;
-            return Some((passed as f64 * side * side / PASSED / positions.len() as f64).sqrt());
+            return (passed > 0).then(|| side * (passed as f64 / PASSED / (looked_at * every as f64)).sqrt());
         }
         codes.iter_mut().for_each(|code| *code >>= 3);
     }
     None
+}
+
+/// The distinct ones of `positions`, sorted by their bits, if they are at most [`FEW`]; else none.
+fn few_distinct(positions: &[[f64; 3]]) -> Vec<DVec3> {
+    let mut few: Vec<[u64; 3]> = Vec::new();
+    for position in positions {
+        let bits = position.map(f64::to_bits);
+        if let Err(place) = few.binary_search(&bits) {
+            if few.len() == FEW {
+                return Vec::new();
+            }
+            few.insert(place, bits);
+        }
+    }
+    few.into_iter().map(|bits| DVec3::from_array(bits.map(f64::from_bits))).collect()
+}
+
+/// The median distance from a position to the nearest other one; None of one.
+fn median_nearest(distinct: &[DVec3]) -> Option<f64> {
+    let nearest = |(index, at): (usize, &DVec3)| {
+        let others = distinct.iter().enumerate().filter(|(other, _)| *other != index);
+        others.map(|(_, other)| length(*other - *at)).min_by(f64::total_cmp)
+    };
+    median(&mut distinct.iter().enumerate().filter_map(nearest).collect::<Vec<_>>())
+}
+
+/// The length of a vector whose squares may underflow.
+fn length(vector: DVec3) -> f64 {
+    let largest = vector.abs().max_element();
+    if largest > 0.0 { (vector / largest).length() * largest } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -79,5 +122,46 @@ mod tests {
             assert!((0.7..1.25).contains(&found), "{found}");
         }
         assert_eq!(spacing(&[[1.0; 3]; 4], &Bounds::of([DVec3::ONE; 4].into_par_iter())), None);
+    }
+
+    fn of(points: &[[f64; 3]]) -> Option<f64> {
+        spacing(points, &Bounds::of(points.par_iter().map(|p| DVec3::from_array(*p))))
+    }
+
+    #[test]
+    fn a_few_points_have_the_spacing_of_a_few() {
+        let mut random = Random::stream(7, 0);
+        for count in 2..=200usize {
+            for scale in [1e-9, 1.0, 1e9] {
+                let points: Vec<[f64; 3]> =
+                    (0..count).map(|_| [random.number(), random.number(), 0.0].map(|x| x * scale)).collect();
+                let nearest = median_nearest(&points.iter().copied().map(DVec3::from_array).collect::<Vec<_>>());
+                let found = of(&points).unwrap_or(0.0) / nearest.unwrap_or(1.0);
+                assert!((0.99..3.5).contains(&found), "{count} at {scale}: {found}");
+            }
+        }
+    }
+
+    #[test]
+    fn points_at_one_place_are_one() {
+        let mut random = Random::stream(8, 0);
+        for count in [1usize, 2, 3, 8, 9, 16, 64, 65, 500] {
+            let points: Vec<[f64; 3]> =
+                (0..count).map(|_| [random.number(), random.number(), random.number()]).collect();
+            for copies in [2, 8, 100] {
+                let all: Vec<[f64; 3]> = (0..copies).flat_map(|_| points.iter().copied()).collect();
+                assert_eq!(of(&all), of(&points), "{count} {copies}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_pair_among_a_few_does_not_set_the_spacing() {
+        let mut points: Vec<[f64; 3]> = (0..9).map(|i| [f64::from(i % 3), f64::from(i / 3), 0.0]).collect();
+        points.push([1e-9, 0.0, 0.0]);
+        assert_eq!(of(&points), Some(1.0));
+        // Spacings that grow along a line.
+        let line: Vec<[f64; 3]> = (0..65).map(|i| [f64::from(i) * f64::from(i), 0.0, 0.0]).collect();
+        assert!(of(&line).is_some_and(|found| (20.0..400.0).contains(&found)), "{:?}", of(&line));
     }
 }

@@ -11,7 +11,7 @@ use crate::scene::{Bounds, SMALLEST_SCENE, Scene, Triangle, Triangles};
 use crate::{Error, Result};
 
 /// What was done to meshes on the way to a scene.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct MeshPreparation {
     /// Triangles of all meshes.
     pub given: u64,
@@ -19,11 +19,14 @@ pub struct MeshPreparation {
     pub triangles: u64,
     /// Left out because a coordinate is not finite or exceeds [`LARGEST_COORDINATE`].
     pub dropped_non_finite: u64,
-    /// Left out because they have no area, as f32 coordinates have them.
+    /// Left out because they have no area, as far as the digits of their coordinates tell.
     pub dropped_degenerate: u64,
     /// Those with a colour that was not finite, which became [`DEFAULT_COLOR`], or an alpha that was not from 0 to 1, which became the
     /// nearer of the two.
     pub replaced_colors: u64,
+    /// The largest error of a corner's coordinate, world units, where it may show: it is more than
+    /// 1/256 of the triangle's width, although coordinates are kept in twice the digits of f32.
+    pub rounding: Option<f64>,
     /// Nobody says which way is up, so it was guessed.
     pub guessed_up: bool,
 }
@@ -34,8 +37,11 @@ impl MeshPreparation {
         let counted = |count: u64, what: &str| (count > 0).then(|| format!("{count} triangles {what}"));
         [
             counted(self.dropped_non_finite, "left out: a coordinate is not finite or too large"),
-            counted(self.dropped_degenerate, "left out: they have no area"),
+            counted(self.dropped_degenerate, "left out: they have no area, as far as the digits of their coordinates tell"),
             counted(self.replaced_colors, "had a colour that is none, or an alpha beyond 0 to 1, which was replaced"),
+            self.rounding.map(|error| {
+                format!("the narrowest triangles lie so far from others that their coordinates err by up to {error:.2e} world units")
+            }),
         ]
         .into_iter()
         .flatten()
@@ -43,8 +49,8 @@ impl MeshPreparation {
     }
 }
 
-/// `scene`, which has none yet, with the triangles of `meshes` beside its surfels, or a scene of them alone. Corners are f32 relative to the
-/// scene's origin, which is that of its surfels if it has some. Triangles have the colours of their corners, and
+/// `scene`, which has none yet, with the triangles of `meshes` beside its surfels, or a scene of them alone. Corners
+/// are relative to the scene's origin, which is that of its surfels if it has some. Triangles have the colours of their corners, and
 /// their normals, or those of their planes where there are none.
 ///
 /// # Errors
@@ -83,11 +89,12 @@ pub fn with_triangles(scene: Option<Scene>, meshes: &[Mesh]) -> Result<(Scene, M
         all.extend(made.into_iter().map(|(triangle, _)| triangle));
     }
     scene.triangles = Triangles::textured(&all, &textures);
+    preparation.rounding = Triangles::rounding(&all);
     preparation.triangles = scene.triangles.len() as u64;
     preparation.dropped_degenerate = all.len() as u64 - preparation.triangles;
     if scene.triangles.is_empty() {
         return Err(Error::EmptyScene(format!(
-            "there are no triangles that have an area and finite corners, of {} in the mesh",
+            "there are no triangles that have finite corners and an area that the digits of their coordinates tell, of {} in the mesh",
             preparation.given
         )));
     }
@@ -124,5 +131,5 @@ fn triangle(mesh: &Mesh, index: usize, origin: DVec3, numbers: &[Option<u32>]) -
         [r * within, g * within, b * within, within].map(|value| value + 0.0)
     };
     let colors = [DVec3::X, DVec3::Y, DVec3::Z].map(&mut color);
-    (Triangle { corners: corners.map(|corner| corner.as_vec3().to_array()), normals, colors, texture }, replaced)
+    (Triangle { corners: corners.map(|corner| corner.to_array()), normals, colors, texture }, replaced)
 }

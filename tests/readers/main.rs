@@ -6,6 +6,7 @@ mod e57;
 #[cfg(feature = "e57")]
 #[path = "../common/e57_page.rs"]
 mod e57_page;
+mod gaussians;
 mod las;
 mod las_damage;
 #[path = "../common/las_forms.rs"]

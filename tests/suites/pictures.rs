@@ -14,6 +14,8 @@ mod copies;
 mod curved;
 #[path = "../facing.rs"]
 mod facing;
+#[path = "../far.rs"]
+mod far;
 #[path = "../frames.rs"]
 mod frames;
 #[path = "../gaussians.rs"]

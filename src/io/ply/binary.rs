@@ -277,7 +277,7 @@ fn skip_bytes(reader: &mut impl BufRead, count: u64) -> io::Result<u64> {
 }
 
 /// Fills `bytes`; fewer only where the file ends.
-fn read_until_end(reader: &mut impl Read, bytes: &mut [u8]) -> io::Result<usize> {
+pub(super) fn read_until_end(reader: &mut impl Read, bytes: &mut [u8]) -> io::Result<usize> {
     let mut filled = 0;
     while filled < bytes.len() {
         match reader.read(&mut bytes[filled..]) {

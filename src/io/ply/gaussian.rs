@@ -4,9 +4,17 @@
 //! Numbers are as they are trained: logarithms of standard deviations `scale_0`, `scale_1` and, in three dimensions, `scale_2`; a quaternion
 //! `rot_0` (w) to `rot_3` of any length; `opacity` before the logistic function; `f_dc_0` to `f_dc_2` and `f_rest_0` on, the coefficients of
 //! spherical harmonics, red, green and blue one after the other. Normals `nx ny nz`, if there are any, are zeros.
+//!
+//! Without `f_dc_0` the colour is `red green blue`, as nerfstudio exports it: codes of sRGB, 0 to
+//! 255 (`ushort`: 65535; `float`: 1). With `f_dc_0` they are not used, as in the method's own viewer.
+//!
+//! `filter_3D` is the filter's standard deviation f (Mip-Splatting, Yu et al. 2024). Each standard
+//! deviation s becomes `sqrt(s^2 + f^2)`, and the opacity is multiplied by
+//! `sqrt(det s^2 / det(s^2 + f^2))`.
 
 use glam::{DQuat, DVec3};
 
+use super::header::Scalar;
 use crate::io::Points;
 use crate::io::fault::{Fault, reserve};
 use crate::io::points::Flattened;
@@ -20,24 +28,78 @@ const FLAT: f64 = 0.1;
 /// The part of a file's Gaussians that need not be.
 const MOST_THICK: f64 = 0.01;
 
+/// The factor of the constant harmonic.
+pub(super) const CONSTANT: f64 = 0.282_094_791_773_878_14;
+
 /// Where the properties of a Gaussian are: each number an index into the columns of the vertices' layout.
 #[derive(Clone, Debug)]
 pub(super) struct GaussianLayout {
     /// Two or three.
-    scales: Vec<usize>,
-    rotation: [usize; 4],
-    opacity: usize,
-    base: [usize; 3],
-    degree: u32,
+    pub(super) scales: Vec<usize>,
+    pub(super) rotation: [usize; 4],
+    pub(super) opacity: usize,
+    pub(super) base: Base,
+    pub(super) degree: u32,
     /// Channel by channel.
-    rest: Vec<usize>,
+    pub(super) rest: Vec<usize>,
+    /// The standard deviation of the filter.
+    pub(super) filter: Option<usize>,
+}
+
+/// Where the colour is that does not change with the view.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Base {
+    /// Coefficients of the constant harmonic.
+    Constant([usize; 3]),
+    /// Codes of sRGB, and the largest value of each.
+    Codes([(usize, f64); 3]),
+}
+
+impl Base {
+    /// Finds the columns: `f_dc_0` to `f_dc_2`, or else `red green blue`.
+    fn of(
+        has: impl Fn(&str) -> bool,
+        mut wanted: impl FnMut(String) -> Result<(usize, Scalar), Fault>,
+    ) -> Result<Self, Fault> {
+        let names = ["red", "green", "blue"];
+        if has("f_dc_0") || !names.iter().all(|name| has(name)) {
+            let mut base = [0; 3];
+            for (k, place) in base.iter_mut().enumerate() {
+                (*place, _) = wanted(format!("f_dc_{k}"))?;
+            }
+            return Ok(Self::Constant(base));
+        }
+        let mut codes = [(0, 1.0); 3];
+        for (code, name) in codes.iter_mut().zip(names) {
+            let (place, scalar) = wanted(name.into())?;
+            *code = (place, most_code(scalar));
+        }
+        Ok(Self::Codes(codes))
+    }
+
+    /// Codes of sRGB, of which 1 is the largest.
+    fn color(&self, value: &impl Fn(usize) -> f64) -> [f64; 3] {
+        match self {
+            Self::Constant(base) => base.map(|column| 0.5 + CONSTANT * value(column)),
+            Self::Codes(codes) => codes.map(|(column, most)| value(column) / most),
+        }
+    }
+}
+
+/// The code of a whole channel: that of 8 bits, but for 16-bit integers and numbers with a point.
+fn most_code(scalar: Scalar) -> f64 {
+    match scalar {
+        Scalar::U16 => 65535.0,
+        Scalar::F32 | Scalar::F64 => 1.0,
+        _ => 255.0,
+    }
 }
 
 impl GaussianLayout {
     /// None if the vertices, whose properties `has` knows and `column` gives places, are no Gaussians.
     pub(super) fn of(
         has: impl Fn(&str) -> bool,
-        mut column: impl FnMut(&str) -> Option<usize>,
+        mut column: impl FnMut(&str) -> Option<(usize, Scalar)>,
     ) -> Result<Option<Self>, Fault> {
         if !(has("scale_0") && has("rot_0")) {
             return Ok(None);
@@ -49,17 +111,16 @@ impl GaussianLayout {
                 ))
             })
         };
+        let base = Base::of(&has, &mut wanted)?;
+        let mut wanted = |name: String| wanted(name).map(|(place, _)| place);
         let dimensions = if has("scale_2") { 3 } else { 2 };
         let scales = (0..dimensions).map(|k| wanted(format!("scale_{k}"))).collect::<Result<_, _>>()?;
         let mut rotation = [0; 4];
         for (k, place) in rotation.iter_mut().enumerate() {
             *place = wanted(format!("rot_{k}"))?;
         }
-        let mut base = [0; 3];
-        for (k, place) in base.iter_mut().enumerate() {
-            *place = wanted(format!("f_dc_{k}"))?;
-        }
         let opacity = wanted("opacity".into())?;
+        let filter = if has("filter_3D") { Some(wanted("filter_3D".into())?) } else { None };
         let mut count = 0;
         while has(&format!("f_rest_{count}")) {
             count += 1;
@@ -70,7 +131,7 @@ impl GaussianLayout {
             )));
         };
         let rest = (0..count).map(|k| wanted(format!("f_rest_{k}"))).collect::<Result<_, _>>()?;
-        Ok(Some(Self { scales, rotation, opacity, base, degree, rest }))
+        Ok(Some(Self { scales, rotation, opacity, base, degree, rest, filter }))
     }
 }
 
@@ -81,7 +142,7 @@ pub(super) struct Gaussians<'a> {
     axes: Vec<[[f32; 3]; 2]>,
     colors: Vec<[f32; 4]>,
     terms: Vec<f32>,
-    /// Of ellipsoids the ratio of the shortest half-axis to the middle one.
+    /// Shortest half-axis over the middle one, for each ellipsoid that can be drawn.
     ratios: Vec<f32>,
 }
 
@@ -96,15 +157,20 @@ impl<'a> Gaussians<'a> {
         Ok(Self { layout, axes, colors, terms, ratios })
     }
 
-    /// The values of a row, by columns.
-    pub(super) fn push(&mut self, value: impl Fn(usize) -> f64) {
+    /// The values of a row, by columns, and where it is.
+    pub(super) fn push(&mut self, position: [f64; 3], value: impl Fn(usize) -> f64) {
         let layout = self.layout;
         let [w, x, y, z] = layout.rotation.map(&value);
         // A rotation of no length becomes one of no number, and so do its half-axes.
         let rotation = DQuat::from_xyzw(x, y, z, w).normalize();
-        let deviations = layout.scales.iter().map(|column| value(*column).exp());
+        let mut opacity = 1.0 / (1.0 + (-value(layout.opacity)).exp());
+        let mut deviations: Vec<f64> = layout.scales.iter().map(|column| value(*column).exp()).collect();
+        if let Some(filter) = layout.filter {
+            opacity *= widened(&mut deviations, value(filter));
+        }
         let units = [DVec3::X, DVec3::Y, DVec3::Z];
-        let mut axes: Vec<(f64, DVec3)> = deviations.zip(units).collect();
+        let mut axes: Vec<(f64, DVec3)> = deviations.into_iter().zip(units).collect();
+        let mut ratio = None;
         if axes.len() == 3 {
             // Equal ones stay in the file's order.
             // One that is no number comes first, so that none is left.
@@ -114,14 +180,18 @@ impl<'a> Gaussians<'a> {
             if thickness.is_nan() {
                 axes[0].0 = f64::NAN;
             }
-            self.ratios.push((thickness / axes[0].0.min(axes[1].0)) as f32);
+            ratio = Some((thickness / axes[0].0.min(axes[1].0)) as f32);
         }
         let half_axis = |(deviation, unit): (f64, DVec3)| (rotation * unit * (EXTENT * deviation)).as_vec3().to_array();
-        self.axes.push([half_axis(axes[0]), half_axis(axes[1])]);
-        let constant = 0.5 / std::f64::consts::PI.sqrt();
-        let [r, g, b] = layout.base.map(|column| (0.5 + constant * value(column)) as f32);
-        let alpha = 1.0 / (1.0 + (-value(layout.opacity)).exp());
-        self.colors.push([r, g, b, alpha as f32]);
+        let axes = [half_axis(axes[0]), half_axis(axes[1])];
+        let [r, g, b] = layout.base.color(&value);
+        let color = [r, g, b, opacity].map(|value| value as f32);
+        // Postshot leaves rows of zeros, which have no rotation: they do not count as thick.
+        let numbers = axes.as_flattened().iter().chain(&color);
+        let is_drawn = numbers.into_iter().all(|x| x.is_finite()) && position.iter().all(|x| x.is_finite());
+        self.ratios.extend(ratio.filter(|ratio| is_drawn && !ratio.is_nan()));
+        self.axes.push(axes);
+        self.colors.push(color);
         let terms = terms_of(layout.degree);
         let of_term = |term: usize| [0, 1, 2].map(|channel| value(layout.rest[channel * terms + term]) as f32);
         self.terms.extend((0..terms).flat_map(of_term));
@@ -144,6 +214,18 @@ impl<'a> Gaussians<'a> {
         };
         points.flattened = flattened(self.ratios);
     }
+}
+
+/// Widens the standard deviations by the filter's, and gives the factor on the opacity.
+fn widened(deviations: &mut [f64], filter: f64) -> f64 {
+    let mut left = 1.0;
+    for deviation in deviations {
+        let wider = deviation.hypot(filter);
+        // Without a filter a width of 0 gives 1 and not 0 / 0.
+        left *= if filter == 0.0 { 1.0 } else { *deviation / wider };
+        *deviation = wider;
+    }
+    left
 }
 
 /// What becomes of ellipsoids of these ratios; None if there are none.

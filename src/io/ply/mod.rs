@@ -22,7 +22,8 @@
 //! The header has a comment `up y` or `up z` where that is known, `closed` for surfels that cover a closed surface, `unsided` where normals tell no sides, and `triangles NAME`
 //! for those that are drawn beside a mesh: no other program says it in a PLY file, and none stumbles over it.
 //!
-//! Files of Gaussians, whose vertices have other names, are read too ([`read`]).
+//! Files of Gaussians, whose vertices have other names, are read too ([`read`]), and SuperSplat's
+//! compressed ones.
 //!
 //! The names of normals, colours and texture coordinates are those of MeshLab, which ignores the half-axes, as do
 //! CloudCompare and Open3D: to them such a file is a cloud with normals and colours.
@@ -35,6 +36,7 @@ mod gaussian;
 mod header;
 mod kept_nodes;
 mod levels;
+mod packed;
 mod read;
 mod rows;
 mod vertex;

@@ -3,7 +3,7 @@
 use super::contents::Contents;
 use super::faces::{Faces, Triangles};
 use super::header::{self, Encoding};
-use super::{ascii, binary, gaussian};
+use super::{ascii, binary, gaussian, packed};
 use crate::io::fault::{self, Fault};
 use crate::io::{Input, Material, Mesh, Points, Texture};
 use crate::io::{closed, triangles};
@@ -30,7 +30,8 @@ use std::sync::Arc;
 ///
 /// Vertices with `scale_0` and `rot_0` are Gaussians, as 2D Gaussian splatting writes them, or flat ones of 3D Gaussian splatting: they get
 /// half-axes of so many standard deviations that nothing shows beyond ([`EXTENT`](crate::scene::gaussian::EXTENT)), and colours with alpha that
-/// change with the view if the file says so. With `flatten` ellipsoids lose their shortest axis, however thick they are.
+/// change with the view if the file says so. SuperSplat's compressed files are read too.
+/// With `flatten` ellipsoids lose their shortest axis, however thick they are.
 ///
 /// A comment `up y` or `up z` in the header says which way is up, `closed` that surfels cover a closed surface, and `triangles NAME` which
 /// mesh they are drawn beside.
@@ -132,7 +133,12 @@ fn contents(
         return Err(in_file(Fault::Malformed("its header has no element 'vertex'".into())));
     };
     progress.begin(&format!("reading {}", fault::name(&path)), vertex.count);
+    let mut packed = || {
+        let points = packed::read(&mut reader, &header, length, progress)?;
+        Ok(Contents { points, faces: Faces::new(surface), tree: None, whole: None })
+    };
     let contents = match header.encoding {
+        _ if packed::is_packed(&header) => packed(),
         Encoding::Ascii => ascii::read(reader, &header, length, Faces::new(surface), progress),
         Encoding::LittleEndian => binary::read::<false>(reader, &header, length, Faces::new(surface), progress),
         Encoding::BigEndian => binary::read::<true>(reader, &header, length, Faces::new(surface), progress),

@@ -140,7 +140,8 @@ impl Layout {
             return Err(Fault::Malformed(format!("its vertices have no property {}", missing.join(", "))));
         };
         let has = |name: &str| places.iter().any(|(place, _)| *place == name);
-        let gaussian = GaussianLayout::of(has, |name| column(&[name]))?;
+        let scalar_of = |name: &str| places.iter().find(|(place, _)| *place == name).map(|(_, place)| place.scalar);
+        let gaussian = GaussianLayout::of(has, |name| column(&[name]).zip(scalar_of(name)))?;
         if gaussian.is_some() {
             let position = [x, y, z];
             return Ok(Self { columns, scalars, row_size, position, gaussian, ..Self::default() });
@@ -278,7 +279,8 @@ impl<'a> Vertices<'a> {
         let [x, y, z] = layout.position;
         self.positions.extend((0..rows).map(|row| [value(x, row), value(y, row), value(z, row)]));
         if let Some(gaussians) = &mut self.gaussians {
-            (0..rows).for_each(|row| gaussians.push(|column| value(column, row)));
+            let position = |row: usize| [x, y, z].map(|column| value(column, row));
+            (0..rows).for_each(|row| gaussians.push(position(row), |column| value(column, row)));
         }
         if let Some(normal) = layout.normal {
             self.normals.extend((0..rows).map(|row| normal.map(|column| value(column, row) as f32)));

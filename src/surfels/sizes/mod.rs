@@ -107,7 +107,14 @@ pub(crate) fn half_axes_at(
     let near: Vec<DVec3> = offsets(distinct, graph, index, NORMAL_NEIGHBOURS).collect();
     match size {
         Size::Knn if !near.is_empty() => cell_ellipse(&near, normal),
-        Size::Ellipse => bounding_ellipse(near.iter().copied().take(ELLIPSE_NEIGHBOURS), normal),
+        Size::Ellipse => match bounding_ellipse(near.iter().copied().take(ELLIPSE_NEIGHBOURS), normal) {
+            // All neighbours lie along the normal: only their distances say how large a disk is.
+            [DVec3::ZERO, _] => {
+                let radius = open_radius(near.iter().copied().take(ELLIPSE_NEIGHBOURS));
+                <[DVec3; 2]>::from(normal.any_orthonormal_pair()).map(|axis| axis * radius)
+            }
+            axes => axes,
+        },
         Size::Knn | Size::Bsp(_) | Size::BspGlobal(_) | Size::Qsplat => [DVec3::ZERO; 2],
     }
 }

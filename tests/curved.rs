@@ -60,10 +60,14 @@ fn compared(frame: &Frame, reference: &Frame) -> (usize, usize) {
 #[test]
 fn kernels_and_twins_meet_the_same_caps() {
     let Some(gpu) = common::gpu() else { return };
-    let (scene, backend) = (curved(), Backend::gpu(gpu));
-    for projection in [Projection::Pinhole, Projection::Orthographic] {
-        let camera = sphere_camera(160, projection);
-        for (low_pass, cull) in [(LowPass::None, Cull::None), (LowPass::None, Cull::Back), (LowPass::Max, Cull::None)] {
+    let backend = Backend::gpu(gpu);
+    let forms = [LowPass::None, LowPass::Max].into_iter().flat_map(|low_pass| {
+        [(Cull::None, true), (Cull::None, false), (Cull::Back, true)].map(|(cull, oriented)| (low_pass, cull, oriented))
+    });
+    for (low_pass, cull, oriented) in forms {
+        let scene = Scene { oriented, ..curved() };
+        for projection in [Projection::Pinhole, Projection::Orthographic] {
+            let camera = sphere_camera(160, projection);
             let options = options(low_pass, cull);
             let decided = RenderOptions { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
             let (reference, _) = render(&scene, &camera, &decided, &Backend::Reference, &()).unwrap();

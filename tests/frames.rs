@@ -21,7 +21,9 @@ use epsplat::frame::Frame;
 use epsplat::gpu::Gpu;
 use epsplat::plan::{Accumulator, Features, Optimisation, Organisation, RenderOptions};
 use epsplat::render::{Backend, Renderer, render};
-use epsplat::scene::{Camera, Colors, Epsilon, Light, LowPass, Maps, Projection, Scene, Shading, Surfel};
+use epsplat::scene::{
+    Camera, Colors, Composite, Epsilon, Light, LowPass, MAPS, Map, Maps, Projection, Scene, Shading, Surfel,
+};
 use glam::{DVec3, Vec3};
 
 /// A scene and a view of it.
@@ -294,4 +296,43 @@ fn refused(row: &Row<'_>, gpu: &Gpu) -> Option<&'static str> {
         (raster.is_some_and(|raster| raster.depth.name() != "exact") && gpu.adapter.api == "gl", "no fine depths"),
     ];
     lacks.into_iter().find(|(lacks, _)| *lacks).map(|(_, why)| why)
+}
+
+/// A disk in the first of many blocks of pixels, alone in the image: blocks without a splat may be left as the image was cleared.
+#[test]
+fn maps_are_right_where_nothing_is() {
+    let Some(gpu) = common::gpu() else { return };
+    let backend = Backend::gpu(gpu);
+    let painted = painted(1);
+    let camera = sphere_camera(8, Projection::Pinhole);
+    // The sphere in the upper left of an image ten times as wide.
+    let camera = Camera { width: 80, height: 48, ..camera };
+    let plain = Scene { colors: Colors::Constant([0.5, 0.4, 0.3, 1.0]), ..painted.clone() };
+    for row in MAPS.iter().filter(|row| row.image_word.is_some()) {
+        let scene = if row.map == Map::TexZ { &painted } else { &plain };
+        let composite = if row.composited { Composite::Layers(2) } else { Composite::Opaque };
+        let lists = [(composite, Organisation::Auto), (composite, Organisation::Scatter)];
+        let tiles = !matches!(row.map, Map::Tail | Map::Surfaces | Map::Index);
+        let tiles = tiles.then_some((Composite::Opaque, Organisation::Tile));
+        for (composite, organisation) in lists.into_iter().chain(tiles) {
+            let maps = Maps::of(&[row.map]);
+            let options = RenderOptions { maps, composite, organisation, ..RenderOptions::default() };
+            let (frame, _) = render(scene, &camera, &options, &backend, &()).unwrap();
+            let (reference, _) = render(scene, &camera, &options, &Backend::Reference, &()).unwrap();
+            let words = |frame: &Frame| frame.map(row.map).unwrap().iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+            let (device, truth) = (words(&frame), words(&reference));
+            let of_nothing = |k: usize| match row.nothing.len() {
+                0 if row.numbers => u32::MAX,
+                0 => 0,
+                n => row.nothing[k % n].to_bits(),
+            };
+            // All but the first two blocks of rows and columns.
+            let width = row.map.width();
+            let empty = (0..device.len()).filter(|k| k / width % 80 >= 16 || k / width / 80 >= 16);
+            for k in empty {
+                let expected = (of_nothing(k % width), of_nothing(k % width));
+                assert_eq!((device[k], truth[k]), expected, "{}, {composite:?}, {organisation:?}, at {k}", row.name);
+            }
+        }
+    }
 }

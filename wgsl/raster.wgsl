@@ -111,16 +111,22 @@ fn shape_with_attributes(@builtin(vertex_index) vertex: u32) -> ShapeCorner {
 
 fn fragment_of(corner: ShapeCorner) -> Fragment {
     hold();
-    var splat: Splat;
-    splat.anchor_x = corner.anchor.x;
-    splat.anchor_y = corner.anchor.y;
-    splat.bounds_last = bitcast<u32>(corner.anchor.z);
-    splat.a = array<f32, 3>(corner.a.x, corner.a.y, corner.a.z);
-    splat.b = array<f32, 3>(corner.b.x, corner.b.y, corner.b.z);
-    splat.c = array<f32, 3>(corner.c.x, corner.c.y, corner.c.z);
-    splat.a_low = array<f32, 3>(corner.a_low.x, corner.a_low.y, corner.a_low.z);
-    // Read only where there are any.
-    splat.clip = clip_in(projected[corner.index]);
+    let record = projected[corner.index];
+    // A constructor names every field, so that none is left out unseen. Those of the record are read only where there are any.
+    let splat = Splat(
+        corner.anchor.x,
+        corner.anchor.y,
+        // corner_image() alone looks at bounds.
+        0u,
+        bitcast<u32>(corner.anchor.z),
+        array<f32, 3>(corner.a.x, corner.a.y, corner.a.z),
+        array<f32, 3>(corner.b.x, corner.b.y, corner.b.z),
+        array<f32, 3>(corner.c.x, corner.c.y, corner.c.z),
+        array<f32, 3>(corner.a_low.x, corner.a_low.y, corner.a_low.z),
+        clip_in(record),
+        cap_in(record),
+        fade_in(record),
+    );
     let pixel = vec2<u32>(corner.position.xy);
     return footprint(splat, filter_in(projected[corner.index]), pixel.x, pixel.y);
 }

@@ -3,7 +3,7 @@
 // eight rows are drawn apart, each by the splats that reach them. The footprint, and so every bit, is that of visibility.wgsl
 // and accumulate.wgsl.
 // Host side: src/passes/tiles.rs.
-// All loops end, by 1, 3 of src/gpu/loops.rs: 0xf29c387476faa087
+// All loops end, by 1, 3 of src/gpu/loops.rs: 0x123395bc59143c44
 
 // The lists of the large splats.
 @group(0) @binding(27) var<storage, read> large_lists: array<u32>;
@@ -84,22 +84,22 @@ fn handed_row(row: array<f32, 3>, from_: u32) -> array<f32, 3> {
     );
 }
 
-// What the footprint is made of.
+// What the footprint is made of. A constructor names every field, so that none is left out unseen.
 fn handed_splat(from_: u32) -> Splat {
-    var splat: Splat;
-    splat.anchor_x = bitcast<i32>(handed(bitcast<u32>(own_splat.anchor_x), from_));
-    splat.anchor_y = bitcast<i32>(handed(bitcast<u32>(own_splat.anchor_y), from_));
-    if (SIDES) {
-        splat.bounds_last = handed(own_splat.bounds_last, from_);
-    }
-    splat.a = handed_row(own_splat.a, from_);
-    splat.b = handed_row(own_splat.b, from_);
-    splat.c = handed_row(own_splat.c, from_);
-    splat.a_low = handed_row(own_splat.a_low, from_);
-    splat.clip = handed_clip(own_splat.clip, from_);
-    splat.cap = handed_cap(own_splat.cap, from_);
-    splat.fade = handed_fade(own_splat.fade, from_);
-    return splat;
+    return Splat(
+        bitcast<i32>(handed(bitcast<u32>(own_splat.anchor_x), from_)),
+        bitcast<i32>(handed(bitcast<u32>(own_splat.anchor_y), from_)),
+        // The fetcher alone looks at bounds, in reaches().
+        0u,
+        handed_side(own_splat.bounds_last, from_),
+        handed_row(own_splat.a, from_),
+        handed_row(own_splat.b, from_),
+        handed_row(own_splat.c, from_),
+        handed_row(own_splat.a_low, from_),
+        handed_clip(own_splat.clip, from_),
+        handed_cap(own_splat.cap, from_),
+        handed_fade(own_splat.fade, from_),
+    );
 }
 
 fn handed_attributes(own: Attributes, from_: u32) -> Attributes {

@@ -1,5 +1,14 @@
 // Caps in tiles: of a splat that another invocation fetched (tile.wgsl).
 
+// bounds_last, whose AWAY bit softened() reads wherever there is a low-pass; without one sides are those of the roots.
+fn handed_side(own: u32, from_: u32) -> u32 {
+    var last = 0u;
+    if (FILTERED) {
+        last = handed(own, from_);
+    }
+    return last;
+}
+
 fn handed_cap(own: Cap, from_: u32) -> Cap {
     return Cap(
         handed_vector(own.heights, from_),

@@ -1,5 +1,10 @@
 // Points that face the camera in tiles. Same interface as tile_flat.wgsl.
 
+// Points have no sides.
+fn handed_side(own: u32, from_: u32) -> u32 {
+    return 0u;
+}
+
 fn handed_cap(own: Cap, from_: u32) -> Cap {
     return own;
 }

@@ -1,5 +1,14 @@
 // Disks in tiles. Same interface as tile_curved.wgsl.
 
+// bounds_last, whose AWAY bit is_away reads where a pixel shows one side.
+fn handed_side(own: u32, from_: u32) -> u32 {
+    var last = 0u;
+    if (SIDES) {
+        last = handed(own, from_);
+    }
+    return last;
+}
+
 fn handed_cap(own: Cap, from_: u32) -> Cap {
     return own;
 }

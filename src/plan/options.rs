@@ -5,7 +5,7 @@ use std::str::FromStr;
 use super::{Accumulator, Optimisation, Raster};
 use crate::error::Error;
 use crate::scene::{
-    Blend, Composite, Cull, Detail, DetailMeasure, Epsilon, Facing, Join, Kernel, Light, LowPass, Map, Maps, Outline,
+    Blend, Composite, Cull, Detail, DetailMeasure, Epsilon, Facing, Join, Kernel, Light, LowPass, Maps, Outline,
     Samples, Shading, ShadingAt, Tail,
 };
 
@@ -148,8 +148,8 @@ impl RenderOptions {
 
     /// Whether a pixel of the image differs from 0 where nothing is.
     pub fn shows_where_nothing_is(&self) -> bool {
-        let maps = [Map::Depth, Map::Transmittance, Map::Surfaces];
-        maps.iter().any(|map| self.maps.has(*map)) || self.background.iter().any(|value| value.to_bits() != 0)
+        self.maps.iter().any(|map| !map.row().nothing.is_empty())
+            || self.background.iter().any(|value| value.to_bits() != 0)
     }
 
     /// Whether an optimisation is not left out.

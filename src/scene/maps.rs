@@ -69,15 +69,23 @@ pub struct MapRow {
     pub numbers: bool,
     /// Two images are compared in it.
     pub compared: bool,
+    /// Its values where nothing is, if they are not all 0: as many as [`channels`](Self::channels), or their first ones over and over. Of
+    /// numbers those that a device writes.
+    pub nothing: &'static [f32],
 }
 
 /// The maps, in the order of [`Map`].
 pub const MAPS: [MapRow; 11] = [
-    row(Map::Depth, "depth", &["Z"], "depth", Some("DEPTH_IMAGE")),
+    MapRow { nothing: &[f32::INFINITY], ..row(Map::Depth, "depth", &["Z"], "depth", Some("DEPTH_IMAGE")) },
     row(Map::Normal, "normal", &["X", "Y", "Z"], "normal-map", Some("NORMAL_IMAGE")),
     row(Map::Weight, "weight", &["Y"], "weight-map", Some("WEIGHT_IMAGE")),
     row(Map::Count, "count", &["Y"], "count", Some("COUNT_IMAGE")),
-    MapRow { raster: false, compared: false, ..row(Map::Decision, "decision", &["Y"], "decision", None) },
+    MapRow {
+        raster: false,
+        compared: false,
+        nothing: &[f32::INFINITY],
+        ..row(Map::Decision, "decision", &["Y"], "decision", None)
+    },
     MapRow {
         raster: false,
         numbers: true,
@@ -87,6 +95,7 @@ pub const MAPS: [MapRow; 11] = [
     MapRow {
         raster: false,
         composited: true,
+        nothing: &[1.0],
         ..row(Map::Transmittance, "transmittance", &["Y"], "transmittance", Some("TRANSMITTANCE_IMAGE"))
     },
     MapRow {
@@ -95,11 +104,16 @@ pub const MAPS: [MapRow; 11] = [
         ..row(Map::Layers, "layers", &["Y"], "layers-map", Some("LAYERS_IMAGE"))
     },
     MapRow { raster: false, composited: true, ..row(Map::Tail, "tail", &["Y"], "tail-map", Some("TAIL_IMAGE")) },
-    MapRow { raster: false, ..row(Map::TexZ, "texz", &["U", "V", "Z"], "texz-map", Some("TEXZ_IMAGE")) },
+    MapRow {
+        raster: false,
+        nothing: &[0.0, 0.0, f32::INFINITY],
+        ..row(Map::TexZ, "texz", &["U", "V", "Z"], "texz-map", Some("TEXZ_IMAGE"))
+    },
     MapRow {
         raster: false,
         composited: true,
         compared: false,
+        nothing: &[f32::INFINITY, 0.0],
         ..row(Map::Surfaces, "surfaces", &SURFACE_CHANNELS, "surfaces", Some("SURFACES_IMAGE"))
     },
 ];
@@ -111,7 +125,18 @@ const fn row(
     need: &'static str,
     image_word: Option<&'static str>,
 ) -> MapRow {
-    MapRow { map, name, channels, need, image_word, raster: true, composited: false, numbers: false, compared: true }
+    MapRow {
+        map,
+        name,
+        channels,
+        need,
+        image_word,
+        raster: true,
+        composited: false,
+        numbers: false,
+        compared: true,
+        nothing: &[],
+    }
 }
 
 impl Map {

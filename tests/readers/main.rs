@@ -10,6 +10,7 @@ mod las;
 mod las_damage;
 #[path = "../common/las_forms.rs"]
 mod las_forms;
+mod las_headers;
 mod mesh;
 mod obj;
 #[cfg(feature = "pcd")]
@@ -19,6 +20,7 @@ mod ply_damage;
 #[cfg(feature = "e57")]
 #[path = "../common/random.rs"]
 mod random;
+mod ranges;
 
 use epsplat::io::{self, Format, Points, ReadOptions};
 use epsplat::{Error, Progress};

@@ -37,6 +37,7 @@ mod kept_nodes;
 mod levels;
 mod read;
 mod rows;
+mod tint;
 mod vertex;
 mod whole;
 mod write;

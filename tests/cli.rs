@@ -446,7 +446,7 @@ fn inputs_have_one_white_and_alphas_can_be_left_out() {
     let classes = folder.file("classes.ply", ply("x y z red green blue alpha", 400, &rows));
     let said = |options: &[&str]| {
         let out = folder.path("out.ply");
-        let arguments = [&["surfels", text(&classes), "-o", text(&out)], options].concat();
+        let arguments = [&["surfels", text(&classes), "-o", text(&out)][..], options].concat();
         (String::from_utf8(succeeds(&arguments).stderr).unwrap(), epsplat::io::read(&out, &()).unwrap().colors.unwrap())
     };
     let (told, colors) = said(&[]);

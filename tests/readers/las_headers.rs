@@ -145,3 +145,60 @@ fn degrees_with_heights_in_metres_are_told() {
     let said = notes(&folder.read("a.las", &bytes).unwrap());
     assert!(said.contains("degrees of longitude and latitude"), "{said}");
 }
+
+/// Normals are among the bytes that PDAL and CloudCompare add to points, of any type.
+#[test]
+fn normals_are_read_from_extra_bytes() {
+    let folder = Folder::new();
+    // Type 9 is f32, type 4 is i16 with a scale.
+    for (format, compressed, kind) in [(2, false, 9u8), (7, true, 9), (7, true, 4), (3, true, 4)] {
+        let mut data = Vec::new();
+        for name in ["Amplitude", "NormalX", "NormalY", "NormalZ"] {
+            let mut entry = vec![0; 192];
+            (entry[2], entry[3]) = (kind, if kind == 4 { 1 << 3 } else { 0 });
+            entry[4..4 + name.len()].copy_from_slice(name.as_bytes());
+            entry[112..120].copy_from_slice(&0.25f64.to_le_bytes());
+            data.extend(entry);
+        }
+        let mut builder = las::Builder::from((1, 4));
+        builder.point_format = las::point::Format::new(format).unwrap();
+        builder.point_format.is_compressed = compressed;
+        builder.point_format.extra_bytes = if kind == 4 { 8 } else { 16 };
+        let record = las::Vlr { user_id: "LASF_Spec".into(), record_id: 4, description: String::new(), data };
+        builder.vlrs.push(record);
+        let has_time = builder.point_format.has_gps_time;
+        let mut writer = las::Writer::new(std::io::Cursor::new(Vec::new()), builder.into_header().unwrap()).unwrap();
+        for i in 0..1000 {
+            let values = [7.0, 0.5, -0.25, 1.0f32];
+            let extra_bytes = match kind {
+                4 => values.iter().flat_map(|value| ((value * 4.0) as i16).to_le_bytes()).collect(),
+                _ => values.iter().flat_map(|value| value.to_le_bytes()).collect(),
+            };
+            let color = Some(las::Color { red: 1, green: 2, blue: 3 });
+            let gps_time = has_time.then_some(1.0);
+            let [x, y, z] = [f64::from(i), 0.0, 1.0];
+            writer
+                .write_point(Point {
+                    x,
+                    y,
+                    z,
+                    color,
+                    gps_time,
+                    extra_bytes,
+                    return_number: 1,
+                    number_of_returns: 1,
+                    ..Point::default()
+                })
+                .unwrap();
+        }
+        let bytes = writer.into_inner().unwrap().into_inner();
+        let read = folder.read("a.laz", &bytes).unwrap();
+        assert_eq!(read.normals, Some(vec![[0.5, -0.25, 1.0]; 1000]), "{format} {compressed} {kind}");
+        let options = io::ReadOptions { describe: true, ..io::ReadOptions::default() };
+        let about = io::read_with(&folder.path("a.laz"), options, &()).unwrap().about.unwrap();
+        let used = |name: &str| {
+            about.attributes.iter().find(|attribute| attribute.name == name).map(|attribute| attribute.used)
+        };
+        assert_eq!((used("NormalX"), used("Amplitude")), (Some(true), Some(false)));
+    }
+}

@@ -208,7 +208,7 @@ impl ColorRules {
                     Some(apply::colors(numbers, rule, alpha))
                 }
                 (_, Some(shades), Some(shading)) => {
-                    told.shades(&shades, shading);
+                    told.shades(shading);
                     Some(Colors::Srgb8(shades.grey(shading)))
                 }
                 _ => None,

@@ -1,9 +1,9 @@
 //! What a user should hear of how numbers became colours.
 
+use super::Numbers;
 use super::evidence::Evidence;
 use super::rule::{AlphaRule, Rule};
 use super::shade::Shading;
-use super::{Numbers, Shades};
 use crate::io::about::{Attribute, Role};
 use crate::scene::color::srgb_to_linear;
 
@@ -72,7 +72,7 @@ impl Told {
     }
 
     /// Adds the intensities of a run.
-    pub fn shades(&mut self, _: &Shades, shading: Shading) {
+    pub fn shades(&mut self, shading: Shading) {
         self.shading = Some(shading);
     }
 

@@ -4,6 +4,7 @@
 //! allocate gigabytes, which no error handling survives, so each of these lengths is looked at here first.
 
 use super::arithmetic::Integers;
+use super::extra::Field;
 use super::shown::Shown;
 use crate::io::fault::Fault;
 use las::raw::{Header, Vlr};
@@ -129,6 +130,8 @@ pub(super) struct Scheme {
     pub(super) has_color: bool,
     /// Of each layer of a chunk, where chunks are in layers, whether anything is taken of it.
     pub(super) needed: Vec<bool>,
+    /// The layer of the first extra byte, where layers are told apart and points have such.
+    pub(super) extra: Option<usize>,
     /// The layer of intensities, where layers are told apart and points have colours.
     pub(super) intensities: Option<usize>,
 }
@@ -177,9 +180,10 @@ impl Scheme {
             _ => false,
         };
         let intensities = layers.iter().position(|layer| *layer == (10, INTENSITIES)).filter(|_| usual && has_color);
+        let extra = layers.iter().position(|layer| *layer == (14, 0)).filter(|_| usual);
         let needed = layers.into_iter().map(|layer| !usual || needed(layer)).collect();
         let chunk = Some(chunk).filter(|&chunk| chunk != 0 && chunk != u32::MAX);
-        Some(Self { compressor, chunk, record, has_color, needed, intensities })
+        Some(Self { compressor, chunk, record, has_color, needed, extra, intensities })
     }
 
     /// Whether the intensities of points with colours are taken, which may all be zero.
@@ -187,6 +191,13 @@ impl Scheme {
         if let Some(needed) = self.intensities.and_then(|layer| self.needed.get_mut(layer)) {
             *needed = taken;
         }
+    }
+
+    /// Takes an attribute of the extra bytes, each of which is a layer.
+    pub(super) fn need_extra(&mut self, field: &Field) {
+        let Some(first) = self.extra else { return };
+        let layers = self.needed.iter_mut().skip(first + field.start).take(field.size.into());
+        layers.for_each(|needed| *needed = true);
     }
 
     /// Bytes of a chunk in layers before these: its first point, how many it has, and how long each layer is.

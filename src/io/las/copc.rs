@@ -1,6 +1,7 @@
 //! COPC 1.0: LAZ files whose chunks are the nodes of an octree, of which a picture takes few.
 
 use super::chunks::{MOST_A_BYTE, Scheme, laszip_record, malformed, promised};
+use super::extra::Normals;
 use super::layers::Layers;
 use super::shown::Shown;
 use super::{Looks, early, header, of_las};
@@ -47,6 +48,8 @@ pub struct Copc {
     pub(super) looks: Option<Looks>,
     /// What their numbers mean, once some have been read by [`read`](Self::read).
     pub(super) rules: ColorRules,
+    /// The normals that points have beside their format.
+    pub(super) normals: Option<Normals>,
     /// What is odd about it.
     pub(super) notes: Vec<String>,
 }
@@ -167,6 +170,7 @@ fn opened(mut file: File, path: PathBuf, length: u64) -> Result<Copc, Fault> {
     let bounds = if min.is_finite() && max.is_finite() { Bounds { min, max } } else { Bounds::EMPTY };
     let name = fault::name(&path);
     let found = header::look(&mut file, (&header, legacy), (length, &name))?;
+    found.normals.iter().flat_map(|normals| &normals.fields).for_each(|field| scheme.need_extra(field));
     let mut notes = found.notes;
     notes.extend(degrees::hint(&name, [min.to_array(), max.to_array()], found.geographic));
     let octree = PointOctree { center, half, spacing, nodes, bounds };
@@ -183,6 +187,7 @@ fn opened(mut file: File, path: PathBuf, length: u64) -> Result<Copc, Fault> {
         count,
         looks: None,
         rules: ColorRules::default(),
+        normals: found.normals,
         notes,
     })
 }

@@ -1,7 +1,7 @@
 //! What the header of a LAS file says of the file, and where two of its fields disagree.
 
 use super::chunks::promised;
-use super::extra;
+use super::extra::{self, Field, Normals};
 use super::system::{self, System};
 use crate::io::about::{About, Attribute, Role};
 use crate::io::fault::Fault;
@@ -33,6 +33,8 @@ pub(super) struct Found {
     pub about: About,
     /// Whether coordinates are degrees, if a coordinate system says it.
     pub geographic: Option<bool>,
+    /// The normals that points have beside their format.
+    pub normals: Option<Normals>,
     /// What is odd.
     pub notes: Vec<String>,
     /// The box that the header gives, and the step of coordinates.
@@ -68,8 +70,10 @@ pub(super) fn look(
     };
     let notes = notes.into_iter().map(named).collect();
     let geographic = system.as_ref().and_then(|system| system.geographic);
-    let about = about(header, system, extra);
-    Ok(Found { about, geographic, notes, bounds, step: scales.map(f64::abs) })
+    let own = Format::new(header.point_data_record_format & 0x3f).map_or(0, |format| format.len());
+    let normals = Normals::of(&extra, own);
+    let about = about(header, system, &extra);
+    Ok(Found { about, geographic, normals, notes, bounds, step: scales.map(f64::abs) })
 }
 
 impl Found {
@@ -105,8 +109,8 @@ impl Found {
 /// What the records of a file tell.
 struct Records {
     systems: system::Records,
-    /// Names and bytes of what points have beside their format.
-    extra: Vec<(String, u16)>,
+    /// What points have beside their format.
+    extra: Vec<Field>,
     /// Where the last record ends.
     end: u64,
 }
@@ -120,7 +124,7 @@ fn records(file: &mut (impl Read + Seek), header: &Header) -> Result<Records, Fa
         let Ok(record) = Vlr::read_from(&mut *file, false) else { break };
         end += RECORD_HEADER + record.data.len() as u64;
         found.take(&record);
-        extra.extend(extra::names(&record).unwrap_or_default());
+        extra.extend(extra::fields(&record).unwrap_or_default());
     }
     if let Some(extended) = header.evlr.filter(|_| found.text.is_none()) {
         found.look_in_extended(file, extended.start_of_first_evlr, extended.number_of_evlrs);
@@ -218,7 +222,7 @@ fn scale(scales: [f64; 3]) -> Option<String> {
 }
 
 /// What people want to know.
-fn about(header: &Header, system: Option<System>, extra: Vec<(String, u16)>) -> About {
+fn about(header: &Header, system: Option<System>, extra: &[Field]) -> About {
     let text = |bytes: &[u8]| {
         let text = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
         let text = String::from_utf8_lossy(text).trim().to_owned();
@@ -230,7 +234,10 @@ fn about(header: &Header, system: Option<System>, extra: Vec<(String, u16)>) -> 
     About {
         format: format!("{kind} 1.{minor}, point format {format}"),
         coordinate_system: system.map(|system| system.name),
-        scanners: text(&header.system_identifier).filter(|name| !NO_SYSTEMS.contains(&name.as_str())).into_iter().collect(),
+        scanners: text(&header.system_identifier)
+            .filter(|name| !NO_SYSTEMS.contains(&name.as_str()))
+            .into_iter()
+            .collect(),
         software: text(&header.generating_software),
         attributes: attributes(format, header.point_data_record_length, extra),
         ..About::default()
@@ -238,7 +245,7 @@ fn about(header: &Header, system: Option<System>, extra: Vec<(String, u16)>) -> 
 }
 
 /// What a point of a format has.
-fn attributes(format: u8, record: u16, named: Vec<(String, u16)>) -> Vec<Attribute> {
+fn attributes(format: u8, record: u16, named: &[Field]) -> Vec<Attribute> {
     let Ok(known) = Format::new(format) else { return Vec::new() };
     let always = [("x y z", true, Role::Other), ("intensity", false, Role::Intensity), ("returns", false, Role::Other)];
     let mut all: Vec<Attribute> = always.map(|(name, used, role)| Attribute::new(name, used, role)).into();
@@ -254,9 +261,11 @@ fn attributes(format: u8, record: u16, named: Vec<(String, u16)>) -> Vec<Attribu
     ];
     all.extend(more.into_iter().filter(|(has, ..)| *has).map(|(_, name, role)| Attribute::new(name, false, role)));
     let mut extra = record.saturating_sub(known.len());
-    for (name, size) in named {
-        extra = extra.saturating_sub(size);
-        all.push(Attribute::new(name, false, Role::Other));
+    let normals = Normals::of(named, known.len());
+    for field in named {
+        extra = extra.saturating_sub(field.size);
+        let is_used = normals.as_ref().is_some_and(|normals| normals.fields.contains(field));
+        all.push(Attribute::new(field.name.clone(), is_used, Role::Other));
     }
     if extra > 0 {
         all.push(Attribute::new(format!("{extra} extra bytes"), false, Role::Other));

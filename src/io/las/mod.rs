@@ -15,6 +15,8 @@ use crate::io::fault::{self, Fault, reserve, surviving};
 use crate::io::values::one_line;
 use crate::io::{Input, Points, ReadOptions, Up, degrees};
 use crate::{Progress, Result};
+use extra::Normals;
+use header::Found;
 use las::reader::{LazParallelism, ReaderOptions};
 use las::{PointData, PointDataBuilder, Reader, raw};
 use shown::Shown;
@@ -57,7 +59,7 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
         return Ok(Points { up: Some(Up::Z), about, notes: found.notes, ..Points::default() });
     }
     progress.begin(&format!("reading {name}"), promised);
-    let points = deep(|| decode(file, decoding, promised.min(length), options, progress));
+    let points = deep(|| decode(file, decoding, promised.min(length), (options, &found), progress));
     progress.end();
     let mut points = points.map_err(|fault| fault.of(&path))?;
     points.notes.extend(found.notes.iter().cloned());
@@ -108,7 +110,7 @@ fn decode(
     mut file: BufReader<Shown>,
     decoding: chunks::Decoding,
     capacity: u64,
-    read_options: &ReadOptions,
+    (read_options, found): (&ReadOptions, &Found),
     progress: &dyn Progress,
 ) -> Result<Points, Fault> {
     file.rewind()?;
@@ -123,7 +125,7 @@ fn decode(
     let format = *header.point_format();
     let mut block = PointDataBuilder::new().for_header(header).build();
     let block_points = (BLOCK / u64::from(format.len()).max(1)).max(1);
-    let mut kept = Kept::default();
+    let mut kept = Kept::of(None, found.normals.as_ref());
     reserve(&mut kept.positions, capacity)?;
     let mut read = 0;
     while read < promised {
@@ -152,8 +154,11 @@ enum Looks {
 
 /// What is kept of the points so far.
 #[derive(Default)]
-struct Kept {
+struct Kept<'a> {
     positions: Vec<[f64; 3]>,
+    /// Which bytes are normals, and these.
+    has_normals: Option<&'a Normals>,
+    normals: Vec<[f32; 3]>,
     codes: Vec<[u16; 3]>,
     /// As long as no colour says anything.
     intensities: Vec<u16>,
@@ -168,15 +173,17 @@ struct Kept {
     left_out: Vec<u64>,
 }
 
-impl Kept {
+impl<'a> Kept<'a> {
     /// Nothing yet, of a file of which it may be known what shows.
-    fn of(looks: Option<Looks>) -> Self {
-        Self { looks, decided: looks.is_some(), ..Self::default() }
+    fn of(looks: Option<Looks>, has_normals: Option<&'a Normals>) -> Self {
+        Self { looks, decided: looks.is_some(), has_normals, ..Self::default() }
     }
 
     /// As points, of which all that were read have these numbers, in order; colours are as they are in the file.
     fn points(self, numbers: impl Iterator<Item = u64>, options: &ReadOptions) -> Points {
-        let Self { positions, codes, intensities, looks, decided, classes, counts, left_out } = self;
+        let Self { positions, has_normals, normals, codes, intensities, looks, decided, classes, counts, left_out } =
+            self;
+        let normals = has_normals.map(|_| normals);
         let kind = Kind { zero_is_none: !decided, ..Kind::of(Number::WORD) };
         let colors = Numbers { values: Values::Words(codes), kind, alpha: None };
         let (colors, shades) = match looks {
@@ -187,7 +194,8 @@ impl Kept {
         let raw = Some(Box::new(RawColors { opacities: options.classes, classes, ..raw }));
         let withheld = left_out.len() as u64;
         let up = Some(Up::Z);
-        let mut points = Points { positions, raw, up, classes: counts, withheld, left_out, ..Points::default() };
+        let mut points =
+            Points { positions, normals, raw, up, classes: counts, withheld, left_out, ..Points::default() };
         leave_out_unseen(&mut points, numbers);
         points
     }
@@ -210,6 +218,9 @@ impl Kept {
         }
         let coordinates = block.x().zip(block.y()).zip(block.z()).map(|((x, y), z)| [x, y, z]);
         self.positions.extend(kept(coordinates, &keeps));
+        if let Some(normals) = self.has_normals {
+            self.normals.extend(kept(records(block).map(|record| normals.of_record(record)), &keeps));
+        }
         if let Some(rgb) = block.rgb().filter(|_| self.looks != Some(Looks::Intensities)) {
             let before = self.codes.len();
             self.codes.extend(kept(rgb.map(|(r, g, b)| [r, g, b]), &keeps));

@@ -56,7 +56,8 @@ impl Copc {
     fn decoded(&mut self, nodes: &[usize], options: &ReadOptions, progress: &dyn Progress) -> Result<Points, Fault> {
         let vlr = LazVlr::from_buffer(&self.laszip).map_err(|error| of_las(error.into()))?;
         let count = self.octree.points(nodes);
-        let mut kept = Kept::of(self.looks);
+        let normals = self.normals.clone();
+        let mut kept = Kept::of(self.looks, normals.as_ref());
         // No longer than the file, whatever it promises.
         reserve(&mut kept.positions, count.min(self.bytes_read(nodes)))?;
         for together in self.batches(nodes) {

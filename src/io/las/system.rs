@@ -78,6 +78,16 @@ impl Records {
     }
 }
 
+/// The code of the whole, which is the last thing in its brackets; those of its parts have more brackets behind them.
+fn code_of_whole(text: &str) -> Option<&str> {
+    let inner = text.strip_suffix("]]")?.trim_end_matches('"');
+    let digits = inner.len() - inner.trim_end_matches(|c: char| c.is_ascii_digit()).len();
+    let (start, code) = inner.split_at(inner.len() - digits);
+    let start = start.trim_end_matches(['"', ' ']).to_ascii_uppercase();
+    let is_code = start.ends_with("AUTHORITY[\"EPSG\",") || start.ends_with("ID[\"EPSG\",");
+    (is_code && digits > 0).then_some(code)
+}
+
 /// A coordinate system.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct System {
@@ -99,13 +109,7 @@ impl System {
         let degrees = has("GEOGCS[") || has("GEOGCRS[") || has("GEODCRS[") || has("GEOGRAPHICCRS[");
         let geographic = if projected { Some(false) } else { (degrees && !has("GEOCCS[")).then_some(true) };
         let name = text.split('"').nth(1).unwrap_or(text).trim();
-        // The authority of the whole comes last.
-        let code = ["AUTHORITY[\"EPSG\",", "ID[\"EPSG\","]
-            .iter()
-            .find_map(|start| upper.rfind(start).map(|at| at + start.len()));
-        let code = code.map(|at| text[at..].trim_start_matches(['"', ' ']).chars().take_while(char::is_ascii_digit));
-        let code =
-            code.map(Iterator::collect::<String>).filter(|code| !code.is_empty() && text.trim_end().ends_with("]]"));
+        let code = code_of_whole(text.trim_end());
         let name: String = name.chars().take(120).map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect();
         Self { name: code.map_or(name.clone(), |code| format!("{name} (EPSG:{code})")), geographic }
     }
@@ -147,6 +151,9 @@ mod tests {
         let degrees = r#"GEOGCRS["WGS 84",DATUM["World Geodetic System 1984"],ID["EPSG",4326]]"#;
         let expected = System { name: "WGS 84 (EPSG:4326)".into(), geographic: Some(true) };
         assert_eq!(System::of_text(degrees), expected);
+        // The code of a unit is none of the whole.
+        let feet = r#"PROJCS["Lambert",GEOGCS["NAD83"],UNIT["foot",0.3048,AUTHORITY["EPSG","9002"]]]"#;
+        assert_eq!(System::of_text(feet), System { name: "Lambert".into(), geographic: Some(false) });
         let keys = [1, 1, 0, 3, MODEL, 0, 1, 1, PROJECTED, 0, 1, 25832, 3073, TEXTS, 6, 0];
         let expected = System { name: "ETRS (EPSG:25832)".into(), geographic: Some(false) };
         assert_eq!(System::of_keys(&keys, b"ETRS |"), Some(expected));

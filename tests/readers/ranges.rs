@@ -366,6 +366,7 @@ fn tiles_of_intensities_have_no_seam() {
     let light = |i: usize| 100.0 + (i % 50) as f64 * 20.0;
     let ply_of = |kind: &str, name: &str, of: &dyn Fn(usize) -> f64| ply(&[(kind, name)], COUNT, |i| vec![of(i)]);
     let las_of = |format: u8, of: &dyn Fn(usize) -> f64| las(format, COUNT, |i| ([0.0; 3], of(i) as u16));
+    #[cfg_attr(not(any(feature = "pcd", feature = "e57")), allow(unused_mut))]
     let mut pairs = vec![
         [("a.las", las_of(0, &dark)), ("b.las", las_of(0, &light))],
         [("a.las", las_of(2, &dark)), ("b.las", las_of(1, &light))],

@@ -404,6 +404,58 @@ fn info_tells_what_is_missing_and_which_command_supplies_it() {
 }
 
 #[test]
+fn info_tells_the_format_and_what_is_not_used() {
+    let folder = Folder::new();
+    let told = |path: &Path| String::from_utf8(succeeds(&["info", text(path)]).stdout).unwrap();
+    let rows: String = (0..400).map(|i| format!("{} {} 0 {i} 3\n", i % 20, i / 20)).collect();
+    let shaded = told(&folder.file("shaded.ply", ply("x y z intensity label", 400, &rows)));
+    for line in [
+        "  format    PLY, text\n",
+        "  used      x, y, z, intensity\n",
+        "  not used  label\n",
+        "  colours   none; intensities are drawn as grey, from 0 (black) to 399 (white)\n",
+    ] {
+        assert!(shaded.contains(line), "{shaded}");
+    }
+    // Normals that some points lack are given, and some of them are lacking.
+    let rows: String = (0..400).map(|i| format!("{} {} 0 0 0 {}\n", i % 20, i / 20, i % 2)).collect();
+    let half = told(&folder.file("half.ply", ply("x y z nx ny nz", 400, &rows)));
+    assert!(half.contains("  normals   given for 200 of 400, the others estimated from neighbours\n"), "{half}");
+    assert!(half.contains("  lacks     some normals, "), "{half}");
+    let scan = told(&Path::new(DATA).join("autzen.laz"));
+    assert!(
+        scan.contains("  format    LAZ 1.") && scan.contains("point format") && scan.contains("  system    "),
+        "{scan}"
+    );
+}
+
+#[test]
+fn inputs_have_one_white_and_alphas_can_be_left_out() {
+    let folder = Folder::new();
+    let tile = |x: i32, most: i32| -> String {
+        (0..400).map(|i| format!("{} {} 0 {}\n", x + i % 20, i / 20, i * most / 400)).collect()
+    };
+    let dark = folder.file("dark.ply", ply("x y z intensity", 400, &tile(0, 400)));
+    let light = folder.file("light.ply", ply("x y z intensity", 400, &tile(20, 4000)));
+    let both = folder.path("both.ply");
+    succeeds(&["surfels", text(&dark), text(&light), "-o", text(&both)]);
+    let colors = epsplat::io::read(&both, &()).unwrap().colors.unwrap();
+    let epsplat::scene::Colors::Srgb8(codes) = colors else { panic!() };
+    assert_eq!((codes[799], codes[399][0].abs_diff(codes[440][0]) < 2), ([255; 4], true));
+    let rows: String = (0..400).map(|i| format!("{} {} 0 200 100 50 {}\n", i % 20, i / 20, i % 7)).collect();
+    let classes = folder.file("classes.ply", ply("x y z red green blue alpha", 400, &rows));
+    let said = |options: &[&str]| {
+        let out = folder.path("out.ply");
+        let arguments = [&["surfels", text(&classes), "-o", text(&out)][..], options].concat();
+        (String::from_utf8(succeeds(&arguments).stderr).unwrap(), epsplat::io::read(&out, &()).unwrap().colors.unwrap())
+    };
+    let (told, colors) = said(&[]);
+    assert!(told.contains("its alpha is at most 6 of 255") && colors.linear(5)[3] < 0.03, "{told}");
+    let (told, colors) = said(&["--ignore-alpha"]);
+    assert!(!told.contains("alpha") && colors.linear(5)[3] == 1.0, "{told}");
+}
+
+#[test]
 fn simplify_keeps_the_picture_with_fewer_surfels() {
     let folder = Folder::new();
     let (dense, sparse, report) = (folder.path("torus.ply"), folder.path("few.ply"), folder.path("report.json"));

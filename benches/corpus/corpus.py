@@ -135,7 +135,8 @@ def compare_info(info, theirs):
     for name, ours, other in (("min", info["min"], low), ("max", info["max"], high)):
         if (np.abs(np.array(ours) - other) > tolerance).any():
             raise Difference(f"the box's {name} is {list(ours)}, of {theirs.reader} {other.tolist()}")
-    colored = theirs.codes is not None or theirs.light is not None
+    # Greys of intensities are no colours.
+    colored = (theirs.codes is not None or theirs.light is not None) and not theirs.made
     if (info["colors"] != "none") != colored:
         raise Difference(f"colours: {info['colors']}, {theirs.reader} has {'some' if colored else 'none'}")
     normals = theirs.normals is not None or theirs.faces
@@ -224,7 +225,8 @@ def check_control(theirs, comparison, faults):
         elif fault == "point":
             altered.positions[row, 2] += 1e-5 * size
         elif fault == "colours":
-            altered.codes = None if theirs.codes is not None or theirs.light is not None else np.zeros((len(kept), 3))
+            colored = (theirs.codes is not None or theirs.light is not None) and not theirs.made
+            altered.codes, altered.made = None if colored else np.zeros((len(kept), 3)), False
             altered.light = None
         elif fault == "normals":
             altered.normals, altered.faces = None, theirs.normals is None and not theirs.faces

@@ -30,23 +30,55 @@ def srgb_to_light(share):
 
 
 def grey_of(intensities):
-    """Greys as documented for files without colours: the 99.9th percentile is white, and one value alone no colour."""
-    if len(np.unique(intensities)) < 2:
+    """Greys as documented for files without colours: the 99.9th percentile is white, zero black or, where some are
+    negative, the 0.1th percentile; one value alone is no colour."""
+    values = intensities.astype(np.float64)
+    finite = np.sort(values[np.isfinite(values)])
+    if len(finite) == 0 or finite[0] == finite[-1]:
         return None
-    rank = int(np.ceil(0.999 * len(intensities)))
-    white = max(int(np.sort(intensities)[rank - 1]), 1)
+    at = lambda share: finite[max(int(np.ceil(share * len(finite))), 1) - 1]
+    black = at(0.001) if finite[0] < 0 else 0.0
+    white = at(0.999)
+    if white <= black:
+        white = finite[finite > black][0]
     # Rust's round, halves away from zero, and its cast, which keeps within the type.
-    grey = np.clip(np.floor(intensities.astype(np.float64) / white * 255.0 + 0.5), 0, 255).astype(np.uint8)
+    shares = np.nan_to_num((values - black) / (white - black), posinf=1.0, neginf=0.0)
+    grey = np.clip(np.floor(shares * 255.0 + 0.5), 0, 255).astype(np.uint8)
     return np.column_stack([grey, grey, grey])
 
 
-def codes_of_intensities(intensities):
-    finite = intensities[np.isfinite(intensities)]
-    largest = float(finite.max()) if len(finite) else 0.0
-    if largest <= 0.0:
-        return np.zeros(len(intensities), dtype=np.uint16)
-    codes = np.floor(np.nan_to_num(intensities.astype(np.float64), posinf=largest) / largest * 65535.0 + 0.5)
-    return np.clip(codes, 0, 65535).astype(np.uint16)
+def ranged(rgb, integer, largest=65535, limits=None, light=False):
+    """Rows as 8-bit codes, or else as light: what they range over is decided as README and the reader's source say."""
+    values = rgb[np.isfinite(rgb)]
+    values = values[values != 0].astype(np.float64)
+    few = lambda outliers: 100 * outliers <= len(values)
+    above = lambda limit: int((values > limit).sum())
+    whole = bool((values % 1 == 0).all())
+    widened = any(few(int((values % factor != 0).sum())) for factor in (256, 257))
+    codes = lambda of: (np.clip(np.nan_to_num(of), 0, 255).astype(np.uint8), None)
+    linear = lambda low, high: (None, srgb_to_light((rgb.astype(np.float64) - low) / (high - low)))
+    if limits is not None:
+        low, high = np.array(limits, dtype=np.float64).reshape(2, -1)
+        outside = ((rgb < low) | (rgb > high)).sum()
+        wide = (low == 0).all() and high.max() >= 4095 and few(above(255))
+        if 100 * outside <= np.isfinite(rgb).sum() and not wide and not (not integer and (high == 1).all()):
+            if (low == 0).all() and (high == 255).all() and whole:
+                return codes(rgb)
+            if (low == 0).all() and (high == 65535).all() and widened:
+                return codes(rgb // 256)
+            return linear(low, high)
+    if integer:
+        if few(above(255)):
+            return codes(rgb)
+        if few(above(65535)):
+            return codes(rgb // 256) if widened else linear(0, 65535)
+        return linear(0, largest)
+    shares = int(((values > 0) & (values < 1)).sum())
+    if values.max(initial=0.0) < 2 or above(1) <= shares:
+        return (None, rgb.astype(np.float64)) if light else linear(0, 1)
+    if few(above(255)):
+        return codes(rgb) if whole else linear(0, 255)
+    return linear(0, 65535)
 
 
 def read_las(path, keep_withheld):
@@ -59,22 +91,18 @@ def read_las(path, keep_withheld):
     cloud = Cloud("laspy", positions, withheld=int(withheld.sum()))
     names = set(data.point_format.dimension_names)
     if {"red", "green", "blue"} <= names:
-        # What the codes mean the format leaves open; the README says how it is decided.
+        # What the codes mean the format leaves open.
         rgb = np.column_stack([np.asarray(data[name]) for name in ("red", "green", "blue")])[kept]
-        largest = int(rgb.max(initial=0))
-        if 0 < largest <= 255:
-            cloud.codes = rgb.astype(np.uint8)
-        elif largest > 0 and ((rgb % 257 == 0).all() or (rgb % 256 == 0).all()):
-            cloud.codes = (rgb >> 8).astype(np.uint8)
-        elif largest > 0:
-            cloud.light = srgb_to_light(rgb / 65535.0)
-    else:
-        cloud.codes, cloud.made = grey_of(np.asarray(data.intensity)[kept]), True
+        if rgb.any():
+            cloud.codes, cloud.light = ranged(rgb, True)
+            return cloud
+    cloud.codes, cloud.made = grey_of(np.asarray(data.intensity)[kept]), True
     return cloud
 
 
 PLY_COLORS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
-PLY_NORMALS = (("nx", "ny", "nz"), ("normal_x", "normal_y", "normal_z"))
+PLY_NORMALS = (("nx", "ny", "nz"), ("normal_x", "normal_y", "normal_z"), ("normalx", "normaly", "normalz"))
+PLY_INTENSITIES = ("intensity", "intensities", "reflectance", "reflectivity", "amplitude", "remission", "gray", "grey")
 
 
 def read_ply(path, _):
@@ -93,15 +121,22 @@ def read_ply(path, _):
     for triple in PLY_COLORS:
         if not set(triple) <= set(names):
             continue
-        channels = [np.asarray(table[name]) for name in triple]
-        kind = channels[0].dtype
-        if kind.kind == "f":
-            cloud.light = np.column_stack(channels).astype(np.float64)
-        elif kind == np.uint16:
-            cloud.light = srgb_to_light(np.column_stack(channels) / 65535.0)
+        channels = np.column_stack([np.asarray(table[name]) for name in triple])
+        kind = max((np.asarray(table[name]).dtype for name in triple), key=lambda kind: (kind.kind == "f", kind.itemsize))
+        if kind == np.uint8:
+            cloud.codes = channels.astype(np.uint8)
+        elif kind.kind == "f" and any(line.startswith("epsplat ") for line in data.comments):
+            cloud.light = channels.astype(np.float64)
         else:
-            cloud.codes = np.clip(np.column_stack(channels), 0, 255).astype(np.uint8)
+            largest = 2**32 - 1 if kind.itemsize == 4 else 65535
+            cloud.codes, cloud.light = ranged(channels, kind.kind != "f", largest, light=True)
         break
+    shades = next((name for name in names if name.lower().removeprefix("scalar_") in PLY_INTENSITIES), None)
+    shown = cloud.codes if cloud.codes is not None else cloud.light
+    if shades is not None and (shown is None or not np.nan_to_num(shown).any()):
+        grey = grey_of(np.asarray(table[shades]).astype(np.float32))
+        if grey is not None:
+            cloud.codes, cloud.light, cloud.made = grey, None, True
     for element in data.elements:
         lists = [p.name for p in element.properties if p.name in ("vertex_indices", "vertex_index")]
         if element.name in ("face", "tristrips") and lists:
@@ -135,7 +170,7 @@ def read_open3d(path, _):
         return cloud
     attributes = open3d.t.io.read_point_cloud(str(path)).point
     if "intensity" in attributes and len(attributes["intensity"]) == len(positions):
-        cloud.codes = grey_of(codes_of_intensities(attributes["intensity"].numpy().reshape(-1)))
+        cloud.codes = grey_of(attributes["intensity"].numpy().reshape(-1).astype(np.float32))
         cloud.made = True
     return cloud
 
@@ -165,7 +200,10 @@ def read_obj(path, _):
     cloud = Cloud("v lines", np.array(positions, dtype=np.float64).reshape(-1, 3), faces=faces)
     colors = np.array(colors, dtype=np.float64).reshape(-1, 3)
     if np.isfinite(colors).any():
-        cloud.light = srgb_to_light(colors / (255.0 if np.nanmax(colors) >= 2.0 else 1.0))
+        cloud.codes, cloud.light = ranged(colors, False)
+        if cloud.codes is not None and not np.isfinite(colors).all():
+            # Vertices without a colour are not compared, which codes cannot say.
+            cloud.codes, cloud.light = None, srgb_to_light(colors / 255.0)
     if not faces and len(normals) == len(positions) > 0:
         cloud.normals = np.array(normals)
     return cloud
@@ -184,7 +222,7 @@ def read_e57(path, _):
     from pye57.utils import get_fields, get_node
 
     file = pye57.E57(str(path))
-    positions, colors, intensities = [], [], []
+    positions, scans = [], []
     for scan in file.data3d:
         points = get_node(scan, "points")
         prototype = pye57.libe57.StructureNode(points.prototype())
@@ -206,23 +244,36 @@ def read_e57(path, _):
         marked = [columns.get(flag, np.zeros(count)) != 0 for flag in flags]
         kept = ~marked[0]
         positions.append(e57_places([columns[name] for name in axes], axes, scan)[kept])
-        rgb = np.full((count, 3), np.nan)
+        rgb, range_of = np.full((count, 3), np.nan), None
         if set(channels) <= present:
-            for channel, name in enumerate(channels):
-                low, high = e57_range(scan, get_node(prototype, name), name)
-                rgb[:, channel] = np.clip((columns[name] - low) / (high - low), 0, 1)
+            rgb = np.column_stack([columns[name] for name in channels])
             rgb[marked[1]] = np.nan
-        colors.append(rgb[kept])
+            ranges = [e57_range(scan, get_node(prototype, name), name) for name in channels]
+            integer = all(isinstance(get_node(prototype, name), pye57.libe57.IntegerNode) for name in channels)
+            limits = None if None in ranges else tuple(zip(*ranges))
+            range_of = (integer, limits)
         strength = np.where(marked[2], 0, columns.get("intensity", np.zeros(count)))
-        intensities.append(strength[kept].astype(np.float32))
+        scans.append((range_of, rgb[kept], strength[kept].astype(np.float32), "intensity" in present))
     if not positions:
         return Cloud("pye57", np.zeros((0, 3)))
     cloud = Cloud("pye57", np.concatenate(positions))
-    colors = np.concatenate(colors)
-    if np.isfinite(colors).any():
-        cloud.light = srgb_to_light(colors)
-    elif len(colors):
-        cloud.codes, cloud.made = grey_of(codes_of_intensities(np.concatenate(intensities))), True
+    shown = [np.isfinite(rgb).any() and (np.nan_to_num(rgb).any() or not has) for _, rgb, _, has in scans]
+    shaded = [has and not shows for shows, (_, _, _, has) in zip(shown, scans)]
+    grey = grey_of(np.concatenate([strength for (_, _, strength, _), on in zip(scans, shaded) if on])) if any(shaded) else None
+    if not any(shown):
+        cloud.codes, cloud.made = grey if all(shaded) else None, True
+        return cloud
+    light, at = [np.full((len(rgb), 3), np.nan) for _, rgb, _, _ in scans], 0
+    for range_of in {scan[0] for scan, shows in zip(scans, shown) if shows}:
+        own = [k for k, (scan, shows) in enumerate(zip(scans, shown)) if shows and scan[0] == range_of]
+        together = np.concatenate([scans[k][1] for k in own])
+        codes, of_all = ranged(together, range_of[0], limits=range_of[1])
+        if codes is not None:
+            of_all = np.where(np.isfinite(together), srgb_to_light(codes / 255.0), np.nan)
+        parts = np.split(of_all, np.cumsum([len(scans[k][1]) for k in own])[:-1])
+        for k, part in zip(own, parts):
+            light[k] = part
+    cloud.light = np.concatenate(light)
     return cloud
 
 
@@ -247,7 +298,7 @@ def e57_places(columns, axes, scan):
 
 
 def e57_range(scan, prototype, name):
-    """Smallest and largest value of a colour channel: those that the scan gives, or else those of the type."""
+    """Smallest and largest value of a colour channel: those that the scan gives, or else those of the type; floats have none."""
     limits = [f"colorLimits/{name}{end}" for end in ("Minimum", "Maximum")]
     if all(scan.isDefined(limit) for limit in limits):
         low, high = (float(scan[limit].value()) for limit in limits)
@@ -256,7 +307,7 @@ def e57_range(scan, prototype, name):
     if hasattr(prototype, "scale"):
         return prototype.scaledMinimum(), prototype.scaledMaximum()
     low, high = float(prototype.minimum()), float(prototype.maximum())
-    return (low, high) if 0 < high - low < 1e9 else (0.0, 1.0)
+    return (low, high) if 0 < high - low < 1e9 else None
 
 
 # The second readers of each format: the first that reads the file is asked.

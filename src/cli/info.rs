@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use epsplat::Result;
-use epsplat::io::{Points, class_name};
+use epsplat::io::{About, Points, class_name};
 use epsplat::scene::{Colors, Scene, gaussian};
 use epsplat::surfels::{self, Coverage, Preparation};
 use serde::Serialize;
@@ -33,9 +33,16 @@ const COVERED: f64 = 0.9;
 
 #[derive(Serialize)]
 struct Info {
+    /// What the file says of itself.
+    file: About,
     points: u64,
     normals: bool,
     radii: bool,
+    /// Points that have a normal, if some lack one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    points_with_normals: Option<u64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    points_with_radii: Option<u64>,
     colors: &'static str,
     /// What it says of Gaussians, if they are some.
     gaussians: Option<Gaussians>,
@@ -128,7 +135,8 @@ impl Gaussians {
 pub fn run(arguments: &Arguments) -> Result<()> {
     outputs::check([&arguments.input], &arguments.json)?;
     let bars = Bars::new();
-    let points = arguments.reading.points(&arguments.input, &bars)?;
+    let mut points = arguments.reading.described(&arguments.input, &bars)?;
+    let about = points.about.take().map(|about| *about).unwrap_or_default();
     let beside = points.beside.clone();
     if let Some(triangles) = beside.clone().filter(|_| points.positions.is_empty()) {
         return match &arguments.json {
@@ -145,22 +153,28 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let (texture, classes) = (points.texture.is_some(), points.classes.clone());
     let numbers = points.texture_numbers.iter().flatten().filter(|number| **number != u32::MAX);
     let images = numbers.max().map_or(u64::from(texture), |last| u64::from(*last) + 1);
-    let held = (points.positions.len() as u64, points.normals.is_some(), points.radii.is_some(), colors(&points));
+    // Grey of intensities is no colour.
+    let of_colors = if about.intensities.is_some() { "none" } else { colors(&points) };
+    let held = (points.positions.len() as u64, points.normals.is_some(), points.radii.is_some(), of_colors);
     let (scene, preparation) =
         surfels::build(vec![points], &bars).map_err(|error| named(error, std::slice::from_ref(&arguments.input)))?;
     let gaussians = Gaussians::of(&scene);
     // They are no samples of a surface that others would have to close.
     let coverage = if gaussians.is_some() { None } else { surfels::coverage(&scene, &bars)? };
     let lacking = [
-        (preparation.estimated_normals > 0, "normals"),
+        (preparation.estimated_normals > 0, if held.1 { "some normals" } else { "normals" }),
         (!scene.oriented && gaussians.is_none(), "a side for its normals"),
-        (preparation.estimated_radii > 0, "radii"),
+        (preparation.estimated_radii > 0, if held.2 { "some radii" } else { "radii" }),
         (coverage.is_some_and(|coverage| coverage.covered < COVERED), "surfels that close the surface"),
     ];
     let mut lacks: Vec<_> = lacking.into_iter().filter(|(lacks, _)| *lacks).map(|(_, what)| what).collect();
     let supplied_by = (!lacks.is_empty()).then(|| supplied_by(arguments));
     lacks.extend((held.3 == "none").then_some("colours"));
+    let with = |given: bool, lacking: u64| (given && lacking > 0).then(|| preparation.surfels.saturating_sub(lacking));
     let info = Info {
+        points_with_normals: with(held.1, preparation.estimated_normals),
+        points_with_radii: with(held.2, preparation.estimated_radii),
+        file: about,
         points: held.0,
         normals: held.1,
         radii: held.2,
@@ -211,6 +225,7 @@ fn table(input: &std::path::Path, info: &Info) -> String {
     // Writing to a string cannot fail.
     let _ = writeln!(text, "{}", input.display());
     let _ = writeln!(text, "  points    {}", info.points);
+    told(&mut text, &info.file);
     held(&mut text, info);
     let _ = writeln!(text, "  box       {} to {}", vector(info.min), vector(info.max));
     let _ = writeln!(text, "  up        {}{}", info.up, if info.preparation.guessed_up { " (a guess)" } else { "" });
@@ -243,9 +258,61 @@ fn table(input: &std::path::Path, info: &Info) -> String {
     text
 }
 
+/// The lines of what the file says of itself.
+fn told(text: &mut String, about: &About) {
+    let mut line = |name: &str, what: &str| {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "  {name:<9} {what}");
+    };
+    if !about.format.is_empty() {
+        line("format", &about.format);
+    }
+    if let Some(system) = &about.coordinate_system {
+        line("system", system);
+    }
+    if let Some(scans) = about.scans {
+        line("scans", &scans.to_string());
+    }
+    if !about.scanners.is_empty() {
+        line("scanner", &listed(&about.scanners));
+    }
+    if let Some(software) = &about.software {
+        line("software", software);
+    }
+    let names = |used: bool| {
+        let names = about.attributes.iter().filter(|attribute| attribute.used == used);
+        listed(&names.map(|attribute| shown(&attribute.name)).collect::<Vec<_>>())
+    };
+    for (used, name) in [(true, "used"), (false, "not used")] {
+        if about.attributes.iter().any(|attribute| attribute.used == used) {
+            line(name, &names(used));
+        }
+    }
+}
+
+/// Names in a line, the first of many.
+fn listed(names: &[String]) -> String {
+    /// Gaussians have 45 coefficients.
+    const MOST: usize = 24;
+    let more = names.len().saturating_sub(MOST);
+    let first = names[..names.len() - more].join(", ");
+    if more > 0 { format!("{first} and {more} more") } else { first }
+}
+
+/// A name from a file on one line.
+fn shown(name: &str) -> String {
+    name.chars().take(40).map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
+}
+
 /// The lines of what each point of the file has, and of what the file has beside them.
 fn held(text: &mut String, info: &Info) {
-    let given = |on| if on { "given" } else { "none, estimated from neighbours" };
+    let all = info.points;
+    let given = |on: bool, with: Option<u64>| match with {
+        Some(0) => "given, but none is usable: estimated from neighbours".to_owned(),
+        Some(with) => format!("given for {with} of {all}, the others estimated from neighbours"),
+        None if on => "given".to_owned(),
+        None => "none, estimated from neighbours".to_owned(),
+    };
     // Writing to a string cannot fail.
     if let Some(Gaussians { degree, opacities: [least, median, greatest], deviations: [longer, shorter] }) =
         info.gaussians
@@ -258,9 +325,18 @@ fn held(text: &mut String, info: &Info) {
         let _ = writeln!(text, "  opacity   {least:.3} to {greatest:.3}, half of them below {median:.3}");
         let _ = writeln!(text, "  sizes     standard deviations of {longer:.4} and {shorter:.4} (medians)");
     } else {
-        let _ = writeln!(text, "  normals   {}", given(info.normals));
-        let _ = writeln!(text, "  radii     {}", given(info.radii));
-        let _ = writeln!(text, "  colours   {}", info.colors);
+        let _ = writeln!(text, "  normals   {}", given(info.normals, info.points_with_normals));
+        let _ = writeln!(text, "  radii     {}", given(info.radii, info.points_with_radii));
+        let _ = match (&info.file.colors, info.file.intensities) {
+            (_, Some([black, white])) => {
+                writeln!(
+                    text,
+                    "  colours   none; intensities are drawn as grey, from {black} (black) to {white} (white)"
+                )
+            }
+            (Some(numbers), _) => writeln!(text, "  colours   {numbers}"),
+            _ => writeln!(text, "  colours   {}", info.colors),
+        };
     }
     // One class says nothing.
     if info.classes.len() > 1 {

@@ -6,7 +6,7 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use epsplat::io::las::Copc;
 use epsplat::io::ply::{Levels, Rows};
-use epsplat::io::{self, ClassOpacities, Format, Input, Mesh, Points, ReadOptions};
+use epsplat::io::{self, ClassOpacities, ColorRules, Format, Input, Mesh, Points, ReadOptions};
 use epsplat::surfels::Limits;
 use epsplat::{Error, Progress, Result};
 
@@ -18,6 +18,9 @@ pub(super) struct InputFormat {
     /// The format of the inputs [default: what their names say, or else their first bytes]
     #[arg(long, value_name = "FORMAT", value_parser = formats())]
     input_format: Option<Format>,
+    /// Leave out the alphas of the inputs' colours, which some programs fill with something else; not the opacities of Gaussians
+    #[arg(long)]
+    ignore_alpha: bool,
 }
 
 /// How point clouds are read.
@@ -119,20 +122,22 @@ impl InputFormat {
                 "only obj and ply files are read as meshes: choose one of them for --input-format".into(),
             ));
         }
-        io::read_mesh_with(path, ReadOptions { format, ..ReadOptions::default() }, bars)
+        let options = ReadOptions { format, ignore_alpha: self.ignore_alpha, ..ReadOptions::default() };
+        io::read_mesh_with(path, options, bars)
     }
 }
 
 impl Reading {
-    /// The points of a file.
-    pub(super) fn points(&self, path: &Path, bars: &Bars) -> Result<Points> {
-        let points = self.read(path, bars)?;
+    /// The points of a file, with what it says of itself.
+    pub(super) fn described(&self, path: &Path, bars: &Bars) -> Result<Points> {
+        let points = io::read_with(path, ReadOptions { describe: true, ..self.options() }, bars)?;
         self.check_classes(std::slice::from_ref(&points))?;
         Ok(points)
     }
 
-    fn read(&self, path: &Path, bars: &Bars) -> Result<Points> {
-        io::read_with(path, self.options(), bars)
+    /// Whether alphas are left out.
+    pub(super) fn ignores_alpha(&self) -> bool {
+        self.input.ignore_alpha
     }
 
     fn options(&self) -> ReadOptions {
@@ -141,6 +146,8 @@ impl Reading {
             keep_withheld: self.keep_withheld,
             flatten: self.flatten,
             classes: self.class_opacity.unwrap_or_default(),
+            ignore_alpha: self.input.ignore_alpha,
+            describe: false,
         }
     }
 
@@ -166,7 +173,8 @@ impl Reading {
     pub(super) fn rows(&self, paths: &[PathBuf]) -> Result<Vec<Rows>> {
         let open = |path: &PathBuf| {
             let is_file = path.is_file() && path != Path::new("-");
-            let rows = if is_file { Rows::open(Input::open(path, self.input.input_format)?)? } else { None };
+            let input = if is_file { Some(Input::open(path, self.input.input_format)?) } else { None };
+            let rows = input.map_or(Ok(None), |input| Rows::open(input, self.input.ignore_alpha))?;
             rows.ok_or_else(|| {
                 Error::Usage(format!(
                     "--memory takes binary PLY files of points with normals and radii, or half-axes, and without faces, textures or levels of detail, and {} is another one: make surfels of it first (epsplat surfels), or leave it out",
@@ -174,17 +182,23 @@ impl Reading {
                 ))
             })
         };
-        paths.iter().map(open).collect()
+        let mut files = paths.iter().map(open).collect::<Result<Vec<_>>>()?;
+        Rows::settle_colors(&mut files)?;
+        Ok(files)
     }
 
-    /// The points of some nodes of each of several files.
+    /// The points of some nodes of each of several files; what their colours mean is told by the first ones that are read with these `rules`.
     pub(super) fn nodes<'a>(
         &self,
         files: impl Iterator<Item = (&'a mut Copc, &'a Vec<usize>)>,
+        rules: &mut ColorRules,
         progress: &dyn Progress,
     ) -> Result<Vec<Points>> {
         let options = self.options();
-        files.map(|(file, nodes)| file.read(nodes, &options, progress)).collect()
+        let read = |(file, nodes): (&mut Copc, &Vec<usize>)| file.read_raw(nodes, &options, progress);
+        let mut points = files.map(read).collect::<Result<Vec<_>>>()?;
+        rules.settle(&mut points);
+        Ok(points)
     }
 
     /// Fails for opacities of classes if none of the inputs has classes.
@@ -203,7 +217,10 @@ impl Reading {
         if paths.iter().filter(|path| *path == Path::new("-")).count() > 1 {
             return Err(Error::Usage("standard input can be read once only: name - once".into()));
         }
-        let inputs = paths.iter().map(|path| self.read(path, bars)).collect::<Result<Vec<_>>>()?;
+        let read = |path| io::read_raw(path, self.options(), bars);
+        let mut inputs = paths.iter().map(|path| read(path)).collect::<Result<Vec<_>>>()?;
+        // Two tiles of one scan have one white.
+        io::settle_colors(&mut inputs);
         self.check_classes(&inputs)?;
         Ok(inputs)
     }
@@ -215,6 +232,7 @@ impl Reading {
         let withheld = if self.keep_withheld { " --keep-withheld" } else { "" };
         let classes = self.class_opacity.filter(|opacities| !opacities.are_plain());
         let classes = classes.map_or(String::new(), |opacities| format!(" --class-opacity {opacities}"));
-        format + withheld + if self.flatten { " --flatten" } else { "" } + &classes
+        let alpha = if self.input.ignore_alpha { " --ignore-alpha" } else { "" };
+        format + withheld + if self.flatten { " --flatten" } else { "" } + alpha + &classes
     }
 }

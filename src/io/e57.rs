@@ -6,11 +6,11 @@ use std::io::{self, BufReader};
 use ::e57::{E57Reader, PointCloud, Record, RecordDataType, RecordName, RecordValue};
 use glam::{DQuat, DVec3};
 
+use crate::io::about::{About, Attribute, Role};
+use crate::io::color_range::{Kind, Number, Numbers, RawColors, Run, Shades, Values};
 use crate::io::fault::{self, Fault, reserve, surviving};
 use crate::io::values::one_line;
-use crate::io::{Input, Points, Up, intensity};
-use crate::scene::Colors;
-use crate::scene::color::{DEFAULT_COLOR, linear_to_srgb, srgb_to_linear};
+use crate::io::{Input, Points, ReadOptions, Up};
 use crate::{Progress, Result};
 
 /// No scan has more attributes.
@@ -19,14 +19,14 @@ const MOST_ATTRIBUTES: usize = 64;
 /// Reads the points of all scans of an E57 file, in the file's own system: each scan's pose is applied, in f64.
 ///
 /// Coordinates are Cartesian or, where a scan has none, spherical; points that are marked as invalid are left out. Normals, if any
-/// scan has the extension `nor` for them, are turned with its pose, and zero where it has none. Colours are sRGB codes, in the range that the scan gives or else its type: of 0 to 255 they stay 8-bit, else they become linear light. Without
-/// colours, intensities become grey as in a LAS file. Up is z.
+/// scan has the extension `nor` for them, are turned with its pose, and zero where it has none. Colours are sRGB codes, in the range that the scan
+/// gives or else its type, unless the values say otherwise ([`RawColors`]). The intensities of scans without colours become grey. Up is z.
 ///
 /// # Errors
 ///
 /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where the file
 /// is not E57, ends early, fails its checksums or cannot be decoded.
-pub fn read(input: Input, progress: &dyn Progress) -> Result<Points> {
+pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
     let Input { file, length, path, .. } = input;
     let opened = surviving(|| {
         let reader = E57Reader::new(BufReader::with_capacity(1 << 18, file)).map_err(of_e57)?;
@@ -47,7 +47,53 @@ pub fn read(input: Input, progress: &dyn Progress) -> Result<Points> {
         Ok(reading.into_points())
     });
     progress.end();
-    points.map_err(|fault| fault.of(&path))
+    let mut points = points.map_err(|fault| fault.of(&path))?;
+    points.raw.iter_mut().for_each(|raw| raw.name = fault::name(&path));
+    points.about = options.describe.then(|| Box::new(about(&reader, &scans)));
+    Ok(points)
+}
+
+/// What a file says of itself.
+fn about(reader: &E57Reader<BufReader<File>>, scans: &[PointCloud]) -> About {
+    let mut about = About { format: "E57".into(), scans: Some(scans.len() as u64), ..About::default() };
+    let system = reader.coordinate_metadata().map(|text| one_line(text.trim())).filter(|text| !text.is_empty());
+    about.coordinate_system = system;
+    about.software = reader.library_version().map(|text| one_line(text.trim())).filter(|text| !text.is_empty());
+    for scan in scans {
+        let parts = [&scan.sensor_vendor, &scan.sensor_model, &scan.sensor_serial];
+        let scanner = parts.into_iter().flatten().map(|part| one_line(part.trim())).collect::<Vec<_>>().join(" ");
+        if !scanner.trim().is_empty() && !about.scanners.contains(&scanner) {
+            about.scanners.push(scanner);
+        }
+        let place = Place::of(scan);
+        let color = color(scan);
+        for (at, record) in scan.prototype.iter().enumerate() {
+            let name = name_of(&record.name);
+            let is_place = place.is_some_and(|place| place.axes.contains(&at) || place.invalid == Some(at));
+            let is_normal = normal(scan).is_some_and(|normal| normal.contains(&at));
+            let role = match record.name {
+                RecordName::Intensity => Role::Intensity,
+                _ if color.is_some_and(|color| color.contains(&at)) => Role::Color,
+                _ => Role::Other,
+            };
+            let used = is_place || is_normal || color.is_some() && record.name == RecordName::IsColorInvalid;
+            if about.attributes.iter().all(|known| known.name != name) {
+                about.attributes.push(Attribute::new(name, used, role));
+            }
+        }
+    }
+    about
+}
+
+/// An attribute as files call it.
+fn name_of(name: &RecordName) -> String {
+    if let RecordName::Unknown { namespace, name } = name {
+        return one_line(&format!("{namespace}:{name}"));
+    }
+    // The crate's names are the format's but for the first letter.
+    let name = format!("{name:?}");
+    let (first, rest) = name.split_at(1);
+    first.to_ascii_lowercase() + rest
 }
 
 /// The crate's failures that are the file's fault, told from the system's.
@@ -138,13 +184,8 @@ struct Reading {
     positions: Vec<[f64; 3]>,
     /// If any scan has normals; zero where there is none.
     normals: Option<Vec<[f32; 3]>>,
-    /// Colours as shares of their range; not numbers where there is none.
-    colors: Vec<[f32; 3]>,
-    /// Whether any point has a colour, and whether all ranges are 0 to 255.
-    colored: bool,
-    wide: bool,
-    /// 0 where there is none.
-    intensities: Vec<f32>,
+    /// Colours and intensities, scan by scan.
+    runs: Vec<Run>,
     /// Numbers of points that are marked as invalid, over all scans.
     left_out: Vec<u64>,
 }
@@ -158,17 +199,17 @@ impl Reading {
     ) -> Result<(), Fault> {
         let Some(place) = Place::of(scan) else { return Ok(()) };
         let (rotation, translation) = pose(scan)?;
-        let color = triple(scan, &[RecordName::ColorRed, RecordName::ColorGreen, RecordName::ColorBlue]);
-        let ranges = color.map(|color| ranges(scan, color));
+        let color = color(scan);
         let normal = normal(scan);
         let color_invalid = index(scan, &RecordName::IsColorInvalid);
         let intensity = index(scan, &RecordName::Intensity);
         let intensity_invalid = index(scan, &RecordName::IsIntensityInvalid);
-        self.wide |= ranges.is_some_and(|ranges| ranges != [(0.0, 255.0); 3]);
+        let mut looks = Looks::default();
         reserve(&mut self.positions, scan.records)?;
         self.normals.as_mut().map_or(Ok(()), |normals| reserve(normals, scan.records))?;
-        reserve(&mut self.colors, scan.records)?;
-        reserve(&mut self.intensities, scan.records)?;
+        reserve(&mut looks.colors, if color.is_some() { scan.records } else { 0 })?;
+        reserve(&mut looks.intensities, if color.is_none() && intensity.is_some() { scan.records } else { 0 })?;
+        let before = self.positions.len();
         let mut unreported = 0;
         for values in reader.pointcloud_raw(scan).map_err(of_e57)? {
             let values = values.map_err(of_e57)?;
@@ -197,48 +238,83 @@ impl Reading {
                 };
                 normals.push((rotation * local).as_vec3().to_array());
             }
-            let mut share = [f32::NAN; 3];
-            if let (Some(color), Some(ranges), false) = (color, ranges, marked(color_invalid)?) {
-                for (share, (at, (low, high))) in share.iter_mut().zip(color.into_iter().zip(ranges)) {
-                    *share = ((number(at)? - low) / (high - low)).clamp(0.0, 1.0) as f32;
-                }
-                self.colored = true;
+            if let Some([r, g, b]) = color {
+                let is_given = !marked(color_invalid)?;
+                looks.color(if is_given { Some([number(r)?, number(g)?, number(b)?]) } else { None });
             }
-            self.colors.push(share);
-            let intensity = intensity.filter(|_| !marked(intensity_invalid).unwrap_or(true));
-            self.intensities.push(intensity.map_or(Ok(0.0), number)? as f32);
+            if let Some(intensity) = intensity.filter(|_| !looks.colored) {
+                let is_given = !marked(intensity_invalid)?;
+                looks.intensities.push(if is_given { number(intensity)? as f32 } else { 0.0 });
+            }
         }
         progress.advance(unreported);
+        self.runs.push(looks.into_run(scan, self.positions.len() - before, (color, intensity)));
         Ok(())
     }
 
     fn into_points(self) -> Points {
-        let colors = if !self.colored {
-            intensity::grey(&intensity::codes(&self.intensities))
-        } else if self.wide {
-            let light = |share: f32| srgb_to_linear(f64::from(share)) as f32;
-            let color = |[r, g, b]: [f32; 3]| {
-                if r.is_nan() { DEFAULT_COLOR } else { [light(r), light(g), light(b), 1.0] }
-            };
-            Some(Colors::Linear(self.colors.into_iter().map(color).collect()))
-        } else {
-            let code = |share: f64| (share * 255.0).round() as u8;
-            let [r, g, b, _] = DEFAULT_COLOR.map(|light| code(linear_to_srgb(light.into())));
-            let default = [r, g, b, 255];
-            let color = |[r, g, b]: [f32; 3]| {
-                if r.is_nan() { default } else { [code(r.into()), code(g.into()), code(b.into()), 255] }
-            };
-            Some(Colors::Srgb8(self.colors.into_iter().map(color).collect()))
-        };
         Points {
             positions: self.positions,
             normals: self.normals,
-            colors,
+            raw: Some(Box::new(RawColors { runs: self.runs, ..RawColors::default() })),
             up: Some(Up::Z),
             left_out: self.left_out,
             ..Points::default()
         }
     }
+}
+
+/// The colours and intensities of a scan while it is being read.
+#[derive(Default)]
+struct Looks {
+    /// As they are in the file; not numbers where a point has none.
+    colors: Vec<[f32; 4]>,
+    /// Some colour is not zero.
+    colored: bool,
+    /// Some point has a colour.
+    given: bool,
+    /// As long as no colour says anything; 0 where there is none.
+    intensities: Vec<f32>,
+}
+
+impl Looks {
+    fn color(&mut self, color: Option<[f64; 3]>) {
+        self.given |= color.is_some();
+        let [r, g, b] = color.unwrap_or([f64::NAN; 3]).map(|value| value as f32);
+        self.colors.push([r, g, b, 1.0]);
+        if !self.colored && color.is_some_and(|color| color != [0.0; 3]) {
+            (self.colored, self.intensities) = (true, Vec::new());
+        }
+    }
+
+    fn into_run(self, scan: &PointCloud, count: usize, (color, intensity): (Option<[usize; 3]>, Option<usize>)) -> Run {
+        let colors = color.filter(|_| self.given).map(|color| Numbers {
+            values: Values::Floats(self.colors),
+            kind: kind(scan, color),
+            alpha: None,
+        });
+        let shades = intensity.filter(|_| !self.colored).map(|at| {
+            let kind = scan.prototype.get(at).map(|record| &record.data_type);
+            let integer = matches!(kind, Some(RecordDataType::Integer { .. }));
+            Shades::Floats { values: self.intensities, integer }
+        });
+        Run { count, colors, shades }
+    }
+}
+
+/// A scan's colours.
+fn color(scan: &PointCloud) -> Option<[usize; 3]> {
+    triple(scan, &[RecordName::ColorRed, RecordName::ColorGreen, RecordName::ColorBlue])
+}
+
+/// What the numbers of a scan's colours are.
+fn kind(scan: &PointCloud, color: [usize; 3]) -> Kind {
+    let of_record = |at: usize| match scan.prototype.get(at).map(|record| &record.data_type) {
+        Some(RecordDataType::Integer { min, max }) => Number::Integer(max.abs_diff(*min)),
+        _ => Number::Float,
+    };
+    let number = if color.map(of_record).contains(&Number::Float) { Number::Float } else { of_record(color[0]) };
+    Kind { limits: limits(scan, color), ..Kind::of(number) }
 }
 
 /// What takes a scan's coordinates to the file's.
@@ -253,30 +329,31 @@ fn pose(scan: &PointCloud) -> Result<(DQuat, DVec3), Fault> {
     Ok((rotation.normalize(), DVec3::new(t.x, t.y, t.z)))
 }
 
-/// Smallest and largest values of a scan's colours: those it gives, or else those of their types.
-fn ranges(scan: &PointCloud, color: [usize; 3]) -> [(f64, f64); 3] {
+/// Smallest and largest values of a scan's colours: those it gives, or else those of their types; floats have none.
+fn limits(scan: &PointCloud, color: [usize; 3]) -> Option<[(f64, f64); 3]> {
     let limits = scan.color_limits.as_ref();
     let given = [
         limits.map(|limits| (&limits.red_min, &limits.red_max)),
         limits.map(|limits| (&limits.green_min, &limits.green_max)),
         limits.map(|limits| (&limits.blue_min, &limits.blue_max)),
     ];
-    std::array::from_fn(|channel| {
-        let Some(Record { data_type, .. }) = scan.prototype.get(color[channel]) else { return (0.0, 1.0) };
+    let of_channel = |channel: usize| {
+        let Record { data_type, .. } = scan.prototype.get(color[channel])?;
         if let Some((Some(low), Some(high))) = given[channel]
             && let (Ok(low), Ok(high)) = (low.to_f64(data_type), high.to_f64(data_type))
             && low < high
         {
-            return (low, high);
+            return Some((low, high));
         }
         match *data_type {
-            RecordDataType::Integer { min, max } if min < max => (min as f64, max as f64),
+            RecordDataType::Integer { min, max } if min < max => Some((min as f64, max as f64)),
             RecordDataType::ScaledInteger { min, max, scale, offset } if min < max && scale > 0.0 => {
-                (min as f64 * scale + offset, max as f64 * scale + offset)
+                Some((min as f64 * scale + offset, max as f64 * scale + offset))
             }
-            _ => (0.0, 1.0),
+            _ => None,
         }
-    })
+    };
+    Some([of_channel(0)?, of_channel(1)?, of_channel(2)?])
 }
 
 fn number(values: &[RecordValue], prototype: &[Record], at: usize) -> Result<f64, Fault> {

@@ -1,11 +1,15 @@
 //! Files: one format each; every reader ends in [`Points`], every writer appears whole or not at all.
 
+pub mod about;
 pub mod atomic;
+mod attributes;
 pub mod camera;
 pub mod cameras;
 mod classes;
 pub(crate) mod closed;
+mod color_range;
 mod companions;
+mod degrees;
 #[cfg(feature = "e57")]
 pub mod e57;
 pub mod exr;
@@ -13,7 +17,6 @@ mod fault;
 mod format;
 pub mod image;
 mod input;
-mod intensity;
 pub mod las;
 pub mod mesh;
 pub mod obj;
@@ -29,7 +32,9 @@ pub(crate) mod triangles;
 mod values;
 pub mod write_behind;
 
+pub use about::About;
 pub use classes::{ClassOpacities, class_name};
+pub use color_range::{ColorRules, RawColors, settle_colors};
 pub use companions::companions;
 pub use format::Format;
 pub use input::Input;
@@ -52,6 +57,10 @@ pub struct ReadOptions {
     pub flatten: bool,
     /// Opacities by the classes of a laser scan's points; other files than LAS have none.
     pub classes: ClassOpacities,
+    /// Alphas beside colours are left out; the opacities of Gaussians are not.
+    pub ignore_alpha: bool,
+    /// What the file says of itself is kept ([`Points::about`]).
+    pub describe: bool,
 }
 
 /// Reads any supported file: PLY, LAS, LAZ (COPC too), OBJ, and with the features of those names E57 and PCD; see [`Input::open`].
@@ -72,14 +81,31 @@ pub fn read(path: &Path, progress: &dyn Progress) -> Result<Points> {
 ///
 /// As [`read`].
 pub fn read_with(path: &Path, options: ReadOptions, progress: &dyn Progress) -> Result<Points> {
+    let mut points = read_raw(path, options, progress)?;
+    settle_colors(std::slice::from_mut(&mut points));
+    Ok(points)
+}
+
+/// Reads the points of a file whose colours stay as the file has them ([`Points::raw`]): [`settle_colors`] settles what they mean,
+/// by all inputs of a scene together.
+///
+/// # Errors
+///
+/// As [`read`].
+pub fn read_raw(path: &Path, options: ReadOptions, progress: &dyn Progress) -> Result<Points> {
     let input = Input::open(path, options.format)?;
-    match input.format {
-        Format::Ply => ply::read(input, options.flatten, progress),
+    let (format, name) = (input.format, fault::name(&input.path));
+    let mut points = match format {
+        Format::Ply => ply::read(input, &options, progress),
         Format::Las => las::read(input, &options, progress),
-        Format::Obj => obj::read(input, progress),
-        Format::E57 => read_e57(input, progress),
-        Format::Pcd => read_pcd(input, progress),
+        Format::Obj => obj::read(input, &options, progress),
+        Format::E57 => read_e57(input, &options, progress),
+        Format::Pcd => read_pcd(input, &options, progress),
+    }?;
+    if format != Format::Las && format != Format::Obj && points.faces.is_none() {
+        points.notes.extend(degrees::hint_of(&name, &points.positions, None));
     }
+    Ok(points)
 }
 
 #[cfg(feature = "e57")]
@@ -88,12 +114,12 @@ use e57::read as read_e57;
 use pcd::read as read_pcd;
 
 #[cfg(not(feature = "e57"))]
-fn read_e57(input: Input, _: &dyn Progress) -> Result<Points> {
+fn read_e57(input: Input, _: &ReadOptions, _: &dyn Progress) -> Result<Points> {
     Err(without(&input.path, "e57"))
 }
 
 #[cfg(not(feature = "pcd"))]
-fn read_pcd(input: Input, _: &dyn Progress) -> Result<Points> {
+fn read_pcd(input: Input, _: &ReadOptions, _: &dyn Progress) -> Result<Points> {
     Err(without(&input.path, "pcd"))
 }
 
@@ -121,8 +147,8 @@ pub fn read_mesh(path: &Path, progress: &dyn Progress) -> Result<Mesh> {
 pub fn read_mesh_with(path: &Path, options: ReadOptions, progress: &dyn Progress) -> Result<Mesh> {
     let input = Input::open(path, options.format)?;
     match input.format {
-        Format::Obj => obj::read_mesh(input, progress),
-        Format::Ply => ply::read_mesh(input, progress),
+        Format::Obj => obj::read_mesh(input, &options, progress),
+        Format::Ply => ply::read_mesh(input, &options, progress),
         _ => Err(Error::malformed(&input.path, "only OBJ and PLY files are read as meshes; convert it to one")),
     }
 }

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use super::Tree;
+use super::about::About;
+use super::color_range::RawColors;
 pub use crate::scene::Up;
 use crate::scene::color::srgb_to_linear;
 use crate::scene::{Cap, Clip, Colors, Whole};
@@ -29,6 +31,8 @@ pub struct Points {
     pub caps: Option<Vec<Cap>>,
     /// Colours, [`Colors::Srgb8`], [`Colors::Linear`] or [`Colors::Harmonics`].
     pub colors: Option<Colors>,
+    /// Colours and intensities as the file has them, until [`settle_colors`](super::settle_colors) makes [`colors`](Self::colors) of them.
+    pub raw: Option<Box<RawColors>>,
     /// They are Gaussians, whose colours are codes of sRGB ([`Scene::encoded`](crate::scene::Scene::encoded)).
     pub encoded: bool,
     /// They were ellipsoids.
@@ -68,6 +72,10 @@ pub struct Points {
     pub left_out: Vec<u64>,
     /// The number of the point of the file that each one is, where several are one; they start at 0.
     pub numbers: Option<Vec<u32>>,
+    /// What the reader found odd in the file, a sentence each.
+    pub notes: Vec<String>,
+    /// What the file says of itself, if [`ReadOptions::describe`](super::ReadOptions::describe) asks for it.
+    pub about: Option<Box<About>>,
 }
 
 /// Ellipsoids whose shortest half-axis was left out.

@@ -17,7 +17,7 @@ use super::{
     LARGEST_COORDINATE, Limits, Preparation, colors, guess_up, mesh, origin_for, painting, texture, unit, usable_axes,
     usable_radius,
 };
-use crate::io::Points;
+use crate::io::{Points, settle_colors};
 use crate::scene::scene::{low_parts, shows};
 use crate::scene::{Atlas, Bounds, Cap, Clip, Colors, SMALLEST_SCENE, Scene, Surfel, Texture, body};
 use crate::{Error, Progress, Result};
@@ -70,6 +70,8 @@ pub fn build_within(
     progress: &dyn Progress,
 ) -> Result<(Scene, Preparation)> {
     limits.check()?;
+    let mut inputs = inputs;
+    settle_colors(&mut inputs);
     let mut inputs: Vec<Points> = inputs.into_iter().map(|input| mesh::of_mesh(input, By::Looks)).collect();
     if textures.is_empty() {
         return built(gather::gather(inputs)?, limits, progress).map(|(made, _)| made);
@@ -111,6 +113,8 @@ fn built_in_texture(
 ///
 /// Those of [`build`].
 pub fn build_at_vertices(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Preparation, Coordinates)> {
+    let mut inputs = inputs;
+    settle_colors(&mut inputs);
     let mut inputs: Vec<Points> = inputs.into_iter().map(|input| mesh::of_mesh(input, By::Vertices)).collect();
     painting::number_together(&mut inputs)?;
     let all_placed = inputs.iter().all(|input| input.texture.is_some() || input.positions.is_empty());

@@ -3,7 +3,7 @@
 use super::colors::ColorGatherer;
 use super::{LARGEST_COORDINATE, Preparation, usable_axes};
 use crate::io::points::Flattened;
-use crate::io::{Points, Up};
+use crate::io::{Points, Up, settle_colors};
 use crate::scene::{Colors, Provenance};
 use crate::{Error, Result};
 
@@ -20,6 +20,8 @@ pub(crate) struct Gathered {
 
 /// Joins the inputs and drops points whose coordinates are unusable.
 pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
+    let mut inputs = inputs;
+    settle_colors(&mut inputs);
     let (mut preparation, mut provenance) = (Preparation::default(), Provenance::default());
     let mut points = Points { closed: true, ..Points::default() };
     let (mut colors, mut flags, input_count) = (ColorGatherer::default(), Vec::new(), inputs.len());
@@ -36,6 +38,7 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
         preparation.withheld += input.withheld;
         preparation.unseen += input.unseen;
         preparation.loose += input.loose;
+        preparation.told.append(&mut input.notes);
         preparation.flattened = Flattened::of_both(preparation.flattened, input.flattened);
         provenance.push(flags.len() as u64, std::mem::take(&mut input.left_out), input.numbers.take());
         if kept < keep.len() {

@@ -58,6 +58,9 @@ pub struct Preparation {
     /// Median distance between an estimated position and the nearest other one, world units; None if nothing had to be
     /// estimated or there is only one position.
     pub median_spacing: Option<f64>,
+    /// What readers found odd in the files ([`Points::notes`](crate::io::Points::notes)).
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub told: Vec<String>,
 }
 
 impl Preparation {
@@ -106,6 +109,8 @@ impl Preparation {
         let rounding = self.rounding.map(|error| {
             format!("the smallest surfels lie so far from others that their coordinates err by up to {error:.2e} world units")
         });
-        notes.into_iter().chain([common, strays, by_neighbours, random, limited, rounding]).flatten().collect()
+        let told = self.told.iter().cloned();
+        told.chain(notes.into_iter().chain([common, strays, by_neighbours, random, limited, rounding]).flatten())
+            .collect()
     }
 }

@@ -123,13 +123,13 @@ fn scans_are_put_where_their_poses_say() {
     }
     assert_eq!(points.colors, Some(Colors::Srgb8(vec![[128, 128, 128, 255], [255; 4]])));
 
-    // Without its pose the scan lies elsewhere; with another one the two are one file, and colours are there for both.
+    // Without its pose the scan lies elsewhere; with another one the two are one file, and its intensities are beside the other's colours.
     let control = folder.read("a.e57", &file(vec![Scan { pose: None, ..spherical() }])).unwrap();
     assert!(control.positions[0][0].abs() < 1e-9 && control.positions[0][1] == 2.0);
     let both = folder.read("a.e57", &file(vec![spherical(), cartesian(2)])).unwrap();
     assert_eq!(both.positions.len(), 4);
     let Some(Colors::Srgb8(codes)) = both.colors else { panic!("{:?}", both.colors) };
-    assert_eq!(codes[1..], [[218, 218, 218, 255], [0, 20, 255, 255], [1, 20, 255, 255]]);
+    assert_eq!(codes, [[128, 128, 128, 255], [255; 4], [0, 20, 255, 255], [1, 20, 255, 255]]);
 }
 
 /// The scan, each of whose points has the normal.
@@ -191,13 +191,17 @@ fn colours_of_other_ranges_become_linear() {
     {
         *record = Record { name, data_type: wide.clone() };
     }
+    for point in &mut scan.points {
+        let wider = [7, 20 * 256 + 5, 65_535].map(RecordValue::Integer);
+        point.splice(4.., wider);
+    }
     let light = |share: f64| srgb_to_linear(share) as f32;
     let colors = |points: epsplat::io::Points| match points.colors {
         Some(Colors::Linear(colors)) => colors[1],
         other => panic!("{other:?}"),
     };
     let points = folder.read("a.e57", &file(vec![scan])).unwrap();
-    let expected = [1.0, 20.0, 255.0].map(|code| light(f64::from((code / 65535.0) as f32)));
+    let expected = [7.0, 5125.0, 65_535.0].map(|code| light(code / 65535.0));
     assert_eq!(colors(points)[..3], expected);
     // Limits of the scan come before those of the type.
     let mut scan = cartesian(2);

@@ -127,15 +127,17 @@ fn colour_codes_are_understood_over_the_whole_file() {
 }
 
 #[test]
-fn intensities_stand_in_for_colours_where_a_format_has_none() {
+fn intensities_stand_in_for_colours_where_there_are_none() {
     let folder = Folder::new();
     let with_intensity = |i: u32| Point { intensity: i as u16 * 10, ..point(i, None) };
-    for format in [0, 6] {
+    for format in [0, 2, 6, 7] {
         let colors = folder.read("a.las", &file(4, format, false, (0..101).map(with_intensity))).unwrap().colors;
         let Some(Colors::Srgb8(codes)) = colors else { panic!("{colors:?}") };
         assert_eq!((codes[0], codes[50], codes[100]), ([0, 0, 0, 255], [128, 128, 128, 255], [255; 4]));
     }
-    assert_eq!(folder.read("a.las", &file(2, 2, false, (0..101).map(with_intensity))).unwrap().colors, None);
+    let one_color = |i: u32| Point { intensity: i as u16 * 10, ..point(i, Some([u16::from(i == 7), 0, 0])) };
+    let colors = folder.read("a.las", &file(2, 2, false, (0..101).map(one_color))).unwrap().colors;
+    assert!(matches!(colors, Some(Colors::Srgb8(codes)) if codes[7] == [1, 0, 0, 255] && codes[8] == [0, 0, 0, 255]));
 }
 
 #[test]

@@ -11,6 +11,7 @@ mod las;
 mod las_damage;
 #[path = "../common/las_forms.rs"]
 mod las_forms;
+mod las_headers;
 mod mesh;
 mod obj;
 #[cfg(feature = "pcd")]
@@ -20,6 +21,7 @@ mod ply_damage;
 #[cfg(feature = "e57")]
 #[path = "../common/random.rs"]
 mod random;
+mod ranges;
 
 use epsplat::io::{self, Format, Points, ReadOptions};
 use epsplat::{Error, Progress};

@@ -81,6 +81,10 @@ fn colours_may_be_codes_of_eight_bits() {
     let folder = Folder::new();
     let colors = |text: &str| match folder.read("a.obj", text.as_bytes()).unwrap().colors {
         Some(Colors::Linear(colors)) => colors,
+        Some(Colors::Srgb8(codes)) => {
+            let count = codes.len();
+            (0..count).map(|index| Colors::Srgb8(codes.clone()).linear(index)).collect()
+        }
         other => panic!("{other:?}"),
     };
     let light = |code: f64| srgb_to_linear(code / 255.0) as f32;

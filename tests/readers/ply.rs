@@ -186,7 +186,8 @@ fn colours_keep_what_their_type_says() {
         let names = ["red", "green", "blue", "alpha"];
         assert_eq!(read("uchar", names, [1.0, 2.0, 255.0, 7.0], 4), Some(Colors::Srgb8(vec![[1, 2, 255, 7]])));
         assert_eq!(read("uint8", names, [1.0, 2.0, 255.0, 7.0], 3), Some(Colors::Srgb8(vec![[1, 2, 255, 255]])));
-        assert_eq!(read("int", names, [1.0, 300.0, -5.0, 7.0], 3), Some(Colors::Srgb8(vec![[1, 255, 0, 255]])));
+        assert_eq!(read("int", names, [1.0, 200.0, -5.0, 7.0], 3), Some(Colors::Srgb8(vec![[1, 200, 0, 255]])));
+        assert_eq!(read("char", names, [1.0, -56.0, -1.0, 7.0], 3), Some(Colors::Srgb8(vec![[1, 200, 255, 255]])));
         assert_eq!(read("uchar", names, [1.0, 2.0, 3.0, 4.0], 2), None);
         for names in [["r", "g", "b", "a"], ["diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"]] {
             assert_eq!(read("uchar", names, [1.0, 2.0, 3.0, 4.0], 4), Some(Colors::Srgb8(vec![[1, 2, 3, 4]])));

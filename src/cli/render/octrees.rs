@@ -1,7 +1,7 @@
 //! `epsplat render --lod` of COPC files: a picture reads those of their nodes that it takes.
 
-use epsplat::io::Points;
 use epsplat::io::las::Copc;
+use epsplat::io::{ColorRules, Points};
 use epsplat::plan::RenderOptions;
 use epsplat::scene::octree::{PointOctree, Thinned, taken};
 use epsplat::scene::{Bounds, Camera, Detail, Scene};
@@ -18,6 +18,8 @@ use super::scene::scene_of;
 pub(super) struct Octrees {
     files: Vec<Copc>,
     octrees: Vec<PointOctree>,
+    /// What the numbers of colours mean, as the coarsest nodes say.
+    rules: ColorRules,
     /// Of the coarsest nodes.
     pub overview: Scene,
 }
@@ -38,10 +40,11 @@ impl Octrees {
         }
         let octrees: Vec<PointOctree> = files.iter().map(|file| file.octree.clone()).collect();
         let nodes: Vec<Vec<usize>> = octrees.iter().map(PointOctree::overview).collect();
-        let points = read(arguments, &mut files, &nodes, bars)?;
+        let mut rules = ColorRules::default();
+        let points = read(arguments, (&mut files, &mut rules), &nodes, bars)?;
         let built = surfels::build_within(points, Vec::new(), &arguments.limits.limits(), bars);
         let (overview, _) = built.map_err(|error| named(error, &arguments.inputs))?;
-        Ok(Some(Self { files, octrees, overview }))
+        Ok(Some(Self { files, octrees, rules, overview }))
     }
 
     /// What the picture of `camera` takes, or where that is nothing the overview; and what that was of all.
@@ -56,7 +59,8 @@ impl Octrees {
         if self.octrees.iter().zip(&nodes).all(|(octree, nodes)| octree.points(nodes) == 0) {
             nodes = self.octrees.iter().map(PointOctree::overview).collect();
         }
-        let mut made = scene_of(arguments, read(arguments, &mut self.files, &nodes, progress)?, progress)?;
+        let points = read(arguments, (&mut self.files, &mut self.rules), &nodes, progress)?;
+        let mut made = scene_of(arguments, points, progress)?;
         self.end(&mut made.0, &nodes);
         // What was read is drawn whole.
         let options = RenderOptions { detail: Detail::FINEST, ..options.clone() };
@@ -95,9 +99,9 @@ fn read_of(files: &[Copc], nodes: &[Vec<usize>]) -> Read {
 /// The points of these nodes of each file.
 fn read(
     arguments: &Arguments,
-    files: &mut [Copc],
+    (files, rules): (&mut [Copc], &mut ColorRules),
     nodes: &[Vec<usize>],
     progress: &dyn Progress,
 ) -> Result<Vec<Points>> {
-    arguments.reading.nodes(files.iter_mut().zip(nodes), progress)
+    arguments.reading.nodes(files.iter_mut().zip(nodes), rules, progress)
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-use epsplat::io::{self, Mesh, Points, Texture};
+use epsplat::io::{self, Mesh, Points, ReadOptions, Texture};
 use epsplat::scene::Scene;
 use epsplat::surfels::{Preparation, with_triangles};
 use epsplat::{Error, Progress, Result, surfels};
@@ -49,7 +49,8 @@ pub(super) fn scene_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dy
         }
         return of_surfels.ok_or_else(|| Error::Usage("there is nothing to render: name a file".into()));
     }
-    let meshes = paths.iter().map(|path| io::read_mesh(path, progress)).collect::<Result<Vec<_>>>()?;
+    let options = ReadOptions { ignore_alpha: arguments.reading.ignores_alpha(), ..ReadOptions::default() };
+    let meshes = paths.iter().map(|path| io::read_mesh_with(path, options, progress)).collect::<Result<Vec<_>>>()?;
     let meshes = painted(meshes, &paths, arguments)?;
     meshes.iter().flat_map(|mesh| &mesh.notes).for_each(|line| note(line));
     let (scene, preparation) = of_surfels.unzip();

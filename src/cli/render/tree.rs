@@ -88,6 +88,7 @@ fn asks_for_all(arguments: &Arguments) -> Option<&'static str> {
         (limits.outliers.is_some(), "--outliers"),
         (limits.largest_ratio != Limits::default().largest_ratio, "--max-radius"),
         (arguments.reading.class_opacity.is_some(), "--class-opacity"),
+        (arguments.reading.ignores_alpha(), "--ignore-alpha"),
         (!arguments.triangles.is_empty(), "--triangles"),
         (arguments.triangle_texture.is_some(), "--triangle-texture"),
         (arguments.join.is_some(), "--join"),

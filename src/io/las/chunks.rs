@@ -4,6 +4,7 @@
 //! allocate gigabytes, which no error handling survives, so each of these lengths is looked at here first.
 
 use super::arithmetic::Integers;
+use super::extra::Field;
 use super::shown::Shown;
 use crate::io::fault::Fault;
 use las::raw::{Header, Vlr};
@@ -14,6 +15,9 @@ pub(super) const CHUNK_LIMIT: u64 = 1 << 28;
 
 /// No byte is more points than this: at its cheapest a point is a symbol of 64 whose probability is 1 - 63 / 2^15, 0.0028 bits.
 pub(super) const MOST_A_BYTE: u64 = 1 << 12;
+
+/// Which layer of a point has its intensity.
+const INTENSITIES: usize = 4;
 
 /// Where a LASzip record has the points per chunk.
 const CHUNK_SIZE: usize = 12;
@@ -126,6 +130,10 @@ pub(super) struct Scheme {
     pub(super) has_color: bool,
     /// Of each layer of a chunk, where chunks are in layers, whether anything is taken of it.
     pub(super) needed: Vec<bool>,
+    /// The layer of the first extra byte, where layers are told apart and points have such.
+    pub(super) extra: Option<usize>,
+    /// The layer of intensities, where layers are told apart and points have colours.
+    pub(super) intensities: Option<usize>,
 }
 
 impl Scheme {
@@ -167,13 +175,29 @@ impl Scheme {
         let usual = kinds.first() == Some(&10) && (!has_color || matches!(kinds.get(1), Some(11 | 12)));
         let needed = |(kind, layer): (u16, usize)| match kind {
             // A point's place, class and flags; and where nothing has a colour intensities are taken for one.
-            10 => layer < 4 || !has_color && layer == 4,
+            10 => layer < INTENSITIES || !has_color && layer == INTENSITIES,
             11 | 12 => layer == 0,
             _ => false,
         };
+        let intensities = layers.iter().position(|layer| *layer == (10, INTENSITIES)).filter(|_| usual && has_color);
+        let extra = layers.iter().position(|layer| *layer == (14, 0)).filter(|_| usual);
         let needed = layers.into_iter().map(|layer| !usual || needed(layer)).collect();
         let chunk = Some(chunk).filter(|&chunk| chunk != 0 && chunk != u32::MAX);
-        Some(Self { compressor, chunk, record, has_color, needed })
+        Some(Self { compressor, chunk, record, has_color, needed, extra, intensities })
+    }
+
+    /// Whether the intensities of points with colours are taken, which may all be zero.
+    pub(super) fn need_intensities(&mut self, taken: bool) {
+        if let Some(needed) = self.intensities.and_then(|layer| self.needed.get_mut(layer)) {
+            *needed = taken;
+        }
+    }
+
+    /// Takes an attribute of the extra bytes, each of which is a layer.
+    pub(super) fn need_extra(&mut self, field: &Field) {
+        let Some(first) = self.extra else { return };
+        let layers = self.needed.iter_mut().skip(first + field.start).take(field.size.into());
+        layers.for_each(|needed| *needed = true);
     }
 
     /// Bytes of a chunk in layers before these: its first point, how many it has, and how long each layer is.

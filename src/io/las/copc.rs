@@ -1,11 +1,12 @@
 //! COPC 1.0: LAZ files whose chunks are the nodes of an octree, of which a picture takes few.
 
 use super::chunks::{MOST_A_BYTE, Scheme, laszip_record, malformed, promised};
+use super::extra::Normals;
 use super::layers::Layers;
 use super::shown::Shown;
-use super::{Meaning, early, of_las};
-use crate::io::fault::{Fault, surviving};
-use crate::io::{Format, Input};
+use super::{Looks, early, header, of_las};
+use crate::io::fault::{self, Fault, surviving};
+use crate::io::{ColorRules, Format, Input, degrees};
 use crate::scene::Bounds;
 use crate::scene::octree::{MOST_LEVELS, OctreeNode, PointOctree};
 use crate::{Error, Result};
@@ -43,8 +44,14 @@ pub struct Copc {
     pub(super) transforms: Vector<Transform>,
     /// Points of all nodes.
     pub(super) count: u64,
-    /// What the colours are, once some have been read.
-    pub(super) meaning: Option<Meaning>,
+    /// What shows, once some have been read.
+    pub(super) looks: Option<Looks>,
+    /// What their numbers mean, once some have been read by [`read`](Self::read).
+    pub(super) rules: ColorRules,
+    /// The normals that points have beside their format.
+    pub(super) normals: Option<Normals>,
+    /// What is odd about it.
+    pub(super) notes: Vec<String>,
 }
 
 /// Where the points of a node lie.
@@ -116,6 +123,7 @@ fn says_copc(file: &File) -> Result<bool, Fault> {
 fn opened(mut file: File, path: PathBuf, length: u64) -> Result<Copc, Fault> {
     file.rewind()?;
     let mut file = BufReader::new(Shown::new(file)?);
+    let legacy = file.get_ref().legacy;
     let header = raw::Header::read_from(&mut file).map_err(of_las)?;
     let record = u64::from(header.point_data_record_length);
     let format = header.point_data_record_format & 0x3f;
@@ -132,7 +140,10 @@ fn opened(mut file: File, path: PathBuf, length: u64) -> Result<Copc, Fault> {
     if !format.is_extended || scheme.has_color != format.has_color {
         // The decoder takes for something else what colours are taken from.
         scheme.needed.fill(true);
+        scheme.intensities = None;
     }
+    // Until it is known that colours show.
+    scheme.need_intensities(true);
     let mut info = [0; INFO_SIZE];
     file.seek(SeekFrom::Start(INFO))?;
     file.read_exact(&mut info)?;
@@ -157,6 +168,11 @@ fn opened(mut file: File, path: PathBuf, length: u64) -> Result<Copc, Fault> {
     let [min, max] =
         [DVec3::new(header.min_x, header.min_y, header.min_z), DVec3::new(header.max_x, header.max_y, header.max_z)];
     let bounds = if min.is_finite() && max.is_finite() { Bounds { min, max } } else { Bounds::EMPTY };
+    let name = fault::name(&path);
+    let found = header::look(&mut file, (&header, legacy), (length, &name))?;
+    found.normals.iter().flat_map(|normals| &normals.fields).for_each(|field| scheme.need_extra(field));
+    let mut notes = found.notes;
+    notes.extend(degrees::hint(&name, [min.to_array(), max.to_array()], found.geographic));
     let octree = PointOctree { center, half, spacing, nodes, bounds };
     Ok(Copc {
         file: file.into_inner().into_file(),
@@ -169,7 +185,10 @@ fn opened(mut file: File, path: PathBuf, length: u64) -> Result<Copc, Fault> {
         format,
         transforms,
         count,
-        meaning: None,
+        looks: None,
+        rules: ColorRules::default(),
+        normals: found.normals,
+        notes,
     })
 }
 

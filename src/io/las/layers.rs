@@ -61,7 +61,14 @@ mod tests {
     #[test]
     fn layers_that_are_not_needed_are_not_read() {
         let needed = [true, true, false, false, true, false, true];
-        let scheme = Scheme { compressor: 3, chunk: None, record: 2, has_color: true, needed: needed.to_vec() };
+        let scheme = Scheme {
+            compressor: 3,
+            chunk: None,
+            record: 2,
+            has_color: true,
+            needed: needed.to_vec(),
+            intensities: None,
+        };
         let lengths = [3u32, 2, 4, 0, 1, 5, 2];
         let mut chunk = vec![7, 8, 9, 0, 0, 0];
         chunk.extend(lengths.iter().flat_map(|length| length.to_le_bytes()));

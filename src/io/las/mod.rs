@@ -2,18 +2,21 @@
 
 mod arithmetic;
 mod chunks;
-mod color;
 mod copc;
+mod extra;
+mod header;
 mod layers;
 mod nodes;
 mod shown;
+mod system;
 
+use crate::io::color_range::{Kind, Number, Numbers, RawColors, Shades, Values};
 use crate::io::fault::{self, Fault, reserve, surviving};
-use crate::io::intensity;
 use crate::io::values::one_line;
-use crate::io::{Input, Points, ReadOptions, Up};
+use crate::io::{Input, Points, ReadOptions, Up, degrees};
 use crate::{Progress, Result};
-use color::Coding;
+use extra::Normals;
+use header::Found;
 use las::reader::{LazParallelism, ReaderOptions};
 use las::{PointData, PointDataBuilder, Reader, raw};
 use shown::Shown;
@@ -30,10 +33,9 @@ const BLOCK: u64 = 1 << 25;
 /// [`Points::unseen`]. Synthetic, key and overlap points (legacy class 12 too) are points like
 /// any other, as they are to PDAL.
 ///
-/// Coordinates are scaled and offset in f64, in the file's own system; up is z. Colours come from the format's RGB:
-/// where the 16-bit codes of the whole file are widened 8-bit values, or no code is above 255, they are 8-bit sRGB; else
-/// they are 16-bit sRGB codes and become linear light; all zero means none. A format without RGB whose intensities vary
-/// gives sRGB greys, with the 99.9th percentile as white.
+/// Coordinates are scaled and offset in f64, in the file's own system; up is z. Colours are the 16-bit numbers of the format's RGB, of
+/// which zeros alone mean none, and without them intensities ([`RawColors`]). Where two fields of the header disagree,
+/// [`Points::notes`] says it.
 ///
 /// # Errors
 ///
@@ -41,21 +43,31 @@ const BLOCK: u64 = 1 << 25;
 /// the file is not LAS, ends early, or cannot be decoded.
 pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
     let Input { file, length, path, .. } = input;
+    let name = fault::name(&path);
     let opened = surviving(|| {
         let mut file = BufReader::with_capacity(1 << 20, Shown::new(file)?);
+        let legacy = file.get_ref().legacy;
         let header = raw::Header::read_from(&mut file).map_err(of_las)?;
         let decoding = chunks::check(&mut file, &header, length).map_err(early)?;
-        Ok((file, decoding, chunks::promised(&header)))
+        let found = header::look(&mut file, (&header, legacy), (length, &name)).map_err(early)?;
+        Ok((file, decoding, chunks::promised(&header), found))
     });
-    let (file, decoding, promised) = opened.map_err(|fault| fault.of(&path))?;
+    let (file, decoding, promised, found) = opened.map_err(|fault| fault.of(&path))?;
+    let about = options.describe.then(|| Box::new(found.about.clone()));
     if promised == 0 {
         // The decoder would still take the length of a chunk table for true, which nothing here vouches for.
-        return Ok(Points { up: Some(Up::Z), ..Points::default() });
+        return Ok(Points { up: Some(Up::Z), about, notes: found.notes, ..Points::default() });
     }
-    progress.begin(&format!("reading {}", fault::name(&path)), promised);
-    let points = deep(|| decode(file, decoding, promised.min(length), options, progress));
+    progress.begin(&format!("reading {name}"), promised);
+    let points = deep(|| decode(file, decoding, promised.min(length), (options, &found), progress));
     progress.end();
-    points.map_err(|fault| fault.of(&path))
+    let mut points = points.map_err(|fault| fault.of(&path))?;
+    points.notes.extend(found.notes.iter().cloned());
+    points.notes.extend(found.outside(&name, &points.positions));
+    points.notes.extend(degrees::hint_of(&name, &points.positions, found.geographic));
+    points.about = about;
+    points.raw.iter_mut().for_each(|raw| raw.name.clone_from(&name));
+    Ok(points)
 }
 
 /// Stack of the threads that decode, bytes; memory is taken only as far as it is used. The decoder calls itself for each
@@ -98,7 +110,7 @@ fn decode(
     mut file: BufReader<Shown>,
     decoding: chunks::Decoding,
     capacity: u64,
-    read_options: &ReadOptions,
+    (read_options, found): (&ReadOptions, &Found),
     progress: &dyn Progress,
 ) -> Result<Points, Fault> {
     file.rewind()?;
@@ -113,7 +125,7 @@ fn decode(
     let format = *header.point_format();
     let mut block = PointDataBuilder::new().for_header(header).build();
     let block_points = (BLOCK / u64::from(format.len()).max(1)).max(1);
-    let mut kept = Kept::default();
+    let mut kept = Kept::of(None, found.normals.as_ref());
     reserve(&mut kept.positions, capacity)?;
     let mut read = 0;
     while read < promised {
@@ -130,24 +142,30 @@ fn decode(
         read += count;
         progress.advance(count);
     }
-    let meaning = kept.meaning(format.has_color);
-    Ok(kept.points(meaning, 0..read, read_options))
+    Ok(kept.points(0..read, read_options))
 }
 
-/// What the colours of a file are, which its format leaves open.
+/// What shows of the points of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Meaning {
-    Codes(Coding),
-    /// Intensities, the white one of which it is, if they differ.
-    Grey(Option<u16>),
+enum Looks {
+    Colors,
+    Intensities,
 }
 
 /// What is kept of the points so far.
 #[derive(Default)]
-struct Kept {
+struct Kept<'a> {
     positions: Vec<[f64; 3]>,
+    /// Which bytes are normals, and these.
+    has_normals: Option<&'a Normals>,
+    normals: Vec<[f32; 3]>,
     codes: Vec<[u16; 3]>,
+    /// As long as no colour says anything.
     intensities: Vec<u16>,
+    /// What shows, as soon as it is known.
+    looks: Option<Looks>,
+    /// What shows was known before these points were read.
+    decided: bool,
     /// Of each, where classes make a difference.
     classes: Vec<u8>,
     /// Points of each class that are not deleted.
@@ -155,28 +173,30 @@ struct Kept {
     left_out: Vec<u64>,
 }
 
-impl Kept {
-    /// What the colours mean, as all that were read say.
-    fn meaning(&self, has_color: bool) -> Meaning {
-        if has_color {
-            Meaning::Codes(Coding::of(&self.codes))
-        } else {
-            Meaning::Grey(intensity::white(&self.intensities))
-        }
+impl<'a> Kept<'a> {
+    /// Nothing yet, of a file of which it may be known what shows.
+    fn of(looks: Option<Looks>, has_normals: Option<&'a Normals>) -> Self {
+        Self { looks, decided: looks.is_some(), has_normals, ..Self::default() }
     }
 
-    /// As points, of which all that were read have these numbers, in order.
-    fn points(self, meaning: Meaning, numbers: impl Iterator<Item = u64>, options: &ReadOptions) -> Points {
-        let Self { positions, codes, intensities, classes, counts, left_out } = self;
-        let colors = match meaning {
-            Meaning::Codes(coding) => color::from_rgb(codes, coding),
-            Meaning::Grey(white) => white.map(|white| intensity::grey_below(&intensities, white)),
+    /// As points, of which all that were read have these numbers, in order; colours are as they are in the file.
+    fn points(self, numbers: impl Iterator<Item = u64>, options: &ReadOptions) -> Points {
+        let Self { positions, has_normals, normals, codes, intensities, looks, decided, classes, counts, left_out } =
+            self;
+        let normals = has_normals.map(|_| normals);
+        let kind = Kind { zero_is_none: !decided, ..Kind::of(Number::WORD) };
+        let colors = Numbers { values: Values::Words(codes), kind, alpha: None };
+        let (colors, shades) = match looks {
+            Some(Looks::Colors) => (Some(colors), None),
+            _ => (None, Some(Shades::Words(intensities))),
         };
-        let colors = options.classes.fade(colors, &classes);
+        let raw = RawColors::of_run(positions.len(), colors, shades);
+        let raw = Some(Box::new(RawColors { opacities: options.classes, classes, ..raw }));
         let withheld = left_out.len() as u64;
         let up = Some(Up::Z);
-        let mut points = Points { positions, colors, up, classes: counts, withheld, left_out, ..Points::default() };
-        leave_out_unseen(&mut points, &classes, options, numbers);
+        let mut points =
+            Points { positions, normals, raw, up, classes: counts, withheld, left_out, ..Points::default() };
+        leave_out_unseen(&mut points, numbers);
         points
     }
 
@@ -198,17 +218,27 @@ impl Kept {
         }
         let coordinates = block.x().zip(block.y()).zip(block.z()).map(|((x, y), z)| [x, y, z]);
         self.positions.extend(kept(coordinates, &keeps));
-        if let Some(rgb) = block.rgb() {
+        if let Some(normals) = self.has_normals {
+            self.normals.extend(kept(records(block).map(|record| normals.of_record(record)), &keeps));
+        }
+        if let Some(rgb) = block.rgb().filter(|_| self.looks != Some(Looks::Intensities)) {
+            let before = self.codes.len();
             self.codes.extend(kept(rgb.map(|(r, g, b)| [r, g, b]), &keeps));
-        } else {
+            if self.looks.is_none() && self.codes[before..].iter().any(|code| *code != [0; 3]) {
+                self.looks = Some(Looks::Colors);
+                self.intensities = Vec::new();
+            }
+        }
+        if self.looks != Some(Looks::Colors) {
             self.intensities.extend(kept(block.intensity(), &keeps));
         }
     }
 }
 
-/// Leaves out the points of these `classes` whose opacity is 0, where all have these numbers: what colours mean was decided by all of them.
-fn leave_out_unseen(points: &mut Points, classes: &[u8], options: &ReadOptions, numbers: impl Iterator<Item = u64>) {
-    let keep: Vec<bool> = classes.iter().map(|class| options.classes.of(*class) > 0.0).collect();
+/// Leaves out the points whose class has the opacity 0, as soon as all of them have decided what colours mean; all have these numbers.
+fn leave_out_unseen(points: &mut Points, numbers: impl Iterator<Item = u64>) {
+    let Some(raw) = &mut points.raw else { return };
+    let keep: Vec<bool> = raw.classes.iter().map(|class| raw.opacities.of(*class) > 0.0).collect();
     points.unseen = keep.iter().filter(|keep| !**keep).count() as u64;
     if points.unseen == 0 {
         return;
@@ -217,7 +247,7 @@ fn leave_out_unseen(points: &mut Points, classes: &[u8], options: &ReadOptions, 
     let mut kept = keep.iter();
     let is_left_out = |number: &u64| deleted.next_if_eq(number).is_some() || kept.next() == Some(&false);
     points.left_out = numbers.filter(is_left_out).collect();
-    points.retain(&keep);
+    raw.keep = Some(keep);
 }
 
 /// The records of a block.

@@ -3,7 +3,7 @@
 use super::chunks::{CHUNK_LIMIT, malformed};
 use super::copc::Copc;
 use super::layers::Layers;
-use super::{Kept, deep, early, of_las};
+use super::{Kept, Looks, deep, early, of_las};
 use crate::io::fault::{self, Fault, reserve, surviving};
 use crate::io::{Points, ReadOptions};
 use crate::{Progress, Result};
@@ -27,6 +27,17 @@ impl Copc {
     ///
     /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where a node cannot be decoded.
     pub fn read(&mut self, nodes: &[usize], options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
+        let mut points = self.read_raw(nodes, options, progress)?;
+        self.rules.settle(std::slice::from_mut(&mut points));
+        Ok(points)
+    }
+
+    /// The same with colours as the file has them ([`Points::raw`]), which are to be settled with those of other files.
+    ///
+    /// # Errors
+    ///
+    /// As [`read`](Self::read).
+    pub fn read_raw(&mut self, nodes: &[usize], options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
         let mut nodes: Vec<usize> = nodes.iter().copied().filter(|&node| self.octree.nodes[node].points > 0).collect();
         nodes.sort_unstable_by_key(|&node| self.chunks[node].offset);
         progress.begin(&format!("looking at {} nodes of {}", nodes.len(), fault::name(&self.path)), nodes.len() as u64);
@@ -37,13 +48,16 @@ impl Copc {
         progress.begin(&format!("reading {} MB of {}", bytes.div_ceil(1_000_000), fault::name(&self.path)), bytes);
         let points = deep(|| self.decoded(&nodes, options, progress));
         progress.end();
-        points.map_err(|fault| self.fault(fault))
+        let mut points = points.map_err(|fault| self.fault(fault))?;
+        points.notes.extend(self.notes.iter().cloned());
+        Ok(points)
     }
 
     fn decoded(&mut self, nodes: &[usize], options: &ReadOptions, progress: &dyn Progress) -> Result<Points, Fault> {
         let vlr = LazVlr::from_buffer(&self.laszip).map_err(|error| of_las(error.into()))?;
         let count = self.octree.points(nodes);
-        let mut kept = Kept::default();
+        let normals = self.normals.clone();
+        let mut kept = Kept::of(self.looks, normals.as_ref());
         // No longer than the file, whatever it promises.
         reserve(&mut kept.positions, count.min(self.bytes_read(nodes)))?;
         for together in self.batches(nodes) {
@@ -60,20 +74,30 @@ impl Copc {
             }
             progress.advance(self.bytes_read(together));
         }
+        self.decide(&kept);
         let numbers = || {
             let of_node =
                 |&node: &usize| self.chunks[node].first..self.chunks[node].first + self.octree.nodes[node].points;
             nodes.iter().flat_map(of_node)
         };
-        let meaning = self.meaning.unwrap_or_else(|| kept.meaning(self.format.has_color));
-        let mut points = kept.points(meaning, numbers(), options);
+        let mut points = kept.points(numbers(), options);
+        if let Some(raw) = &mut points.raw {
+            raw.name = fault::name(&self.path);
+        }
         let mut left_out = std::mem::take(&mut points.left_out).into_iter().peekable();
         if u32::try_from(self.count).is_ok() {
             let kept = numbers().filter(|number| left_out.next_if_eq(number).is_none());
             points.numbers = Some(kept.map(|number| number as u32).collect());
         }
-        self.meaning = Some(meaning);
         Ok(points)
+    }
+
+    /// Decides what shows of all nodes by the first ones that are read: where that is colours, intensities are read no more.
+    fn decide(&mut self, kept: &Kept) {
+        if self.looks.is_none() && !kept.positions.is_empty() {
+            self.looks = Some(kept.looks.unwrap_or(Looks::Intensities));
+            self.scheme.need_intensities(self.looks == Some(Looks::Intensities));
+        }
     }
 
     /// Runs of nodes that are read together.

@@ -1,10 +1,10 @@
 //! The lines of an OBJ file.
 
 use crate::Progress;
+use crate::io::RawColors;
+use crate::io::color_range::{Kind, Number, Numbers, Values};
 use crate::io::fault::Fault;
 use crate::io::values::{BYTE_ORDER_MARK, finite, line_end, parse_number, shown};
-use crate::scene::Colors;
-use crate::scene::color::{DEFAULT_COLOR, srgb_to_linear};
 use std::io::{BufRead, Read};
 
 use super::faces::{Faces, Named, Triangle};
@@ -197,23 +197,16 @@ impl Lines {
         Ok(())
     }
 
-    /// One colour for each position, in linear light, if any has one.
+    /// One colour for each position as the file has it, if any has one.
     ///
-    /// No standard says what colours range over: most programs write shares of 1, some codes of 0 to 255. A channel that comes to
-    /// 2 or more in the file is taken for codes; colour and alpha each for itself.
-    pub(super) fn colors(&self) -> Option<Colors> {
-        let unit = |of: fn(&[f64; 4]) -> f64| {
-            let largest = self.colors.iter().map(of).fold(0.0, f64::max);
-            if largest >= 2.0 { 255.0 } else { 1.0 }
-        };
-        let (full, opaque) = (unit(|[r, g, b, _]| r.max(*g).max(*b)), unit(|[.., a]| *a));
-        let linear = |&[r, g, b, a]: &[f64; 4]| {
-            if r.is_nan() {
-                return DEFAULT_COLOR;
-            }
-            let [r, g, b] = [r, g, b].map(|share| finite(srgb_to_linear(share / full)));
-            [r, g, b, finite(a / opaque)]
-        };
-        (!self.colors.is_empty()).then(|| Colors::Linear(self.colors.iter().map(linear).collect()))
+    /// No standard says what colours range over: most programs write shares of 1, some codes of 0 to 255.
+    pub(super) fn colors(&self, ignore_alpha: bool) -> Option<RawColors> {
+        let count = self.colors.len();
+        let has_alpha = !ignore_alpha && self.colors.iter().any(|[.., alpha]| !alpha.is_nan() && *alpha != 1.0);
+        let number = |color: &[f64; 4]| color.map(|value| if value.is_nan() { f32::NAN } else { finite(value) });
+        let values = Values::Floats(self.colors.iter().map(number).collect());
+        let alpha = has_alpha.then_some(Number::Float);
+        (count > 0)
+            .then(|| RawColors::of_run(count, Some(Numbers { values, kind: Kind::of(Number::Float), alpha }), None))
     }
 }

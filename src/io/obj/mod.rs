@@ -7,11 +7,12 @@ mod material;
 
 pub(super) use material::companions;
 
+use crate::io::about::About;
 use crate::io::closed::is_closed;
 use crate::io::fault::{self, Fault};
 use crate::io::points::Faces;
 use crate::io::triangles::Triangles;
-use crate::io::{Input, Mesh, Points, Up};
+use crate::io::{Input, Mesh, Points, RawColors, ReadOptions, Up, settle_colors};
 use crate::{Progress, Result};
 use lines::Lines;
 use std::io::BufReader;
@@ -24,8 +25,8 @@ use std::io::BufReader;
 ///   with one `vn` for each `v` pairs them.
 /// - Radii: 1.1 times the smallest with which disks at a triangle's corners cover it, the largest over the vertex's
 ///   triangles; polygons are made of triangles; a vertex of no triangle has none (zero).
-/// - Colours: the three numbers after a vertex's coordinates, sRGB-coded in [0, 1], or where any is 2 or more in [0, 255], become
-///   linear light; a fourth is alpha.
+/// - Colours: the three numbers after a vertex's coordinates, sRGB-coded in [0, 1] or in [0, 255], as all of them say
+///   ([`RawColors`]); a fourth is alpha.
 ///
 /// Text may be in UTF-16, of either byte order, if a byte order mark says so. Up is y. Lines, points, curves and materials are passed over, so a missing MTL file is no error.
 ///
@@ -33,8 +34,12 @@ use std::io::BufReader;
 ///
 /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where
 /// a number is none or a face names a vertex or normal that does not exist; where a file has no normal at all, none is missed.
-pub fn read(input: Input, progress: &dyn Progress) -> Result<Points> {
-    read_with(input, false, progress, points)
+pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
+    let name = fault::name(&input.path);
+    let mut points = read_with(input, false, progress, |lines| points(lines, options.ignore_alpha))?;
+    points.raw.iter_mut().for_each(|raw| raw.name.clone_from(&name));
+    points.about = options.describe.then(|| Box::new(About { format: "OBJ".into(), ..About::default() }));
+    Ok(points)
 }
 
 /// Reads the triangles of an OBJ file, those of all groups and materials as one mesh, with every `v` line a vertex.
@@ -49,9 +54,10 @@ pub fn read(input: Input, progress: &dyn Progress) -> Result<Points> {
 /// # Errors
 ///
 /// As [`read`], and where a face names texture coordinates that do not exist, in a file that has some.
-pub fn read_mesh(input: Input, progress: &dyn Progress) -> Result<Mesh> {
+pub fn read_mesh(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Mesh> {
     let path = input.path.clone();
-    let (mut mesh, libraries, names) = read_with(input, true, progress, mesh)?;
+    let make = |lines| mesh(lines, &fault::name(&path), options.ignore_alpha);
+    let (mut mesh, libraries, names) = read_with(input, true, progress, make)?;
     mesh.materials = material::read(&path, &libraries, &names, &mut mesh.notes);
     Ok(mesh)
 }
@@ -68,8 +74,8 @@ fn read_with<T>(input: Input, surface: bool, progress: &dyn Progress, make: impl
     made.map_err(in_file)
 }
 
-fn points(lines: Lines) -> Points {
-    let colors = lines.colors();
+fn points(lines: Lines, ignore_alpha: bool) -> Points {
+    let raw = lines.colors(ignore_alpha).map(Box::new);
     let mut around = Triangles::new(&lines.positions);
     let (mut triangles, mut named) = (Vec::new(), Vec::new());
     for triangle in lines.triangles() {
@@ -90,7 +96,7 @@ fn points(lines: Lines) -> Points {
         radii: has_faces.then_some(radii),
         of_mesh: has_faces,
         closed: face_as_named && is_closed(&lines.positions, &triangles),
-        colors,
+        raw,
         up: Some(Up::Y),
         faces: has_faces.then(|| {
             let all = named.len() == triangles.len();
@@ -102,7 +108,10 @@ fn points(lines: Lines) -> Points {
 }
 
 /// The mesh without its materials, the libraries they are in, and their names.
-fn mesh(lines: Lines) -> (Mesh, Vec<String>, Vec<String>) {
+fn mesh(lines: Lines, name: &str, ignore_alpha: bool) -> (Mesh, Vec<String>, Vec<String>) {
+    let raw = lines.colors(ignore_alpha).map(|raw| Box::new(RawColors { name: name.to_owned(), ..raw }));
+    let mut colored = Points { raw, ..Points::default() };
+    settle_colors(std::slice::from_mut(&mut colored));
     let (mut vertices, mut normals) = (Vec::new(), Vec::new());
     let (mut texture, mut material) = (Vec::new(), Vec::new());
     for triangle in lines.triangles() {
@@ -115,7 +124,8 @@ fn mesh(lines: Lines) -> (Mesh, Vec<String>, Vec<String>) {
         normals: (!normals.is_empty()).then_some(normals),
         texture: (lines.faces.have_texture() && !texture.is_empty()).then_some(texture),
         material: (!lines.materials.is_empty()).then_some(material),
-        colors: lines.colors(),
+        colors: colored.colors,
+        notes: colored.notes,
         triangles: vertices,
         positions: lines.positions,
         up: Some(Up::Y),

@@ -2,9 +2,9 @@
 
 use std::io::{self, BufRead, Read};
 
-use super::header::{Header, Scalar};
+use super::header::{Field, Header, Scalar};
 use super::lzf;
-use super::points::{Columns, Place, Reading};
+use super::points::{Cell, Columns, Place, Reading};
 use crate::Progress;
 use crate::io::Points;
 use crate::io::fault::{Fault, reserve};
@@ -23,16 +23,17 @@ fn ends_early(header: &Header, rows: u64) -> Fault {
 /// A point a line, its numbers between white space; `left` bytes follow the header, here and below.
 pub(super) fn ascii(
     mut reader: impl BufRead,
-    header: &Header,
+    (header, columns): (&Header, Columns),
     left: u64,
     progress: &dyn Progress,
 ) -> Result<Points, Fault> {
-    let columns = Columns::of(header)?;
-    let mut wanted: Vec<_> = columns.used().map(|field| (field, columns.is_packed(field))).collect();
+    let cells = columns.cells.iter().enumerate();
+    let mut wanted: Vec<_> =
+        cells.map(|(index, cell)| (cell.field, cell.part, index, columns.is_packed(index))).collect();
     wanted.sort_unstable();
     // Each number takes a digit and a separator at least.
-    let mut reading = Reading::with_capacity(columns, header.points.min(left / 2))?;
-    let mut values = vec![0.0; header.fields.len()];
+    let mut values = vec![0.0; columns.cells.len()];
+    let mut reading = Reading::with_capacity(columns, header, header.points.min(left / 2))?;
     let (mut line, mut number, mut unreported) = (Vec::new(), header.lines, 0);
     while reading.len() < header.points {
         line.clear();
@@ -50,19 +51,16 @@ pub(super) fn ascii(
         }
         let mut wanted = wanted.iter().peekable();
         for (index, field) in header.fields.iter().enumerate() {
-            let mut skipped = field.count;
-            if let Some((_, packed)) = wanted.next_if(|(wanted, _)| *wanted == index) {
+            for part in 0..field.count {
                 let word = words.next().ok_or_else(|| too_few(number))?;
-                let value = if *packed { packed_color(word, field.scalar) } else { parse_number(word) };
-                values[index] = value
-                    .ok_or_else(|| Fault::Malformed(format!("line {number}: '{}' is not a number", shown(word))))?;
-                skipped -= 1;
-            }
-            for _ in 0..skipped {
-                words.next().ok_or_else(|| too_few(number))?;
+                while let Some((_, _, cell, packed)) = wanted.next_if(|(f, p, ..)| (*f, *p) == (index, part)) {
+                    let value = if *packed { packed_color(word, field.scalar) } else { parse_number(word) };
+                    values[*cell] = value
+                        .ok_or_else(|| Fault::Malformed(format!("line {number}: '{}' is not a number", shown(word))))?;
+                }
             }
         }
-        reading.extend(1, |field, _| values[field]);
+        reading.extend(1, |cell, _| values[cell]);
         unreported += 1;
         if unreported == 1 << 16 {
             progress.advance(std::mem::take(&mut unreported));
@@ -80,7 +78,11 @@ fn too_few(line: u64) -> Fault {
 fn packed_color(word: &[u8], scalar: Scalar) -> Option<f64> {
     let text = std::str::from_utf8(word).ok()?;
     let bits = match scalar {
-        Scalar::Float => text.parse::<f32>().ok()?.to_bits(),
+        // Bits that are written as an integer, though the type says otherwise.
+        Scalar::Float if text.bytes().all(|byte| byte.is_ascii_digit()) => text.parse().ok()?,
+        Scalar::Float => {
+            text.parse::<i32>().map(i32::cast_unsigned).or_else(|_| text.parse().map(f32::to_bits)).ok()?
+        }
         Scalar::Unsigned => text.parse().ok()?,
         Scalar::Signed => text.parse::<i32>().ok()?.cast_unsigned(),
     };
@@ -90,11 +92,10 @@ fn packed_color(word: &[u8], scalar: Scalar) -> Option<f64> {
 /// A point after the other.
 pub(super) fn binary(
     mut reader: impl Read,
-    header: &Header,
+    (header, columns): (&Header, Columns),
     left: u64,
     progress: &dyn Progress,
 ) -> Result<Points, Fault> {
-    let columns = Columns::of(header)?;
     let held = left / header.row;
     if held < header.points {
         return Err(ends_early(header, held));
@@ -105,8 +106,8 @@ pub(super) fn binary(
         places.push(Place { start, stride: header.row as usize });
         start += (field.size * field.count) as usize;
     }
-    let packed: Vec<_> = (0..header.fields.len()).map(|field| columns.is_packed(field)).collect();
-    let mut reading = Reading::with_capacity(columns, header.points)?;
+    let cells = Cells::of(header, &columns, &places);
+    let mut reading = Reading::with_capacity(columns, header, header.points)?;
     let rows = (BLOCK / header.row).max(1);
     let mut block = Vec::new();
     reserve(&mut block, rows.min(header.points) * header.row)?;
@@ -117,7 +118,7 @@ pub(super) fn binary(
         if reader.by_ref().take(size).read_to_end(&mut block)? < size as usize {
             return Err(ends_early(header, reading.len() + block.len() as u64 / header.row));
         }
-        extend(&mut reading, header, &block, (&places, &packed), rows as usize);
+        cells.extend(&mut reading, &block, rows as usize);
         progress.advance(rows);
     }
     Ok(reading.into_points())
@@ -126,13 +127,12 @@ pub(super) fn binary(
 /// The lengths of what follows, packed and not; then, packed, the first field of all points, the second of all, and so on.
 pub(super) fn compressed(
     mut reader: impl Read,
-    header: &Header,
+    (header, columns): (&Header, Columns),
     left: u64,
     progress: &dyn Progress,
 ) -> Result<Points, Fault> {
-    let columns = Columns::of(header)?;
     if header.points == 0 {
-        return Ok(Reading::with_capacity(columns, 0)?.into_points());
+        return Ok(Reading::with_capacity(columns, header, 0)?.into_points());
     }
     let mut lengths = [[0; 4]; 2];
     for length in &mut lengths {
@@ -167,17 +167,32 @@ pub(super) fn compressed(
         places.push(Place { start, stride });
         start += stride * header.points as usize;
     }
-    let packed: Vec<_> = (0..header.fields.len()).map(|field| columns.is_packed(field)).collect();
-    let mut reading = Reading::with_capacity(columns, header.points)?;
-    extend(&mut reading, header, &bytes, (&places, &packed), header.points as usize);
+    let cells = Cells::of(header, &columns, &places);
+    let mut reading = Reading::with_capacity(columns, header, header.points)?;
+    cells.extend(&mut reading, &bytes, header.points as usize);
     progress.advance(header.points);
     Ok(reading.into_points())
 }
 
-/// Takes `rows` points, whose fields lie at `places` in `bytes`.
-fn extend(reading: &mut Reading, header: &Header, bytes: &[u8], (places, packed): (&[Place], &[bool]), rows: usize) {
-    reading.extend(rows, |field, row| {
-        let Place { start, stride } = places[field];
-        header.fields[field].number(bytes, start + row * stride, packed[field])
-    });
+/// Where each cell's numbers lie in bytes: its field, its place, and whether it is a packed colour.
+struct Cells<'a>(Vec<(&'a Field, Place, bool)>);
+
+impl<'a> Cells<'a> {
+    /// Those of `columns`, of fields that lie at `places`.
+    fn of(header: &'a Header, columns: &Columns, places: &[Place]) -> Self {
+        let of_cell = |(index, cell): (usize, &Cell)| {
+            let (field, Place { start, stride }) = (&header.fields[cell.field], places[cell.field]);
+            let start = start + (field.size * cell.part) as usize;
+            (field, Place { start, stride }, columns.is_packed(index))
+        };
+        Self(columns.cells.iter().enumerate().map(of_cell).collect())
+    }
+
+    /// Takes `rows` points.
+    fn extend(&self, reading: &mut Reading, bytes: &[u8], rows: usize) {
+        reading.extend(rows, |cell, row| {
+            let (field, Place { start, stride }, packed) = self.0[cell];
+            field.number(bytes, start + row * stride, packed)
+        });
+    }
 }

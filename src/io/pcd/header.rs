@@ -39,6 +39,8 @@ pub(super) struct Field {
 pub(super) struct Header {
     pub(super) fields: Vec<Field>,
     pub(super) points: u64,
+    /// Width and height of an organised cloud.
+    pub(super) image: Option<[u64; 2]>,
     pub(super) data: Data,
     /// Bytes of a point.
     pub(super) row: u64,
@@ -76,11 +78,12 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
         let bad = |what: &str| Fault::Malformed(format!("line {number}: {what}: '{}'", shown(text.trim().as_bytes())));
         let data = raw.take(keyword, words).map_err(|what| bad(&what))?;
         if let Some(data) = data {
+            let image = raw.width.zip(raw.height).filter(|(_, height)| *height > 1).map(<[u64; 2]>::from);
             let (fields, points) = raw.finish().map_err(Fault::Malformed)?;
             let sizes = fields.iter().map(|field| field.size.checked_mul(field.count));
             let row = sizes.reduce(|a, b| a?.checked_add(b?)).flatten();
             let row = row.ok_or_else(|| Fault::Malformed("its points would be longer than any file".into()))?;
-            return Ok(Header { fields, points, data, row, lines: number, bytes, line_end });
+            return Ok(Header { fields, points, image, data, row, lines: number, bytes, line_end });
         }
     }
     Err(Fault::Malformed("the PCD header has no end".into()))

@@ -7,20 +7,23 @@ mod points;
 
 use std::io::BufReader;
 
+use crate::io::about::About;
 use crate::io::fault::{self, Fault};
-use crate::io::{Input, Points};
+use crate::io::{Input, Points, ReadOptions};
 use crate::{Progress, Result};
-use header::Data;
+use header::{Data, Header};
+use points::Columns;
 
 /// Reads the points of a PCD file: `ascii`, `binary` or `binary_compressed`.
 ///
 /// - `x y z` of any type become f64 positions; organised clouds mark missing points by coordinates that are not finite.
-/// - `normal_x normal_y normal_z` become normals.
+/// - `normal_x normal_y normal_z`, or one field of three numbers, become normals.
 /// - `rgb` or `rgba`, one number of 4 bytes whatever its type, become 8-bit sRGB codes: blue in the lowest byte, then green,
-///   red, and in `rgba` alpha, unless that is 0 in the whole file.
-/// - `intensity`, where there is no colour, becomes grey as in a LAS file.
+///   red, and in `rgba` alpha, unless that is 0 in the whole file. Some programs write these codes as the value of a float.
+/// - `red green blue` with or without `alpha`, or one field of three numbers or four, become colours by what they range over.
+/// - `intensity` becomes grey where there are no colours, or all are zero.
 ///
-/// Other fields are skipped. Coordinates stay relative to the sensor whose pose the line `VIEWPOINT` gives, as most programs
+/// Names are those that programs write; other fields are skipped. Coordinates stay relative to the sensor whose pose the line `VIEWPOINT` gives, as most programs
 /// take them.
 ///
 /// # Errors
@@ -28,18 +31,35 @@ use header::Data;
 /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where the
 /// header is not PCD's, `x`, `y` or `z` is missing, the file ends before the points that its header promises, a number in text
 /// is none, or compressed data cannot be decoded.
-pub fn read(input: Input, progress: &dyn Progress) -> Result<Points> {
+pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
     let Input { file, length, path, .. } = input;
     let in_file = |fault: Fault| fault.of(&path);
     let mut reader = BufReader::with_capacity(1 << 18, file);
     let header = header::read(&mut reader).map_err(in_file)?;
     let left = length.saturating_sub(header.bytes);
     progress.begin(&format!("reading {}", fault::name(&path)), header.points);
+    let columns = Columns::of(&header, options.ignore_alpha).map_err(in_file)?;
+    let about = options.describe.then(|| Box::new(about(&header, &columns)));
     let points = match header.data {
-        Data::Ascii => body::ascii(reader, &header, left, progress),
-        Data::Binary => body::binary(reader, &header, left, progress),
-        Data::Compressed => body::compressed(reader, &header, left, progress),
+        Data::Ascii => body::ascii(reader, (&header, columns), left, progress),
+        Data::Binary => body::binary(reader, (&header, columns), left, progress),
+        Data::Compressed => body::compressed(reader, (&header, columns), left, progress),
     };
     progress.end();
-    points.map_err(in_file)
+    let mut points = points.map_err(in_file)?;
+    points.raw.iter_mut().for_each(|raw| raw.name = fault::name(&path));
+    points.about = about;
+    Ok(points)
+}
+
+/// What a file says of itself.
+fn about(header: &Header, columns: &Columns) -> About {
+    let data = match header.data {
+        Data::Ascii => "text",
+        Data::Binary => "binary",
+        Data::Compressed => "binary, compressed",
+    };
+    let image = header.image.map_or(String::new(), |[width, height]| format!(", an image of {width} x {height}"));
+    let attributes = columns.attributes(header);
+    About { format: format!("PCD, {data}{image}"), attributes, ..About::default() }
 }

@@ -1,48 +1,119 @@
 //! What the fields of a PCD file mean, and the points they become.
 
-use super::header::{Field, Header};
+use super::header::{Field, Header, Scalar};
 use crate::io::Points;
+use crate::io::about::{Attribute, Role};
+use crate::io::attributes::{self, find, find_triple};
+use crate::io::color_range::{Kind, Number, Numbers, RawColors, Shades, Values};
 use crate::io::fault::{Fault, reserve};
-use crate::io::intensity;
-use crate::scene::Colors;
+use crate::io::values::finite;
 
-/// Which fields are used, by their index in the header.
+/// One number of a point: which field's, and which of the numbers of that.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Cell {
+    pub(super) field: usize,
+    pub(super) part: u64,
+}
+
+/// Which numbers are used: others are indices of these.
+#[derive(Clone, Debug)]
 pub(super) struct Columns {
+    pub(super) cells: Vec<Cell>,
     position: [usize; 3],
     normal: Option<[usize; 3]>,
-    /// The packed colour, and whether it has an alpha.
-    color: Option<(usize, bool)>,
-    /// Only where there is no colour.
+    color: Option<Color>,
     intensity: Option<usize>,
 }
 
+/// Where a colour is.
+#[derive(Clone, Copy, Debug)]
+enum Color {
+    /// In the four bytes of one number, of this type, and whether it has an alpha.
+    Packed(usize, Scalar, bool),
+    /// In numbers of this type, alpha of that one.
+    Channels([usize; 3], Option<usize>, [Number; 2]),
+}
+
+impl Field {
+    fn number_kind(&self) -> Number {
+        match (self.scalar, self.size) {
+            (Scalar::Float, _) => Number::Float,
+            (_, 1) => Number::Byte,
+            (_, 2) => Number::WORD,
+            (_, 4) => Number::Integer(u32::MAX.into()),
+            _ => Number::Integer(u64::MAX),
+        }
+    }
+}
+
 impl Columns {
-    pub(super) fn of(header: &Header) -> Result<Self, Fault> {
-        // In either case; a name that is written as here comes first.
-        let first =
-            |is: &dyn Fn(&str) -> bool| header.fields.iter().position(|field| is(&field.name) && field.count > 0);
-        let named =
-            |name: &str| first(&|given| given == name).or_else(|| first(&|given| given.eq_ignore_ascii_case(name)));
-        let triple = |names: [&str; 3]| Some([named(names[0])?, named(names[1])?, named(names[2])?]);
-        let Some(position) = triple(["x", "y", "z"]) else {
+    pub(super) fn of(header: &Header, ignore_alpha: bool) -> Result<Self, Fault> {
+        let fields = &header.fields;
+        // A field of no numbers has no name that could be meant.
+        let names = fields.iter().map(|field| if field.count > 0 { field.name.as_str() } else { "" });
+        let named = |name: &str| find(&[name], names.clone());
+        let mut cells = Vec::new();
+        let mut cell = |field: usize, part: u64| {
+            cells.push(Cell { field, part });
+            cells.len() - 1
+        };
+        let [Some(x), Some(y), Some(z)] = ["x", "y", "z"].map(named) else {
             let missing: Vec<&str> = ["x", "y", "z"].into_iter().filter(|name| named(name).is_none()).collect();
             return Err(Fault::Malformed(format!("its points have no field {}", missing.join(", "))));
         };
-        let packed = |name: &str| named(name).filter(|&index| header.fields[index].size == 4);
-        let color = packed("rgba").map(|rgba| (rgba, true)).or_else(|| Some((packed("rgb")?, false)));
-        let intensity = named("intensity").filter(|_| color.is_none());
-        Ok(Self { position, normal: triple(["normal_x", "normal_y", "normal_z"]), color, intensity })
+        let position = [x, y, z].map(|field| cell(field, 0));
+        let vector = |names_of: &[&str]| find(names_of, names.clone()).filter(|&field| fields[field].count >= 3);
+        let normal = match (find_triple(attributes::NORMAL, names.clone()), vector(attributes::NORMAL_VECTOR)) {
+            (Some(normal), _) => Some(normal.map(|field| cell(field, 0))),
+            (None, Some(field)) => Some([0, 1, 2].map(|part| cell(field, part))),
+            (None, None) => None,
+        };
+        let packed = |name: &str| named(name).filter(|&field| fields[field].size == 4 && fields[field].count == 1);
+        let color = if let Some((field, has_alpha)) =
+            packed("rgba").map(|rgba| (rgba, !ignore_alpha)).or_else(|| Some((packed("rgb")?, false)))
+        {
+            Some(Color::Packed(cell(field, 0), fields[field].scalar, has_alpha))
+        } else if let Some(channels) = find_triple(attributes::COLOR, names.clone()) {
+            let alpha = find(attributes::ALPHA, names.clone()).filter(|_| !ignore_alpha);
+            let kind = |field: Option<usize>| field.map_or(Number::Byte, |field| fields[field].number_kind());
+            let widest =
+                channels.into_iter().max_by_key(|&field| (fields[field].scalar == Scalar::Float, fields[field].size));
+            let kinds = [kind(widest), kind(alpha)];
+            Some(Color::Channels(channels.map(|field| cell(field, 0)), alpha.map(|field| cell(field, 0)), kinds))
+        } else {
+            vector(attributes::COLOR_VECTOR).map(|field| {
+                let channels = [0, 1, 2].map(|part| cell(field, part));
+                let alpha = (fields[field].count > 3 && !ignore_alpha).then(|| cell(field, 3));
+                Color::Channels(channels, alpha, [fields[field].number_kind(); 2])
+            })
+        };
+        let intensity = find(attributes::INTENSITY, names.clone()).map(|field| cell(field, 0));
+        Ok(Self { cells, position, normal, color, intensity })
     }
 
-    /// The fields that are used.
-    pub(super) fn used(&self) -> impl Iterator<Item = usize> {
-        let color = self.color.map(|(color, _)| color);
-        self.position.into_iter().chain(self.normal.into_iter().flatten()).chain(color).chain(self.intensity)
+    /// Whether a cell's four bytes are colours, whatever the type of its number.
+    pub(super) fn is_packed(&self, cell: usize) -> bool {
+        matches!(self.color, Some(Color::Packed(packed, ..)) if packed == cell)
     }
 
-    /// Whether a field's four bytes are colours, whatever the type of its number.
-    pub(super) fn is_packed(&self, field: usize) -> bool {
-        self.color.is_some_and(|(color, _)| color == field)
+    /// What a point has, and what of it is used.
+    pub(super) fn attributes(&self, header: &Header) -> Vec<Attribute> {
+        let colors: Vec<usize> = match self.color {
+            Some(Color::Packed(cell, ..)) => vec![cell],
+            Some(Color::Channels(channels, alpha, _)) => channels.into_iter().chain(alpha).collect(),
+            None => Vec::new(),
+        };
+        let of_field = |(field, own): (usize, &Field)| {
+            let cell = self.cells.iter().position(|cell| cell.field == field);
+            let role = match cell {
+                Some(cell) if colors.contains(&cell) => Role::Color,
+                Some(cell) if self.intensity == Some(cell) => Role::Intensity,
+                _ => Role::Other,
+            };
+            Attribute::new(own.name.clone(), cell.is_some(), role)
+        };
+        // Padding has the name of nothing.
+        header.fields.iter().enumerate().filter(|(_, field)| field.name != "_").map(of_field).collect()
     }
 }
 
@@ -52,60 +123,131 @@ pub(super) struct Reading {
     positions: Vec<[f64; 3]>,
     normals: Vec<[f32; 3]>,
     codes: Vec<[u8; 4]>,
-    intensities: Vec<f32>,
+    floats: Vec<[f32; 4]>,
+    /// Intensities, as long as no colour says anything.
+    shades: Vec<f32>,
+    colored: bool,
+    /// The intensities are integers.
+    integer: bool,
 }
 
 impl Reading {
     /// Room for `rows`, which must be a number that the file's length allows.
-    pub(super) fn with_capacity(columns: Columns, rows: u64) -> Result<Self, Fault> {
+    pub(super) fn with_capacity(columns: Columns, header: &Header, rows: u64) -> Result<Self, Fault> {
         let (mut positions, mut normals) = (Vec::new(), Vec::new());
-        let (mut codes, mut intensities) = (Vec::new(), Vec::new());
         let of = |used: bool| if used { rows } else { 0 };
         reserve(&mut positions, rows)?;
         reserve(&mut normals, of(columns.normal.is_some()))?;
-        reserve(&mut codes, of(columns.color.is_some()))?;
-        reserve(&mut intensities, of(columns.intensity.is_some()))?;
-        Ok(Self { columns, positions, normals, codes, intensities })
+        let (mut codes, mut floats, mut shades) = (Vec::new(), Vec::new(), Vec::new());
+        let has_floats = matches!(columns.color, Some(Color::Channels(..)));
+        reserve(&mut codes, of(columns.color.is_some() && !has_floats))?;
+        reserve(&mut floats, of(has_floats))?;
+        reserve(&mut shades, of(columns.intensity.is_some() && columns.color.is_none()))?;
+        let field = columns.intensity.map(|cell| &header.fields[columns.cells[cell].field]);
+        let integer = field.is_some_and(|field| field.scalar != Scalar::Float);
+        Ok(Self { columns, positions, normals, codes, floats, shades, colored: false, integer })
     }
 
     pub(super) fn len(&self) -> u64 {
         self.positions.len() as u64
     }
 
-    /// Takes `rows` points; `value` gives a field's first number in each, of a packed colour its bits.
+    /// Takes `rows` points; `value` gives the number of a cell in each, of a packed colour its bits.
     pub(super) fn extend(&mut self, rows: usize, value: impl Fn(usize, usize) -> f64) {
         let columns = &self.columns;
-        self.positions.extend((0..rows).map(|row| columns.position.map(|field| value(field, row))));
+        self.positions.extend((0..rows).map(|row| columns.position.map(|cell| value(cell, row))));
         if let Some(normal) = columns.normal {
-            self.normals.extend((0..rows).map(|row| normal.map(|field| value(field, row) as f32)));
+            self.normals.extend((0..rows).map(|row| normal.map(|cell| value(cell, row) as f32)));
         }
-        if let Some((color, _)) = columns.color {
-            self.codes.extend((0..rows).map(|row| {
-                let [blue, green, red, alpha] = (value(color, row) as u32).to_le_bytes();
-                [red, green, blue, alpha]
-            }));
+        let mut colored = false;
+        match columns.color {
+            Some(Color::Packed(color, ..)) => {
+                let before = self.codes.len();
+                self.codes.extend((0..rows).map(|row| {
+                    let [blue, green, red, alpha] = (value(color, row) as u32).to_le_bytes();
+                    [red, green, blue, alpha]
+                }));
+                colored = self.codes[before..].iter().any(|[r, g, b, _]| [*r, *g, *b] != [0; 3]);
+            }
+            Some(Color::Channels(channels, alpha, [kind, alpha_kind])) => {
+                let before = self.floats.len();
+                self.floats.extend((0..rows).map(|row| {
+                    let [r, g, b] = channels.map(|cell| unsigned(value(cell, row), kind));
+                    [r, g, b, alpha.map_or(1.0, |cell| unsigned(value(cell, row), alpha_kind))]
+                }));
+                colored = self.floats[before..].iter().any(|[r, g, b, _]| [*r, *g, *b] != [0.0; 3]);
+            }
+            None => {}
         }
-        if let Some(intensity) = columns.intensity {
-            self.intensities.extend((0..rows).map(|row| value(intensity, row) as f32));
+        if colored && !self.colored {
+            (self.colored, self.shades) = (true, Vec::new());
+        }
+        if let Some(intensity) = columns.intensity.filter(|_| !self.colored) {
+            self.shades.extend((0..rows).map(|row| value(intensity, row) as f32));
         }
     }
 
     pub(super) fn into_points(mut self) -> Points {
-        let columns = self.columns;
-        if let Some((_, has_alpha)) = columns.color
-            && !(has_alpha && self.codes.iter().any(|code| code[3] > 0))
-        {
-            self.codes.iter_mut().for_each(|code| code[3] = 255);
-        }
+        let count = self.positions.len();
+        let colors = match self.columns.color {
+            Some(Color::Packed(_, scalar, has_alpha)) => {
+                if scalar == Scalar::Float {
+                    unpack_values(&mut self.codes);
+                }
+                if !(has_alpha && self.codes.iter().any(|code| code[3] > 0)) {
+                    self.codes.iter_mut().for_each(|code| code[3] = 255);
+                }
+                let alpha = has_alpha.then_some(Number::Byte);
+                Some(Numbers { values: Values::Bytes(self.codes), kind: Kind::of(Number::Byte), alpha })
+            }
+            Some(Color::Channels(_, alpha, [kind, alpha_kind])) => {
+                // Bytes are judged as what they are: codes.
+                let is_byte = kind == Number::Byte && (alpha.is_none() || alpha_kind == Number::Byte);
+                let code = |[r, g, b, a]: &[f32; 4]| {
+                    [*r as u8, *g as u8, *b as u8, if alpha.is_some() { *a as u8 } else { 255 }]
+                };
+                let values = match is_byte {
+                    true => Values::Bytes(self.floats.iter().map(code).collect()),
+                    false => Values::Floats(self.floats),
+                };
+                let kind = if is_byte || kind != Number::Byte { kind } else { Number::WORD };
+                Some(Numbers { values, kind: Kind::of(kind), alpha: alpha.map(|_| alpha_kind) })
+            }
+            None => None,
+        };
+        let shades = self.columns.intensity.filter(|_| !self.colored);
+        let shades = shades.map(|_| Shades::Floats { values: self.shades, integer: self.integer });
+        let raw = (colors.is_some() || shades.is_some()).then(|| Box::new(RawColors::of_run(count, colors, shades)));
         Points {
             positions: self.positions,
-            normals: columns.normal.map(|_| self.normals),
-            colors: match columns.color {
-                Some(_) => Some(Colors::Srgb8(self.codes)),
-                None => intensity::grey(&intensity::codes(&self.intensities)),
-            },
+            normals: self.columns.normal.map(|_| self.normals),
+            raw,
             ..Points::default()
         }
+    }
+}
+
+/// A number of a colour: signed ones are unsigned ones that a program took for signed.
+fn unsigned(value: f64, kind: Number) -> f32 {
+    match kind {
+        Number::Byte if value < 0.0 => (value + 256.0) as f32,
+        Number::WORD if value < 0.0 => (value + 65536.0) as f32,
+        _ => finite(value),
+    }
+}
+
+/// Some programs write a packed colour as the value of a float and not as its bits: then all of them are whole numbers, which bits of
+/// colours hardly are.
+fn unpack_values(codes: &mut [[u8; 4]]) {
+    let value = |[red, green, blue, alpha]: [u8; 4]| f32::from_le_bytes([blue, green, red, alpha]);
+    let is_whole = |value: f32| (0.0..=u32::MAX as f32).contains(&value) && value.fract() == 0.0;
+    let all_whole = codes.iter().all(|code| is_whole(value(*code)));
+    if !all_whole || codes.iter().all(|code| value(*code) == 0.0) {
+        return;
+    }
+    for code in codes {
+        let [blue, green, red, alpha] = (value(*code) as u32).to_le_bytes();
+        *code = [red, green, blue, alpha];
     }
 }
 
@@ -119,7 +261,7 @@ pub(super) struct Place {
 impl Field {
     /// The number at `at`, little-endian; of a packed colour its bits.
     pub(super) fn number(&self, bytes: &[u8], at: usize, packed: bool) -> f64 {
-        use super::header::Scalar::{Float, Signed, Unsigned};
+        use Scalar::{Float, Signed, Unsigned};
         macro_rules! number {
             ($type:ty) => {
                 // Places lie within the bytes.

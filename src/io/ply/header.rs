@@ -1,5 +1,6 @@
 //! The header of a PLY file (Turk 1994): encoding, elements and their properties.
 
+use super::vertex::is_tree;
 use crate::io::Up;
 use crate::io::fault::Fault;
 use crate::io::values::{BYTE_ORDER_MARK, line_end, shown};
@@ -80,6 +81,16 @@ pub(super) struct Element {
     pub(super) name: String,
     pub(super) count: u64,
     pub(super) properties: Vec<Property>,
+    pub(super) tints: Tints,
+}
+
+/// How the colours of rows are read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Tints {
+    /// As epsplat writes them: what floats range over is known.
+    pub(super) own: bool,
+    /// Without alphas.
+    pub(super) ignore_alpha: bool,
 }
 
 /// Everything before the values.
@@ -169,7 +180,12 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
                     return Err(malformed("an element needs a name and a count"));
                 };
                 let count = count.parse().map_err(|_| malformed("the element's count is not a number of rows"))?;
-                elements.push(Element { name: name.to_owned(), count, properties: Vec::new() });
+                elements.push(Element {
+                    name: name.to_owned(),
+                    count,
+                    properties: Vec::new(),
+                    tints: Tints::default(),
+                });
             }
             Some("property") => {
                 let property = property(words).ok_or_else(|| malformed("not a property"))?;
@@ -178,6 +194,8 @@ pub(super) fn read(reader: &mut impl BufRead) -> Result<Header, Fault> {
             }
             Some("end_header") => {
                 let encoding = encoding.ok_or_else(|| malformed("the PLY header has no format line"))?;
+                let own = comments.own || elements.iter().any(is_tree);
+                elements.iter_mut().for_each(|element| element.tints.own = own);
                 return Ok(Header { encoding, elements, comments, lines: number, line_end });
             }
             Some(_) => return Err(malformed("not a PLY header line")),

@@ -39,6 +39,7 @@ mod levels;
 mod packed;
 mod read;
 mod rows;
+mod tint;
 mod vertex;
 mod whole;
 mod write;

@@ -2,10 +2,12 @@
 
 use super::contents::Contents;
 use super::faces::{Faces, Triangles};
-use super::header::{self, Encoding};
+use super::header::{self, Element, Encoding};
+use super::vertex::Layout;
 use super::{ascii, binary, gaussian, packed};
+use crate::io::about::About;
 use crate::io::fault::{self, Fault};
-use crate::io::{Input, Material, Mesh, Points, Texture};
+use crate::io::{Input, Material, Mesh, Points, ReadOptions, Texture, settle_colors};
 use crate::io::{closed, triangles};
 use crate::scene::Whole;
 use crate::{Progress, Result};
@@ -17,12 +19,13 @@ use std::sync::Arc;
 /// Reads the vertices of a PLY file: ASCII, or binary of either byte order.
 ///
 /// - `x y z` of any scalar type become f64 positions.
-/// - `nx ny nz` become normals, `radius` (or else `scale`) radii in world units.
+/// - `nx ny nz` become normals, `radius` (or else `scale`) radii in world units, by these and other names that programs write.
 /// - `sx sy sz` and `tx ty tz`, all six, become half-axes in world units.
 /// - `texture_u texture_v` (also `texcoord_u texcoord_v`, `s t`, `u v`) become texture coordinates.
 /// - `red green blue` (also `r g b`, `diffuse_red ...`) with optional `alpha`: `uchar` are 8-bit sRGB codes and stay so;
-///   `ushort` are 16-bit sRGB codes and become linear light; `float` and `double` are linear light as they are; other
-///   integers are taken for 8-bit codes. Alpha is straight and linear in each case.
+///   what other types range over, all numbers of a scene tell together ([`RawColors`](crate::io::RawColors)): `float` and
+///   `double` of 0 to 1 are linear light as they are. Alpha is straight and linear in each case.
+/// - `intensity` (also `scalar_Intensity ...`) becomes grey where there are no colours, or all are zero.
 ///
 /// In a mesh, a list `vertex_indices` (or `vertex_index`) in an element `face` or `tristrips`, vertices without normals and
 /// radii get them from the triangles around them, as in an OBJ file: normals weighted by area, and radii with which disks
@@ -44,8 +47,8 @@ use std::sync::Arc;
 /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where
 /// the header is not PLY's, `x`, `y` or `z` is missing, the file ends before the vertices or faces that its header
 /// promises, a number in text is none, a list has a negative length, or a face names a vertex that does not exist.
-pub fn read(input: Input, flatten: bool, progress: &dyn Progress) -> Result<Points> {
-    let (mut points, faces, _) = contents(input, (false, flatten), progress)?;
+pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
+    let (mut points, faces, _) = contents(input, false, options, progress)?;
     if faces.triangles.is_empty() {
         return Ok(points);
     }
@@ -73,16 +76,18 @@ pub fn read(input: Input, flatten: bool, progress: &dyn Progress) -> Result<Poin
 /// # Errors
 ///
 /// As [`read`].
-pub fn read_mesh(input: Input, progress: &dyn Progress) -> Result<Mesh> {
+pub fn read_mesh(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Mesh> {
     let folder = input.path.parent().unwrap_or(Path::new("")).to_owned();
-    let (points, faces, textures) = contents(input, (true, true), progress)?;
+    let options = ReadOptions { flatten: true, ..*options };
+    let (mut points, faces, textures) = contents(input, true, &options, progress)?;
+    settle_colors(std::slice::from_mut(&mut points));
+    let mut notes = std::mem::take(&mut points.notes);
     let points = points.in_light();
     let Triangles { triangles, texture, texture_numbers } = faces;
     fn corners<T: Copy>(triangles: &[[u32; 3]], of_vertices: &[T]) -> Vec<[T; 3]> {
         triangles.iter().map(|corners| corners.map(|vertex| of_vertices[vertex as usize])).collect()
     }
     let texture = texture.or_else(|| points.texture.map(|texture| corners(&triangles, &texture)));
-    let mut notes = Vec::new();
     let mut material = |name: String| {
         let path = beside(&folder, &name);
         let read = Texture::read(&path);
@@ -105,6 +110,17 @@ pub fn read_mesh(input: Input, progress: &dyn Progress) -> Result<Mesh> {
     })
 }
 
+/// What a file says of itself.
+fn about(header: &header::Header, vertex: &Element) -> Result<About, Fault> {
+    let encoding = match header.encoding {
+        Encoding::Ascii => "text",
+        Encoding::LittleEndian => "binary, little-endian",
+        Encoding::BigEndian => "binary, big-endian",
+    };
+    let attributes = Layout::of(vertex)?.attributes(vertex);
+    Ok(About { format: format!("PLY, {encoding}"), attributes, ..About::default() })
+}
+
 /// The textures, and the mesh, that the PLY file at `path` names.
 pub(in crate::io) fn companions(path: &Path) -> Vec<PathBuf> {
     let header = File::open(path).map_err(Fault::Io).and_then(|file| header::read(&mut BufReader::new(file)));
@@ -119,16 +135,18 @@ fn beside(folder: &Path, name: &str) -> PathBuf {
 }
 
 /// The vertices, the triangles, which name vertices that exist, and the names of textures. With `surface`, faces may have texture
-/// coordinates; with `flatten` Gaussians may be thick.
+/// coordinates. Colours are as the file has them.
 fn contents(
     input: Input,
-    (surface, flatten): (bool, bool),
+    surface: bool,
+    options: &ReadOptions,
     progress: &dyn Progress,
 ) -> Result<(Points, Triangles, Vec<String>)> {
     let Input { file, length, path, .. } = input;
     let in_file = |fault: Fault| fault.of(&path);
     let mut reader = BufReader::with_capacity(1 << 16, file);
-    let header = header::read(&mut reader).map_err(in_file)?;
+    let mut header = header::read(&mut reader).map_err(in_file)?;
+    header.elements.iter_mut().for_each(|element| element.tints.ignore_alpha = options.ignore_alpha);
     let Some(vertex) = header.elements.iter().find(|element| element.name == "vertex") else {
         return Err(in_file(Fault::Malformed("its header has no element 'vertex'".into())));
     };
@@ -145,7 +163,11 @@ fn contents(
     };
     progress.end();
     let Contents { mut points, faces, tree, whole } = contents.map_err(in_file)?;
-    gaussian::check(&points, flatten).map_err(in_file)?;
+    gaussian::check(&points, options.flatten).map_err(in_file)?;
+    points.raw.iter_mut().for_each(|raw| raw.name = fault::name(&path));
+    if options.describe {
+        points.about = Some(Box::new(about(&header, vertex).map_err(in_file)?));
+    }
     points.up = header.comments.up;
     points.closed = header.comments.closed;
     points.unsided = header.comments.unsided;

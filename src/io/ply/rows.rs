@@ -13,8 +13,9 @@ use super::header::{self, Comments, Element, Encoding, Kind};
 use super::vertex::{Layout, is_tree};
 use super::write::Properties;
 use super::write_scene::vertex;
+use crate::io::color_range::Survey;
 use crate::io::fault::Fault;
-use crate::io::{Format, Input, Points};
+use crate::io::{ColorRules, Format, Input, Points};
 use crate::scene::Scene;
 use crate::{Error, Progress, Result};
 
@@ -37,6 +38,8 @@ pub struct Rows {
     /// How they are written, if they are.
     written: Option<Properties>,
     comments: Comments,
+    /// What the numbers of colours mean.
+    rules: ColorRules,
 }
 
 impl Rows {
@@ -46,7 +49,7 @@ impl Rows {
     /// # Errors
     ///
     /// [`Error::Read`] where the system cannot read, [`Error::Malformed`] where the header is not PLY's, or promises more points than there are.
-    pub fn open(input: Input) -> Result<Option<Self>> {
+    pub fn open(input: Input, ignore_alpha: bool) -> Result<Option<Self>> {
         let Input { file, length, path, format } = input;
         if format != Format::Ply {
             return Ok(None);
@@ -57,7 +60,8 @@ impl Rows {
             let start = reader.stream_position()?;
             Ok((header, start))
         };
-        let (header, start) = opened().map_err(|fault: Fault| fault.of(&path))?;
+        let (mut header, start) = opened().map_err(|fault: Fault| fault.of(&path))?;
+        header.elements.iter_mut().for_each(|element| element.tints.ignore_alpha = ignore_alpha);
         let other =
             header.elements.iter().skip(1).any(|element| is_tree(element) || Faces::are(element) && element.count > 0);
         let Some(element) = header.elements.into_iter().next().filter(|first| first.name == "vertex" && !other) else {
@@ -77,7 +81,19 @@ impl Rows {
         }
         let comments = header.comments;
         let sound = layout.is_disk() || element.count == 0;
-        Ok(sound.then_some(Self { file: None, path, element, layout, start, size, big, written: None, comments }))
+        let rules = ColorRules::default();
+        Ok(sound.then_some(Self {
+            file: None,
+            path,
+            element,
+            layout,
+            start,
+            size,
+            big,
+            written: None,
+            comments,
+            rules,
+        }))
     }
 
     /// No rows yet, with what `properties` name, in a file without a name in `folder`, which goes with this; errors call it `path`.
@@ -95,7 +111,8 @@ impl Rows {
         let size = layout.row_size as u64;
         let (file, path) = (Some(Mutex::new(file)), path.to_owned());
         let written = Some(properties);
-        Ok(Self { file, path, element, layout, start: 0, size, big: false, written, comments: Comments::default() })
+        let (comments, rules) = (Comments::default(), ColorRules::default());
+        Ok(Self { file, path, element, layout, start: 0, size, big: false, written, comments, rules })
     }
 
     /// How many there are.
@@ -151,13 +168,57 @@ impl Rows {
     ///
     /// [`Error::Malformed`] if these are none.
     pub fn points(&self, bytes: &[u8]) -> Result<Points> {
+        let mut points = self.raw(bytes)?;
+        // What is odd of a piece is not odd of all.
+        self.rules.clone().settle(std::slice::from_mut(&mut points));
+        points.notes.clear();
+        let Comments { up, closed, unsided, .. } = self.comments;
+        Ok(Points { up, closed, unsided, ..points })
+    }
+
+    /// The same with colours as the file has them.
+    fn raw(&self, bytes: &[u8]) -> Result<Points> {
         let read = match self.big {
             true => binary::vertices_in::<true>(bytes, &self.layout),
             false => binary::vertices_in::<false>(bytes, &self.layout),
         };
-        let (points, _) = read.map_err(|fault| fault.of(&self.path))?;
-        let Comments { up, closed, unsided, .. } = self.comments;
-        Ok(Points { up, closed, unsided, ..points })
+        read.map(|(points, _)| points).map_err(|fault| fault.of(&self.path))
+    }
+
+    /// Settles what the colours of files mean that are one scene, by all rows where not each tells it for itself.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Read`] where the system cannot read, [`Error::Malformed`] where rows are none.
+    pub fn settle_colors(files: &mut [Self]) -> Result<()> {
+        let (mut survey, mut rules) = (Survey::default(), ColorRules::default());
+        for file in files.iter_mut().filter(|file| file.layout.is_judged_whole()) {
+            file.settle_looks()?;
+            for piece in file.pieces(TOGETHER) {
+                if let Some(raw) = &file.raw(&file.bytes(piece)?)?.raw {
+                    survey.add(raw);
+                }
+            }
+        }
+        rules.decide(&survey);
+        files.iter_mut().for_each(|file| file.rules.clone_from(&rules));
+        Ok(())
+    }
+
+    /// Settles whether colours show, or intensities where all of them are zero.
+    fn settle_looks(&mut self) -> Result<()> {
+        if self.layout.color.is_none() || self.layout.intensity.is_none() {
+            return Ok(());
+        }
+        let mut colored = false;
+        for piece in self.pieces(TOGETHER) {
+            colored = self.raw(&self.bytes(piece)?)?.raw.is_some_and(|raw| raw.is_colored());
+            if colored {
+                break;
+            }
+        }
+        self.layout.show(colored);
+        Ok(())
     }
 
     /// The bytes of some surfels of `scene`, as rows that are written.

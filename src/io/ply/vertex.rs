@@ -1,11 +1,13 @@
 //! What the properties of a PLY vertex mean, and the points they become.
 
 use super::gaussian::{GaussianLayout, Gaussians};
-use super::header::{Element, Kind, Scalar};
+use super::header::{self, Element, Scalar, Tints};
+use super::tint::{Tint, code, number};
+use crate::io::about::{Attribute, Role};
+use crate::io::attributes::{self, find, find_triple};
+use crate::io::color_range::{Kind, Number, Numbers, RawColors, Shades, Values};
 use crate::io::fault::{Fault, reserve};
-use crate::io::values::{SRGB16_TO_LINEAR, finite};
 use crate::io::{Points, TreeRow};
-use crate::scene::color::SRGB8_TO_LINEAR;
 use crate::scene::{Cap, Clip, Colors};
 
 /// A property that is used, by where it lies among the row's numbers.
@@ -16,43 +18,6 @@ pub(super) struct Column {
     /// Bytes from the start of a binary row; lists do not count.
     pub(super) offset: usize,
     pub(super) scalar: Scalar,
-}
-
-/// How a colour channel is coded: by its type.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Coding {
-    /// sRGB, 0 to 255; any integer type of another size is taken to hold such codes.
-    Code8,
-    /// sRGB, 0 to 65535.
-    Code16,
-    /// Linear light.
-    Linear,
-}
-
-impl Coding {
-    fn of(scalar: Scalar) -> Self {
-        match scalar {
-            Scalar::U16 => Self::Code16,
-            Scalar::F32 | Scalar::F64 => Self::Linear,
-            _ => Self::Code8,
-        }
-    }
-
-    fn light(self, value: f64) -> f32 {
-        match self {
-            Self::Code8 => SRGB8_TO_LINEAR[usize::from(value as u8)],
-            Self::Code16 => SRGB16_TO_LINEAR[usize::from(value as u16)],
-            Self::Linear => finite(value),
-        }
-    }
-
-    fn alpha(self, value: f64) -> f32 {
-        match self {
-            Self::Code8 => f32::from(value as u8) / 255.0,
-            Self::Code16 => f32::from(value as u16) / 65535.0,
-            Self::Linear => finite(value),
-        }
-    }
 }
 
 /// Where a row's attributes are: each number an index into `columns`.
@@ -69,8 +34,12 @@ pub(super) struct Layout {
     axes: Option<[[usize; 3]; 2]>,
     clip: Option<[usize; 6]>,
     cap: Option<[usize; 3]>,
-    color: Option<[(usize, Coding); 3]>,
-    alpha: Option<(usize, Coding)>,
+    pub(super) color: Option<[usize; 3]>,
+    alpha: Option<usize>,
+    tint: Tint,
+    pub(super) intensity: Option<usize>,
+    /// Colours are what they are, whatever other files have.
+    own: bool,
     texture: Option<[usize; 2]>,
     texture_number: Option<usize>,
     texture_slopes: Option<[[usize; 3]; 2]>,
@@ -110,7 +79,7 @@ fn scalars_of(element: &Element) -> Vec<(&str, Column)> {
     let mut places: Vec<(&str, Column)> = Vec::new();
     let mut offset = 0;
     for property in &element.properties {
-        if let Kind::Scalar(scalar) = property.kind {
+        if let header::Kind::Scalar(scalar) = property.kind {
             places.push((&property.name, Column { slot: places.len(), offset, scalar }));
             offset += scalar.size();
         }
@@ -146,12 +115,18 @@ impl Layout {
             let position = [x, y, z];
             return Ok(Self { columns, scalars, row_size, position, gaussian, ..Self::default() });
         }
-        let mut triple = |names: [&[&str]; 3]| Some([column(names[0])?, column(names[1])?, column(names[2])?]);
-        let normal = triple([&["nx", "normal_x"], &["ny", "normal_y"], &["nz", "normal_z"]]);
-        let color =
-            triple([&["red", "r", "diffuse_red"], &["green", "g", "diffuse_green"], &["blue", "b", "diffuse_blue"]]);
-        let alpha = color.and_then(|_| column(&["alpha", "a", "diffuse_alpha"]));
-        let radius = column(&["radius", "scale"]);
+        let names = places.iter().map(|(name, _)| *name);
+        let Tints { own, ignore_alpha } = vertex.tints;
+        let found = |slot: usize| [places[slot].0];
+        let normal = find_triple(attributes::NORMAL, names.clone());
+        let normal = normal.and_then(|slots| each(slots.map(|slot| column(&found(slot)))));
+        let color = find_triple(attributes::COLOR, names.clone());
+        let color = color.and_then(|slots| each(slots.map(|slot| column(&found(slot)))));
+        let alpha = color.filter(|_| !ignore_alpha).and_then(|_| find(attributes::ALPHA, names.clone()));
+        let alpha = alpha.and_then(|slot| column(&found(slot)));
+        let intensity = find(attributes::INTENSITY, names.clone()).filter(|_| !own);
+        let intensity = intensity.and_then(|slot| column(&found(slot)));
+        let radius = find(attributes::RADIUS, names.clone()).and_then(|slot| column(&found(slot)));
         let mut axis = |names: [&str; 3]| Some([column(&names[..1])?, column(&names[1..2])?, column(&names[2..])?]);
         let axes = axis(["sx", "sy", "sz"]).zip(axis(["tx", "ty", "tz"])).map(<[_; 2]>::from);
         let cap = axes.and_then(|_| axis(CAP_NAMES));
@@ -167,8 +142,8 @@ impl Layout {
             let found: Vec<usize> = names.iter().filter_map(|name| column(&[name])).collect();
             <[usize; 4]>::try_from(found).ok()
         });
-        let coded = |index: usize| (index, Coding::of(columns[index].scalar));
-        let (color, alpha) = (color.map(|color| color.map(coded)), alpha.map(coded));
+        let scalar = |column: usize| columns[column].scalar;
+        let tint = color.map(|color| Tint::of(color.map(scalar), alpha.map(scalar), own)).unwrap_or_default();
         Ok(Self {
             columns,
             scalars,
@@ -181,6 +156,9 @@ impl Layout {
             cap,
             color,
             alpha,
+            tint,
+            intensity,
+            own,
             texture,
             texture_number,
             texture_slopes: texture_slopes.filter(|_| texture.is_some()),
@@ -200,10 +178,41 @@ impl Layout {
         (self.axes.is_some() || round) && self.gaussian.is_none() && self.texture.is_none()
     }
 
-    /// Whether colours stay the 8-bit codes they are in the file.
-    fn is_srgb8(&self) -> bool {
-        self.color.iter().flatten().chain(&self.alpha).all(|(_, coding)| *coding == Coding::Code8)
+    /// Whether all rows of the file tell what colours are, and not each for itself.
+    pub(super) fn is_judged_whole(&self) -> bool {
+        self.gaussian.is_none() && !self.own && (self.intensity.is_some() || matches!(self.tint, Tint::Numbers(..)))
     }
+
+    /// Lets either colours or intensities show of all rows, where a row has both.
+    pub(super) fn show(&mut self, colors: bool) {
+        if colors {
+            self.intensity = None;
+        } else {
+            (self.color, self.alpha) = (None, None);
+        }
+    }
+
+    /// What a row has, and what of it is used.
+    pub(super) fn attributes(&self, vertex: &Element) -> Vec<Attribute> {
+        let mut slots = 0..;
+        let attribute = |property: &header::Property| {
+            let slot = if let header::Kind::Scalar(_) = property.kind { slots.next() } else { None };
+            let column = slot.and_then(|slot| self.columns.iter().position(|column| column.slot == slot));
+            let is_color = |column: &usize| self.color.iter().flatten().chain(&self.alpha).any(|own| own == column);
+            let role = match column {
+                Some(column) if is_color(&column) => Role::Color,
+                Some(column) if self.intensity == Some(column) => Role::Intensity,
+                _ => Role::Other,
+            };
+            Attribute::new(property.name.clone(), column.is_some(), role)
+        };
+        vertex.properties.iter().map(attribute).collect()
+    }
+}
+
+/// All three, if there are three.
+fn each([a, b, c]: [Option<usize>; 3]) -> Option<[usize; 3]> {
+    Some([a?, b?, c?])
 }
 
 /// The points of a file while they are being read.
@@ -220,7 +229,12 @@ pub(super) struct Vertices<'a> {
     texture_numbers: Vec<u32>,
     texture_slopes: Vec<[[f32; 3]; 2]>,
     srgb8: Vec<[u8; 4]>,
-    linear: Vec<[f32; 4]>,
+    /// Linear light, or other numbers.
+    floats: Vec<[f32; 4]>,
+    /// Intensities, as long as no colour says anything.
+    shades: Vec<f32>,
+    /// Some colour is not zero.
+    colored: bool,
     gaussians: Option<Gaussians<'a>>,
     rows: Vec<TreeRow>,
 }
@@ -231,7 +245,7 @@ impl<'a> Vertices<'a> {
         let (mut positions, mut normals, mut radii) = (Vec::new(), Vec::new(), Vec::new());
         let (mut axes, mut clips, mut caps, mut texture) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let (mut texture_numbers, mut texture_slopes) = (Vec::new(), Vec::new());
-        let (mut srgb8, mut linear) = (Vec::new(), Vec::new());
+        let (mut srgb8, mut floats, mut shades) = (Vec::new(), Vec::new(), Vec::new());
         reserve(&mut positions, rows)?;
         reserve(&mut normals, if layout.normal.is_some() { rows } else { 0 })?;
         reserve(&mut radii, if layout.radius.is_some() { rows } else { 0 })?;
@@ -241,13 +255,14 @@ impl<'a> Vertices<'a> {
         reserve(&mut texture, if layout.texture.is_some() { rows } else { 0 })?;
         reserve(&mut texture_numbers, if layout.texture_number.is_some() { rows } else { 0 })?;
         reserve(&mut texture_slopes, if layout.texture_slopes.is_some() { rows } else { 0 })?;
-        let (codes, lights) = match (layout.color.is_some(), layout.is_srgb8()) {
+        let (codes, others) = match (layout.color.is_some(), layout.tint) {
             (false, _) => (0, 0),
-            (true, true) => (rows, 0),
-            (true, false) => (0, rows),
+            (true, Tint::Codes) => (rows, 0),
+            (true, _) => (0, rows),
         };
         reserve(&mut srgb8, codes)?;
-        reserve(&mut linear, lights)?;
+        reserve(&mut floats, others)?;
+        reserve(&mut shades, if layout.intensity.is_some() && layout.color.is_none() { rows } else { 0 })?;
         let mut tree = Vec::new();
         reserve(&mut tree, if layout.node.is_some() { rows } else { 0 })?;
         let gaussians = layout.gaussian.as_ref().map(|own| Gaussians::with_capacity(own, rows)).transpose()?;
@@ -263,7 +278,9 @@ impl<'a> Vertices<'a> {
             texture_numbers,
             texture_slopes,
             srgb8,
-            linear,
+            floats,
+            shades,
+            colored: false,
             gaussians,
             rows: tree,
         })
@@ -321,29 +338,58 @@ impl<'a> Vertices<'a> {
                 leaf: value(leaf, row) != 0.0,
             }));
         }
+        self.extend_colors(rows, &value);
+    }
+
+    /// The colours and intensities of rows.
+    fn extend_colors(&mut self, rows: usize, value: &impl Fn(usize, usize) -> f64) {
+        let layout = self.layout;
         if let Some(color) = layout.color {
-            if layout.is_srgb8() {
-                self.srgb8.extend((0..rows).map(|row| {
-                    let [r, g, b] = color.map(|(column, _)| value(column, row) as u8);
-                    [r, g, b, layout.alpha.map_or(255, |(column, _)| value(column, row) as u8)]
-                }));
-            } else {
-                self.linear.extend((0..rows).map(|row| {
-                    let [r, g, b] = color.map(|(column, coding)| coding.light(value(column, row)));
-                    [r, g, b, layout.alpha.map_or(1.0, |(column, coding)| coding.alpha(value(column, row)))]
-                }));
+            match layout.tint {
+                Tint::Codes => self.srgb8.extend((0..rows).map(|row| {
+                    let [r, g, b] = color.map(|column| code(value(column, row)));
+                    [r, g, b, layout.alpha.map_or(255, |column| code(value(column, row)))]
+                })),
+                Tint::Light | Tint::Numbers(..) => self.floats.extend((0..rows).map(|row| {
+                    let number = |column: usize| number(value(column, row), layout.columns[column].scalar);
+                    let [r, g, b] = color.map(number);
+                    [r, g, b, layout.alpha.map_or(1.0, number)]
+                })),
             }
+        }
+        let Some(intensity) = layout.intensity.filter(|_| !self.colored) else { return };
+        let nonzero = |column: usize| (0..rows).any(|row| value(column, row) != 0.0);
+        if layout.color.is_some_and(|color| color.into_iter().any(nonzero)) {
+            self.colored = true;
+            self.shades = Vec::new();
+        } else {
+            self.shades.extend((0..rows).map(|row| value(intensity, row) as f32));
         }
     }
 
     /// The points, and of nodes what else they have.
     pub(super) fn into_points(self) -> (Points, Vec<TreeRow>) {
         let layout = self.layout;
-        let colors = match (layout.color.is_some(), layout.is_srgb8()) {
-            (false, _) => None,
-            (true, true) => Some(Colors::Srgb8(self.srgb8)),
-            (true, false) => Some(Colors::Linear(self.linear)),
-        };
+        let count = self.positions.len();
+        let (mut colors, mut raw) = (None, None);
+        match (layout.color.is_some(), layout.tint) {
+            (true, Tint::Light) => colors = Some(Colors::Linear(self.floats)),
+            (true, Tint::Codes) if layout.own => colors = Some(Colors::Srgb8(self.srgb8)),
+            (has_color, tint) if has_color || layout.intensity.is_some() => {
+                let (values, number, alpha) = match tint {
+                    Tint::Numbers(number, alpha) => (Values::Floats(self.floats), number, alpha),
+                    _ => (Values::Bytes(self.srgb8), Number::Byte, Number::Byte),
+                };
+                let kind = Kind { light: true, ..Kind::of(number) };
+                let numbers = Numbers { values, kind, alpha: layout.alpha.map(|_| alpha) };
+                let shades = layout.intensity.filter(|_| !self.colored).map(|column| {
+                    let integer = !layout.columns[column].scalar.is_float();
+                    Shades::Floats { values: self.shades, integer }
+                });
+                raw = Some(Box::new(RawColors::of_run(count, has_color.then_some(numbers), shades)));
+            }
+            _ => {}
+        }
         let mut points = Points {
             positions: self.positions,
             normals: layout.normal.map(|_| self.normals),
@@ -352,6 +398,7 @@ impl<'a> Vertices<'a> {
             clips: layout.clip.map(|_| self.clips),
             caps: layout.cap.map(|_| self.caps),
             colors,
+            raw,
             texture: layout.texture.map(|_| self.texture),
             texture_numbers: layout.texture_number.map(|_| self.texture_numbers),
             texture_slopes: layout.texture_slopes.map(|_| self.texture_slopes),

@@ -70,7 +70,7 @@ fn files(folder: &Path, inputs: &[Points]) -> Vec<PathBuf> {
 }
 
 fn rows(paths: &[PathBuf]) -> Vec<Rows> {
-    paths.iter().map(|path| Rows::open(Input::open(path, None).unwrap()).unwrap().unwrap()).collect()
+    paths.iter().map(|path| Rows::open(Input::open(path, None).unwrap(), false).unwrap().unwrap()).collect()
 }
 
 /// What is made where memory has room for so many points.
@@ -187,13 +187,13 @@ fn what_cannot_be_made_is_told() {
 fn other_files_are_no_rows() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("some.ply");
-    let is_rows = || Rows::open(Input::open(&path, None).unwrap()).unwrap().is_some();
+    let is_rows = || Rows::open(Input::open(&path, None).unwrap(), false).unwrap().is_some();
     let points = sphere(40, [0.0; 3], 1.0);
     ply::write_points(&path, &points, &()).unwrap();
     assert!(is_rows());
     let bytes = std::fs::read(&path).unwrap();
     std::fs::write(&path, &bytes[..bytes.len() - 1]).unwrap();
-    let short = Rows::open(Input::open(&path, None).unwrap()).err().unwrap().to_string();
+    let short = Rows::open(Input::open(&path, None).unwrap(), false).err().unwrap().to_string();
     assert!(short.contains("promises 40 vertices, the file ends after 39"), "{short}");
     for other in [
         Points { radii: None, ..points.clone() },

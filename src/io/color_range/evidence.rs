@@ -1,0 +1,119 @@
+//! What the numbers of colours say of what they range over.
+
+use super::{Kind, Numbers, Values};
+use rayon::prelude::*;
+
+/// Points that a thread looks at at once.
+const TOGETHER: usize = 1 << 14;
+
+/// No colour is larger.
+const LARGEST: f64 = 1e12;
+
+/// What the numbers of all channels say.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(in crate::io) struct Evidence {
+    /// Numbers that are not zero.
+    pub nonzero: u64,
+    /// Numbers above 1, 255 and 65535.
+    pub above: [u64; 3],
+    /// Numbers between 0 and 1, as shares of 1 are.
+    pub shares: u64,
+    /// Numbers of these that are 8-bit codes times 257, and times 256.
+    pub widened: [u64; 2],
+    /// Numbers that are not whole.
+    pub fractions: u64,
+    /// Numbers outside of the limits that the header states.
+    pub outside: u64,
+    /// All of them, zeros too.
+    pub count: u64,
+    pub largest: f64,
+}
+
+impl Evidence {
+    pub fn of(numbers: &Numbers) -> Self {
+        let Kind { limits, .. } = numbers.kind;
+        let add = |mut all: Self, color: [f64; 3]| {
+            for (channel, value) in color.into_iter().enumerate() {
+                all.add(value);
+                let is_outside = |limits: [(f64, f64); 3]| value < limits[channel].0 || value > limits[channel].1;
+                all.outside += u64::from(limits.is_some_and(is_outside));
+            }
+            all
+        };
+        numbers.fold(add, Self::both)
+    }
+
+    /// What the alphas say.
+    pub fn of_alphas(numbers: &Numbers) -> Self {
+        fn add(mut all: Evidence, alpha: f64) -> Evidence {
+            all.add(alpha);
+            all
+        }
+        let of_codes = |codes: &[[u8; 4]]| codes.iter().map(|code| f64::from(code[3])).fold(Self::default(), add);
+        let of_floats = |colors: &[[f32; 4]]| colors.iter().map(|color| f64::from(color[3])).fold(Self::default(), add);
+        match &numbers.values {
+            Values::Bytes(codes) => codes.par_chunks(TOGETHER).map(of_codes).reduce(Self::default, Self::both),
+            Values::Floats(colors) => colors.par_chunks(TOGETHER).map(of_floats).reduce(Self::default, Self::both),
+            Values::Words(_) => Self::default(),
+        }
+    }
+
+    fn add(&mut self, value: f64) {
+        self.count += 1;
+        // What stands for infinity says nothing.
+        if value == 0.0 || value.is_nan() || value.abs() > LARGEST {
+            return;
+        }
+        self.nonzero += 1;
+        self.shares += u64::from(value > 0.0 && value < 1.0);
+        for (above, limit) in self.above.iter_mut().zip([1.0, 255.0, 65535.0]) {
+            *above += u64::from(value > limit);
+        }
+        let whole = value.fract() == 0.0;
+        self.fractions += u64::from(!whole);
+        if whole && (0.0..=65535.0).contains(&value) {
+            let code = value as u16;
+            self.widened[0] += u64::from(code == 257 * (code >> 8));
+            self.widened[1] += u64::from(code & 0xff == 0);
+        }
+        self.largest = self.largest.max(value);
+    }
+
+    pub fn both(self, other: Self) -> Self {
+        Self {
+            nonzero: self.nonzero + other.nonzero,
+            above: [0, 1, 2].map(|k| self.above[k] + other.above[k]),
+            shares: self.shares + other.shares,
+            widened: [0, 1].map(|k| self.widened[k] + other.widened[k]),
+            fractions: self.fractions + other.fractions,
+            outside: self.outside + other.outside,
+            count: self.count + other.count,
+            largest: self.largest.max(other.largest),
+        }
+    }
+}
+
+impl Numbers {
+    /// What `add` makes of all colours, and `both` of two results, whose default is that of none.
+    pub(super) fn fold<T: Default + Send>(
+        &self,
+        add: impl Fn(T, [f64; 3]) -> T + Sync,
+        both: impl Fn(T, T) -> T + Sync,
+    ) -> T {
+        macro_rules! folded {
+            ($values:expr, $color:expr) => {
+                $values
+                    .par_chunks(TOGETHER)
+                    .map(|values| values.iter().filter_map($color).fold(T::default(), &add))
+                    .reduce(T::default, &both)
+            };
+        }
+        match &self.values {
+            Values::Bytes(codes) => folded!(codes, |code: &[u8; 4]| Some([0, 1, 2].map(|k| f64::from(code[k])))),
+            Values::Words(codes) => folded!(codes, |code: &[u16; 3]| Some(code.map(f64::from))),
+            Values::Floats(colors) => folded!(colors, |color: &[f32; 4]| {
+                (!color[0].is_nan()).then(|| [0, 1, 2].map(|k| f64::from(color[k])))
+            }),
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! Grey from intensities.
+
+use super::Shades;
+use rayon::prelude::*;
+
+/// Which intensities are black and white.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Shading {
+    pub black: f64,
+    pub white: f64,
+}
+
+/// The intensities of all inputs, by how often each is there.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Levels {
+    /// Of each whole number of 16 bits; empty where there is none.
+    words: Vec<u64>,
+    /// All others that are finite.
+    others: Vec<f32>,
+}
+
+impl Shades {
+    /// Integers are judged together, and so are floats.
+    pub(super) fn class(&self) -> usize {
+        match self {
+            Self::Words(_) | Self::Floats { integer: true, .. } => 0,
+            Self::Floats { .. } => 1,
+        }
+    }
+
+    /// Codes of grey.
+    pub(super) fn grey(&self, shading: Shading) -> Vec<[u8; 4]> {
+        let Shading { black, white } = shading;
+        let code = |value: f64| {
+            // A cast takes what is no number for 0, and what is beyond the range for its end.
+            let code = ((value - black) / (white - black) * 255.0).round() as u8;
+            [code, code, code, 255]
+        };
+        match self {
+            Self::Words(values) => values.par_iter().map(|value| code((*value).into())).collect(),
+            Self::Floats { values, .. } => values.par_iter().map(|value| code((*value).into())).collect(),
+        }
+    }
+}
+
+impl Levels {
+    pub fn is_empty(&self) -> bool {
+        self.words.is_empty() && self.others.is_empty()
+    }
+
+    pub fn add(&mut self, shades: &Shades) {
+        self.words.resize(1 << 16, 0);
+        match shades {
+            Shades::Words(values) => values.iter().for_each(|value| self.words[usize::from(*value)] += 1),
+            Shades::Floats { values, .. } => {
+                for &value in values.iter().filter(|value| value.is_finite()) {
+                    match value as u16 {
+                        word if f32::from(word) == value => self.words[usize::from(word)] += 1,
+                        _ => self.others.push(value),
+                    }
+                }
+            }
+        }
+    }
+
+    /// White is the 99.9th percentile, so that a few glints do not blacken the rest; black is zero, or where some are negative
+    /// the 0.1th percentile. None where all are the same.
+    pub fn shading(&self) -> Option<Shading> {
+        let mut others = self.others.clone();
+        others.par_sort_unstable_by(f32::total_cmp);
+        let of_words = self.words.iter().enumerate().filter(|(_, count)| **count > 0);
+        let of_words = of_words.map(|(word, count)| (word as f64, *count));
+        let mut of_words = of_words.peekable();
+        let mut of_others = others.iter().map(|other| f64::from(*other)).peekable();
+        // All levels, from the smallest on, with how many there are of each.
+        let ascending = std::iter::from_fn(|| match (of_words.peek(), of_others.peek()) {
+            (Some((word, _)), Some(other)) if other < word => of_others.next().map(|other| (other, 1)),
+            (None, Some(_)) => of_others.next().map(|other| (other, 1)),
+            _ => of_words.next(),
+        });
+        let ascending: Vec<(f64, u64)> = ascending.collect();
+        let (least, most) = (ascending.first()?.0, ascending.last()?.0);
+        if least == most {
+            return None;
+        }
+        let count: u64 = ascending.iter().map(|(_, count)| count).sum();
+        let at = |share: f64| {
+            let rank = ((share * count as f64).ceil() as u64).max(1);
+            let mut below = 0;
+            let found = ascending.iter().find(|(_, count)| {
+                below += count;
+                below >= rank
+            });
+            found.map_or(most, |(level, _)| *level)
+        };
+        let black = if least < 0.0 { at(0.001) } else { 0.0 };
+        // Where nearly all are as dark as black, any other is white.
+        let next = || ascending.iter().map(|(level, _)| *level).find(|level| *level > black);
+        let white = Some(at(0.999)).filter(|white| *white > black).or_else(next)?;
+        Some(Shading { black, white })
+    }
+}

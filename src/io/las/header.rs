@@ -1,0 +1,274 @@
+//! What the header of a LAS file says of the file, and where two of its fields disagree.
+
+use super::chunks::promised;
+use super::extra::{self, Field, Normals};
+use super::system::{self, System};
+use crate::io::about::{About, Attribute, Role};
+use crate::io::fault::Fault;
+use las::point::Format;
+use las::raw::{Header, Vlr};
+use std::io::{Read, Seek, SeekFrom};
+
+/// Bytes of the headers of versions 1.0 to 1.2, 1.3 and 1.4.
+const SIZES: [u16; 3] = [227, 235, 375];
+
+/// Bytes before the data of a variable-length record.
+const RECORD_HEADER: u64 = 54;
+
+/// Where a header says that its coordinate system is a text.
+const IS_TEXT: u16 = 1 << 4;
+
+/// What begins a note of a picture that is hardly what was meant.
+const WARNING: &str = "warning: ";
+
+/// What a header has in the place of a system that measured something.
+const NO_SYSTEMS: [&str; 5] = ["MERGE", "MODIFICATION", "EXTRACTION", "TRANSFORMATION", "OTHER"];
+
+/// Points may lie outside of the header's box by this many steps of their coordinates.
+const STEPS: f64 = 2.0;
+
+/// What is known of a file before its points are read.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Found {
+    pub about: About,
+    /// Whether coordinates are degrees, if a coordinate system says it.
+    pub geographic: Option<bool>,
+    /// The normals that points have beside their format.
+    pub normals: Option<Normals>,
+    /// What is odd.
+    pub notes: Vec<String>,
+    /// The box that the header gives, and the step of coordinates.
+    bounds: [[f64; 3]; 2],
+    step: [f64; 3],
+}
+
+/// Reads what the header and its records say; `legacy` is the count of points of LAS 1.0 to 1.3 as the file has it.
+pub(super) fn look(
+    file: &mut (impl Read + Seek),
+    (header, legacy): (&Header, u32),
+    (length, name): (u64, &str),
+) -> Result<Found, Fault> {
+    let Records { systems, extra, end } = records(file, header)?;
+    let system = System::of(&systems);
+    let mut notes = Vec::from_iter(counts(header, legacy));
+    notes.extend(room(header, length));
+    notes.extend(formats(header));
+    notes.extend(places(header, end));
+    if system.is_some() && (header.global_encoding & IS_TEXT != 0) != systems.text.is_some() {
+        let (says, has) = if systems.text.is_some() { ("GeoTIFF keys", "a text") } else { ("a text", "GeoTIFF keys") };
+        notes.push(format!("its header says that {says} tell its coordinate system, and its records have {has}"));
+    }
+    let scales = [header.x_scale_factor, header.y_scale_factor, header.z_scale_factor];
+    notes.extend(scale(scales));
+    let bounds = [[header.min_x, header.min_y, header.min_z], [header.max_x, header.max_y, header.max_z]];
+    if (0..3).any(|axis| bounds[0][axis] > bounds[1][axis]) && promised(header) > 0 {
+        notes.push(format!("the box in its header is upside down: from {:?} to {:?}", bounds[0], bounds[1]));
+    }
+    let named = |note: String| match note.strip_prefix(WARNING) {
+        Some(note) => format!("{WARNING}{name}: {note}"),
+        None => format!("{name}: {note}"),
+    };
+    let notes = notes.into_iter().map(named).collect();
+    let geographic = system.as_ref().and_then(|system| system.geographic);
+    let own = Format::new(header.point_data_record_format & 0x3f).map_or(0, |format| format.len());
+    let normals = Normals::of(&extra, own);
+    let about = about(header, system, &extra);
+    Ok(Found { about, geographic, normals, notes, bounds, step: scales.map(f64::abs) })
+}
+
+impl Found {
+    /// A sentence if points lie outside of the box that the header gives.
+    pub fn outside(&self, name: &str, positions: &[[f64; 3]]) -> Option<String> {
+        let [min, max] = self.bounds;
+        let is_outside = |position: &&[f64; 3]| {
+            let beyond = |axis: usize| {
+                let room = STEPS * self.step[axis];
+                position[axis] < min[axis] - room || position[axis] > max[axis] + room
+            };
+            (0..3).any(beyond)
+        };
+        // A box that is upside down is told by itself, and so are scales that are none.
+        if (0..3).any(|axis| min[axis] > max[axis] || self.step[axis] == 0.0) {
+            return None;
+        }
+        let count = positions.iter().filter(is_outside).count();
+        let spans = |of: fn(f64, f64) -> f64, start: f64| {
+            positions.iter().fold([start; 3], |all, position| [0, 1, 2].map(|axis| of(all[axis], position[axis])))
+        };
+        (count > 0).then(|| {
+            format!(
+                "{name}: {count} of {} points lie outside of the box in its header, {min:?} to {max:?}: they span {:?} to {:?}",
+                positions.len(),
+                spans(f64::min, f64::INFINITY),
+                spans(f64::max, f64::NEG_INFINITY)
+            )
+        })
+    }
+}
+
+/// What the records of a file tell.
+struct Records {
+    systems: system::Records,
+    /// What points have beside their format.
+    extra: Vec<Field>,
+    /// Where the last record ends.
+    end: u64,
+}
+
+fn records(file: &mut (impl Read + Seek), header: &Header) -> Result<Records, Fault> {
+    let (mut found, mut extra) = (system::Records::default(), Vec::new());
+    let mut end = u64::from(header.header_size);
+    file.seek(SeekFrom::Start(end))?;
+    for _ in 0..header.number_of_variable_length_records {
+        // A file that ends here is refused elsewhere.
+        let Ok(record) = Vlr::read_from(&mut *file, false) else { break };
+        end += RECORD_HEADER + record.data.len() as u64;
+        found.take(&record);
+        extra.extend(extra::fields(&record).unwrap_or_default());
+    }
+    if let Some(extended) = header.evlr.filter(|_| found.text.is_none()) {
+        found.look_in_extended(file, extended.start_of_first_evlr, extended.number_of_evlrs);
+    }
+    Ok(Records { systems: found, extra, end })
+}
+
+/// Counts that disagree.
+fn counts(header: &Header, legacy: u32) -> Option<String> {
+    let large = header.large_file?.number_of_point_records;
+    let legacy = u64::from(legacy);
+    // Zero is how a writer says that it is not used.
+    if legacy == 0 || legacy == large {
+        return None;
+    }
+    let taken = promised(header);
+    Some(format!("its header says {large} points, and {legacy} in the field of older versions: {taken} are read"))
+}
+
+/// More room than the points take, or more returns than points.
+fn room(header: &Header, length: u64) -> Option<String> {
+    let count = promised(header);
+    let by_return: u64 = match header.large_file {
+        Some(large) => large.number_of_points_by_return.iter().fold(0, |sum, count| sum.saturating_add(*count)),
+        None => header.number_of_points_by_return.iter().map(|count| u64::from(*count)).sum(),
+    };
+    if by_return > count {
+        return Some(format!("its header says {count} points, and {by_return} points over all returns"));
+    }
+    let is_plain = header.point_data_record_format & 0x80 == 0
+        && header.evlr.is_none()
+        && header.start_of_waveform_data_packet_record.is_none();
+    let room = length.saturating_sub(header.offset_to_point_data.into());
+    let held = room.checked_div(header.point_data_record_length.into())?;
+    (is_plain && held > count).then(|| format!("its header says {count} points, and the file has bytes for {held}"))
+}
+
+/// A version that does not have the point format, or a record that is longer than the format and says not why.
+fn formats(header: &Header) -> Option<String> {
+    let format = header.point_data_record_format & 0x3f;
+    let since = match format {
+        0 | 1 => 0,
+        2 | 3 => 2,
+        4 | 5 => 3,
+        _ => 4,
+    };
+    let minor = header.version.minor;
+    (minor < since)
+        .then(|| format!("its header says LAS 1.{minor}, and point format {format}, which LAS 1.{since} brought"))
+}
+
+/// Offsets and sizes that disagree with each other.
+fn places(header: &Header, end: u64) -> Vec<String> {
+    let mut notes = Vec::new();
+    let size = match header.version.minor {
+        0..=2 => SIZES[0],
+        3 => SIZES[1],
+        _ => SIZES[2],
+    };
+    let (own, start) = (header.header_size, u64::from(header.offset_to_point_data));
+    if own < size {
+        notes.push(format!("its header says that it is {own} bytes long, and those of its version have {size}"));
+    }
+    if end > start {
+        notes.push(format!("its points start at byte {start}, and the records before them end at byte {end}"));
+    }
+    if let Some(extended) = header.evlr {
+        let at = extended.start_of_first_evlr;
+        let record = u64::from(header.point_data_record_length);
+        let plain = header.point_data_record_format & 0x80 == 0;
+        let points_end = start.saturating_add(if plain { record.saturating_mul(promised(header)) } else { 0 });
+        if at < points_end && extended.number_of_evlrs > 0 {
+            notes.push(format!("its extended records start at byte {at}, and its points end at byte {points_end}"));
+        }
+    }
+    notes
+}
+
+/// Scales that place points wrongly.
+fn scale(scales: [f64; 3]) -> Option<String> {
+    let along = |is: fn(f64) -> bool| {
+        let axes = scales.iter().zip(["x", "y", "z"]).filter(|(scale, _)| is(**scale)).map(|(_, axis)| axis);
+        axes.collect::<Vec<_>>()
+    };
+    let zero = along(|scale| scale == 0.0);
+    if !zero.is_empty() {
+        return Some(format!(
+            "{WARNING}its header says that the scale along {} is 0, so all points have the same coordinate there",
+            zero.join(", ")
+        ));
+    }
+    let odd = along(|scale| !(scale.is_finite() && scale > 0.0));
+    (!odd.is_empty())
+        .then(|| format!("{WARNING}its header gives a scale along {} that is no positive number", odd.join(", ")))
+}
+
+/// What people want to know.
+fn about(header: &Header, system: Option<System>, extra: &[Field]) -> About {
+    let text = |bytes: &[u8]| {
+        let text = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
+        let text = String::from_utf8_lossy(text).trim().to_owned();
+        (!text.is_empty()).then_some(text)
+    };
+    let format = header.point_data_record_format & 0x3f;
+    let kind = if header.point_data_record_format & 0x80 != 0 { "LAZ" } else { "LAS" };
+    let minor = header.version.minor;
+    About {
+        format: format!("{kind} 1.{minor}, point format {format}"),
+        coordinate_system: system.map(|system| system.name),
+        scanners: text(&header.system_identifier)
+            .filter(|name| !NO_SYSTEMS.contains(&name.as_str()))
+            .into_iter()
+            .collect(),
+        software: text(&header.generating_software),
+        attributes: attributes(format, header.point_data_record_length, extra),
+        ..About::default()
+    }
+}
+
+/// What a point of a format has.
+fn attributes(format: u8, record: u16, named: &[Field]) -> Vec<Attribute> {
+    let Ok(known) = Format::new(format) else { return Vec::new() };
+    let always = [("x y z", true, Role::Other), ("intensity", false, Role::Intensity), ("returns", false, Role::Other)];
+    let mut all: Vec<Attribute> = always.map(|(name, used, role)| Attribute::new(name, used, role)).into();
+    all.push(Attribute::new("classification", true, Role::Other));
+    for name in ["scan angle", "user data", "point source"] {
+        all.push(Attribute::new(name, false, Role::Other));
+    }
+    let more = [
+        (known.has_gps_time, "GPS time", Role::Other),
+        (known.has_color, "red green blue", Role::Color),
+        (known.has_nir, "near infrared", Role::Other),
+        (known.has_waveform, "waveform", Role::Other),
+    ];
+    all.extend(more.into_iter().filter(|(has, ..)| *has).map(|(_, name, role)| Attribute::new(name, false, role)));
+    let mut extra = record.saturating_sub(known.len());
+    let normals = Normals::of(named, known.len());
+    for field in named {
+        extra = extra.saturating_sub(field.size);
+        let is_used = normals.as_ref().is_some_and(|normals| normals.fields.contains(field));
+        all.push(Attribute::new(field.name.clone(), is_used, Role::Other));
+    }
+    if extra > 0 {
+        all.push(Attribute::new(format!("{extra} extra bytes"), false, Role::Other));
+    }
+    all
+}

@@ -1,0 +1,57 @@
+//! What the numbers of a PLY vertex's colour are.
+
+use super::header::Scalar;
+use crate::io::color_range::Number;
+use crate::io::values::finite;
+
+/// What the numbers of a colour are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Tint {
+    /// 8-bit sRGB codes.
+    #[default]
+    Codes,
+    /// Linear light, as epsplat writes it.
+    Light,
+    /// Numbers of this type, and alphas of that one: all of them tell what they range over.
+    Numbers(Number, Number),
+}
+
+impl Tint {
+    pub(super) fn of(color: [Scalar; 3], alpha: Option<Scalar>, own: bool) -> Self {
+        let mut all = color.into_iter().chain(alpha);
+        let number = |scalar| match scalar {
+            Scalar::U8 | Scalar::I8 => Number::Byte,
+            Scalar::U16 | Scalar::I16 => Number::WORD,
+            Scalar::I32 | Scalar::U32 => Number::Integer(u32::MAX.into()),
+            Scalar::F32 | Scalar::F64 => Number::Float,
+        };
+        if own && all.clone().all(Scalar::is_float) {
+            return Self::Light;
+        }
+        if all.all(|scalar| number(scalar) == Number::Byte) {
+            return Self::Codes;
+        }
+        let widest = color.into_iter().max_by_key(|scalar| (scalar.is_float(), scalar.size()));
+        // Bytes beside wider numbers are judged as these are.
+        let of_color = match widest.map_or(Number::Byte, number) {
+            Number::Byte => Number::WORD,
+            wider => wider,
+        };
+        Self::Numbers(of_color, alpha.map_or(Number::Byte, number))
+    }
+}
+
+/// An 8-bit code: signed ones are unsigned ones that a program took for signed.
+pub(super) fn code(value: f64) -> u8 {
+    // A cast takes what is beyond the range for its end.
+    if value < 0.0 { (value as i8).cast_unsigned() } else { value as u8 }
+}
+
+/// A number of a colour that is no code yet; of signed 16-bit ones as of bytes.
+pub(super) fn number(value: f64, scalar: Scalar) -> f32 {
+    match scalar {
+        Scalar::I8 if value < 0.0 => (value + 256.0) as f32,
+        Scalar::I16 if value < 0.0 => (value + 65536.0) as f32,
+        _ => finite(value),
+    }
+}

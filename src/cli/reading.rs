@@ -10,6 +10,7 @@ use epsplat::io::{self, ClassOpacities, Format, Input, Mesh, Points, ReadOptions
 use epsplat::surfels::Limits;
 use epsplat::{Error, Progress, Result};
 
+use super::note;
 use super::progress::Bars;
 
 /// What inputs are, whatever they are called.
@@ -132,7 +133,9 @@ impl Reading {
     }
 
     fn read(&self, path: &Path, bars: &Bars) -> Result<Points> {
-        io::read_with(path, self.options(), bars)
+        let points = io::read_with(path, self.options(), bars)?;
+        points.notes.iter().for_each(|line| note(line));
+        Ok(points)
     }
 
     fn options(&self) -> ReadOptions {

@@ -1,6 +1,7 @@
 //! Files: one format each; every reader ends in [`Points`], every writer appears whole or not at all.
 
 pub mod atomic;
+mod beside;
 pub mod camera;
 pub mod cameras;
 mod classes;
@@ -17,6 +18,7 @@ mod intensity;
 pub mod las;
 pub mod mesh;
 pub mod obj;
+pub mod paint;
 #[cfg(feature = "pcd")]
 pub mod pcd;
 pub mod ply;
@@ -24,6 +26,7 @@ pub mod png;
 pub mod points;
 mod polygon;
 pub mod texture;
+pub(crate) mod textures;
 mod tree;
 pub(crate) mod triangles;
 mod values;
@@ -34,6 +37,7 @@ pub use companions::companions;
 pub use format::Format;
 pub use input::Input;
 pub use mesh::{Material, Mesh};
+pub use paint::Paint;
 pub use points::{Points, Up};
 pub use texture::Texture;
 pub use tree::{Tree, TreeRow};

@@ -308,3 +308,26 @@ fn an_error_of_a_camera_names_the_option_or_the_file_that_gave_it() {
     assert!(!image.exists());
     succeeds(&[&line[..], &["--ortho", "3"]].concat());
 }
+
+/// Editors and shells on Windows begin a file with a mark, or write it in UTF-16.
+#[test]
+fn camera_files_may_begin_with_a_byte_order_mark() {
+    let folder = Folder::new();
+    let one = r#"{"width": 8, "height": 8, "fov": 40, "eye": [0, 0, 3], "target": [0, 0, 0]}"#;
+    let many = transforms(LENS, &[frame("a.png", DMat3::IDENTITY, DVec3::Z)]);
+    let forms = |text: &str| {
+        let codes: Vec<u16> = format!("\u{feff}{text}").encode_utf16().collect();
+        let [little, big] = [u16::to_le_bytes, u16::to_be_bytes]
+            .map(|bytes| codes.iter().flat_map(|&code| bytes(code)).collect::<Vec<u8>>());
+        [format!("\u{feff}{text}").into_bytes(), little, big]
+    };
+    let plain = |text: &str| folder.file("plain.json", text);
+    let expected = epsplat::io::camera::read(&plain(one)).unwrap();
+    for bytes in forms(one) {
+        assert_eq!(epsplat::io::camera::read(&folder.file("one.json", bytes)).unwrap(), expected);
+    }
+    let expected = cameras::read(&plain(&many), (8, 8)).unwrap();
+    for bytes in forms(&many) {
+        assert_eq!(cameras::read(&folder.file("many.json", bytes), (8, 8)).unwrap(), expected);
+    }
+}

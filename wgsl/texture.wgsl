@@ -1,6 +1,6 @@
 // Surfels that are painted by textures: what is summed of their places in them, and the lookup (textures.wgsl) at the mean of these.
 // Twin: src/scene/texture.rs.
-// All loops end, by 1 of src/gpu/loops.rs: 0x4be836dc6aedd403
+// All loops end, by 1 of src/gpu/loops.rs: 0x72c5d58f37fbc572
 
 override PLACE_CHANNEL: u32;
 
@@ -75,7 +75,6 @@ fn textured(pixel: u32, weight: f32, blended: vec4<f32>) -> vec4<f32> {
     let cell = cell_of(place);
     let number = u32(cell.y * held.atlas.w + cell.x);
     let exists = number < held.textures;
-    // A cell is a whole number of turns wide.
-    let seen = seen_texture(select(0u, number, exists), place, covered_part);
+    let seen = seen_texture(select(0u, number, exists), place - cell * held.atlas.z, covered_part);
     return blended + select(0.0, share, exists) * (seen - blended);
 }

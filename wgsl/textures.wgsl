@@ -7,23 +7,31 @@
 struct Level {
     size: vec2<i32>,
     texels: u32,
+    // Beyond [0, 1] the edges go on; else the image is repeated.
+    clamps: bool,
 }
+
+// Beside a width.
+const CLAMPS: u32 = 0x80000000u;
 
 fn level_at(head: u32, level: u32) -> Level {
     let first = head + 1u + 3u * level;
-    let size = vec2<i32>(i32(textures[first]), i32(textures[first + 1u]));
-    return Level(size, textures[first + 2u]);
+    let size = vec2<i32>(i32(textures[first] & ~CLAMPS), i32(textures[first + 1u]));
+    return Level(size, textures[first + 2u], (textures[first] & CLAMPS) != 0u);
 }
 
 fn level_texel(level: Level, column: i32, row: i32) -> vec4<f32> {
     // Both are at least -1 and at most the size.
-    let at = (vec2<i32>(column, row) + level.size) % level.size;
+    let given = vec2<i32>(column, row);
+    let at = select((given + level.size) % level.size, clamp(given, vec2<i32>(0), level.size - 1), level.clamps);
     return premultiplied_of(textures[level.texels + u32(at.y * level.size.x + at.x)]);
 }
 
-// Premultiplied linear colour. Between the middles of texels interpolated, beyond [0, 1] repeated; origin bottom left.
+// Premultiplied linear colour. Between the middles of texels interpolated, beyond [0, 1] repeated or clamped; origin bottom left.
 fn level_color(level: Level, place: vec2<f32>) -> vec4<f32> {
-    let at = fract(vec2<f32>(place.x, 1.0 - place.y)) * vec2<f32>(level.size) - 0.5;
+    let turns = vec2<f32>(place.x, 1.0 - place.y);
+    let within = select(fract(turns), clamp(turns, vec2<f32>(0.0), vec2<f32>(1.0)), level.clamps);
+    let at = within * vec2<f32>(level.size) - 0.5;
     let low = floor(at);
     let share = at - low;
     let column = i32(low.x);

@@ -30,7 +30,7 @@ pub struct Arguments {
     /// How many pixels the diagonal of the mesh's box will be seen as long as
     #[arg(long, value_name = "N", default_value = "1000", value_parser = pixels)]
     pixels: f64,
-    /// An image for the whole mesh, in place of its own materials: .png or .jpg
+    /// An image for the whole mesh, in place of its own materials: .png, .jpg, .bmp or .tga
     #[arg(long, value_name = "FILE")]
     texture: Option<PathBuf>,
     /// What became of the mesh as JSON, to a file or - for stdout
@@ -67,6 +67,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let paths: Vec<PathBuf> =
         (1..=images.len()).map(|k| arguments.output.with_extension(format!("mesh-{k}.png"))).collect();
     outputs::check(inputs(), written().chain(&paths))?;
+    if divided.triangles.iter().flat_map(|mesh| &mesh.materials).any(Material::clamps) {
+        note("materials say -clamp on, which a PLY file cannot: their images are repeated beyond their edges");
+    }
     for (image, path) in images.iter().zip(&paths) {
         io::png::write_texture(path, image)?;
     }

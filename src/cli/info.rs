@@ -211,7 +211,10 @@ fn supplied_by(arguments: &Arguments) -> String {
 }
 
 fn colors(points: &Points) -> &'static str {
+    let paint = points.faces.as_ref().and_then(|faces| faces.paint.as_ref());
     match points.colors {
+        None if paint.is_some_and(|paint| paint.has_images()) => "by images of materials",
+        None if paint.is_some_and(|paint| !paint.colors.is_empty()) => "of faces or materials",
         None => "none",
         Some(Colors::Srgb8(_)) => "8-bit sRGB",
         Some(Colors::Harmonics(_)) => "spherical harmonics",

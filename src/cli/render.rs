@@ -65,7 +65,7 @@ pub struct Arguments {
     /// Meshes whose triangles are drawn as they are, beside the surfels, whose files come before, or alone: .obj or .ply
     #[arg(long, value_name = "MESH", num_args = 1.., help_heading = "Triangles")]
     triangles: Vec<PathBuf>,
-    /// An image to paint the meshes with none of whose materials has one, by their texture coordinates: .png or .jpg
+    /// An image to paint the meshes with none of whose materials has one, by their texture coordinates: .png, .jpg, .bmp or .tga
     #[arg(long, value_name = "IMAGE", help_heading = "Triangles")]
     triangle_texture: Option<PathBuf>,
     /// What shows where surfels meet triangles: corrected (the nearer one, surfels by the depth that they blend to), nearest (the nearer
@@ -206,7 +206,7 @@ pub struct Arguments {
     #[arg(long, value_name = "EXPONENT")]
     shininess: Option<f32>,
     /// An image to paint the surfels with, by their texture coordinates (`epsplat sample` writes them), in place of their own
-    /// colours: .png or .jpg. Given again it is the next input's, or that of the next number (texnumber) of an input's points
+    /// colours: .png, .jpg, .bmp or .tga. Given again it is the next input's, or that of the next number (texnumber) of an input's points
     #[arg(long = "texture", value_name = "IMAGE")]
     textures: Vec<PathBuf>,
     /// Draw a cut of levels of detail: nodes that are seen smaller than this in place of the surfels below them. Square pixels, 16px, or a part of

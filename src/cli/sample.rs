@@ -42,7 +42,7 @@ pub struct Arguments {
     /// How often the mesh's box is halved; else until there is a voxel for every four samples
     #[arg(long, value_name = "HALVINGS", value_parser = clap::value_parser!(u32).range(0..=60))]
     depth: Option<u32>,
-    /// An image for the whole mesh, in place of its own materials: .png or .jpg
+    /// An image for the whole mesh, in place of its own materials: .png, .jpg, .bmp or .tga
     #[arg(long, value_name = "FILE")]
     texture: Option<PathBuf>,
     /// Another seed gives other samples, but of projected ones
@@ -105,6 +105,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         if mesh.materials.iter().any(dyed) {
             note("their own colours are those of the images times the materials' colours, which --texture leaves out");
         }
+        if mesh.materials.iter().any(Material::clamps) {
+            note("materials say -clamp on, which --texture leaves out: it repeats images beyond their edges");
+        }
     }
     Ok(())
 }
@@ -119,8 +122,8 @@ fn quoted(path: &Path) -> String {
 fn images(mesh: &Mesh) -> Vec<PathBuf> {
     let (textures, _) = mesh.textures();
     let image = |texture: &Arc<Texture>| {
-        let own = mesh.materials.iter().find(|material| material.texture.as_ref() == Some(texture));
-        own.and_then(|material| material.image.clone())
+        let own = |material: &&Material| material.texture.as_ref().is_some_and(|own| Arc::ptr_eq(own, texture));
+        mesh.materials.iter().find(own).and_then(|material| material.image.clone())
     };
     textures.iter().filter_map(image).collect()
 }

@@ -1,5 +1,7 @@
 //! Images that are read: one limit of their size for all, found in the header before anything is allocated.
 
+use std::fs::{self, File};
+use std::io::BufReader;
 use std::path::Path;
 
 use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
@@ -36,23 +38,68 @@ pub fn check_room(path: &Path, bytes: u64) -> Result<()> {
     room.map_err(|_| Error::read(path, std::io::ErrorKind::OutOfMemory.into()))
 }
 
-/// Decodes the image at `path`, a PNG, or without a `format` a PNG or JPEG by its first bytes. `each` is how many bytes a pixel
+/// Makes sure that a file that is named by another one is a file: a pipe or a device may have no end.
+///
+/// # Errors
+///
+/// [`Error::Read`] where there is none, [`Error::Malformed`] for what is no file.
+pub(super) fn check_file(path: &Path) -> Result<()> {
+    let metadata = fs::metadata(path).map_err(|error| Error::read(path, error))?;
+    // A folder says what it is when it is read.
+    let is_file = metadata.is_file() || metadata.is_dir();
+    if is_file { Ok(()) } else { Err(Error::malformed(path, "an image is a file, and this is a device or a pipe")) }
+}
+
+/// The bytes of a file.
+///
+/// # Errors
+///
+/// Those of [`check_file`], and [`Error::Read`] where the system cannot read.
+pub(super) fn bytes(path: &Path) -> Result<Vec<u8>> {
+    check_file(path)?;
+    fs::read(path).map_err(|error| Error::read(path, error))
+}
+
+/// Width and height of an image, by its header.
+///
+/// # Errors
+///
+/// Those of [`decode`].
+pub(super) fn size(path: &Path) -> Result<[u32; 2]> {
+    let (reader, unreadable) = opened(path, None)?;
+    reader.into_dimensions().map(<[u32; 2]>::from).map_err(unreadable)
+}
+
+/// The formats of pictures that surfaces are painted with.
+const PAINT: &str = "PNG, JPEG, BMP or TGA";
+
+type Opened = (ImageReader<BufReader<File>>, Box<dyn Fn(ImageError) -> Error>);
+
+/// A file that is open as an image, and how what is wrong with it is said.
+fn opened(path: &Path, format: Option<ImageFormat>) -> Result<Opened> {
+    let called = if format.is_some() { "PNG" } else { PAINT };
+    let of = path.to_owned();
+    let unreadable = move |e: ImageError| Error::malformed(&of, format!("not a readable {called}: {e}"));
+    let mut reader = ImageReader::open(path).map_err(|e| Error::read(path, e))?;
+    match format {
+        Some(format) => reader.set_format(format),
+        // What the name says stays where the first bytes say nothing, as they do of TGA.
+        None => reader = reader.with_guessed_format().map_err(|e| Error::read(path, e))?,
+    }
+    // The limit is ours; the library's is less than we write.
+    reader.no_limits();
+    Ok((reader, Box::new(unreadable)))
+}
+
+/// Decodes the image at `path`, a PNG, or without a `format` one that surfaces are painted with, by its first bytes or its name. `each` is how many bytes a pixel
 /// what is made of it will take.
 ///
 /// # Errors
 ///
 /// [`Error::Read`] where the system cannot read, [`Error::Malformed`] for what is no such image or too large.
 pub(super) fn decode(path: &Path, format: Option<ImageFormat>, each: u64) -> Result<DynamicImage> {
-    let called = if format.is_some() { "PNG" } else { "PNG or JPEG" };
-    let unreadable = |e: ImageError| Error::malformed(path, format!("not a readable {called}: {e}"));
-    let mut reader = ImageReader::open(path).map_err(|e| Error::read(path, e))?;
-    match format {
-        Some(format) => reader.set_format(format),
-        None => reader = reader.with_guessed_format().map_err(|e| Error::read(path, e))?,
-    }
-    // The limit is ours; the library's is less than we write.
-    reader.no_limits();
-    let decoder = reader.into_decoder().map_err(unreadable)?;
+    let (reader, unreadable) = opened(path, format)?;
+    let decoder = reader.into_decoder().map_err(&unreadable)?;
     let (width, height) = decoder.dimensions();
     let own = u64::from(decoder.color_type().bytes_per_pixel());
     check(path, (width.into(), height.into()), own + each)?;

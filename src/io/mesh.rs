@@ -7,8 +7,9 @@ use glam::{DVec2, DVec3};
 
 use super::Texture;
 use super::points::retain_colors;
+use super::textures::Numbers;
 use crate::error::{Error, Result};
-use crate::scene::color::{DEFAULT_COLOR, SRGB8_TO_LINEAR, linear_to_srgb, mean_color};
+use crate::scene::color::{DEFAULT_COLOR, mean_color};
 use crate::scene::{Colors, Up};
 
 /// A triangle mesh as a file gives it: f64 world coordinates and whatever attributes exist.
@@ -23,7 +24,9 @@ pub struct Mesh {
     pub normals: Option<Vec<[[f32; 3]; 3]>>,
     /// One colour for each vertex.
     pub colors: Option<Colors>,
-    /// Texture coordinates (u, v) for each corner of each triangle, origin bottom left.
+    /// One linear colour with straight alpha for each triangle, where vertices have none.
+    pub face_colors: Option<Vec<[f32; 4]>>,
+    /// Texture coordinates (u, v) for each corner of each triangle, origin bottom left; not a number for triangles without.
     pub texture: Option<Vec<[[f32; 2]; 3]>>,
     /// What triangles may be made of.
     pub materials: Vec<Material>,
@@ -49,31 +52,16 @@ pub struct Material {
 }
 
 impl Material {
-    /// The number of its texture among `textures`, where it is put if it is not there; if there is one.
-    pub(crate) fn number_among(&self, textures: &mut Vec<Arc<Texture>>) -> Option<u32> {
-        let texture = self.texture.as_ref()?;
-        let known = textures.iter().position(|known| Arc::ptr_eq(known, texture) || known == texture);
-        let number = known.unwrap_or(textures.len());
-        if known.is_none() {
-            textures.push(texture.clone());
-        }
-        u32::try_from(number).ok()
+    /// Whether the edges of its image go on beyond [0, 1].
+    pub fn clamps(&self) -> bool {
+        self.texture.as_ref().is_some_and(|texture| texture.clamps())
     }
 
     /// The image times the diffuse colour, in linear light and codes of 8 bits; if there is an image.
     pub fn painted(&self) -> Option<Arc<Texture>> {
         let texture = self.texture.as_ref()?;
-        if self.diffuse == [1.0; 4] {
-            return Some(texture.clone());
-        }
-        let [width, height] = texture.size();
-        let times = |[r, g, b, a]: &[u8; 4]| {
-            let [r, g, b] = [r, g, b].map(|code| SRGB8_TO_LINEAR[usize::from(*code)]);
-            let code = |value: f64| (255.0 * value.clamp(0.0, 1.0)).round() as u8;
-            let light = [0, 1, 2].map(|k| code(linear_to_srgb(f64::from([r, g, b][k] * self.diffuse[k]))));
-            [light[0], light[1], light[2], code(f64::from(*a) / 255.0 * f64::from(self.diffuse[3]))]
-        };
-        Texture::new(width, height, texture.texels().iter().map(times).collect()).map(Arc::new)
+        let plain = self.diffuse == [1.0; 4];
+        Some(if plain { texture.clone() } else { Arc::new(texture.times(self.diffuse)) })
     }
 }
 
@@ -96,6 +84,7 @@ impl Mesh {
         };
         let lengths = [
             self.normals.as_ref().map(Vec::len),
+            self.face_colors.as_ref().map(Vec::len),
             self.texture.as_ref().map(Vec::len),
             self.material.as_ref().map(Vec::len),
         ];
@@ -138,8 +127,15 @@ impl Mesh {
             .iter()
             .flatten()
             .for_each(|&of| is_used.get_mut(of as usize).into_iter().for_each(|used| *used = true));
-        let before = |of: u32| is_used.iter().take(of as usize).filter(|used| **used).count() as u32;
-        material.iter_mut().flatten().for_each(|of| *of = before(*of));
+        let mut used = 0;
+        let before: Vec<u32> = is_used
+            .iter()
+            .map(|is_used| {
+                used += u32::from(*is_used);
+                used - u32::from(*is_used)
+            })
+            .collect();
+        material.iter_mut().flatten().for_each(|of| *of = before.get(*of as usize).copied().unwrap_or(used));
         let materials = self.materials.iter().zip(&is_used).filter(|(_, used)| **used).map(|(of, _)| of.clone());
         Self {
             materials: materials.collect(),
@@ -148,6 +144,7 @@ impl Mesh {
             triangles,
             normals: self.normals.as_ref().map(|all| kept(all, keep)),
             colors,
+            face_colors: self.face_colors.as_ref().map(|all| kept(all, keep)),
             texture: self.texture.as_ref().map(|all| kept(all, keep)),
             up: self.up,
             notes: Vec::new(),
@@ -163,23 +160,25 @@ impl Mesh {
 
     /// The textures that triangles are painted with, each once, and which of them each triangle has.
     pub fn textures(&self) -> (Vec<Arc<Texture>>, Vec<Option<u32>>) {
-        let mut textures = Vec::new();
-        let of_material: Vec<Option<u32>> =
-            self.materials.iter().map(|material| material.number_among(&mut textures)).collect();
+        let mut textures = Numbers::default();
+        let number = |material: &Material| material.texture.as_ref().map(|texture| textures.of(texture));
+        let of_material: Vec<Option<u32>> = self.materials.iter().map(number).collect();
         let material = |triangle: usize| self.material.as_ref()?.get(triangle).copied();
         let of_triangle = |triangle: usize| *of_material.get(material(triangle)? as usize)?;
         let numbers = (0..self.triangles.len()).map(of_triangle).collect();
-        (textures, numbers)
+        (textures.all, numbers)
     }
 
-    /// Texture coordinates on a triangle, by its index, at the point with these corner weights, whose sum is 1; if the mesh has any.
+    /// Texture coordinates on a triangle, by its index, at the point with these corner weights, whose sum is 1; if the
+    /// triangle has any.
     pub fn texture_at(&self, triangle: usize, weights: DVec3) -> Option<[f32; 2]> {
         let [a, b, c] = self.texture.as_ref()?.get(triangle)?.map(|[u, v]| DVec2::new(u.into(), v.into()));
-        Some((a * weights.x + b * weights.y + c * weights.z).as_vec2().to_array())
+        let place = (a * weights.x + b * weights.y + c * weights.z).as_vec2();
+        place.is_finite().then(|| place.to_array())
     }
 
     /// The colour there: linear RGB, straight alpha. A texture times its material's diffuse colour, if there is one; else the
-    /// interpolated colours of the vertices; else the diffuse colour.
+    /// interpolated colours of the vertices; else the triangle's own; else the diffuse colour.
     pub fn color_at(&self, triangle: usize, weights: DVec3) -> [f32; 4] {
         let material = self.material_of(triangle);
         let textured = material.and_then(|material| Some((material, material.texture.as_ref()?)));
@@ -192,8 +191,14 @@ impl Mesh {
                 let corners = self.triangles[triangle].map(|vertex| colors.linear(vertex as usize));
                 mean_color(corners.into_iter().zip(weights.to_array()))
             }
-            None => material.map_or(DEFAULT_COLOR, |material| material.diffuse),
+            None => self.own_color(triangle).unwrap_or(DEFAULT_COLOR),
         }
+    }
+
+    /// The colour of a triangle, by its index, or of its material; if it has one.
+    pub fn own_color(&self, triangle: usize) -> Option<[f32; 4]> {
+        let own = self.face_colors.as_ref().and_then(|all| all.get(triangle)).copied();
+        own.or_else(|| self.material_of(triangle).map(|material| material.diffuse))
     }
 
     /// The material of a triangle, by its index in `triangles`.

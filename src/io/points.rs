@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use super::Tree;
 use super::about::About;
 use super::color_range::RawColors;
+use super::{Paint, Tree};
 pub use crate::scene::Up;
 use crate::scene::color::srgb_to_linear;
 use crate::scene::{Cap, Clip, Colors, Whole};
@@ -66,13 +66,20 @@ pub struct Points {
     pub withheld: u64,
     /// Points that the file holds and that were left out, as their class has the opacity 0.
     pub unseen: u64,
-    /// Vertices of a mesh that the file holds and that were left out, as no triangle with an area names them.
+    /// Vertices of a mesh that the file holds and that were left out, as no triangle names them.
     pub loose: u64,
+    /// Triangles of a mesh that were left out, as a corner is nowhere that is drawn.
+    pub broken: u64,
+    /// Vertices of a mesh that were left out, as their triangles have no area, or a corner that is nowhere.
+    pub stranded: u64,
+    /// Surfels of a mesh that have the mean of an image over them.
+    pub averaged: u64,
     /// The numbers, in order, of all points that the file holds and that were left out; they start at 0.
     pub left_out: Vec<u64>,
     /// The number of the point of the file that each one is, where several are one; they start at 0.
     pub numbers: Option<Vec<u32>>,
-    /// What the reader found odd in the file, a sentence each.
+    /// What the reader found odd in the file, what belongs to them and could not be read, or looks other than somebody may expect, a
+    /// sentence each.
     pub notes: Vec<String>,
     /// What the file says of itself, if [`ReadOptions::describe`](super::ReadOptions::describe) asks for it.
     pub about: Option<Box<About>>,
@@ -114,9 +121,17 @@ pub struct Faces {
     pub triangles: Vec<[u32; 3]>,
     /// The normals that the file gives the corners, any length; zero or non-finite means missing.
     pub normals: Option<Vec<[[f32; 3]; 3]>>,
+    /// What they look like, beside the colours of their vertices.
+    pub paint: Option<Box<Paint>>,
 }
 
 impl Points {
+    /// Whether triangles, or points where there are none, have places in a texture.
+    pub fn has_places(&self) -> bool {
+        let paint = self.faces.as_ref().and_then(|faces| faces.paint.as_ref());
+        self.texture.is_some() || self.of_mesh && paint.is_some_and(|paint| !paint.places.is_empty())
+    }
+
     /// With colours in linear light that are the same from every side, whatever they were.
     #[must_use]
     pub fn in_light(mut self) -> Self {

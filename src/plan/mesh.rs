@@ -95,8 +95,11 @@ impl MeshNeeds {
     }
 }
 
+/// The bit of a width that says that edges go on beyond [0, 1]. No image is so wide.
+const CLAMPS: u32 = 1 << 31;
+
 /// The words of textures on a device: where each one's head is, then the heads, the number of levels and of each its width, its height and where
-/// its texels are, then the texels.
+/// its texels are, then the texels. A width has [`CLAMPS`] beside it where the edges of the image go on.
 pub fn texture_words(textures: &[&Mipmap]) -> Vec<u32> {
     let mut words = vec![0; textures.len()];
     for (number, mipmap) in textures.iter().enumerate() {
@@ -105,7 +108,8 @@ pub fn texture_words(textures: &[&Mipmap]) -> Vec<u32> {
         words.push(levels.len() as u32);
         let mut texels = words.len() + 3 * levels.len();
         for level in levels {
-            words.extend(level.size());
+            let [width, height] = level.size();
+            words.extend([if level.clamps() { width | CLAMPS } else { width }, height]);
             words.push(texels as u32);
             texels += level.texels().len();
         }

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use super::Texture;
 use super::srgb::{SRGB8_TO_LINEAR, linear_to_srgb};
 
@@ -44,7 +46,7 @@ impl Mipmap {
 }
 
 /// The image at half its width and height; none of one texel.
-fn half(of: &Texture) -> Option<Texture> {
+pub(crate) fn half(of: &Texture) -> Option<Texture> {
     let [width, height] = of.size();
     if (width, height) == (1, 1) {
         return None;
@@ -74,7 +76,8 @@ fn half(of: &Texture) -> Option<Texture> {
         let code = |light: f64| (255.0 * linear_to_srgb(if a > 0.0 { light / a } else { 0.0 })).round() as u8;
         [code(r), code(g), code(b), (255.0 * a).round() as u8]
     };
-    Texture::new(columns, rows, (0..columns * rows).map(texel).collect())
+    let texels = (0..columns * rows).into_par_iter().map(texel).collect();
+    Texture::new(columns, rows, texels).map(|half| half.clamped(of.clamps()))
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::srgb::SRGB8_TO_LINEAR;
+use super::srgb::{SRGB8_TO_LINEAR, linear_to_srgb};
 use super::{Atlas, Camera, Mipmap, Projection};
 use crate::error::{Error, Result};
 
@@ -16,13 +16,41 @@ pub struct Texture {
     height: u32,
     /// Rows from the top.
     texels: Vec<[u8; 4]>,
+    /// Beyond [0, 1] its edges go on; else it is repeated.
+    clamps: bool,
 }
 
 impl Texture {
     /// An image of `width` x `height` texels, rows from the top; None if there are not as many, or none.
     pub fn new(width: u32, height: u32, texels: Vec<[u8; 4]>) -> Option<Self> {
         let count = u64::from(width) * u64::from(height);
-        (count > 0 && count == texels.len() as u64).then_some(Self { width, height, texels })
+        (count > 0 && count == texels.len() as u64).then_some(Self { width, height, texels, clamps: false })
+    }
+
+    /// The same image, whose edges go on beyond [0, 1] if it `clamps`, and which else is repeated there.
+    #[must_use]
+    pub fn clamped(self, clamps: bool) -> Self {
+        Self { clamps, ..self }
+    }
+
+    /// Whether its edges go on beyond [0, 1].
+    pub fn clamps(&self) -> bool {
+        self.clamps
+    }
+
+    /// The image times a linear colour with straight alpha, in codes of 8 bits.
+    #[must_use]
+    pub fn times(&self, factor: [f32; 4]) -> Self {
+        // Three tables of codes, as a texel has no more.
+        let table = |k: usize| -> [u8; 256] {
+            let light = |code: usize| f64::from(SRGB8_TO_LINEAR[code] * factor[k]);
+            std::array::from_fn(|code| (255.0 * linear_to_srgb(light(code).clamp(0.0, 1.0))).round() as u8)
+        };
+        let [red, green, blue] = [0, 1, 2].map(table);
+        let alpha = |code: u8| (f64::from(code) * f64::from(factor[3]).clamp(0.0, 1.0)).round() as u8;
+        let times =
+            |[r, g, b, a]: &[u8; 4]| [red[usize::from(*r)], green[usize::from(*g)], blue[usize::from(*b)], alpha(*a)];
+        Self { texels: self.texels.par_iter().map(times).collect(), ..*self }
     }
 
     /// Width and height, texels.
@@ -36,14 +64,17 @@ impl Texture {
     }
 
     /// The colour at texture coordinates (u, v), origin bottom left: linear RGB premultiplied by alpha, and alpha. Between the
-    /// middles of texels it is interpolated; beyond [0, 1] the image is repeated. The twin of `level_color` in `wgsl/textures.wgsl`.
+    /// middles of texels it is interpolated; beyond [0, 1] the image is repeated, or its edges go on where it
+    /// [clamps](Self::clamped). The twin of `level_color` in `wgsl/textures.wgsl`.
     pub fn premultiplied_at(&self, [u, v]: [f64; 2]) -> [f64; 4] {
         // What is not a number has no place; that of 0 serves.
         let place = |turns: f64, size: u32| {
             let turns = if turns.is_finite() { turns } else { 0.0 };
-            let at = (turns - turns.floor()) * f64::from(size) - 0.5;
+            let within = if self.clamps { turns.clamp(0.0, 1.0) } else { turns - turns.floor() };
+            let at = within * f64::from(size) - 0.5;
             let low = at.floor();
-            ([low, low + 1.0].map(|k| (k as i64).rem_euclid(size.into()) as usize), at - low)
+            let texel = |k: i64| if self.clamps { k.clamp(0, i64::from(size) - 1) } else { k.rem_euclid(size.into()) };
+            ([low, low + 1.0].map(|k| texel(k as i64) as usize), at - low)
         };
         let ((columns, right), (rows, down)) = (place(u, self.width), place(1.0 - v, self.height));
         let mut sum = [0.0; 4];
@@ -76,7 +107,8 @@ impl Texture {
     }
 }
 
-fn straight([r, g, b, a]: [f64; 4]) -> [f32; 4] {
+/// A premultiplied colour with straight alpha.
+pub(crate) fn straight([r, g, b, a]: [f64; 4]) -> [f32; 4] {
     if a > 0.0 { [r / a, g / a, b / a, a].map(|c| c as f32) } else { [0.0; 4] }
 }
 
@@ -262,7 +294,7 @@ impl Textured {
         let place = self.joint_at(means);
         let Some(mipmap) = self.mipmaps.get(self.atlas.number(place) as usize) else { return blended };
         let [width, height] = mipmap.levels()[0].size();
-        let texel = mipmap.seen_at(place, part * f64::from(width) * f64::from(height));
+        let texel = mipmap.seen_at(self.atlas.own(place), part * f64::from(width) * f64::from(height));
         std::array::from_fn(|k| blended[k] + share * (texel[k] - blended[k]))
     }
 }
@@ -287,5 +319,11 @@ mod tests {
         assert_eq!(texture.at(0.5, 0.25), [0.0, 1.0, 0.0, 0.5]);
         assert!(texture.at(f32::NAN, f32::INFINITY).iter().all(|c| c.is_finite()));
         assert!(Texture::new(2, 2, vec![red]).is_none() && Texture::new(0, 2, vec![]).is_none());
+        // Clamped, edges go on: no other side shines in at a border, and none beyond.
+        let clamped = texture.clamped(true);
+        for (u, v, color) in [(0.0, 0.75, [1.0, 0.0, 0.0, 1.0]), (7.5, 3.0, [0.0, 0.0, 1.0, 1.0])] {
+            assert_eq!(clamped.at(u, v), color);
+        }
+        assert_eq!(clamped.at(0.5, 0.75), [0.5, 0.0, 0.5, 1.0]);
     }
 }

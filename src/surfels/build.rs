@@ -9,17 +9,17 @@ use super::curvature::{Around, normals_at};
 use super::estimate::{self, Estimate, Estimates};
 use super::gather::{self, Gathered};
 use super::graph::NeighbourGraph;
-use super::mesh::By;
+use super::mesh::{By, Painting};
 use super::orient::opposed;
 use super::outliers::drop_outliers;
 use super::positions::DistinctPositions;
 use super::{
-    LARGEST_COORDINATE, Limits, Preparation, colors, guess_up, mesh, origin_for, painting, texture, unit, usable_axes,
+    LARGEST_COORDINATE, Limits, Preparation, colors, guess_up, mesh, origin_for, painting, unit, usable_axes,
     usable_radius,
 };
 use crate::io::{Points, settle_colors};
 use crate::scene::scene::{low_parts, shows};
-use crate::scene::{Atlas, Bounds, Cap, Clip, Colors, SMALLEST_SCENE, Scene, Surfel, Texture, body};
+use crate::scene::{Atlas, Bounds, Cap, Clip, SMALLEST_SCENE, Scene, Surfel, Texture, body};
 use crate::{Error, Progress, Result};
 
 /// The largest radius of a disk, in extents of the scene: from anywhere near the scene it is a plane without an end, and depths
@@ -72,7 +72,8 @@ pub fn build_within(
     limits.check()?;
     let mut inputs = inputs;
     settle_colors(&mut inputs);
-    let mut inputs: Vec<Points> = inputs.into_iter().map(|input| mesh::of_mesh(input, By::Looks)).collect();
+    let painting = if textures.is_empty() { Painting::Means } else { Painting::Given };
+    let mut inputs: Vec<Points> = inputs.into_iter().map(|input| mesh::of_mesh(input, By::Looks, painting)).collect();
     if textures.is_empty() {
         return built(gather::gather(inputs)?, limits, progress).map(|(made, _)| made);
     }
@@ -80,16 +81,11 @@ pub fn build_within(
         return Err(Error::Usage("a texture paints points that have texture coordinates, and some have none".into()));
     }
     painting::number(&mut inputs, textures.len())?;
-    let gathered = gather::gather(inputs)?;
-    let (mut scene, preparation, places) = built_in_texture(gathered, textures.len() as u32, limits, progress)?;
-    // Nodes have no place in a texture.
-    scene.hierarchy = None;
-    scene.colors = Colors::Textured(texture::painted(&scene, textures, &places, progress)?);
-    Ok((scene, preparation))
+    painting::painted(inputs, textures.into_iter().map(Arc::new).collect(), limits, progress)
 }
 
 /// The scene of points with texture coordinates, and these, of which unusable ones are replaced, in the plane of so many textures at least.
-fn built_in_texture(
+pub(super) fn built_in_texture(
     mut gathered: Gathered,
     textures: u32,
     limits: &Limits,
@@ -115,7 +111,8 @@ fn built_in_texture(
 pub fn build_at_vertices(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Preparation, Coordinates)> {
     let mut inputs = inputs;
     settle_colors(&mut inputs);
-    let mut inputs: Vec<Points> = inputs.into_iter().map(|input| mesh::of_mesh(input, By::Vertices)).collect();
+    let mut inputs: Vec<Points> =
+        inputs.into_iter().map(|input| mesh::of_mesh(input, By::Vertices, Painting::Means)).collect();
     painting::number_together(&mut inputs)?;
     let all_placed = inputs.iter().all(|input| input.texture.is_some() || input.positions.is_empty());
     let mut gathered = gather::gather(inputs)?;

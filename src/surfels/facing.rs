@@ -6,10 +6,10 @@ use rayon::prelude::*;
 use super::build::built;
 use super::estimate::{LONE_RADIUS, RADIUS_RANGE};
 use super::gather::gather;
-use super::mesh::{By, of_mesh};
+use super::mesh::{By, Painting, of_mesh};
 use super::spacing::spacing;
 use super::{Limits, Preparation, usable_axes, usable_radius};
-use crate::io::Points;
+use crate::io::{Points, settle_colors};
 use crate::scene::{PointSize, Scene, body};
 use crate::{Progress, Result};
 
@@ -31,7 +31,9 @@ pub fn build_facing(
     progress: &dyn Progress,
 ) -> Result<(Scene, Preparation)> {
     limits.check()?;
-    let inputs: Vec<Points> = inputs.into_iter().map(|input| of_mesh(input, By::Vertices)).collect();
+    let mut inputs = inputs;
+    settle_colors(&mut inputs);
+    let inputs: Vec<Points> = inputs.into_iter().map(|input| of_mesh(input, By::Vertices, Painting::Means)).collect();
     let mut gathered = gather(inputs)?;
     let points = &mut gathered.points;
     let own = |i: usize| {

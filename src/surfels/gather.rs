@@ -1,6 +1,7 @@
 //! All inputs as one set of points with finite coordinates.
 
 use super::colors::ColorGatherer;
+use super::mesh::color_vertices;
 use super::{LARGEST_COORDINATE, Preparation, usable_axes};
 use crate::io::points::Flattened;
 use crate::io::{Points, Up, settle_colors};
@@ -26,6 +27,7 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
     let mut points = Points { closed: true, ..Points::default() };
     let (mut colors, mut flags, input_count) = (ColorGatherer::default(), Vec::new(), inputs.len());
     for mut input in inputs {
+        color_vertices(&mut input);
         let mut keep: Vec<bool> = input.positions.iter().map(is_usable).collect();
         if input.encoded {
             for (index, keep) in keep.iter_mut().enumerate().filter(|(_, keep)| **keep) {
@@ -39,6 +41,9 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
         preparation.unseen += input.unseen;
         preparation.loose += input.loose;
         preparation.told.append(&mut input.notes);
+        preparation.stranded += input.stranded;
+        preparation.broken += input.broken;
+        preparation.averaged += input.averaged;
         preparation.flattened = Flattened::of_both(preparation.flattened, input.flattened);
         provenance.push(flags.len() as u64, std::mem::take(&mut input.left_out), input.numbers.take());
         if kept < keep.len() {

@@ -52,6 +52,7 @@ pub use self::facing::build_facing;
 pub use self::from_points::{FromPoints, Surfels, from_points};
 pub use self::limits::Limits;
 pub use self::orient::Orientation;
+pub use self::painting::build_painted;
 pub use self::preparation::Preparation;
 pub use self::sizes::{Size, Triangle};
 pub use self::triangles::{MeshPreparation, with_triangles};

@@ -1,8 +1,16 @@
 //! Which of several textures paints which point.
 
-use crate::io::Points;
-use crate::scene::Atlas;
-use crate::{Error, Result};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use super::build::{build_within, built_in_texture};
+use super::gather::gather;
+use super::mesh::{By, Painting, of_mesh};
+use super::{Limits, Preparation, texture};
+use crate::io::{Paint, Points, Texture, settle_colors};
+use crate::scene::mipmap::half;
+use crate::scene::{Atlas, Colors, Scene};
+use crate::{Error, Progress, Result};
 
 /// The most textures of a scene: then coordinates in their plane keep the digits that a texture of 16384 texels needs.
 const MOST: u64 = 1024;
@@ -19,14 +27,17 @@ pub(super) fn number(inputs: &mut [Points], textures: usize) -> Result<()> {
         offset(inputs, &vec![1; inputs.len()]);
         return Ok(());
     }
+    if textures as u64 > MOST {
+        return Err(Error::Usage(format!("{textures} textures are given, and a scene has {MOST} at most")));
+    }
     // What no point has comes last in a single input.
-    if all != textures as u64 && !(inputs.len() == 1 && all < textures as u64) || textures as u64 > MOST {
-        let given = if textures == 1 { "1 texture is".into() } else { format!("{textures} textures are") };
-        let needed = if all == 1 { "one is".into() } else { format!("{all} are") };
-        return Err(Error::Usage(format!(
-            "{given} given, and {needed} needed: one for all, one for each input, or as many as the numbers of its points (texnumber) name, \
-             and no more than {MOST}"
-        )));
+    if all != textures as u64 && !(inputs.len() == 1 && all < textures as u64) {
+        let given = if textures == 1 { "1 texture is given".into() } else { format!("{textures} textures are given") };
+        let needed = match one_each {
+            true => format!("1 is needed for all inputs, or {all}, one for each"),
+            false => format!("{all} are needed: as many as the numbers of points (texnumber) name"),
+        };
+        return Err(Error::Usage(format!("{given}, and {needed}")));
     }
     offset(inputs, &named);
     Ok(())
@@ -43,6 +54,126 @@ pub(super) fn number_together(inputs: &mut [Points]) -> Result<()> {
         offset(inputs, &named);
     }
     Ok(())
+}
+
+/// The most texels of all images of meshes' materials together that surfels are painted with: with their halvings they fit into the
+/// 128 MiB that any device binds.
+const MOST_TEXELS: u64 = 1 << 24;
+
+/// The images that the materials of inputs name.
+#[derive(Debug, Default)]
+struct Own {
+    /// Each times the colour of a material.
+    textures: Vec<Arc<Texture>>,
+    /// Which inputs have some.
+    has_images: Vec<bool>,
+    /// How many of them were halved.
+    halved: u64,
+}
+
+/// The images that the materials of the inputs' meshes name, whose triangles get their numbers among all. None, where there are more
+/// than a scene has, or Gaussians beside them, whose colours are codes.
+fn own(inputs: &mut [Points]) -> Own {
+    fn painted(input: &mut Points) -> Option<&mut Paint> {
+        let paint = input.faces.as_mut().filter(|_| input.of_mesh)?.paint.as_deref_mut();
+        paint.filter(|paint| paint.has_images())
+    }
+    if inputs.iter().any(|input| input.encoded) {
+        return Own::default();
+    }
+    let (mut images, mut known) = (Vec::new(), HashMap::new());
+    let mut numbers: Vec<Option<Vec<u32>>> = Vec::new();
+    for input in inputs.iter_mut() {
+        numbers.push(painted(input).map(|paint| {
+            let mut number = |triangle: usize| {
+                let texture = paint.textures.get(paint.number(triangle)? as usize)?;
+                let factor = paint.colors.get(triangle).copied().unwrap_or([1.0; 4]);
+                Some(*known.entry((Arc::as_ptr(texture), factor.map(f32::to_bits))).or_insert_with(|| {
+                    images.push((texture.clone(), factor));
+                    images.len() as u32 - 1
+                }))
+            };
+            (0..paint.numbers.len()).map(|triangle| number(triangle).unwrap_or(u32::MAX)).collect()
+        }));
+    }
+    if images.len() as u64 > MOST {
+        return Own::default();
+    }
+    let has_images = numbers.iter().map(Option::is_some).collect();
+    for (input, numbers) in inputs.iter_mut().zip(numbers) {
+        if let Some((paint, numbers)) = painted(input).zip(numbers) {
+            (paint.numbers, paint.textures) = (numbers, Vec::new());
+        }
+    }
+    let halvings = halvings(&images.iter().map(|(texture, _)| texture.size()).collect::<Vec<_>>());
+    let halved = halvings.iter().filter(|count| **count > 0).count() as u64;
+    let made = |((texture, factor), halvings): ((Arc<Texture>, [f32; 4]), u32)| {
+        let texture = (0..halvings).fold(texture, |of, _| half(&of).map_or(of, Arc::new));
+        if factor == [1.0; 4] { texture } else { Arc::new(texture.times(factor)) }
+    };
+    Own { textures: images.into_iter().zip(halvings).map(made).collect(), has_images, halved }
+}
+
+/// How often images of these sizes are halved until they have no more than [`MOST_TEXELS`]: always the largest.
+fn halvings(sizes: &[[u32; 2]]) -> Vec<u32> {
+    let mut halvings = vec![0; sizes.len()];
+    let texels =
+        |k: usize, halvings: u32| sizes[k].iter().map(|side| u64::from((side >> halvings).max(1))).product::<u64>();
+    let mut total: u64 = (0..sizes.len()).map(|k| texels(k, 0)).sum();
+    while total > MOST_TEXELS {
+        let Some(largest) = (0..sizes.len()).max_by_key(|&k| texels(k, halvings[k])) else { break };
+        total -= texels(largest, halvings[largest]) - texels(largest, halvings[largest] + 1);
+        halvings[largest] += 1;
+    }
+    halvings
+}
+
+/// The surfels of an input beside those that are painted: what has no image of its own has no texture.
+fn beside_painted(mut points: Points, has_images: bool) -> Points {
+    if !has_images || points.texture_slopes.is_none() {
+        let count = points.positions.len();
+        (points.texture, points.texture_numbers) = (Some(vec![[0.0; 2]; count]), Some(vec![u32::MAX; count]));
+        points.texture_slopes = None;
+    }
+    points
+}
+
+/// [`build_within`], painted with the images that the materials of the inputs' meshes name; surfels of others have their colours. Without
+/// such images, or with more than can be told apart, it is the same: surfels have the means of the images over their triangles.
+///
+/// # Errors
+///
+/// Those of [`build_within`].
+pub fn build_painted(
+    mut inputs: Vec<Points>,
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> Result<(Scene, Preparation)> {
+    limits.check()?;
+    settle_colors(&mut inputs);
+    let own = own(&mut inputs);
+    if own.textures.is_empty() {
+        return build_within(inputs, Vec::new(), limits, progress);
+    }
+    let made = |(input, has_images)| beside_painted(of_mesh(input, By::Looks, Painting::Own), has_images);
+    let inputs = inputs.into_iter().zip(own.has_images).map(made).collect();
+    let (scene, preparation) = painted(inputs, own.textures, limits, progress)?;
+    Ok((scene, Preparation { halved_images: own.halved, ..preparation }))
+}
+
+/// The scene of points that are numbered by these textures.
+pub(super) fn painted(
+    inputs: Vec<Points>,
+    textures: Vec<Arc<Texture>>,
+    limits: &Limits,
+    progress: &dyn Progress,
+) -> Result<(Scene, Preparation)> {
+    let gathered = gather(inputs)?;
+    let (mut scene, preparation, places) = built_in_texture(gathered, textures.len() as u32, limits, progress)?;
+    // Nodes have no place in a texture.
+    scene.hierarchy = None;
+    scene.colors = Colors::Textured(texture::painted(&scene, textures, &places, progress)?);
+    Ok((scene, preparation))
 }
 
 /// Moves the numbers of each input past those of the inputs before it, which have so many.
@@ -97,4 +228,18 @@ pub(super) fn join(points: &mut Points, at_least: u32) -> Atlas {
         places.iter_mut().zip(numbers).for_each(|(place, number)| *place = atlas.joint(number, *place));
     }
     atlas
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_images_are_halved_until_they_fit() {
+        assert_eq!(halvings(&[[4096, 2048], [1024, 1024]]), [0, 0]);
+        assert_eq!(halvings(&[[4096, 4096], [16, 16]]), [1, 0]);
+        assert_eq!(halvings(&[[16384, 16384]]), [2]);
+        assert_eq!(halvings(&[[8192, 4096], [8192, 4096], [64, 64]]), [1, 1, 0]);
+        assert!(halvings(&[]).is_empty());
+    }
 }

@@ -15,8 +15,12 @@ pub struct Preparation {
     pub withheld: u64,
     /// Points that are in the files but not among `points`: their class has the opacity 0.
     pub unseen: u64,
-    /// Vertices that are in the meshes but not among `points`: no triangle with an area names them.
+    /// Vertices that are in the meshes but not among `points`: no triangle names them.
     pub loose: u64,
+    /// The same, but their triangles have no area, or a corner that is not finite or exceeds [`LARGEST_COORDINATE`].
+    pub stranded: u64,
+    /// Triangles of meshes left out because a coordinate of a corner is not finite or exceeds [`LARGEST_COORDINATE`].
+    pub broken: u64,
     /// Gaussians left out because their scales, rotation, opacity or colour are no numbers, or span no surface.
     pub shapeless: u64,
     /// Ellipsoids that were made surfels.
@@ -42,6 +46,10 @@ pub struct Preparation {
     pub clamped_alphas: u64,
     /// Points whose texture coordinates were not finite or too large and became 0; counted where a texture paints them.
     pub replaced_places: u64,
+    /// Surfels that have the mean of an image over their triangles, as no image paints them.
+    pub averaged: u64,
+    /// Images of materials that were halved, so that all of them fit into a device's memory.
+    pub halved_images: u64,
     /// Different positions among the surfels; None if nothing had to be estimated, so nobody looked.
     pub distinct_positions: Option<u64>,
     /// No input says which way is up, so it was guessed.
@@ -79,6 +87,12 @@ impl Preparation {
             ),
             counted(self.unseen, "were left out: their class has the opacity 0"),
             (self.loose > 0).then(|| format!("{} vertices of no triangle were left out", self.loose)),
+            (self.broken > 0)
+                .then(|| format!("{} triangles were left out: a coordinate is not finite or too large", self.broken)),
+            (self.stranded > 0).then(|| {
+                let what = "were left out: none of their triangles has an area and finite corners";
+                format!("{} vertices {what}", self.stranded)
+            }),
             (self.shapeless > 0).then(|| {
                 let what =
                     "were left out: their scales, rotation, opacity or colour are no numbers, or span no surface";
@@ -93,6 +107,17 @@ impl Preparation {
             ),
             counted(self.clamped_alphas, "had an alpha that is not from 0 to 1 and got the nearer of the two"),
             counted(self.replaced_places, "had texture coordinates that are not finite or too large and became 0"),
+        ];
+        let images = [
+            (self.averaged > 0).then(|| {
+                format!("{} surfels have one colour each, the mean of the image on their triangle", self.averaged)
+            }),
+            (self.halved_images > 0).then(|| {
+                format!(
+                    "{} images were halved to paint surfels with: together they are too large (--triangles takes them as they are)",
+                    self.halved_images
+                )
+            }),
         ];
         let common = self.common_radius.map(|(points, radius)| {
             format!("{points} points have no radius and took one for all, by the mean spacing: {radius:.3e} world units (--point-size)")
@@ -110,7 +135,7 @@ impl Preparation {
             format!("the smallest surfels lie so far from others that their coordinates err by up to {error:.2e} world units")
         });
         let told = self.told.iter().cloned();
-        told.chain(notes.into_iter().chain([common, strays, by_neighbours, random, limited, rounding]).flatten())
-            .collect()
+        let notes = notes.into_iter().chain(images);
+        told.chain(notes.chain([common, strays, by_neighbours, random, limited, rounding]).flatten()).collect()
     }
 }

@@ -28,7 +28,7 @@ const LEAST_SPREAD: f64 = 1e-3;
 /// Paints the surfels of `scene` with `textures` at their coordinates.
 pub(super) fn painted(
     scene: &Scene,
-    textures: Vec<Texture>,
+    textures: Vec<Arc<Texture>>,
     coordinates: &Coordinates,
     progress: &dyn Progress,
 ) -> Result<Textured> {
@@ -50,7 +50,7 @@ pub(super) fn painted(
         )
     };
     let colors = places.par_iter().enumerate().map(color).collect();
-    Textured::new(textures.into_iter().map(Arc::new).collect(), coordinates.atlas, places, colors)
+    Textured::new(textures, coordinates.atlas, places, colors)
 }
 
 /// Whether the slopes of a surfel were given and can be used: over its disk they gain no more than coordinates may be.
@@ -59,10 +59,16 @@ fn are_known((surfel, slopes): (&Surfel, &[[f32; 3]; 2])) -> bool {
     all.iter().any(|gain| *gain != 0.0) && all.iter().all(|gain| gain.abs() * surfel.radius() <= LARGEST_PLACE)
 }
 
-/// Places whose slopes are all to be filled in, where every surfel has its own.
+/// Places whose slopes are all to be filled in, where every surfel has its own, or no texture.
 fn given(scene: &Scene, coordinates: &Coordinates) -> Option<Vec<Place>> {
-    let known = scene.surfels.iter().zip(&coordinates.slopes).filter(|given| are_known(*given)).count();
-    (known == scene.surfels.len()).then(|| vec![Place::default(); known])
+    let Coordinates { centers, slopes, atlas } = coordinates;
+    let is_bare = |center: &[f32; 2]| atlas.number(center.map(f64::from)) >= atlas.textures;
+    let is_given = |index: usize| {
+        let known = slopes.get(index).is_some_and(|slopes| are_known((&scene.surfels[index], slopes)));
+        known || is_bare(&centers[index])
+    };
+    let all = (0..scene.surfels.len()).all(is_given);
+    all.then(|| centers.iter().map(|&center| Place { center, ..Place::default() }).collect())
 }
 
 /// The place of a surfel whose coordinates change so. It overlaps others that are as far off as it is large.

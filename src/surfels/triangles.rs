@@ -5,7 +5,8 @@ use rayon::prelude::*;
 
 use super::build::LARGEST_PLACE;
 use super::{LARGEST_COORDINATE, guess_up, origin_for, unit};
-use crate::io::Mesh;
+use crate::io::textures::Numbers;
+use crate::io::{Material, Mesh};
 use crate::scene::color::DEFAULT_COLOR;
 use crate::scene::{Bounds, SMALLEST_SCENE, Scene, Triangle, Triangles};
 use crate::{Error, Result};
@@ -77,18 +78,19 @@ pub fn with_triangles(scene: Option<Scene>, meshes: &[Mesh]) -> Result<(Scene, M
         let up = given.unwrap_or_else(|| guess_up(&bounds));
         Scene { origin: origin_for(&bounds), oriented: true, up, ..Scene::default() }
     });
-    let (mut all, mut textures) = (Vec::new(), Vec::new());
+    let (mut all, mut textures) = (Vec::new(), Numbers::default());
     for mesh in meshes {
         preparation.given += mesh.triangles.len() as u64;
         // The number of each material's texture, whatever meshes share it.
-        let numbers: Vec<Option<u32>> = mesh.materials.iter().map(|of| of.number_among(&mut textures)).collect();
+        let number = |of: &Material| of.texture.as_ref().map(|texture| textures.of(texture));
+        let numbers: Vec<Option<u32>> = mesh.materials.iter().map(number).collect();
         let of = mesh.triangles.par_iter().enumerate().filter(|(_, corners)| usable(mesh, corners));
         let made: Vec<(Triangle, bool)> = of.map(|(index, _)| triangle(mesh, index, scene.origin, &numbers)).collect();
         preparation.dropped_non_finite += (mesh.triangles.len() - made.len()) as u64;
         preparation.replaced_colors += made.iter().filter(|(_, replaced)| *replaced).count() as u64;
         all.extend(made.into_iter().map(|(triangle, _)| triangle));
     }
-    scene.triangles = Triangles::textured(&all, &textures);
+    scene.triangles = Triangles::textured(&all, &textures.all);
     preparation.rounding = Triangles::rounding(&all);
     preparation.triangles = scene.triangles.len() as u64;
     preparation.dropped_degenerate = all.len() as u64 - preparation.triangles;

@@ -89,6 +89,7 @@ impl TriangleTree {
         let paint = Mesh {
             triangles: mesh.triangles.clone(),
             colors: mesh.colors.clone(),
+            face_colors: mesh.face_colors.clone(),
             texture: mesh.texture.clone(),
             materials: mesh.materials.clone(),
             material: mesh.material.clone(),

@@ -119,9 +119,11 @@ fn materials_textures_and_what_of_them_is_missing() {
         mesh.notes
     );
 
-    // One corner without coordinates: none can be relied on. The points of the file are what they were.
-    let partly = format!("{text}f 1 2 3\n");
-    assert_eq!(read(&folder, "a.obj", partly.as_bytes()).texture, None);
+    // A face without coordinates has none, and all others have theirs. The points of the file are what they were.
+    let partly = read(&folder, "a.obj", format!("{text}f 1 2/1 3/2\n").as_bytes());
+    assert_eq!(partly.texture.as_ref().unwrap()[..7], mesh.texture.as_ref().unwrap()[..]);
+    assert!(partly.texture.as_ref().unwrap()[7].as_flattened().iter().all(|turns| turns.is_nan()));
+    assert_eq!(partly.color_at(7, glam::DVec3::X), [1.0, 0.5, 1.0, 1.0]);
     assert_eq!(folder.read("a.obj", text.as_bytes()).unwrap().positions.len(), 3);
     std::fs::write(folder.path("a.obj"), "v 0 0 0\nvt 0 0\nf 1/1 1/1 1/2\n").unwrap();
     let error = io::read_mesh(&folder.path("a.obj"), &()).unwrap_err();
@@ -196,10 +198,13 @@ fn picture(format: image::ImageFormat) -> Vec<u8> {
 }
 
 #[test]
-fn textures_are_png_or_jpeg_whatever_they_are_called() {
+fn textures_are_of_several_formats_whatever_they_are_called() {
     let folder = Folder::new();
     let path = folder.path("texture.png");
-    for (format, close) in [(image::ImageFormat::Png, 0.0), (image::ImageFormat::Jpeg, 0.05)] {
+    use image::ImageFormat::{Bmp, Jpeg, Png, Tga};
+    for (format, close) in [(Png, 0.0), (Jpeg, 0.05), (Bmp, 0.0), (Tga, 0.0)] {
+        // Nothing in a TGA file says what it is.
+        let path = if format == Tga { folder.path("texture.TGA") } else { path.clone() };
         std::fs::write(&path, picture(format)).unwrap();
         let texture = io::Texture::read(&path).unwrap();
         for (u, expected) in [(0.1, [0.956, 0.0, 0.0]), (0.9, [0.0, 0.0, 0.956])] {
@@ -208,11 +213,11 @@ fn textures_are_png_or_jpeg_whatever_they_are_called() {
         }
     }
     // A picture cut short, and what is none.
-    let jpeg = picture(image::ImageFormat::Jpeg);
+    let jpeg = picture(Jpeg);
     for bytes in [&jpeg[..jpeg.len() / 3], &jpeg[..10], b"GIF89a", b""] {
         std::fs::write(&path, bytes).unwrap();
         let message = sentence(&io::Texture::read(&path).unwrap_err(), &path);
-        assert!(message.starts_with("not a readable PNG or JPEG: "), "{message}");
+        assert!(message.starts_with("not a readable PNG, JPEG, BMP or TGA: "), "{message}");
     }
 }
 
@@ -259,5 +264,109 @@ fn faces_have_texture_coordinates_of_their_own_and_a_texture_each() {
             let mesh = read(&folder, "a.ply", &[&comments[..], &file(encoding, &elements)[4..]].concat());
             assert_eq!((mesh.triangles.len(), mesh.texture, mesh.material), (3, None, None));
         }
+    }
+}
+
+/// Each of as many materials as a part of a building has, in a time that grows with their number.
+#[test]
+fn many_materials_are_read_at_once() {
+    let folder = Folder::new();
+    let count = 40_000;
+    std::fs::write(folder.path("a.png"), picture(image::ImageFormat::Png)).unwrap();
+    let library: String = (0..count)
+        .map(|k| format!("newmtl part {k}\nKd {} 0.5 0\nmap_Kd A.PNG\n", f64::from(k) / f64::from(count)))
+        .collect();
+    std::fs::write(folder.path("a.mtl"), library).unwrap();
+    let faces: String = (0..2 * count).map(|k| format!("usemtl part {}\nf 1/1 2/1 3/1\n", k * 7919 % count)).collect();
+    let text = format!("mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\n{faces}");
+    let start = std::time::Instant::now();
+    let mesh = read(&folder, "a.obj", text.as_bytes());
+    let part = mesh.part(&vec![true; mesh.triangles.len()]);
+    let points = io::read(&folder.path("a.obj"), &()).unwrap();
+    assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
+    assert_eq!((mesh.materials.len(), part.materials.len()), (count as usize, count as usize));
+    for triangle in [0, 1, 77, 2 * count as usize - 1] {
+        let expected = (triangle as i32 * 7919 % count) as f32 / count as f32;
+        for mesh in [&mesh, &part] {
+            assert!((mesh.material_of(triangle).unwrap().diffuse[0] - expected).abs() < 1e-6);
+        }
+    }
+    let paint = points.faces.unwrap().paint.unwrap();
+    assert_eq!((paint.textures.len(), paint.numbers.len()), (1, 2 * count as usize));
+}
+
+/// Copies and links of one file are decoded once; others together have a limit.
+#[test]
+fn images_of_a_mesh_have_a_limit() {
+    let folder = Folder::new();
+    // Black, of few bytes.
+    let image = |name: &str, width: u32, height: u32| {
+        image::GrayImage::new(width, height).save(folder.path(name)).unwrap();
+    };
+    image("0.png", 16384, 4096);
+    for k in 1..6 {
+        std::fs::copy(folder.path("0.png"), folder.path(&format!("{k}.png"))).unwrap();
+    }
+    let mesh = |files: std::ops::Range<usize>| {
+        let library: String = files.clone().map(|k| format!("newmtl {k}\nmap_Kd {k}.png\n")).collect();
+        std::fs::write(folder.path("a.mtl"), library).unwrap();
+        let faces: String = files.map(|k| format!("usemtl {k}\nf 1/1 2/1 3/1\n")).collect();
+        std::fs::write(folder.path("a.obj"), format!("mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\n{faces}"))
+            .unwrap();
+        io::read_mesh(&folder.path("a.obj"), &())
+    };
+    let copies = mesh(0..6).unwrap();
+    let first = copies.materials[0].texture.as_ref().unwrap();
+    assert!(copies.materials.iter().all(|of| std::sync::Arc::ptr_eq(of.texture.as_ref().unwrap(), first)));
+    drop(copies);
+    image("6.png", 16384, 12289);
+    let error = mesh(5..7).unwrap_err();
+    let said = sentence(&error, &folder.path("6.png"));
+    assert!(said.contains("images of one mesh have 268451840 pixels, and 268435456 are read at most"), "{said}");
+    // Points do without.
+    let points = io::read(&folder.path("a.obj"), &()).unwrap();
+    assert!(points.notes[0].contains("images of its materials are left out") && points.faces.unwrap().paint.is_some());
+}
+
+/// A stranger's file may name what has no end.
+#[cfg(unix)]
+#[test]
+fn libraries_and_images_are_files() {
+    let folder = Folder::new();
+    let text =
+        |library: &str| format!("mtllib {library}\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl m\nf 1/1 2/1 3/1\n");
+    std::fs::write(folder.path("m.mtl"), "newmtl m\nmap_Kd /dev/zero\n").unwrap();
+    for library in ["/dev/zero", "m.mtl"] {
+        let mesh = read(&folder, "a.obj", text(library).as_bytes());
+        assert!(mesh.notes.len() == 1 && mesh.notes[0].contains("a device or a pipe"), "{:?}", mesh.notes);
+    }
+}
+
+#[test]
+fn flipped_bytes_of_libraries_and_images_never_panic() {
+    let folder = Folder::new();
+    let mut random = super::Random(11);
+    let mut flipped = |bytes: &[u8]| {
+        let mut bytes = bytes.to_vec();
+        for _ in 0..1 + random.below(6) {
+            let at = random.below(bytes.len());
+            bytes[at] = random.bits() as u8;
+        }
+        bytes.truncate(bytes.len() - random.below(bytes.len() / 4));
+        bytes
+    };
+    let library =
+        b"newmtl m\nKd 0.5 0 1\nd 0.5\nmap_Kd -s 2 2 -o 0.5 0.5 -clamp on -mm 0 1 a.png\nNEWMTL n\nmap_kd b.tga\n";
+    let text =
+        "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nusemtl m\nf 1/1 2/2 3/1\nusemtl n\nf 1/1 2/2 3/1\n";
+    use image::ImageFormat::{Bmp, Jpeg, Png, Tga};
+    let pictures = [("a.png", Png), ("a.png", Jpeg), ("a.png", Bmp), ("b.tga", Tga)];
+    for round in 0..300 {
+        let (name, format) = pictures[round % 4];
+        std::fs::write(folder.path(name), flipped(&picture(format))).unwrap();
+        std::fs::write(folder.path("m.mtl"), if round % 3 == 0 { flipped(library) } else { library.to_vec() }).unwrap();
+        std::fs::write(folder.path("a.obj"), text).unwrap();
+        let _ = io::read_mesh(&folder.path("a.obj"), &());
+        let _ = io::read(&folder.path("a.obj"), &());
     }
 }

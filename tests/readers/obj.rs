@@ -95,6 +95,27 @@ fn colours_may_be_codes_of_eight_bits() {
     assert_eq!(colors("v 1 2 3 1 1.5 0\n"), [[1.0, srgb_to_linear(1.5) as f32, 0.0, 1.0]]);
 }
 
+/// ZBrush's colours of vertices, in comments.
+#[test]
+fn polypaint_gives_colours() {
+    let folder = Folder::new();
+    let vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
+    let read = |text: &str| folder.read("a.obj", text.as_bytes()).unwrap().colors;
+    let codes = |all: &[[u8; 4]]| Some(Colors::Srgb8(all.to_vec()));
+    let [red, mixed, grey] = [[255, 0, 0, 255], [1, 35, 171, 255], [218, 218, 218, 255]];
+    // On lines of any length; the mask of a vertex is not its alpha.
+    let block = "#MRGB \n# The following MRGB block contains ZBrush Vertex Color\n#MRGB ffff000000ff0000\n#MRGB FF0123ABff0123ab\n# End of MRGB block\n";
+    assert_eq!(read(&format!("{vertices}{block}f 1 2 3\n")), codes(&[red, red, mixed, mixed]));
+    // Too few, too many, and what is none.
+    assert_eq!(read(&format!("{vertices}#MRGB ffff0000\n")), codes(&[red, grey, grey, grey]));
+    assert_eq!(read(&format!("{vertices}#MRGB {}\n", "ffff0000".repeat(6))), codes(&[red; 4]));
+    assert_eq!(read(&format!("{vertices}#MRGB ffff0000xyzxyzxyffff0000ff\n")), codes(&[red, grey, grey, grey]));
+    assert_eq!(read(&format!("{vertices}#MRGB\n")), None);
+    // A vertex's own come first.
+    let own = read("v 0 0 0 0 0 1\n#MRGB ffff0000\n");
+    assert_eq!(own, Some(Colors::Linear(vec![[0.0, 0.0, 1.0, 1.0]])));
+}
+
 #[test]
 fn a_byte_order_mark_is_no_part_of_the_first_vertex() {
     let folder = Folder::new();

@@ -28,6 +28,8 @@ mod images;
 mod invariance;
 #[path = "../layers.rs"]
 mod layers;
+#[path = "../materials.rs"]
+mod materials;
 #[path = "../nearest.rs"]
 mod nearest;
 #[path = "../oit.rs"]

@@ -136,8 +136,12 @@ fn textures_are_as_many_as_are_named() {
     assert_eq!(count(made(vec![plain(), Points::default()], both()).unwrap()), 2);
     assert_eq!(count(made(vec![plain(), several()], [both(), both()[..1].to_vec()].concat()).unwrap()), 3);
     for (inputs, textures, told) in [
-        (vec![plain(), plain()], [both(), both()].concat(), "4 textures are given, and 2 are needed"),
-        (vec![several()], vec![waves(true)], "1 texture is given, and 2 are needed"),
+        (
+            vec![plain(), plain()],
+            [both(), both()].concat(),
+            "4 textures are given, and 1 is needed for all inputs, or 2, one for each",
+        ),
+        (vec![several()], vec![waves(true)], "1 texture is given, and 2 are needed: as many as the numbers of points"),
         (vec![plain(), several()], both(), "2 textures are given, and 3 are needed"),
     ] {
         let error = made(inputs, textures).unwrap_err();

@@ -4,7 +4,10 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use epsplat::io::{self, Mesh, Points, ReadOptions, Texture};
-use epsplat::scene::Scene;
+use epsplat::plan::BackendName;
+use epsplat::plan::check::textured;
+use epsplat::scene::color::srgb8;
+use epsplat::scene::{Blend, Colors, Scene};
 use epsplat::surfels::{Preparation, with_triangles};
 use epsplat::{Error, Progress, Result, surfels};
 
@@ -12,6 +15,8 @@ use super::super::note;
 use super::super::progress::Bars;
 use super::super::reading::named;
 use super::Arguments;
+use super::options::options;
+use super::output::Format;
 
 /// A scene, and what became of its points.
 pub(super) type Made = (Scene, Preparation);
@@ -77,12 +82,21 @@ fn painted(mut meshes: Vec<Mesh>, paths: &[PathBuf], arguments: &Arguments) -> R
     Ok(meshes)
 }
 
+/// Whether surfels can be painted with the images of their meshes' materials, as pictures are made; else they have the means of
+/// these.
+fn paints(arguments: &Arguments) -> bool {
+    let reference = arguments.backend.0 == Some(BackendName::Reference);
+    let finest = arguments.lod.is_none() && arguments.splats.is_none();
+    let options = options(arguments, Format::Exr);
+    finest && options.is_ok_and(|options| textured(&options, reference).is_ok() && options.blend != Blend::Nearest)
+}
+
 /// The surfels of all inputs.
 fn surfels_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dyn Progress) -> Result<Made> {
     let textures = arguments.textures.iter().map(|image| Texture::read(image)).collect::<Result<Vec<_>>>()?;
     let mut read = arguments.inputs.iter().zip(&inputs);
     if !textures.is_empty()
-        && let Some((path, _)) = read.find(|(_, points)| points.texture.is_none() && !points.positions.is_empty())
+        && let Some((path, _)) = read.find(|(_, points)| !points.has_places() && !points.positions.is_empty())
     {
         let what = "its points have no texture coordinates, so they cannot be textured; `epsplat sample` gives surfels of a mesh some";
         return Err(Error::malformed(path, what));
@@ -90,7 +104,18 @@ fn surfels_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dyn Progres
     let limits = arguments.limits.limits();
     let built = match arguments.facing {
         Some(_) => surfels::build_facing(inputs, arguments.point_size, &limits, progress),
+        None if textures.is_empty() && paints(arguments) => surfels::build_painted(inputs, &limits, progress),
         None => surfels::build_within(inputs, textures, &limits, progress),
     };
-    built.map_err(|error| named(error, &arguments.inputs))
+    let (scene, preparation) = built.map_err(|error| named(error, &arguments.inputs))?;
+    Ok((if arguments.blend == Some(Blend::Nearest) { rounded(scene) } else { scene }, preparation))
+}
+
+/// A scene whose colours have 8 bits, which is what `--blend nearest` keeps.
+fn rounded(mut scene: Scene) -> Scene {
+    if let Colors::Linear(colors) = &scene.colors {
+        note("colours are rounded to the 8 bits that --blend nearest keeps");
+        scene.colors = Colors::Srgb8(colors.iter().map(|color| srgb8(*color)).collect());
+    }
+    scene
 }

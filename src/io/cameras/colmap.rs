@@ -39,6 +39,9 @@ pub(super) fn read(folder: &Path) -> Result<Vec<NamedCamera>> {
     images(&mut Lines::of(BufReader::new(file)), &lenses).map_err(|fault| fault.of(&path))
 }
 
+/// The cameras by their identifiers; of one that cannot be used why, and on which line: that matters to images of it alone.
+type Lenses = HashMap<u64, Result<Camera, String>>;
+
 /// What a line of `cameras.txt` says.
 struct Camera {
     size: (u32, u32),
@@ -57,19 +60,22 @@ const MODELS: [(&str, bool, &[&str]); 6] = [
     ("FULL_OPENCV", true, &["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"]),
 ];
 
-fn lenses(lines: &mut Lines<impl BufRead>) -> Result<HashMap<u64, Camera>, Fault> {
-    let mut lenses = HashMap::new();
+fn lenses(lines: &mut Lines<impl BufRead>) -> Result<Lenses, Fault> {
+    let mut lenses = Lenses::new();
     while lines.next_record()? {
-        let (id, camera) = lens(lines.words()).map_err(|what| lines.fault(&what))?;
-        if lenses.insert(id, camera).is_some() {
-            return Err(lines.fault(&format!("there is another camera {id}")));
-        }
+        let mut words = lines.words();
+        let id = whole(words.next(), "CAMERA_ID").map_err(|what| lines.fault(&what))?;
+        let line = lines.number;
+        let camera = match lenses.contains_key(&id) {
+            false => lens(words),
+            true => Err(format!("there is another camera {id}")),
+        };
+        lenses.insert(id, camera.map_err(|what| format!("line {line} of {CAMERAS}: {what}")));
     }
     Ok(lenses)
 }
 
-fn lens<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<(u64, Camera), String> {
-    let id = whole(words.next(), "CAMERA_ID")?;
+fn lens<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<Camera, String> {
     let name = words.next().ok_or("it ends before its MODEL")?;
     let model = MODELS.iter().find(|(model, ..)| *model == name);
     let (_, two, distortions) = model.ok_or_else(|| {
@@ -88,10 +94,10 @@ fn lens<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<(u64, Camera), S
         _ => return Err("its parameters are not a lens's".into()),
     };
     let distortion = distortions.iter().zip(rest).map(|(name, value)| (*name, *value)).find(|(_, value)| *value != 0.0);
-    Ok((id, Camera { size, intrinsics, distortion }))
+    Ok(Camera { size, intrinsics, distortion })
 }
 
-fn images(lines: &mut Lines<impl BufRead>, lenses: &HashMap<u64, Camera>) -> Result<Vec<NamedCamera>, Fault> {
+fn images(lines: &mut Lines<impl BufRead>, lenses: &Lenses) -> Result<Vec<NamedCamera>, Fault> {
     let mut images = Vec::new();
     while lines.next_record()? {
         images.push(image(&lines.line, lenses).map_err(|what| lines.fault(&what))?);
@@ -106,7 +112,7 @@ fn images(lines: &mut Lines<impl BufRead>, lenses: &HashMap<u64, Camera>) -> Res
     Ok(images)
 }
 
-fn image(line: &str, lenses: &HashMap<u64, Camera>) -> Result<NamedCamera, String> {
+fn image(line: &str, lenses: &Lenses) -> Result<NamedCamera, String> {
     let mut rest = line;
     let mut next = || {
         let (word, after) = match rest.trim_start().split_once(|c: char| c.is_ascii_whitespace()) {
@@ -125,6 +131,7 @@ fn image(line: &str, lenses: &HashMap<u64, Camera>) -> Result<NamedCamera, Strin
     // A name may hold spaces.
     let name = name_of(rest.trim()).ok_or("its NAME is no name of a file")?;
     let lens = lenses.get(&id).ok_or_else(|| format!("there is no camera {id} in {CAMERAS}"))?;
+    let lens = lens.as_ref().map_err(|what| format!("its camera {id} cannot be used, {what}"))?;
     let [w, x, y, z, tx, ty, tz] = pose;
     let quaternion = DQuat::from_xyzw(x, y, z, w);
     let length = quaternion.length();
@@ -170,6 +177,9 @@ impl<R: BufRead> Lines<R> {
         self.line.clear();
         self.number += 1;
         let read = self.reader.read_line(&mut self.line);
+        if self.number == 1 && self.line.starts_with('\u{feff}') {
+            self.line.drain(..'\u{feff}'.len_utf8());
+        }
         read.map(|bytes| bytes > 0).map_err(|error| match error.kind() {
             std::io::ErrorKind::InvalidData => self.fault("it is not UTF-8 text"),
             _ => Fault::Io(error),
@@ -244,18 +254,31 @@ mod tests {
 
     #[test]
     fn what_is_not_colmaps_is_said_with_its_line() {
+        let of_one = "7 1 0 0 0 0 0 0 1 a.png\n";
         for (cameras, said) in [
-            ("1 PINHOLE 640 480 500 510 320", "line 1: a PINHOLE camera has 4 parameters, not 3"),
-            ("\n1 OPENCV_FISHEYE 6 4 5 5 3 2 0 0 0 0", "line 2: the model 'OPENCV_FISHEYE' is not a pinhole's"),
-            ("one", "line 1: its CAMERA_ID, 'one', is not a whole number"),
-            ("1", "line 1: it ends before its MODEL"),
-            ("1 PINHOLE 640 -480 1 1 1 1", "line 1: its HEIGHT, '-480', is not a whole number"),
-            ("1 PINHOLE 640 480 1 1 1 nan", "line 1: its PARAMS, 'nan', is not a number"),
-            ("1 PINHOLE 6 4 1 1 1 1\n1 PINHOLE 6 4 1 1 1 1", "line 2: there is another camera 1"),
+            ("1 PINHOLE 640 480 500 510 320", "line 1 of cameras.txt: a PINHOLE camera has 4 parameters, not 3"),
+            (
+                "\n1 OPENCV_FISHEYE 6 4 5 5 3 2 0 0 0 0",
+                "line 2 of cameras.txt: the model 'OPENCV_FISHEYE' is not a pinhole's",
+            ),
+            ("1", "line 1 of cameras.txt: it ends before its MODEL"),
+            ("1 PINHOLE 640 -480 1 1 1 1", "line 1 of cameras.txt: its HEIGHT, '-480', is not a whole number"),
+            ("1 PINHOLE 640 480 1 1 1 nan", "line 1 of cameras.txt: its PARAMS, 'nan', is not a number"),
+            ("1 PINHOLE 6 4 1 1 1 1\n1 PINHOLE 6 4 1 1 1 1", "line 2 of cameras.txt: there is another camera 1"),
         ] {
-            let message = read(cameras, "").unwrap_err();
-            assert!(message.starts_with(said), "{message}");
+            let message = read(cameras, of_one).unwrap_err();
+            assert!(
+                message.starts_with("line 1: its camera 1 cannot be used, ") && message.contains(said),
+                "{message}"
+            );
+            // What no image has is of no matter.
+            let others = format!("{cameras}\n2 PINHOLE 640 480 500 510 320 240\n");
+            assert_eq!(read(&others, "7 1 0 0 0 0 0 0 2 a.png\n").unwrap().len(), 1);
         }
+        let message = read("one", "").unwrap_err();
+        assert!(message.starts_with("line 1: its CAMERA_ID, 'one', is not a whole number"), "{message}");
+        let marked = format!("\u{feff}{LENSES}");
+        assert_eq!(read(&marked, &format!("\u{feff}# Images\n{of_one}")).unwrap().len(), 1);
         for (poses, said) in [
             ("1 1 0 0 0 0 0 0 1 a.png\n2 1 0 0 0 0 0 0 1 b.png\n", "line 2: not points"),
             ("1 1 0 0 0 0 0 0 3 a.png", "line 1: there is no camera 3 in cameras.txt"),

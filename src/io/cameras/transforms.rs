@@ -10,7 +10,7 @@ use super::{NamedCamera, name_of};
 use crate::error::{Error, Result};
 use crate::io::camera::{CameraFile, Pose, rigid};
 use crate::io::fault::Fault;
-use crate::io::values::{one_line, shown};
+use crate::io::values::{one_line, read_text, shown};
 use crate::scene::Lens;
 
 /// Lens models that are a pinhole's where nothing is distorted.
@@ -19,7 +19,7 @@ const PINHOLES: [&str; 6] = ["PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADI
 const DISTORTIONS: [&str; 8] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
 
 pub(super) fn read(path: &Path, size: (u32, u32)) -> Result<Vec<NamedCamera>> {
-    let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
+    let text = read_text(path).map_err(|e| Error::read(path, e))?;
     parse(&text, size).map_err(|what| Fault::Malformed(what).of(path))
 }
 

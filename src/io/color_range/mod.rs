@@ -81,6 +81,17 @@ pub(super) enum Values {
     Floats(Vec<[f32; 4]>),
 }
 
+impl Values {
+    /// Whether none differs from another.
+    fn are_one(&self) -> bool {
+        match self {
+            Self::Bytes(codes) => codes.windows(2).all(|pair| pair[0] == pair[1]),
+            Self::Words(codes) => codes.windows(2).all(|pair| pair[0] == pair[1]),
+            Self::Floats(numbers) => numbers.windows(2).all(|pair| pair[0] == pair[1]),
+        }
+    }
+}
+
 /// The colours of a run of points.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Numbers {
@@ -128,6 +139,13 @@ impl RawColors {
     /// Those of points that are one run.
     pub(super) fn of_run(count: usize, colors: Option<Numbers>, shades: Option<Shades>) -> Self {
         Self { runs: vec![Run { count, colors, shades }], ..Self::default() }
+    }
+
+    /// Whether no colour differs from another, and no intensities are kept.
+    pub(super) fn is_one_color(&self) -> bool {
+        let is_one =
+            |run: &Run| run.shades.is_none() && run.colors.as_ref().is_none_or(|colors| colors.values.are_one());
+        self.runs.len() < 2 && self.runs.iter().all(is_one)
     }
 
     /// Whether some colour is not zero: then no intensities are kept.

@@ -26,9 +26,21 @@ pub(super) struct Faces {
     corners: Vec<Corner>,
     /// Of each face where its corners end, and its material or [`NONE`].
     faces: Vec<(usize, u32)>,
-    /// A corner without a normal, or without texture coordinates, was among them.
+    /// A corner without a normal was among them.
     lacks_normal: bool,
-    lacks_texture: bool,
+    /// A corner with texture coordinates was.
+    has_texture: bool,
+}
+
+/// How corners are numbered where a face is, and what is wrong with them is said.
+#[derive(Clone, Copy)]
+pub(super) struct Numbering {
+    /// Vertices, texture coordinates and normals so far, from which a number below 0 counts back.
+    pub(super) counts: [usize; 3],
+    /// The line of the file.
+    pub(super) line: u64,
+    /// Texture coordinates that are none are an error; else they are as if there were none.
+    pub(super) strict: bool,
 }
 
 /// What corners name.
@@ -45,8 +57,8 @@ pub(super) struct Triangle {
     pub(super) vertices: [u32; 3],
     /// The normals that its corners name, if every corner of the file names one.
     pub(super) normals: Option<[[f64; 3]; 3]>,
-    /// Its corners' texture coordinates, if every corner of the file names some.
-    pub(super) texture: Option<[[f32; 2]; 3]>,
+    /// Its corners' texture coordinates; not a number where one of them names none.
+    pub(super) texture: [[f32; 2]; 3],
     /// The number of its material; `u32::MAX` before the first `usemtl`.
     pub(super) material: u32,
 }
@@ -57,18 +69,17 @@ impl Faces {
         self.faces.is_empty()
     }
 
-    /// Every corner names texture coordinates.
+    /// A corner names texture coordinates.
     pub(super) fn have_texture(&self) -> bool {
-        !self.lacks_texture && !self.is_empty()
+        self.has_texture
     }
 
-    /// Adds the face of a line's `words`, of which a number below 0 counts back from the `count`s of what the file has so far; texture
-    /// coordinates only if they are wanted.
+    /// Adds the face of a line's `words`, which is of a material by its number.
     pub(super) fn add<'w>(
         &mut self,
         words: impl Iterator<Item = &'w [u8]> + Clone,
-        counts: [usize; 3],
-        (wants_texture, material, line): (bool, Option<usize>, u64),
+        Numbering { counts, line, strict }: Numbering,
+        material: Option<u32>,
     ) -> Result<(), Fault> {
         let words = words.take_while(|word| !word.starts_with(b"#"));
         // A face of one or two corners has no area.
@@ -79,29 +90,31 @@ impl Faces {
             let mut parts = word.split(|&byte| byte == b'/').map(Some).chain(std::iter::repeat(None));
             let mut named = |kind: usize| -> Result<Option<u32>, Fault> {
                 let part = parts.next().flatten().filter(|part| !part.is_empty());
-                let wanted = part.filter(|_| kind != TEXTURE || wants_texture);
-                let parsed = wanted.map(|part| part_of(part).ok_or_else(|| no_corner(line, word))).transpose()?;
+                let parsed = part.map(|part| part_of(part).ok_or_else(|| no_corner(line, word)));
+                let parsed =
+                    if kind == TEXTURE && !strict { parsed.and_then(Result::ok) } else { parsed.transpose()? };
                 Ok(parsed.map(|number| place(number, counts[kind])))
             };
             let (vertex, texture, normal) = (named(0)?, named(TEXTURE)?, named(2)?);
             let vertex = vertex.ok_or_else(|| no_corner(line, word))?;
             self.lacks_normal |= normal.is_none();
-            self.lacks_texture |= texture.is_none();
+            self.has_texture |= texture.is_some();
             self.corners.push(Corner { vertex, texture: texture.unwrap_or(NONE), normal: normal.unwrap_or(NONE) });
         }
-        self.faces.push((self.corners.len(), material.map_or(NONE, |number| number as u32)));
+        self.faces.push((self.corners.len(), material.unwrap_or(NONE)));
         Ok(())
     }
 
     /// Fails if a corner names what the file, which has so many of each, has not. Of texture coordinates or normals that a file has none of at
-    /// all none is missed: programs write their numbers anyway.
-    pub(super) fn check(&mut self, counts: [usize; 3]) -> Result<(), Fault> {
-        self.lacks_texture |= counts[TEXTURE] == 0;
+    /// all none is missed: programs write their numbers anyway; nor is any of texture coordinates, if this is not `strict`.
+    pub(super) fn check(&mut self, counts: [usize; 3], strict: bool) -> Result<(), Fault> {
+        self.has_texture &= counts[TEXTURE] > 0;
         self.lacks_normal |= counts[2] == 0;
+        let is_missed = |kind: usize| kind == 0 || counts[kind] > 0 && (strict || kind != TEXTURE);
         for corner in &self.corners {
             let named = [corner.vertex, corner.texture, corner.normal];
             let beyond = |kind: &usize| named[*kind] != NONE && named[*kind] as usize >= counts[*kind];
-            if let Some(kind) = (0..3).filter(|&kind| kind == 0 || counts[kind] > 0).find(beyond) {
+            if let Some(kind) = (0..3).filter(|&kind| is_missed(kind)).find(beyond) {
                 return Err(missing(kind));
             }
         }
@@ -127,11 +140,13 @@ impl Faces {
 
     fn triangle(&self, named: Named<'_>, corners: [Corner; 3], material: u32) -> Triangle {
         let normal = |corner: Corner| named.normals.get(corner.normal as usize).copied().unwrap_or_default();
-        let texture = |corner: Corner| named.texture.get(corner.texture as usize).copied().unwrap_or_default();
+        let texture = |corner: Corner| named.texture.get(corner.texture as usize).copied().unwrap_or([f32::NAN; 2]);
+        let places = corners.map(texture);
+        let is_placed = places.as_flattened().iter().all(|turns| turns.is_finite());
         Triangle {
             vertices: corners.map(|corner| corner.vertex),
             normals: (!self.lacks_normal).then(|| corners.map(normal)),
-            texture: (!self.lacks_texture).then(|| corners.map(texture)),
+            texture: if is_placed { places } else { [[f32::NAN; 2]; 3] },
             material,
         }
     }

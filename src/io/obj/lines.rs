@@ -5,9 +5,11 @@ use crate::io::RawColors;
 use crate::io::color_range::{Kind, Number, Numbers, Values};
 use crate::io::fault::Fault;
 use crate::io::values::{BYTE_ORDER_MARK, finite, line_end, parse_number, shown};
+use crate::scene::color::{DEFAULT_COLOR, srgb8};
+use std::collections::HashMap;
 use std::io::{BufRead, Read};
 
-use super::faces::{Faces, Named, Triangle};
+use super::faces::{Faces, Named, Numbering, Triangle};
 
 /// No line is longer, with those that continue it; a polygon of a million corners is shorter.
 const LINE_LIMIT: usize = 1 << 24;
@@ -18,13 +20,17 @@ pub(super) struct Lines {
     pub(super) positions: Vec<[f64; 3]>,
     /// One colour and alpha for each position, or none at all, as the file has them; none of its own is not a number.
     colors: Vec<[f64; 4]>,
+    /// What lines `#MRGB` say, the codes of a vertex after those of another.
+    polypaint: Vec<[u8; 4]>,
     pub(super) normals: Vec<[f64; 3]>,
-    /// Only if a surface is wanted, and so for all that follows.
     pub(super) texture: Vec<[f32; 2]>,
     /// What `mtllib` names.
     pub(super) libraries: Vec<String>,
-    /// What `usemtl` names, each once.
+    /// What `usemtl` names, each once, and their numbers.
     pub(super) materials: Vec<String>,
+    numbers: HashMap<String, u32>,
+    /// The number of the current one.
+    material: Option<u32>,
     pub(super) faces: Faces,
     /// Lines read.
     count: u64,
@@ -81,20 +87,21 @@ impl<R: BufRead> Reader<'_, R> {
 }
 
 impl Lines {
-    /// Reads all of them; of texture coordinates, materials and their libraries only if a `surface` is wanted.
+    /// Reads all of them. Texture coordinates that are none are an error only if `strict`: for points it matters little where
+    /// in a texture they are.
     ///
     /// # Errors
     /// A number that is none, or a face that names what does not exist.
-    pub(super) fn read(reader: impl BufRead, surface: bool, progress: &dyn Progress) -> Result<Self, Fault> {
+    pub(super) fn read(reader: impl BufRead, strict: bool, progress: &dyn Progress) -> Result<Self, Fault> {
         let line_end = b'\n';
         let mut rest = Reader { reader, progress, unreported: 0, count: 0, line: Vec::new(), line_end };
-        let (mut lines, mut material) = (Self::default(), None);
+        let mut lines = Self::default();
         while rest.next_line()? {
             lines.count = rest.count;
-            lines.take(&rest.line, surface, &mut material)?;
+            lines.take(&rest.line, strict)?;
         }
         progress.advance(rest.unreported);
-        lines.faces.check(lines.counts())?;
+        lines.faces.check(lines.counts(), strict)?;
         Ok(lines)
     }
 
@@ -109,8 +116,8 @@ impl Lines {
         [self.positions.len(), self.texture.len(), self.normals.len()]
     }
 
-    /// Takes a line; `material` is the number of the current one.
-    fn take(&mut self, line: &[u8], surface: bool, material: &mut Option<usize>) -> Result<(), Fault> {
+    /// Takes a line.
+    fn take(&mut self, line: &[u8], strict: bool) -> Result<(), Fault> {
         let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
         match words.next() {
             Some(b"v") => self.vertex(words)?,
@@ -121,28 +128,31 @@ impl Lines {
                 }
                 self.normals.push(normal);
             }
-            Some(b"vt") if surface => {
-                let (u, v) = (self.number(words.next())? as f32, words.next());
-                let v = if v.is_some() { self.number(v)? as f32 } else { 0.0 };
-                self.texture.push([u, v]);
+            Some(b"vt") => {
+                let place = self.place(words);
+                self.texture.push(if strict { place? } else { place.unwrap_or([f32::NAN; 2]) });
             }
-            Some(b"mtllib") if surface => self.libraries.push(rest_of(line, b"mtllib")),
-            Some(b"usemtl") if surface => {
-                let name = rest_of(line, b"usemtl");
-                let known = self.materials.iter().position(|material| *material == name);
-                *material = Some(known.unwrap_or(self.materials.len()));
-                if known.is_none() {
-                    self.materials.push(name);
-                }
-            }
+            Some(b"mtllib") => self.libraries.push(rest_of(line, b"mtllib")),
+            Some(b"usemtl") => self.material = Some(self.number_of(rest_of(line, b"usemtl"))),
             Some(b"f") => {
-                let (counts, line) = (self.counts(), self.count);
-                self.faces.add(words, counts, (surface, *material, line))?;
+                let numbering = Numbering { counts: self.counts(), line: self.count, strict };
+                self.faces.add(words, numbering, self.material)?;
             }
+            Some(b"#MRGB") => self.polypaint.extend(words.next().into_iter().flat_map(polypaint)),
             _ => {}
         }
         Ok(())
     }
+}
+
+/// The codes of a line `#MRGB` of ZBrush: of each vertex a mask, red, green and blue, two digits of base 16 each.
+fn polypaint(digits: &[u8]) -> impl Iterator<Item = [u8; 4]> {
+    let of_vertex = |digits: &[u8; 8]| {
+        let code = u32::from_str_radix(std::str::from_utf8(digits).ok()?, 16).ok()?;
+        let [_, r, g, b] = code.to_be_bytes();
+        Some([r, g, b, 255])
+    };
+    digits.as_chunks::<8>().0.iter().map_while(of_vertex)
 }
 
 /// What follows the keyword on a line, which may hold spaces.
@@ -152,6 +162,22 @@ fn rest_of(line: &[u8], keyword: &[u8]) -> String {
 }
 
 impl Lines {
+    /// `u` or `u v`.
+    fn place<'w>(&self, mut words: impl Iterator<Item = &'w [u8]>) -> Result<[f32; 2], Fault> {
+        let (u, v) = (self.number(words.next())? as f32, words.next());
+        Ok([u, if v.is_some() { self.number(v)? as f32 } else { 0.0 }])
+    }
+
+    /// The number of the material of this name.
+    fn number_of(&mut self, name: String) -> u32 {
+        let next = self.materials.len() as u32;
+        let number = *self.numbers.entry(name.clone()).or_insert(next);
+        if number == next {
+            self.materials.push(name);
+        }
+        number
+    }
+
     fn number(&self, word: Option<&[u8]>) -> Result<f64, Fault> {
         let line = self.count;
         let word = word.ok_or_else(|| Fault::Malformed(format!("line {line}: too few numbers")))?;
@@ -199,14 +225,21 @@ impl Lines {
 
     /// One colour for each position as the file has it, if any has one.
     ///
-    /// No standard says what colours range over: most programs write shares of 1, some codes of 0 to 255.
+    /// No standard says what colours range over: most programs write shares of 1, some codes of 0 to 255. Where no vertex has
+    /// one, those of lines `#MRGB`, in the vertices' order, count.
     pub(super) fn colors(&self, ignore_alpha: bool) -> Option<RawColors> {
-        let count = self.colors.len();
+        let of = |values, number, alpha| {
+            let numbers = Numbers { values, kind: Kind::of(number), alpha };
+            Some(RawColors::of_run(self.positions.len(), Some(numbers), None))
+        };
+        if self.colors.is_empty() {
+            let mut codes = self.polypaint.clone();
+            codes.resize(self.positions.len(), srgb8(DEFAULT_COLOR));
+            return if self.polypaint.is_empty() { None } else { of(Values::Bytes(codes), Number::Byte, None) };
+        }
         let has_alpha = !ignore_alpha && self.colors.iter().any(|[.., alpha]| !alpha.is_nan() && *alpha != 1.0);
         let number = |color: &[f64; 4]| color.map(|value| if value.is_nan() { f32::NAN } else { finite(value) });
         let values = Values::Floats(self.colors.iter().map(number).collect());
-        let alpha = has_alpha.then_some(Number::Float);
-        (count > 0)
-            .then(|| RawColors::of_run(count, Some(Numbers { values, kind: Kind::of(Number::Float), alpha }), None))
+        of(values, Number::Float, has_alpha.then_some(Number::Float))
     }
 }

@@ -2,6 +2,7 @@
 
 mod encoding;
 mod faces;
+mod library;
 mod lines;
 mod material;
 
@@ -12,10 +13,11 @@ use crate::io::closed::is_closed;
 use crate::io::fault::{self, Fault};
 use crate::io::points::Faces;
 use crate::io::triangles::Triangles;
-use crate::io::{Input, Mesh, Points, RawColors, ReadOptions, Up, settle_colors};
+use crate::io::{Input, Mesh, Paint, Points, RawColors, ReadOptions, Up, settle_colors};
 use crate::{Progress, Result};
 use lines::Lines;
 use std::io::BufReader;
+use std::path::Path;
 
 /// Reads the vertices of an OBJ file, one point for each `v` line and in their order, whatever groups and materials
 /// the faces are in.
@@ -26,18 +28,20 @@ use std::io::BufReader;
 /// - Radii: 1.1 times the smallest with which disks at a triangle's corners cover it, the largest over the vertex's
 ///   triangles; polygons are made of triangles; a vertex of no triangle has none (zero).
 /// - Colours: the three numbers after a vertex's coordinates, sRGB-coded in [0, 1] or in [0, 255], as all of them say
-///   ([`RawColors`]); a fourth is alpha.
+///   ([`RawColors`]); a fourth is alpha. Where no vertex has any, those of ZBrush's lines `#MRGB`.
+/// - What its triangles look like, by materials and images, as [`read_mesh`] reads them.
 ///
-/// Text may be in UTF-16, of either byte order, if a byte order mark says so. Up is y. Lines, points, curves and materials are passed over, so a missing MTL file is no error.
+/// Text may be in UTF-16, of either byte order, if a byte order mark says so. Up is y. Lines, points and curves are passed over,
+/// and a missing MTL file or image is no error, but named in [`Points::notes`].
 ///
 /// # Errors
 ///
 /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where
 /// a number is none or a face names a vertex or normal that does not exist; where a file has no normal at all, none is missed.
 pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
-    let name = fault::name(&input.path);
-    let mut points = read_with(input, false, progress, |lines| points(lines, options.ignore_alpha))?;
-    points.raw.iter_mut().for_each(|raw| raw.name.clone_from(&name));
+    let path = input.path.clone();
+    let mut points = read_with(input, false, progress, |lines| points(lines, &path, options.ignore_alpha))?;
+    points.raw.iter_mut().for_each(|raw| raw.name = fault::name(&path));
     points.about = options.describe.then(|| Box::new(About { format: "OBJ".into(), ..About::default() }));
     Ok(points)
 }
@@ -45,87 +49,91 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
 /// Reads the triangles of an OBJ file, those of all groups and materials as one mesh, with every `v` line a vertex.
 ///
 /// Polygons are made of triangles, concave ones too. Corners have the `vn` they name where every corner of the file names one, else the
-/// mesh is faceted; and so with `vt`. Colours are read as by [`read`], and lines, points and curves are passed over too. A
-/// file without faces is a mesh without triangles, and no error here.
+/// mesh is faceted; a triangle all of whose corners name a `vt` has those. Colours are read as by [`read`], and lines, points and
+/// curves are passed over too. A file without faces is a mesh without triangles, and no error here.
 ///
-/// Of the materials in the MTL files beside it the diffuse colour `Kd` (linear light), the opacity `d` and the image
-/// `map_Kd` (PNG or JPEG, sRGB) are read. Files that cannot be read are left out and named in [`Mesh::notes`].
+/// Of the materials in the MTL files beside it, whatever the case of their names and keywords, the diffuse colour `Kd`
+/// (linear light), the opacity `d` and the image `map_Kd` (PNG, JPEG, BMP or TGA, sRGB; with `-s`, `-o` and `-clamp`) are
+/// read. Files that cannot be read are left out and named in [`Mesh::notes`].
 ///
 /// # Errors
 ///
-/// As [`read`], and where a face names texture coordinates that do not exist, in a file that has some.
+/// As [`read`], and where a face names texture coordinates that do not exist, in a file that has some, or images together have
+/// more pixels than [`MOST_PIXELS`](crate::io::image::MOST_PIXELS).
 pub fn read_mesh(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Mesh> {
     let path = input.path.clone();
-    let make = |lines| mesh(lines, &fault::name(&path), options.ignore_alpha);
-    let (mut mesh, libraries, names) = read_with(input, true, progress, make)?;
-    mesh.materials = material::read(&path, &libraries, &names, &mut mesh.notes);
-    Ok(mesh)
+    read_with(input, true, progress, |lines| {
+        let raw = lines.colors(options.ignore_alpha);
+        let raw = raw.map(|raw| Box::new(RawColors { name: fault::name(&path), ..raw }));
+        let mut colored = Points { raw, ..Points::default() };
+        settle_colors(std::slice::from_mut(&mut colored));
+        let (mut mesh, libraries, names) = mesh(lines);
+        (mesh.colors, mesh.notes) = (colored.colors, colored.notes);
+        material::give(&mut mesh, &path, &libraries, names)?;
+        Ok(mesh)
+    })
 }
 
 /// Opens the file and makes of its lines and faces what is asked for.
-fn read_with<T>(input: Input, surface: bool, progress: &dyn Progress, make: impl Fn(Lines) -> T) -> Result<T> {
+fn read_with<T>(input: Input, strict: bool, progress: &dyn Progress, make: impl Fn(Lines) -> Result<T>) -> Result<T> {
     let Input { file, length, path, .. } = input;
     let in_file = |fault: Fault| fault.of(&path);
     let (reader, length) =
         encoding::decoded(BufReader::with_capacity(1 << 18, file), length).map_err(Fault::Io).map_err(in_file)?;
     progress.begin(&format!("reading {}", fault::name(&path)), length);
-    let made = Lines::read(reader, surface, progress).map(make);
+    let made = Lines::read(reader, strict, progress).map_err(in_file).and_then(make);
     progress.end();
-    made.map_err(in_file)
+    made
 }
 
-fn points(lines: Lines, ignore_alpha: bool) -> Points {
+/// The vertices of the lines of the file at `path`, and what their triangles look like.
+fn points(lines: Lines, path: &Path, ignore_alpha: bool) -> Result<Points> {
     let raw = lines.colors(ignore_alpha).map(Box::new);
+    let has_faces = !lines.faces.is_empty();
+    let paired = || lines.normals.iter().map(|normal| normal.map(|c| c as f32)).collect::<Vec<_>>();
+    let alone = (!has_faces && !lines.normals.is_empty() && lines.normals.len() == lines.positions.len()).then(paired);
     let mut around = Triangles::new(&lines.positions);
-    let (mut triangles, mut named) = (Vec::new(), Vec::new());
     for triangle in lines.triangles() {
-        triangles.push(triangle.vertices);
-        named.extend(triangle.normals.map(|named| named.map(|normal| normal.map(|c| c as f32))));
         around.add(triangle.vertices.map(|vertex| vertex as usize), triangle.normals.map(|all| all.map(Some)));
     }
-    let has_faces = !lines.faces.is_empty();
     let face_as_named = around.face_as_named();
     let (face_normals, radii) = around.finish();
-    let paired = || lines.normals.iter().map(|normal| normal.map(|c| c as f32)).collect::<Vec<_>>();
-    let normals = match has_faces {
-        true => Some(face_normals),
-        false => (!lines.normals.is_empty() && lines.normals.len() == lines.positions.len()).then(paired),
-    };
-    Points {
-        normals,
+    let (mut mesh, libraries, names) = mesh(lines);
+    if let Err(error) = material::give(&mut mesh, path, &libraries, names) {
+        mesh.materials.iter_mut().for_each(|material| material.texture = None);
+        mesh.notes.push(format!("the images of its materials are left out: {error}"));
+    }
+    let paint = Paint::of(&mesh).map(Box::new);
+    let Mesh { positions, triangles, normals, notes, .. } = mesh;
+    Ok(Points {
+        normals: if has_faces { Some(face_normals) } else { alone },
         radii: has_faces.then_some(radii),
         of_mesh: has_faces,
-        closed: face_as_named && is_closed(&lines.positions, &triangles),
+        closed: face_as_named && is_closed(&positions, &triangles),
         raw,
         up: Some(Up::Y),
-        faces: has_faces.then(|| {
-            let all = named.len() == triangles.len();
-            Faces { triangles, normals: all.then_some(named) }
-        }),
-        positions: lines.positions,
+        faces: has_faces.then_some(Faces { triangles, normals, paint }),
+        positions,
+        notes,
         ..Points::default()
-    }
+    })
 }
 
-/// The mesh without its materials, the libraries they are in, and their names.
-fn mesh(lines: Lines, name: &str, ignore_alpha: bool) -> (Mesh, Vec<String>, Vec<String>) {
-    let raw = lines.colors(ignore_alpha).map(|raw| Box::new(RawColors { name: name.to_owned(), ..raw }));
-    let mut colored = Points { raw, ..Points::default() };
-    settle_colors(std::slice::from_mut(&mut colored));
+/// The mesh without its colours and materials, the libraries they are in, and their names.
+fn mesh(lines: Lines) -> (Mesh, Vec<String>, Vec<String>) {
     let (mut vertices, mut normals) = (Vec::new(), Vec::new());
     let (mut texture, mut material) = (Vec::new(), Vec::new());
+    let (has_texture, has_material) = (lines.faces.have_texture(), !lines.materials.is_empty());
     for triangle in lines.triangles() {
         vertices.push(triangle.vertices);
         normals.extend(triangle.normals.map(|named| named.map(|normal| normal.map(|c| c as f32))));
-        texture.extend(triangle.texture);
-        material.push(triangle.material);
+        texture.extend(has_texture.then_some(triangle.texture));
+        material.extend(has_material.then_some(triangle.material));
     }
     let mesh = Mesh {
         normals: (!normals.is_empty()).then_some(normals),
-        texture: (lines.faces.have_texture() && !texture.is_empty()).then_some(texture),
-        material: (!lines.materials.is_empty()).then_some(material),
-        colors: colored.colors,
-        notes: colored.notes,
+        texture: (!texture.is_empty()).then_some(texture),
+        material: has_material.then_some(material),
         triangles: vertices,
         positions: lines.positions,
         up: Some(Up::Y),

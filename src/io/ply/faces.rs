@@ -1,6 +1,7 @@
 //! The triangles of a PLY file: polygons of the element `face`, strips of the element `tristrips`.
 
-use super::header::{Element, Kind, Property};
+use super::face_colors;
+use super::header::{Element, Kind, Property, Scalar};
 use super::vertex::is_tree;
 use super::whole::is_whole;
 use crate::io::fault::Fault;
@@ -25,6 +26,8 @@ pub(super) enum Role {
     Texture,
     /// The number of its texture.
     TextureNumber,
+    /// A channel of its colour: red, green, blue or alpha.
+    Color(usize),
     /// Nothing.
     Unused,
 }
@@ -35,8 +38,13 @@ pub(super) struct Faces {
     triangles: Vec<[u32; 3]>,
     /// The polygons of more than three corners: their first triangle, and how many.
     polygons: Vec<(usize, usize)>,
-    /// Whether texture coordinates are read; they may be absent.
-    surface: bool,
+    /// Whether rows may have texture coordinates, and numbers of textures.
+    placed: bool,
+    numbered: bool,
+    /// The types of the channels of colours, of which those of alpha may be absent; none where rows have no colours.
+    channels: Option<[Option<Scalar>; 4]>,
+    /// Colours of the triangles, one each, as the file has them; not a number for those without. None if no row has any.
+    colors: Vec<[f32; 4]>,
     /// Texture coordinates of the triangles, one each, or as many as there were before the first face without.
     texture: Vec<[[f32; 2]; 3]>,
     /// Which of the file's textures each triangle has.
@@ -50,6 +58,8 @@ pub(super) struct Faces {
     /// The row's texture coordinates, and its texture.
     row_texture: Vec<f32>,
     row_number: u32,
+    /// The row's colour.
+    row_color: [f32; 4],
     /// The last two vertices of a strip, or the first and the last one of a polygon, with their numbers in the row.
     kept: [Option<(u32, usize)>; 2],
     /// Whether the next triangle of the strip is turned round.
@@ -69,31 +79,41 @@ pub(super) struct Triangles {
     pub(super) triangles: Vec<[u32; 3]>,
     /// Texture coordinates of each corner, if every face has some.
     pub(super) texture: Option<Vec<[[f32; 2]; 3]>>,
-    /// Which of the file's textures each triangle has.
+    /// Which of the file's textures each triangle has; the first, if no row says it.
     pub(super) texture_numbers: Vec<u32>,
+    /// The linear colour of each triangle, straight alpha, if faces have any.
+    pub(super) colors: Option<Vec<[f32; 4]>>,
 }
 
 impl Faces {
-    /// None yet; with `surface`, texture coordinates are read too.
-    pub(super) fn new(surface: bool) -> Self {
-        Self { surface, ..Self::default() }
-    }
-
     /// Whether an element lists the vertices of faces.
     pub(super) fn are(element: &Element) -> bool {
         element.properties.iter().any(|property| role(element, property) == Role::Corners)
     }
 
     /// What each property of an element is read for.
-    pub(super) fn roles(&self, element: &Element) -> Vec<Role> {
+    pub(super) fn roles(&mut self, element: &Element) -> Vec<Role> {
         let mut found = false;
         let mut role = |property: &Property| match role(element, property) {
             // The first list of vertices is theirs.
             Role::Corners if std::mem::replace(&mut found, true) => Role::Unused,
-            Role::Texture | Role::TextureNumber if !self.surface => Role::Unused,
             role => role,
         };
-        element.properties.iter().map(&mut role).collect()
+        let mut roles: Vec<Role> = element.properties.iter().map(&mut role).collect();
+        let mut channels = [None; 4];
+        for (property, role) in element.properties.iter().zip(&roles) {
+            if let (Role::Color(channel), Kind::Scalar(scalar)) = (role, property.kind) {
+                channels[*channel] = Some(scalar);
+            }
+        }
+        if found && channels[..3].iter().all(Option::is_some) {
+            self.channels = Some(channels);
+        } else {
+            roles.iter_mut().filter(|role| matches!(role, Role::Color(_))).for_each(|role| *role = Role::Unused);
+        }
+        self.placed = roles.contains(&Role::Texture);
+        self.numbered |= roles.contains(&Role::TextureNumber);
+        roles
     }
 
     /// Begins a row.
@@ -101,6 +121,7 @@ impl Faces {
         self.shape = shape_of(element);
         (self.kept, self.odd) = ([None, None], false);
         (self.corner, self.first, self.row_number) = (0, self.triangles.len(), 0);
+        self.row_color = [f32::NAN, f32::NAN, f32::NAN, f32::NAN];
         self.corners.clear();
         self.row_texture.clear();
     }
@@ -112,6 +133,7 @@ impl Faces {
             Role::Texture => self.row_texture.push(number as f32),
             // A cast takes what is no number of a texture for that of none.
             Role::TextureNumber => self.row_number = if number < 0.0 { u32::MAX } else { number as u32 },
+            Role::Color(channel) => self.row_color[channel] = number as f32,
             Role::Unused => {}
         }
         Ok(())
@@ -141,7 +163,7 @@ impl Faces {
                 // Strips turn corners by triangles without area.
                 if first.0 != second.0 && second.0 != vertex && vertex != first.0 {
                     self.triangles.push(triangle.map(|(vertex, _)| vertex));
-                    if self.surface {
+                    if self.placed {
                         self.corners.push(triangle.map(|(_, corner)| corner));
                     }
                 }
@@ -160,10 +182,17 @@ impl Faces {
         if self.shape == Some(Shape::Polygon) && made > 1 && made + 2 == self.corner {
             self.polygons.push((self.first, made));
         }
-        if !self.surface {
+        if self.channels.is_some() {
+            self.colors.resize(self.first, [f32::NAN; 4]);
+            self.colors.resize(self.triangles.len(), self.row_color);
+        }
+        if self.numbered {
+            self.texture_numbers.resize(self.first, 0);
+            self.texture_numbers.resize(self.triangles.len(), self.row_number);
+        }
+        if !self.placed {
             return;
         }
-        self.texture_numbers.resize(self.triangles.len(), self.row_number);
         let (pairs, _) = self.row_texture.as_chunks::<2>();
         if pairs.len() >= self.corner && self.texture.len() == self.first {
             self.texture.extend(self.corners.iter().map(|corners| corners.map(|corner| pairs[corner])));
@@ -172,7 +201,7 @@ impl Faces {
 
     /// The triangles of a file with these vertices.
     pub(super) fn finish(self, positions: &[[f64; 3]]) -> Result<Triangles, Fault> {
-        let Self { mut triangles, mut texture, texture_numbers, polygons, .. } = self;
+        let Self { mut triangles, mut texture, mut texture_numbers, polygons, mut colors, channels, .. } = self;
         let vertices = positions.len();
         if let Some(vertex) = triangles.as_flattened().iter().find(|vertex| **vertex as usize >= vertices) {
             return Err(Fault::Malformed(format!("a face names the vertex {vertex}, but there are {vertices}")));
@@ -186,7 +215,10 @@ impl Faces {
             texture.get_mut(fan).into_iter().for_each(|fan| remake(fan, &parts));
         }
         let texture = Some(texture).filter(|texture| !texture.is_empty() && texture.len() == triangles.len());
-        Ok(Triangles { triangles, texture, texture_numbers })
+        texture_numbers.resize(triangles.len(), 0);
+        colors.resize(triangles.len(), [f32::NAN; 4]);
+        let colors = channels.filter(|_| !triangles.is_empty()).map(|channels| face_colors::linear(colors, channels));
+        Ok(Triangles { triangles, texture, texture_numbers, colors })
     }
 }
 
@@ -214,6 +246,7 @@ fn role(element: &Element, property: &Property) -> Role {
         (Some(_), Kind::List { .. }, "vertex_indices" | "vertex_index") => Role::Corners,
         (Some(Shape::Polygon), Kind::List { .. }, "texcoord") => Role::Texture,
         (Some(Shape::Polygon), Kind::Scalar(_), "texnumber") => Role::TextureNumber,
+        (Some(_), Kind::Scalar(_), name) => face_colors::channel(name).map_or(Role::Unused, Role::Color),
         _ => Role::Unused,
     }
 }

@@ -31,6 +31,7 @@
 mod ascii;
 mod binary;
 mod contents;
+mod face_colors;
 mod faces;
 mod gaussian;
 mod header;

@@ -6,15 +6,16 @@ use super::header::{self, Element, Encoding};
 use super::vertex::Layout;
 use super::{ascii, binary, gaussian, packed};
 use crate::io::about::About;
+use crate::io::beside::Beside;
 use crate::io::fault::{self, Fault};
-use crate::io::{Input, Material, Mesh, Points, ReadOptions, Texture, settle_colors};
+use crate::io::textures::Images;
+use crate::io::{Input, Material, Mesh, Paint, Points, ReadOptions, settle_colors};
 use crate::io::{closed, triangles};
-use crate::scene::Whole;
+use crate::scene::{Colors, Whole};
 use crate::{Progress, Result};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// Reads the vertices of a PLY file: ASCII, or binary of either byte order.
 ///
@@ -29,7 +30,7 @@ use std::sync::Arc;
 ///
 /// In a mesh, a list `vertex_indices` (or `vertex_index`) in an element `face` or `tristrips`, vertices without normals and
 /// radii get them from the triangles around them, as in an OBJ file: normals weighted by area, and radii with which disks
-/// cover the triangles.
+/// cover the triangles. What triangles look like, by colours of their own and by images, is read as [`read_mesh`] reads it.
 ///
 /// Vertices with `scale_0` and `rot_0` are Gaussians, as 2D Gaussian splatting writes them, or flat ones of 3D Gaussian splatting: they get
 /// half-axes of so many standard deviations that nothing shows beyond ([`EXTENT`](crate::scene::gaussian::EXTENT)), and colours with alpha that
@@ -48,66 +49,114 @@ use std::sync::Arc;
 /// the header is not PLY's, `x`, `y` or `z` is missing, the file ends before the vertices or faces that its header
 /// promises, a number in text is none, a list has a negative length, or a face names a vertex that does not exist.
 pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
-    let (mut points, faces, _) = contents(input, false, options, progress)?;
+    let path = input.path.clone();
+    let (mut points, mut faces, textures) = contents(input, options, progress)?;
     if faces.triangles.is_empty() {
         return Ok(points);
     }
+    choose_colors(&mut points, &mut faces);
     let mut triangles = triangles::Triangles::new(&points.positions);
     faces.triangles.iter().for_each(|corners| triangles.add(corners.map(|corner| corner as usize), None));
     let (normals, radii) = triangles.finish();
     let closed = closed::is_closed(&points.positions, &faces.triangles);
     points.closed = closed && points.normals.as_ref().is_none_or(|given| triangles::agree(given, &normals));
-    let corners = |given: &Vec<[f32; 3]>| faces.triangles.iter().map(|t| t.map(|v| given[v as usize])).collect();
-    let named = points.normals.as_ref().map(corners);
+    let named = points.normals.as_ref().map(|given| corners(&faces.triangles, given));
     points.normals.get_or_insert(normals);
     points.of_mesh = points.radii.is_none() && points.axes.is_none();
     points.radii.get_or_insert(radii);
-    points.faces = Some(crate::io::points::Faces { triangles: faces.triangles, normals: named });
+    // Places of vertices alone are those of points, which any image may paint.
+    let is_painted = !textures.is_empty() || faces.texture.is_some() || faces.colors.is_some();
+    let of_vertices = points.texture.as_ref().filter(|_| is_painted).map(|texture| corners(&faces.triangles, texture));
+    let mut mesh = Mesh {
+        triangles: faces.triangles,
+        face_colors: faces.colors,
+        texture: faces.texture.or(of_vertices),
+        ..Mesh::default()
+    };
+    if let Err(error) = paint(&mut mesh, &path, textures, faces.texture_numbers) {
+        mesh.notes.push(format!("its images are left out: {error}"));
+    }
+    let paint = Paint::of(&mesh).map(Box::new);
+    points.notes.append(&mut mesh.notes);
+    points.faces = Some(crate::io::points::Faces { triangles: mesh.triangles, normals: named, paint });
     Ok(points)
 }
 
 /// Reads the triangles of a PLY file: the polygons of the element `face`, concave ones too, and the strips of the element `tristrips`.
 ///
 /// Corners have what their vertices have: normals, colours, texture coordinates; the last from the list `texcoord` of the faces
-/// instead, as MeshLab writes it, where every face has one. What comments `TextureFile` name, PNG or JPEG beside the file, are the
-/// materials, of which a face's `texnumber` is one, or else the first; those that cannot be read are left out and named in
-/// [`Mesh::notes`]. A file without faces is a mesh without triangles, and no error here.
+/// instead, as MeshLab writes it, where every face has one. Triangles have the colours of their faces, `red green blue` with or
+/// without `alpha`, if those of vertices do not hide them: integers are codes of sRGB, of 8 bits, or of 16 if there are larger
+/// ones than 255, and floats linear light up to 1, or such codes. What comments `TextureFile` name, PNG, JPEG, BMP or TGA beside
+/// the file, are the materials, of which a face's `texnumber` is one, or else the first; those that cannot be read are left out
+/// and named in [`Mesh::notes`]. A file without faces is a mesh without triangles, and no error here.
 ///
 /// # Errors
 ///
-/// As [`read`].
+/// As [`read`], and where images together have more pixels than [`MOST_PIXELS`](crate::io::image::MOST_PIXELS).
 pub fn read_mesh(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Mesh> {
-    let folder = input.path.parent().unwrap_or(Path::new("")).to_owned();
+    let path = input.path.clone();
     let options = ReadOptions { flatten: true, ..*options };
-    let (mut points, faces, textures) = contents(input, true, &options, progress)?;
+    let (mut points, mut faces, textures) = contents(input, &options, progress)?;
+    choose_colors(&mut points, &mut faces);
     settle_colors(std::slice::from_mut(&mut points));
-    let mut notes = std::mem::take(&mut points.notes);
     let points = points.in_light();
-    let Triangles { triangles, texture, texture_numbers } = faces;
-    fn corners<T: Copy>(triangles: &[[u32; 3]], of_vertices: &[T]) -> Vec<[T; 3]> {
-        triangles.iter().map(|corners| corners.map(|vertex| of_vertices[vertex as usize])).collect()
-    }
-    let texture = texture.or_else(|| points.texture.map(|texture| corners(&triangles, &texture)));
-    let mut material = |name: String| {
-        let path = beside(&folder, &name);
-        let read = Texture::read(&path);
-        let texture = read.map(Arc::new).map_err(|error| notes.push(format!("a texture is left out: {error}"))).ok();
-        Material { image: texture.is_some().then_some(path), name, diffuse: [1.0; 4], texture }
-    };
-    let materials: Vec<_> = textures.into_iter().map(&mut material).collect();
-    // Where an image is missing the colours of the vertices are what is left.
-    let painted = texture.is_some() && materials.iter().any(|material| material.texture.is_some());
-    Ok(Mesh {
+    let triangles = faces.triangles;
+    let mut mesh = Mesh {
         normals: points.normals.map(|normals| corners(&triangles, &normals)),
-        texture,
+        texture: faces.texture.or_else(|| points.texture.map(|texture| corners(&triangles, &texture))),
         positions: points.positions,
         up: points.up,
         colors: points.colors,
+        face_colors: faces.colors,
         triangles,
-        material: painted.then_some(texture_numbers),
-        materials,
-        notes,
-    })
+        notes: points.notes,
+        ..Mesh::default()
+    };
+    paint(&mut mesh, &path, textures, faces.texture_numbers)?;
+    Ok(mesh)
+}
+
+/// What the vertices of triangles have, for each of their corners.
+fn corners<T: Copy>(triangles: &[[u32; 3]], of_vertices: &[T]) -> Vec<[T; 3]> {
+    triangles.iter().map(|corners| corners.map(|vertex| of_vertices[vertex as usize])).collect()
+}
+
+/// Leaves the colours of vertices or those of faces: of vertices those count, as they are finer, unless all are one colour, which
+/// programs write without being asked.
+fn choose_colors(points: &mut Points, faces: &mut Triangles) {
+    if faces.colors.is_none() {
+        return;
+    }
+    let are_one = points.raw.as_ref().is_none_or(|raw| raw.is_one_color())
+        && match &points.colors {
+            Some(Colors::Srgb8(codes)) => codes.windows(2).all(|pair| pair[0] == pair[1]),
+            Some(Colors::Linear(colors)) => colors.windows(2).all(|pair| pair[0] == pair[1]),
+            Some(_) => false,
+            None => true,
+        };
+    if are_one {
+        (points.colors, points.raw) = (None, None);
+    } else {
+        faces.colors = None;
+        points.notes.push("faces have colours too, which those of vertices hide".into());
+    }
+}
+
+/// Gives a mesh the images of these `names` beside the file at `path` as materials, of which each triangle has one by its number.
+fn paint(mesh: &mut Mesh, path: &Path, names: Vec<String>, numbers: Vec<u32>) -> Result<()> {
+    let (mut beside, mut images) = (Beside::of(path), Images::default());
+    let mut materials = Vec::new();
+    for name in names {
+        let path = beside.file(&name);
+        let texture = images.read(&path, false, &mut mesh.notes)?;
+        materials.push(Material { image: texture.is_some().then_some(path), name, diffuse: [1.0; 4], texture });
+    }
+    // Where an image is missing the colours of the vertices are what is left.
+    let painted = mesh.texture.is_some() && materials.iter().any(|material| material.texture.is_some());
+    mesh.material = painted.then_some(numbers);
+    mesh.materials = materials;
+    Ok(())
 }
 
 /// What a file says of itself.
@@ -125,8 +174,10 @@ fn about(header: &header::Header, vertex: &Element) -> Result<About, Fault> {
 pub(in crate::io) fn companions(path: &Path) -> Vec<PathBuf> {
     let header = File::open(path).map_err(Fault::Io).and_then(|file| header::read(&mut BufReader::new(file)));
     let folder = path.parent().unwrap_or(Path::new(""));
-    let names = |header: header::Header| header.comments.textures.into_iter().chain(header.comments.beside);
-    header.map_or(Vec::new(), |header| names(header).map(|name| beside(folder, &name)).collect())
+    let Ok(header) = header else { return Vec::new() };
+    let mut files = Beside::of(path);
+    let images = header.comments.textures.iter().map(|name| files.file(name));
+    images.chain(header.comments.beside.map(|name| beside(folder, &name))).collect()
 }
 
 /// A file that is named in the one at `path`, as Windows may write it.
@@ -134,14 +185,9 @@ fn beside(folder: &Path, name: &str) -> PathBuf {
     folder.join(name.replace('\\', "/"))
 }
 
-/// The vertices, the triangles, which name vertices that exist, and the names of textures. With `surface`, faces may have texture
-/// coordinates. Colours are as the file has them.
-fn contents(
-    input: Input,
-    surface: bool,
-    options: &ReadOptions,
-    progress: &dyn Progress,
-) -> Result<(Points, Triangles, Vec<String>)> {
+/// The vertices, the triangles, which name vertices that exist, and the names of textures. Colours of vertices are as the file has
+/// them.
+fn contents(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<(Points, Triangles, Vec<String>)> {
     let Input { file, length, path, .. } = input;
     let in_file = |fault: Fault| fault.of(&path);
     let mut reader = BufReader::with_capacity(1 << 16, file);
@@ -153,13 +199,13 @@ fn contents(
     progress.begin(&format!("reading {}", fault::name(&path)), vertex.count);
     let mut packed = || {
         let points = packed::read(&mut reader, &header, length, progress)?;
-        Ok(Contents { points, faces: Faces::new(surface), tree: None, whole: None })
+        Ok(Contents { points, faces: Faces::default(), tree: None, whole: None })
     };
     let contents = match header.encoding {
         _ if packed::is_packed(&header) => packed(),
-        Encoding::Ascii => ascii::read(reader, &header, length, Faces::new(surface), progress),
-        Encoding::LittleEndian => binary::read::<false>(reader, &header, length, Faces::new(surface), progress),
-        Encoding::BigEndian => binary::read::<true>(reader, &header, length, Faces::new(surface), progress),
+        Encoding::Ascii => ascii::read(reader, &header, length, Faces::default(), progress),
+        Encoding::LittleEndian => binary::read::<false>(reader, &header, length, Faces::default(), progress),
+        Encoding::BigEndian => binary::read::<true>(reader, &header, length, Faces::default(), progress),
     };
     progress.end();
     let Contents { mut points, faces, tree, whole } = contents.map_err(in_file)?;

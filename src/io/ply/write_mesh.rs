@@ -4,6 +4,8 @@ use std::collections::HashMap;
 use std::io::Write;
 use std::path::Path;
 
+use glam::DVec3;
+
 use super::write::{Color, ColorProperties, Properties, Vertex};
 use crate::Result;
 use crate::io::Mesh;
@@ -34,9 +36,11 @@ pub fn write_mesh(path: &Path, mesh: &Mesh, images: &[String], progress: &dyn Pr
         .collect();
     let number = |triangle: usize| {
         let material = mesh.material.as_ref().and_then(|all| all.get(triangle));
-        material.and_then(|&material| *numbers.get(material as usize)?).filter(|_| mesh.texture.is_some())
+        material
+            .and_then(|&material| *numbers.get(material as usize)?)
+            .filter(|_| mesh.texture_at(triangle, DVec3::X).is_some())
     };
-    let colored = mesh.colors.is_some() || mesh.material.is_some();
+    let colored = mesh.colors.is_some() || mesh.face_colors.is_some() || mesh.material.is_some();
     let (vertices, corners) = vertices(mesh, colored, |triangle| number(triangle).is_some());
     let properties = Properties {
         double_coordinates: mesh.positions.iter().flatten().any(|c| f64::from(*c as f32) != *c && !c.is_nan()),
@@ -84,7 +88,7 @@ fn vertices(mesh: &Mesh, colored: bool, has_image: impl Fn(usize) -> bool) -> (V
     let mut corner = |triangle: usize, k: usize| {
         let position = mesh.positions[mesh.triangles[triangle][k] as usize];
         let normal = mesh.normals.as_ref().map_or([0.0; 3], |normals| normals[triangle][k]);
-        let weights = glam::DVec3::AXES[k];
+        let weights = DVec3::AXES[k];
         let color = match (colored, has_image(triangle)) {
             (false, _) => [0.0; 4],
             (true, true) => [1.0; 4],

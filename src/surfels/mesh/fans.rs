@@ -93,13 +93,21 @@ pub(super) struct Around {
 enum Beyond {
     /// A triangle that goes on with the surface.
     Surface(u32),
+    /// One that does too, but looks otherwise.
+    Look,
     /// An edge, a border, or several triangles.
     Edge,
 }
 
 impl Around {
-    /// Those of a mesh of so many `vertices`; triangles without an area are none.
-    pub fn new(vertices: usize, triangles: &[[u32; 3]], facets: &[Option<Facet>]) -> Self {
+    /// Those of a mesh of so many `vertices`; triangles without an area are none. Two with a side in common look like one surface
+    /// where they `go_on`.
+    pub fn new(
+        vertices: usize,
+        triangles: &[[u32; 3]],
+        facets: &[Option<Facet>],
+        go_on: impl Fn([u32; 2]) -> bool + Sync,
+    ) -> Self {
         let real = || (0u32..).zip(triangles.iter().zip(facets)).filter(|(_, (_, facet))| facet.is_some());
         let mut starts = vec![0u32; vertices + 1];
         for (_, (corners, _)) in real() {
@@ -117,7 +125,12 @@ impl Around {
             }
         }
         let mut around = Self { starts, triangles: of, beyond: Vec::new() };
-        let beyond = |number: u32| [0, 1, 2].map(|side| around.beyond_side(number, side, triangles, facets));
+        let beyond = |number: u32| {
+            [0, 1, 2].map(|side| match around.beyond_side(number, side, triangles, facets) {
+                Beyond::Surface(other) if !go_on([number, other]) => Beyond::Look,
+                beyond => beyond,
+            })
+        };
         around.beyond = (0..triangles.len() as u32).into_par_iter().map(beyond).collect();
         around
     }
@@ -150,15 +163,18 @@ impl Around {
         }
     }
 
-    /// The sides of a triangle, each from its corner on, past which the surface does not go on.
-    pub fn ends(&self, triangle: u32) -> [bool; 3] {
-        self.beyond[triangle as usize].map(|beyond| beyond == Beyond::Edge)
+    /// The sides of a triangle, each from its corner on, past which the surface does not go on, or looks otherwise. With
+    /// `is_flat`, if all three are such sides, those where it goes on are none.
+    pub fn ends(&self, triangle: u32, is_flat: bool) -> [bool; 3] {
+        let beyond = self.beyond[triangle as usize];
+        let ends = beyond.map(|beyond| !matches!(beyond, Beyond::Surface(_)));
+        if is_flat && ends == [true; 3] { beyond.map(|beyond| beyond == Beyond::Edge) } else { ends }
     }
 
     fn corner(&self, triangle: u32, vertex: u32, triangles: &[[u32; 3]]) -> Option<Corner> {
         let corners = triangles[triangle as usize];
         let place = corners.iter().position(|&corner| corner == vertex)?;
-        let ends = self.beyond[triangle as usize][(place + 1) % 3] == Beyond::Edge;
+        let ends = !matches!(self.beyond[triangle as usize][(place + 1) % 3], Beyond::Surface(_));
         Some(Corner { triangle, place, next: corners[(place + 1) % 3], last: corners[(place + 2) % 3], ends })
     }
 
@@ -169,7 +185,7 @@ impl Around {
         // What follows a triangle, counter-clockwise, lies beyond its side from the last corner to the vertex.
         let follows = |corner: &Corner| match self.beyond[corner.triangle as usize][(corner.place + 2) % 3] {
             Beyond::Surface(other) => corners.binary_search_by_key(&other, |corner| corner.triangle).ok(),
-            Beyond::Edge => None,
+            Beyond::Look | Beyond::Edge => None,
         };
         let after: Vec<Option<usize>> = corners.iter().map(follows).collect();
         let mut begins = vec![true; corners.len()];

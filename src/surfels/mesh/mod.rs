@@ -1,6 +1,7 @@
 //! Surfels of a mesh, which cover it and end where the surface does.
 //!
-//! Where the mesh says nothing of its vertices but where they are, each triangle has a surfel, cut along its sides ([`triangles`]). Where
+//! Where the mesh says nothing of its vertices but where they are, each triangle has a surfel, cut along its sides ([`triangles`]), and the
+//! look of the triangle ([`skin`]). Where
 //! vertices have colours or normals of their own, surfels at them blend those from one to the next: the triangles around a vertex make a
 //! fan, or several where the surface has an edge or a border there ([`fans`]). Each fan has a surfel in its own plane, the least ellipse
 //! with which those of all corners cover the triangles ([`cover`]), cut along the fan's two sides ([`Clip`]): else disks would stand out
@@ -8,6 +9,7 @@
 
 mod cover;
 mod fans;
+mod skin;
 mod triangles;
 
 use glam::{DVec2, DVec3, Vec2};
@@ -16,10 +18,14 @@ use rayon::prelude::*;
 use self::cover::Facet;
 pub(super) use self::fans::TOLERANCE;
 use self::fans::{Around, Fan};
+use self::skin::{Look, Skin};
+pub(super) use self::skin::{Painting, color_vertices};
 use crate::io::Points;
-use crate::io::points::taken;
-use crate::scene::Clip;
+use crate::io::points::{Faces, taken};
+use crate::scene::color::DEFAULT_COLOR;
+use crate::scene::{Clip, Colors};
 use crate::surfels::ellipse::Ellipse;
+use crate::surfels::gather::is_usable;
 
 /// How much larger disks are than needed to cover: a blending kernel fades towards its rim.
 const OVERLAP: f64 = 1.1;
@@ -37,6 +43,8 @@ struct Made {
     s: DVec3,
     t: DVec3,
     clip: Clip,
+    /// None of a mesh that has no other colours than those of its vertices.
+    look: Option<Box<Look>>,
 }
 
 /// What the surfels of a mesh stand for.
@@ -48,36 +56,123 @@ pub(super) enum By {
     Vertices,
 }
 
-/// The surfels of a mesh; the vertices that no triangle with an area names cover nothing. A cloud, or one with a few triangles, stays as
-/// it is, and so does a mesh whose file says radii.
-pub(super) fn of_mesh(mut points: Points, by: By) -> Points {
-    let Some(faces) = points.faces.take().filter(|_| points.of_mesh) else { return points };
-    let facets: Vec<Option<Facet>> = faces.triangles.par_iter().map(|t| Facet::of(&points.positions, *t)).collect();
-    let around = Around::new(points.positions.len(), &faces.triangles, &facets);
+/// The surfels of a mesh, painted as `painting` says; the vertices that no triangle with an area names cover nothing. A cloud, or
+/// one with a few triangles, stays as it is, and so does a mesh whose file says radii: its points have the colours of its triangles.
+pub(super) fn of_mesh(mut points: Points, by: By, painting: Painting) -> Points {
+    let Some(faces) = points.faces.as_ref().filter(|_| points.of_mesh) else { return uncovered(points) };
+    let triangles = &faces.triangles;
+    let facets: Vec<Option<Facet>> = triangles.par_iter().map(|t| Facet::of(&points.positions, *t)).collect();
+    let skin = faces.paint.as_deref();
+    let skin = skin.map(|paint| Skin::new(paint, (triangles, &facets), painting, points.colors.is_some()));
+    let go_on = |pair| by == By::Vertices || skin.as_ref().is_none_or(|skin| skin.goes_on(pair));
+    let around = Around::new(points.positions.len(), triangles, &facets, go_on);
     if 2 * around.loose() > points.positions.len() {
-        return points;
+        return uncovered(points);
     }
-    points.loose = around.loose() as u64;
-    if by == By::Looks && triangles::are_plain(&points, &faces, &facets) {
-        let made = |(number, facet): (usize, &Option<Facet>)| {
-            let ends = around.ends(number as u32);
-            facet.as_ref().map(|facet| triangles::surfels(number as u32, facet, ends)).unwrap_or_default()
-        };
-        let all: Vec<Made> = facets.par_iter().enumerate().flat_map_iter(made).collect();
-        return of_triangles(points, &faces.triangles, &all);
+    let left_out = LeftOut::of(&points.positions, triangles, around.loose());
+    let plain = by == By::Looks && triangles::are_plain(&points, faces, &facets);
+    let all = match plain {
+        true => at_triangles(&facets, &around, skin.as_ref()),
+        false => at_vertices(&points, faces, (&facets, &around, skin.as_ref())),
+    };
+    drop(skin);
+    let Some(faces) = points.faces.take() else { return points };
+    left_out.tell(&mut points);
+    let made = match plain {
+        true => of_triangles(points, &faces.triangles, &all),
+        false => {
+            let vertices = all.iter().map(|made| made.of).collect();
+            shaped(taken(points, vertices), &all)
+        }
+    };
+    dressed(made, &all, painting)
+}
+
+/// Points that are none of a mesh's surfels, with the colours that triangles have there.
+fn uncovered(mut points: Points) -> Points {
+    color_vertices(&mut points);
+    points.faces = None;
+    points
+}
+
+/// What of a mesh has no surfels.
+struct LeftOut {
+    loose: u64,
+    stranded: u64,
+    broken: u64,
+}
+
+impl LeftOut {
+    /// Of a mesh so many of whose vertices are corners of no facet.
+    fn of(positions: &[[f64; 3]], triangles: &[[u32; 3]], bare: usize) -> Self {
+        if bare == 0 {
+            return Self { loose: 0, stranded: 0, broken: 0 };
+        }
+        let mut is_named = vec![false; positions.len()];
+        triangles.as_flattened().iter().for_each(|vertex| is_named[*vertex as usize] = true);
+        let loose = is_named.iter().filter(|named| !**named).count();
+        let is_broken = |corners: &&[u32; 3]| !corners.iter().all(|corner| is_usable(&positions[*corner as usize]));
+        let broken = triangles.iter().filter(is_broken).count();
+        Self { loose: loose as u64, stranded: (bare - loose) as u64, broken: broken as u64 }
     }
-    let tolerance = TOLERANCE * crate::surfels::bounds(&points).extent().length();
+
+    fn tell(&self, points: &mut Points) {
+        (points.loose, points.stranded, points.broken) = (self.loose, self.stranded, self.broken);
+    }
+}
+
+/// A surfel for each triangle, or three.
+fn at_triangles(facets: &[Option<Facet>], around: &Around, skin: Option<&Skin<'_>>) -> Vec<Made> {
+    let made = |(number, facet): (usize, &Option<Facet>)| {
+        let number = number as u32;
+        let ends = around.ends(number, skin.is_none_or(|skin| skin.is_flat(number)));
+        let mut made = facet.as_ref().map(|facet| triangles::surfels(number, facet, ends)).unwrap_or_default();
+        for made in &mut made {
+            made.look = skin.map(|skin| Box::new(skin.of_triangle(number, made.center)));
+        }
+        made
+    };
+    facets.par_iter().enumerate().flat_map_iter(made).collect()
+}
+
+/// A surfel for each of the fans of each vertex, or two.
+fn at_vertices(
+    points: &Points,
+    faces: &Faces,
+    (facets, around, skin): (&[Option<Facet>], &Around, Option<&Skin<'_>>),
+) -> Vec<Made> {
+    let tolerance = TOLERANCE * crate::surfels::bounds(points).extent().length();
     let made = |vertex: u32| {
-        let fans = around.fans(vertex, &faces.triangles, &facets, tolerance);
+        let fans = around.fans(vertex, &faces.triangles, facets, tolerance);
         let of_fan = |fan: Fan| {
             let normal = fan.seen_normal(faces.normals.as_ref());
-            surfels((vertex, normal), &fan, &points.positions, &facets)
+            let mut made = surfels((vertex, normal), &fan, &points.positions, facets);
+            let look = skin.map(|skin| skin.of_fan(&fan));
+            made.iter_mut().for_each(|made| made.look = look.map(Box::new));
+            made
         };
         fans.into_iter().flat_map(of_fan).collect::<Vec<_>>()
     };
-    let all: Vec<Made> = (0..points.positions.len() as u32).into_par_iter().flat_map_iter(made).collect();
-    let vertices = all.iter().map(|made| made.of).collect();
-    shaped(taken(points, vertices), &all)
+    (0..points.positions.len() as u32).into_par_iter().flat_map_iter(made).collect()
+}
+
+/// `points`, one for each surfel, with the surfels' looks.
+fn dressed(mut points: Points, all: &[Made], painting: Painting) -> Points {
+    let look = |made: &Made| made.look.as_deref().copied().unwrap_or_default();
+    points.averaged = all.iter().filter(|made| look(made).averaged).count() as u64;
+    if all.iter().any(|made| look(made).color.is_some()) {
+        let of_vertex = |index: usize| points.colors.as_ref().map_or(DEFAULT_COLOR, |colors| colors.linear(index));
+        let color = |(index, made): (usize, &Made)| look(made).color.unwrap_or_else(|| of_vertex(index));
+        points.colors = Some(Colors::Linear(all.iter().enumerate().map(color).collect()));
+    }
+    let is_placed = all.iter().any(|made| look(made).placed.is_some());
+    if is_placed && (painting == Painting::Own || points.texture.is_none()) {
+        let placed = || all.iter().map(|made| look(made).placed);
+        points.texture = Some(placed().map(|placed| placed.map_or([0.0; 2], |placed| placed.center)).collect());
+        points.texture_slopes = Some(placed().map(|placed| placed.map_or([[0.0; 3]; 2], |of| of.slopes)).collect());
+        points.texture_numbers = Some(placed().map(|placed| placed.map_or(u32::MAX, |of| of.number)).collect());
+    }
+    points
 }
 
 /// The surfels of triangles. Each has the number and the colour of its first corner, and the mean place in the texture.
@@ -134,7 +229,7 @@ fn surfels((vertex, normal): (u32, DVec3), fan: &Fan, positions: &[[f64; 3]], fa
         for (line, of_disk) in lines.iter().zip(&mut clip.0) {
             *of_disk = line.on_disk(major, minor, MARGIN * minor.length());
         }
-        Made { of: vertex, center, normal, s: world(major), t: world(minor), clip }
+        Made { of: vertex, center, normal, s: world(major), t: world(minor), clip, look: None }
     };
     cover::lines(fan, &corners, major.length()).into_iter().map(made).collect()
 }

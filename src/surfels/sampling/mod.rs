@@ -220,11 +220,13 @@ fn guessed_up(mesh: &Mesh) -> Up {
 
 fn points(surface: &MeshSurface<'_>, places: &[Place], normals: Vec<DVec3>, colors: Option<Vec<[f32; 4]>>) -> Points {
     let places = places.par_iter();
+    // Those of no texture have no place in it, and any will do.
+    let place_of = |place: &Place| surface.texture(*place).unwrap_or_default();
     Points {
         positions: places.clone().map(|place| (surface.center + surface.point(*place)).to_array()).collect(),
         normals: Some(normals.into_iter().map(|normal| normal.as_vec3().to_array()).collect()),
         colors: colors.map(Colors::Linear),
-        texture: places.clone().map(|place| surface.texture(*place)).collect(),
+        texture: surface.mesh.texture.as_ref().map(|_| places.clone().map(place_of).collect()),
         texture_numbers: surface.texture_numbers().map(|of| places.map(|place| of[surface.index(*place)]).collect()),
         up: Some(surface.mesh.up.unwrap_or_else(|| guessed_up(surface.mesh))),
         ..Points::default()

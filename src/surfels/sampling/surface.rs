@@ -107,17 +107,23 @@ impl<'a> MeshSurface<'a> {
         self.triangles[at.triangle as usize].index
     }
 
-    /// The number of each of the mesh's triangles' texture, if there are several, or some have none; [`u32::MAX`] means none.
+    /// The number of each of the mesh's triangles' texture, if there are several, or some triangles have none or no place in
+    /// it; [`u32::MAX`] means none.
     pub(super) fn texture_numbers(&self) -> Option<Vec<u32>> {
+        let places = self.mesh.texture.as_ref()?;
         let (textures, numbers) = self.mesh.textures();
-        let alike = textures.len() < 2 && (textures.is_empty() || numbers.iter().all(Option::is_some));
-        (self.mesh.texture.is_some() && !alike)
-            .then(|| numbers.into_iter().map(|number| number.unwrap_or(u32::MAX)).collect())
+        let otherwise = if textures.is_empty() { 0 } else { u32::MAX };
+        let number = |(number, places): (Option<u32>, &[[f32; 2]; 3])| {
+            let is_placed = places.as_flattened().iter().all(|turns| turns.is_finite());
+            if is_placed { number.unwrap_or(otherwise) } else { u32::MAX }
+        };
+        let numbers: Vec<u32> = numbers.into_iter().zip(places).map(number).collect();
+        (textures.len() > 1 || numbers.iter().any(|number| *number != 0)).then_some(numbers)
     }
 
     /// Whether the mesh says anything of colours.
     pub fn is_colored(&self) -> bool {
-        self.mesh.colors.is_some() || self.mesh.material.is_some()
+        self.mesh.colors.is_some() || self.mesh.face_colors.is_some() || self.mesh.material.is_some()
     }
 
     /// The colour there: linear RGB, straight alpha.

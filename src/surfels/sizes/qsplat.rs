@@ -47,7 +47,7 @@ mod tests {
     #[test]
     fn the_largest_triangle_at_a_vertex_says_its_size() {
         let positions = vec![[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 4.0, 0.0], [-1.0, 0.1, 0.0], [9.0, 9.0, 9.0]];
-        let faces = Faces { triangles: vec![[0, 1, 2], [0, 2, 3]], normals: None };
+        let faces = Faces { triangles: vec![[0, 1, 2], [0, 2, 3]], normals: None, paint: None };
         let mut points = Points { positions, faces: Some(faces), ..Points::default() };
         measure(&mut points).unwrap();
         let radii = points.radii.unwrap();

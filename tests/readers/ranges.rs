@@ -13,7 +13,7 @@ const ORANGE: [f64; 3] = [230.0, 120.0, 30.0];
 const BLUE: [f64; 3] = [30.0, 90.0, 220.0];
 
 fn turns(i: usize) -> [f64; 3] {
-    if i % 2 == 0 { ORANGE } else { BLUE }
+    if i.is_multiple_of(2) { ORANGE } else { BLUE }
 }
 
 /// The place of a point in a square of 40 by 50.
@@ -308,7 +308,7 @@ fn floats_are_light_in_ply_and_srgb_elsewhere() {
     let of_obj = folder.read("a.obj", &obj(COUNT, shares)).unwrap().colors.unwrap();
     assert_eq!(of_obj.linear(0)[0], srgb_to_linear(share.into()) as f32);
     // Light that is brighter than white is light, and its share is told.
-    let bright = |i: usize| shares(i).map(|share| if i % 10 == 0 { share * 6.0 } else { share }).to_vec();
+    let bright = |i: usize| shares(i).map(|share| if i.is_multiple_of(10) { share * 6.0 } else { share }).to_vec();
     let points = folder.read("a.ply", &ply(&float, COUNT, bright)).unwrap();
     assert!((points.colors.unwrap().linear(0)[0] - 6.0 * share).abs() < 1e-6);
     assert!(

@@ -67,6 +67,7 @@ mod tests {
             record: 2,
             has_color: true,
             needed: needed.to_vec(),
+            extra: None,
             intensities: None,
         };
         let lengths = [3u32, 2, 4, 0, 1, 5, 2];

@@ -52,13 +52,14 @@ mod tests {
     use crate::random::Random;
     use crate::scene::Bounds;
     use crate::surfels::estimate::fitted_normal;
+    use rayon::prelude::*;
 
     /// The share of lone points among 2,000 in a unit cube that is flattened to this height, by the planes through their neighbours.
     fn lone(height: f64) -> f64 {
         let mut random = Random::stream(11, 0);
         let mut number = || random.number();
         let positions: Vec<[f64; 3]> = (0..2000).map(|_| [number(), number(), height * number()]).collect();
-        let bounds = Bounds::of(positions.iter().map(|position| DVec3::from_array(*position)));
+        let bounds = Bounds::of(positions.par_iter().map(|position| DVec3::from_array(*position)));
         let distinct = DistinctPositions::new(&positions, &bounds, DVec3::ZERO).unwrap();
         let graph = NeighbourGraph::new(&distinct, NORMAL_NEIGHBOURS, &());
         let normals: Vec<DVec3> = (0..2000)
@@ -82,7 +83,7 @@ mod tests {
     fn of_few_points_nothing_is_told() {
         let positions: Vec<[f64; 3]> =
             (0..9).map(|k| [f64::from(k % 3), f64::from(k / 3), f64::from(k * k % 5)]).collect();
-        let bounds = Bounds::of(positions.iter().map(|position| DVec3::from_array(*position)));
+        let bounds = Bounds::of(positions.par_iter().map(|position| DVec3::from_array(*position)));
         let distinct = DistinctPositions::new(&positions, &bounds, DVec3::ZERO).unwrap();
         let graph = NeighbourGraph::new(&distinct, NORMAL_NEIGHBOURS, &());
         assert_eq!(lone_radius((&distinct, &graph), 0, |_| DVec3::Z), None);

@@ -102,6 +102,7 @@ mod tests {
     use crate::random::Random;
     use crate::scene::Bounds;
     use crate::surfels::positions::DistinctPositions;
+    use rayon::prelude::*;
 
     /// The mean growth in the middle of a grid of the spacing 1 with these heights, by their exact plane.
     fn growth(height: impl Fn(f64, f64) -> f64) -> f64 {
@@ -109,7 +110,7 @@ mod tests {
             .map(|k| (f64::from(k % 20) - 9.5, f64::from(k / 20) - 9.5))
             .map(|(x, y)| [x, y, height(x, y)])
             .collect();
-        let bounds = Bounds::of(positions.iter().map(|position| DVec3::from_array(*position)));
+        let bounds = Bounds::of(positions.par_iter().map(|position| DVec3::from_array(*position)));
         let distinct = DistinctPositions::new(&positions, &bounds, DVec3::ZERO).unwrap();
         let graph = NeighbourGraph::new(&distinct, 16, &());
         let rough = |index: u32| {

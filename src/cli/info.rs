@@ -126,7 +126,7 @@ impl Gaussians {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    outputs::check([&arguments.input], &arguments.json)?;
+    outputs::check(arguments.reading.sources(std::slice::from_ref(&arguments.input)), &arguments.json)?;
     let bars = Bars::new();
     let points = arguments.reading.points(&arguments.input, &bars)?;
     let beside = points.beside.clone();

@@ -6,8 +6,8 @@ use std::io::{self, BufReader};
 use ::e57::{E57Reader, PointCloud, Record, RecordDataType, RecordName, RecordValue};
 use glam::{DQuat, DVec3};
 
-use crate::io::fault::{self, Fault, reserve, surviving};
-use crate::io::values::one_line;
+use crate::io::fault::{self, Fault, Unread, reserve, surviving};
+use crate::io::values::{one_line, shown};
 use crate::io::{Input, Points, Up, intensity};
 use crate::scene::Colors;
 use crate::scene::color::{DEFAULT_COLOR, linear_to_srgb, srgb_to_linear};
@@ -22,32 +22,76 @@ const MOST_ATTRIBUTES: usize = 64;
 /// scan has the extension `nor` for them, are turned with its pose, and zero where it has none. Colours are sRGB codes, in the range that the scan gives or else its type: of 0 to 255 they stay 8-bit, else they become linear light. Without
 /// colours, intensities become grey as in a LAS file. Up is z.
 ///
+/// A scan that has no points or cannot be read is left out, and told by [`Points::unread`], if
+/// another one can be read and this is not `strict`.
+///
 /// # Errors
 ///
 /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where the file
 /// is not E57, ends early, fails its checksums or cannot be decoded.
-pub fn read(input: Input, progress: &dyn Progress) -> Result<Points> {
+pub fn read(input: Input, strict: bool, progress: &dyn Progress) -> Result<Points> {
     let Input { file, length, path, .. } = input;
     let opened = surviving(|| {
         let reader = E57Reader::new(BufReader::with_capacity(1 << 18, file)).map_err(of_e57)?;
-        let scans = reader.pointclouds();
-        let (mut promised, mut left) = (0u64, length.saturating_mul(8));
-        for (number, scan) in (1..).zip(&scans) {
-            left = check(scan, left).map_err(|what| Fault::Malformed(format!("its scan {number} {what}")))?;
-            promised = promised.saturating_add(scan.records);
-        }
-        Ok((reader, scans, promised))
+        let mut unread = Unread::default();
+        let scans = usable(reader.pointclouds(), length.saturating_mul(8), (&mut unread, strict))?;
+        Ok((reader, scans, unread))
     });
-    let (mut reader, scans, promised) = opened.map_err(|fault| fault.of(&path))?;
+    let (mut reader, (scans, all), mut unread) = opened.map_err(|fault| fault.of(&path))?;
+    let promised = scans.iter().map(|(_, scan)| scan.records).fold(0, u64::saturating_add);
     progress.begin(&format!("reading {}", fault::name(&path)), promised);
     let points = surviving(|| {
-        let any_normals = scans.iter().any(|scan| normal(scan).is_some());
+        let any_normals = scans.iter().any(|(_, scan)| normal(scan).is_some());
         let mut reading = Reading { normals: any_normals.then(Vec::new), ..Reading::default() };
-        scans.iter().try_for_each(|scan| reading.scan(&mut reader, scan, progress))?;
-        Ok(reading.into_points())
+        let mut read = unread.is_empty();
+        for (name, scan) in &scans {
+            let before = reading.state();
+            match surviving(|| reading.scan(&mut reader, scan, progress)) {
+                Ok(()) => read = true,
+                Err(fault) => {
+                    reading.go_back(before, scan.records);
+                    unread.add(|what| format!("{name}: {what}"), scan.records, fault, strict)?;
+                }
+            }
+        }
+        let unread = unread.told(&path, ("scans", all), read)?;
+        Ok(Points { unread, ..reading.into_points() })
     });
     progress.end();
     points.map_err(|fault| fault.of(&path))
+}
+
+/// The scans that have points, by their names, and how many there are in all: those that have none,
+/// or promise more than is left of so many bits of the file, are left out.
+fn usable(
+    scans: Vec<PointCloud>,
+    mut left: u64,
+    (unread, strict): (&mut Unread, bool),
+) -> Result<(Vec<(String, PointCloud)>, u64), Fault> {
+    let (mut usable, all) = (Vec::new(), scans.len() as u64);
+    for (number, scan) in (1..).zip(scans) {
+        let name = match scan.name.as_deref().map(str::trim).filter(|name| !name.is_empty()) {
+            Some(name) => format!("scan {number} '{}'", shown(name.as_bytes())),
+            None => format!("scan {number}"),
+        };
+        match check(&scan, left) {
+            // One scan without points is a file without points, which is no fault.
+            Ok(_) if scan.records == 0 && all > 1 => {
+                let fault = Fault::Malformed(format!("its scan {number} has no points"));
+                unread.add(|_| format!("{name} has no points"), 0, fault, strict)?;
+            }
+            Ok(_) if scan.records == 0 => {}
+            Ok(rest) => {
+                left = rest;
+                usable.push((name, scan));
+            }
+            Err(what) => {
+                let fault = Fault::Malformed(format!("its scan {number} {what}"));
+                unread.add(|_| format!("{name} {what}"), scan.records, fault, strict)?;
+            }
+        }
+    }
+    Ok((usable, all))
 }
 
 /// The crate's failures that are the file's fault, told from the system's.
@@ -150,6 +194,24 @@ struct Reading {
 }
 
 impl Reading {
+    /// Points so far, those that are left out, and what is known of colours.
+    fn state(&self) -> (usize, usize, [bool; 2]) {
+        (self.positions.len(), self.left_out.len(), [self.colored, self.wide])
+    }
+
+    /// Leaves out all points of a scan of so many, since which this was the state.
+    fn go_back(&mut self, (positions, left_out, [colored, wide]): (usize, usize, [bool; 2]), records: u64) {
+        self.positions.truncate(positions);
+        self.normals.iter_mut().for_each(|normals| normals.truncate(positions));
+        self.colors.truncate(positions);
+        self.intensities.truncate(positions);
+        self.left_out.truncate(left_out);
+        (self.colored, self.wide) = (colored, wide);
+        // Their numbers stay those of the file.
+        let first = (positions + left_out) as u64;
+        self.left_out.extend(first..first.saturating_add(records));
+    }
+
     fn scan(
         &mut self,
         reader: &mut E57Reader<BufReader<File>>,

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 
+use super::input::check_regular;
 use crate::error::{Error, Result};
 
 /// The most pixels of an image that is read: a picture of 16384x16384, as textures of scans are.
@@ -45,6 +46,7 @@ pub fn check_room(path: &Path, bytes: u64) -> Result<()> {
 pub(super) fn decode(path: &Path, format: Option<ImageFormat>, each: u64) -> Result<DynamicImage> {
     let called = if format.is_some() { "PNG" } else { "PNG or JPEG" };
     let unreadable = |e: ImageError| Error::malformed(path, format!("not a readable {called}: {e}"));
+    check_regular(path).map_err(|e| Error::read(path, e))?;
     let mut reader = ImageReader::open(path).map_err(|e| Error::read(path, e))?;
     match format {
         Some(format) => reader.set_format(format),

@@ -12,7 +12,7 @@ pub mod exr;
 mod fault;
 mod format;
 pub mod image;
-mod input;
+pub(crate) mod input;
 mod intensity;
 pub mod las;
 pub mod mesh;
@@ -32,7 +32,7 @@ pub mod write_behind;
 pub use classes::{ClassOpacities, class_name};
 pub use companions::companions;
 pub use format::Format;
-pub use input::Input;
+pub use input::{Input, MOST_COPIED};
 pub use mesh::{Material, Mesh};
 pub use points::{Points, Up};
 pub use texture::Texture;
@@ -52,6 +52,9 @@ pub struct ReadOptions {
     pub flatten: bool,
     /// Opacities by the classes of a laser scan's points; other files than LAS have none.
     pub classes: ClassOpacities,
+    /// A file of which a part cannot be read is an error: a scan of an E57 file, a chunk of a LAZ
+    /// file, a node of a COPC file. Else that part is left out, and told by [`Points::unread`].
+    pub strict: bool,
 }
 
 /// Reads any supported file: PLY, LAS, LAZ (COPC too), OBJ, and with the features of those names E57 and PCD; see [`Input::open`].
@@ -77,7 +80,7 @@ pub fn read_with(path: &Path, options: ReadOptions, progress: &dyn Progress) -> 
         Format::Ply => ply::read(input, options.flatten, progress),
         Format::Las => las::read(input, &options, progress),
         Format::Obj => obj::read(input, progress),
-        Format::E57 => read_e57(input, progress),
+        Format::E57 => read_e57(input, options.strict, progress),
         Format::Pcd => read_pcd(input, progress),
     }
 }
@@ -88,7 +91,7 @@ use e57::read as read_e57;
 use pcd::read as read_pcd;
 
 #[cfg(not(feature = "e57"))]
-fn read_e57(input: Input, _: &dyn Progress) -> Result<Points> {
+fn read_e57(input: Input, _: bool, _: &dyn Progress) -> Result<Points> {
     Err(without(&input.path, "e57"))
 }
 

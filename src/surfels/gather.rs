@@ -36,6 +36,7 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
         preparation.withheld += input.withheld;
         preparation.unseen += input.unseen;
         preparation.loose += input.loose;
+        preparation.unread.append(&mut input.unread);
         preparation.flattened = Flattened::of_both(preparation.flattened, input.flattened);
         provenance.push(flags.len() as u64, std::mem::take(&mut input.left_out), input.numbers.take());
         if kept < keep.len() {

@@ -15,6 +15,8 @@ pub struct Preparation {
     pub withheld: u64,
     /// Points that are in the files but not among `points`: their class has the opacity 0.
     pub unseen: u64,
+    /// Parts of files that could not be read and were left out, named and counted: a sentence each.
+    pub unread: Vec<String>,
     /// Vertices that are in the meshes but not among `points`: no triangle with an area names them.
     pub loose: u64,
     /// Gaussians left out because their scales, rotation, opacity or colour are no numbers, or span no surface.
@@ -106,6 +108,8 @@ impl Preparation {
         let rounding = self.rounding.map(|error| {
             format!("the smallest surfels lie so far from others that their coordinates err by up to {error:.2e} world units")
         });
-        notes.into_iter().chain([common, strays, by_neighbours, random, limited, rounding]).flatten().collect()
+        let unread = self.unread.iter().cloned();
+        let notes = notes.into_iter().chain([common, strays, by_neighbours, random, limited, rounding]).flatten();
+        unread.chain(notes).collect()
     }
 }

@@ -6,19 +6,23 @@ mod color;
 mod copc;
 mod layers;
 mod nodes;
+mod rest;
 mod shown;
 
 use crate::io::fault::{self, Fault, reserve, surviving};
 use crate::io::intensity;
 use crate::io::values::one_line;
 use crate::io::{Input, Points, ReadOptions, Up};
-use crate::{Progress, Result};
+use crate::{Error, Progress, Result};
 use color::Coding;
 use las::reader::{LazParallelism, ReaderOptions};
-use las::{PointData, PointDataBuilder, Reader, raw};
+use las::{PointData, PointDataBuilder, Reader, Transform, Vector, raw};
 use shown::Shown;
 use std::collections::BTreeMap;
+use std::fs::File;
 use std::io::{self, BufReader, Seek};
+use std::ops::Range;
+use std::path::Path;
 
 pub use copc::Copc;
 
@@ -35,27 +39,53 @@ const BLOCK: u64 = 1 << 25;
 /// they are 16-bit sRGB codes and become linear light; all zero means none. A format without RGB whose intensities vary
 /// gives sRGB greys, with the 99.9th percentile as white.
 ///
+/// A chunk of a compressed file that cannot be decoded is left out, and told by [`Points::unread`],
+/// if another one can be decoded and
+/// [`ReadOptions::strict`] is not said.
+///
 /// # Errors
 ///
 /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where
 /// the file is not LAS, ends early, or cannot be decoded.
 pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
     let Input { file, length, path, .. } = input;
+    let again = file.try_clone().map_err(|error| Error::read(&path, error))?;
+    match whole((file, length), &path, options, progress) {
+        Err(Fault::Malformed(what)) if !options.strict => {
+            let points = deep(|| rest::read((again, length), &path, options, progress));
+            // What is wrong was told already.
+            points.map_err(|fault| match fault {
+                Fault::Malformed(_) => Fault::Malformed(what),
+                of_system => of_system,
+            })
+        }
+        points => points,
+    }
+    .map_err(|fault| fault.of(&path))
+}
+
+/// All points of a file that is what its header says.
+fn whole(
+    (file, length): (File, u64),
+    path: &Path,
+    options: &ReadOptions,
+    progress: &dyn Progress,
+) -> Result<Points, Fault> {
     let opened = surviving(|| {
         let mut file = BufReader::with_capacity(1 << 20, Shown::new(file)?);
         let header = raw::Header::read_from(&mut file).map_err(of_las)?;
         let decoding = chunks::check(&mut file, &header, length).map_err(early)?;
         Ok((file, decoding, chunks::promised(&header)))
     });
-    let (file, decoding, promised) = opened.map_err(|fault| fault.of(&path))?;
+    let (file, decoding, promised) = opened?;
     if promised == 0 {
         // The decoder would still take the length of a chunk table for true, which nothing here vouches for.
         return Ok(Points { up: Some(Up::Z), ..Points::default() });
     }
-    progress.begin(&format!("reading {}", fault::name(&path)), promised);
+    progress.begin(&format!("reading {}", fault::name(path)), promised);
     let points = deep(|| decode(file, decoding, promised.min(length), options, progress));
     progress.end();
-    points.map_err(|fault| fault.of(&path))
+    points
 }
 
 /// Stack of the threads that decode, bytes; memory is taken only as far as it is used. The decoder calls itself for each
@@ -134,6 +164,23 @@ fn decode(
     Ok(kept.points(meaning, 0..read, read_options))
 }
 
+/// What the records of a file are, as the decoder takes it.
+fn shape_of(header: &raw::Header) -> Result<(las::point::Format, Vector<Transform>), Fault> {
+    let record = header.point_data_record_length;
+    let mut format = las::point::Format::new(header.point_data_record_format & 0x3f).map_err(of_las)?;
+    let Some(extra) = record.checked_sub(format.len()) else {
+        return chunks::malformed("its LASzip record does not describe its points");
+    };
+    format.extra_bytes = extra;
+    let transform = |scale, offset| Transform { scale, offset };
+    let transforms = Vector {
+        x: transform(header.x_scale_factor, header.x_offset),
+        y: transform(header.y_scale_factor, header.y_offset),
+        z: transform(header.z_scale_factor, header.z_offset),
+    };
+    Ok((format, transforms))
+}
+
 /// What the colours of a file are, which its format leaves open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Meaning {
@@ -177,6 +224,19 @@ impl Kept {
         let up = Some(Up::Z);
         let mut points = Points { positions, colors, up, classes: counts, withheld, left_out, ..Points::default() };
         leave_out_unseen(&mut points, &classes, options, numbers);
+        points
+    }
+
+    /// As points, of which those that were read have the numbers of these runs; `all` are in the
+    /// file. Points are numbered as in the file, if it has fewer than 2^32, else as they are kept.
+    fn numbered(self, meaning: Meaning, runs: &[Range<u64>], all: u64, options: &ReadOptions) -> Points {
+        let numbers = || runs.iter().cloned().flatten();
+        let mut points = self.points(meaning, numbers(), options);
+        let mut left_out = std::mem::take(&mut points.left_out).into_iter().peekable();
+        if u32::try_from(all).is_ok() {
+            let kept = numbers().filter(|number| left_out.next_if_eq(number).is_none());
+            points.numbers = Some(kept.map(|number| number as u32).collect());
+        }
         points
     }
 

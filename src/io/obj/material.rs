@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::encoding;
+use crate::io::input::check_regular;
 use crate::io::values::{BYTE_ORDER_MARK, finite, one_line};
 use crate::io::{Material, Texture};
 
@@ -52,7 +53,7 @@ pub(super) fn read(path: &Path, libraries: &[String], names: &[String], notes: &
 }
 
 /// The `libraries` that the OBJ file at `path` names, and the images that these name.
-pub(in crate::io) fn companions(path: &Path, libraries: &[String]) -> Vec<PathBuf> {
+pub(super) fn companions(path: &Path, libraries: &[String]) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut files = Vec::new();
     for library in libraries.iter().flat_map(|line| names_in(folder, line)) {
@@ -61,7 +62,9 @@ pub(in crate::io) fn companions(path: &Path, libraries: &[String]) -> Vec<PathBu
         files.push(library);
         let images = text.lines().filter_map(|line| {
             let (keyword, image) = first_word(line.trim());
-            let map = keyword.starts_with("map_") || matches!(keyword, "bump" | "disp" | "decal" | "norm" | "refl");
+            let keyword = keyword.to_ascii_lowercase();
+            let map =
+                keyword.starts_with("map_") || matches!(&keyword[..], "bump" | "disp" | "decal" | "norm" | "refl");
             map.then(|| beside(folder, file_of(image)))
         });
         files.extend(images);
@@ -70,6 +73,7 @@ pub(in crate::io) fn companions(path: &Path, libraries: &[String]) -> Vec<PathBu
 }
 
 fn text_of(path: &Path) -> io::Result<String> {
+    check_regular(path)?;
     let mut bytes = Vec::new();
     let (reader, _) = encoding::decoded(BufReader::new(File::open(path)?), LONGEST)?;
     reader.take(LONGEST).read_to_end(&mut bytes)?;

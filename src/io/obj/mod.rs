@@ -5,8 +5,6 @@ mod faces;
 mod lines;
 mod material;
 
-pub(super) use material::companions;
-
 use crate::io::closed::is_closed;
 use crate::io::fault::{self, Fault};
 use crate::io::points::Faces;
@@ -14,7 +12,9 @@ use crate::io::triangles::Triangles;
 use crate::io::{Input, Mesh, Points, Up};
 use crate::{Progress, Result};
 use lines::Lines;
+use std::fs::File;
 use std::io::BufReader;
+use std::path::{Path, PathBuf};
 
 /// Reads the vertices of an OBJ file, one point for each `v` line and in their order, whatever groups and materials
 /// the faces are in.
@@ -54,6 +54,13 @@ pub fn read_mesh(input: Input, progress: &dyn Progress) -> Result<Mesh> {
     let (mut mesh, libraries, names) = read_with(input, true, progress, mesh)?;
     mesh.materials = material::read(&path, &libraries, &names, &mut mesh.notes);
     Ok(mesh)
+}
+
+/// The libraries that an OBJ file at `path` names, and the images that these name.
+pub(super) fn companions(file: &mut File, path: &Path) -> Vec<PathBuf> {
+    let length = file.metadata().map_or(0, |there| there.len());
+    let named = file.try_clone().and_then(|file| encoding::decoded(BufReader::with_capacity(1 << 18, file), length));
+    named.map_or(Vec::new(), |(reader, _)| material::companions(path, &Lines::libraries(reader)))
 }
 
 /// Opens the file and makes of its lines and faces what is asked for.

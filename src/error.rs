@@ -35,6 +35,14 @@ pub enum Error {
     /// An argument that can never work, whatever the files and the machine (exit code 2).
     #[error("{0}")]
     Usage(String),
+    /// The system has too little memory.
+    #[error("the system has no memory for {what}: about {mebibytes} MiB are needed")]
+    NoMemory {
+        /// What would take it.
+        what: String,
+        /// How much that would be, MiB.
+        mebibytes: u64,
+    },
     /// The inputs together hold nothing to draw.
     #[error("{0}")]
     EmptyScene(String),

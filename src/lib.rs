@@ -40,6 +40,7 @@ pub mod frame;
 pub mod gpu;
 pub mod hardcases;
 pub mod io;
+mod memory;
 pub mod metrics;
 mod morton;
 pub mod passes;

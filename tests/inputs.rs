@@ -215,3 +215,87 @@ fn damaged_files_are_one_sentence() {
     }
     assert_eq!(info(piped(&["info", "-", "--json", "-"], &without_chunks))["points"], 200);
 }
+
+/// Of a folder what cannot be read is left out and told, if something can be; what is named alone
+/// must be read. Files that begin with a dot are no part of a folder.
+#[test]
+fn one_bad_file_of_a_folder_does_not_lose_the_others() {
+    let folder = Folder::new();
+    let rows: String = (0..60).map(|i| format!("{} {} 0\n", i % 6, i / 6)).collect();
+    let in_folder = |name: &str, bytes: &[u8]| {
+        std::fs::create_dir_all(folder.path("tiles")).unwrap();
+        std::fs::write(folder.path("tiles").join(name), bytes).unwrap();
+    };
+    let good = ply("x y z", 60, &rows);
+    in_folder("a.ply", good.as_bytes());
+    in_folder("b.las", &third_withheld(90));
+    in_folder("._a.ply", b"what macOS keeps of a file");
+    in_folder(".hidden.las", b"");
+    let (tiles, output) = (folder.path("tiles"), folder.path("o.ply"));
+    let surfels = |more: &[&str]| epsplat(&[&["surfels", text(&tiles), "-o", text(&output)], more].concat());
+    let told = |output: &Output| String::from_utf8(output.stderr.clone()).unwrap();
+    // Control: of a folder without any nothing is told, strictly neither.
+    for strict in [&[][..], &["--strict"]] {
+        let whole = surfels(strict);
+        assert!(whole.status.success() && told(&whole).contains("o.ply: 120 surfels"), "{}", told(&whole));
+        assert!(!told(&whole).contains("--strict"), "{}", told(&whole));
+    }
+    let mut cut = third_withheld(90);
+    cut.truncate(900);
+    let copc = std::fs::read(Path::new(DATA).join("simple.copc.laz")).unwrap();
+    for (name, bytes) in [
+        ("bad.ply", &b""[..]),
+        ("bad.ply", b"ply\nformat ascii 1.0\nelement vertex 9\nproperty float x\nend_header\n"),
+        ("bad.las", &cut),
+        ("bad.laz", &copc[..20_000]),
+        ("bad.obj", b"v 1 2 x\n"),
+        ("aa.ply", b"ply\n"),
+    ] {
+        in_folder(name, bytes);
+        let rest = surfels(&[]);
+        let said = told(&rest);
+        assert!(rest.status.success() && said.contains("o.ply: 120 surfels"), "{name}: {said}");
+        assert!(said.contains("1 of 3 files of folders left out: ") && said.contains(name), "{name}: {said}");
+        let picture = folder.path("o.png");
+        let picture = ["render", text(&tiles), "-o", text(&picture), "--backend", "reference", "--size", "8x8"];
+        assert!(told(&succeeds(&picture)).contains("1 of 3 files of folders left out: "), "{name}");
+        let strict = surfels(&["--strict"]);
+        assert!(strict.status.code() == Some(1) && told(&strict).contains(name), "{name}: {}", told(&strict));
+        // Named alone, or beside the folder, it must be read.
+        let alone = tiles.join(name);
+        fails(&["surfels", text(&alone), "-o", text(&output)], 1, &[name]);
+        fails(&["info", text(&alone)], 1, &[name]);
+        std::fs::remove_file(&alone).unwrap();
+        let beside = folder.file(name, bytes);
+        fails(&["surfels", text(&tiles), text(&beside), "-o", text(&output)], 1, &[name]);
+    }
+    // Where nothing of a folder can be read the first file's fault is told.
+    ["a.ply", "b.las"].iter().for_each(|name| std::fs::write(tiles.join(name), "bad").unwrap());
+    assert!(only_line(&surfels(&[]), 1).contains("a.ply"));
+    // What begins with a dot is no file of a folder, but can be named.
+    ["a.ply", "b.las"].iter().for_each(|name| std::fs::remove_file(tiles.join(name)).unwrap());
+    fails(&["surfels", text(&tiles), "-o", text(&output)], 2, &["has no"]);
+    let dotted = folder.file(".a.ply", &good);
+    succeeds(&["info", text(&dotted)]);
+}
+
+/// A broken node of a COPC file is told with the picture that leaves it out, and in the JSON of
+/// `info`.
+#[test]
+fn a_broken_node_is_told_with_its_picture() {
+    let folder = Folder::new();
+    let mut bytes = std::fs::read(Path::new(DATA).join("simple.copc.laz")).unwrap();
+    let record = usize::from(u16::from_le_bytes(*bytes[105..].first_chunk().unwrap()));
+    let start = u32::from_le_bytes(*bytes[96..].first_chunk().unwrap()) as usize + 8;
+    bytes[start + record + 4..start + record + 8].copy_from_slice(&0x7fff_ff00u32.to_le_bytes());
+    let (scan, picture) = (folder.file("a.copc.laz", bytes), folder.path("o.png"));
+    let render = ["render", text(&scan), "-o", text(&picture), "--backend", "reference", "--size", "8x8"];
+    for (more, kind) in [(&[][..], "chunks"), (&["--lod", "0.0001px"], "nodes")] {
+        let told = String::from_utf8(succeeds(&[&render[..], more].concat()).stderr).unwrap();
+        assert!(told.contains("a.copc.laz: 1 of ") && told.contains(&format!("{kind} left out, with ")), "{told}");
+        fails(&[&render[..], more, &["--strict"]].concat(), 1, &["a.copc.laz"]);
+    }
+    let said = info(epsplat(&["info", text(&scan), "--json", "-"]));
+    let unread = said["preparation"]["unread"].as_array().unwrap();
+    assert!(unread.len() == 1 && unread[0].as_str().unwrap().contains("chunk 1: "), "{unread:?}");
+}

@@ -328,4 +328,28 @@ fn trees_are_made_within_memory() {
         let (code, _, told) = epsplat(&[&["lod", "-o", &refused], arguments].concat());
         assert!(code == 2 && told.contains(words) && !Path::new(&refused).exists(), "{arguments:?}: {told}");
     }
+    // The least that is named is enough, whether points were looked at or not.
+    for memory in ["1MiB".to_owned(), format!("{}MiB", 96 + 48 * threads + 10)] {
+        let lod = |memory: &str| epsplat(&["lod", &surfels, "-o", &refused, "--memory", memory]);
+        let (code, _, told) = lod(&memory);
+        assert!(code == 2 && !Path::new(&refused).exists(), "{memory}: {told}");
+        let least = told.split("less than the ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap();
+        let (code, _, told) = lod(least);
+        assert_eq!(code, 0, "{least}: {told}");
+        assert!(std::fs::read(&refused).unwrap() == std::fs::read(&levels).unwrap());
+        std::fs::remove_file(&refused).unwrap();
+    }
+}
+
+/// Nodes at the camera's plane and at outlines are divided at any size: where that makes more than
+/// was asked for it is told.
+#[test]
+fn more_splats_than_asked_for_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let (bunny, output) = (concat!(env!("CARGO_MANIFEST_DIR"), "/data/bunny.obj"), path_in(&folder, "o.png"));
+    for (splats, more) in [("1", true), ("20", true), ("3000", false)] {
+        let line = ["render", bunny, "-o", &output, "--size", "48x48", "--backend", "reference", "--splats", splats];
+        let (code, _, told) = epsplat(&line);
+        assert_eq!((code, told.contains(&format!(" not the {splats} of --splats"))), (0, more), "{told}");
+    }
 }

@@ -6,6 +6,7 @@ use std::path::Path;
 use super::config::Config;
 use super::definition::{Definition, Making, OneOrMany, Rims, SceneEntry};
 use crate::error::{Error, Result};
+use crate::io::input::text;
 use crate::plan::{BackendName, check};
 use crate::scene::camera::check_size;
 use crate::scene::{Detail, Shading};
@@ -17,7 +18,7 @@ impl Definition {
     ///
     /// [`Error::Read`] if there is none, [`Error::Malformed`] if it is no study; the message names the key.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::read(path, e))?;
+        let text = text(path)?;
         Self::parse(&text, path)
     }
 
@@ -37,9 +38,9 @@ impl Definition {
     fn check(&self) -> Result<(), String> {
         sized("size", Some(self.size))?;
         sized("quick.size", self.quick.size)?;
-        if self.runs == 0 || self.quick.runs == Some(0) {
-            return Err("runs: at least one run is needed".into());
-        }
+        within("runs", self.runs, MOST_RUNS)?;
+        within("quick.runs", self.quick.runs.unwrap_or(1), MOST_RUNS)?;
+        within("rays", self.rays, MOST_RAYS)?;
         unique("scene", self.scenes.iter().map(|scene| (&scene.name, scene.quick)))?;
         let configs = unique("config", self.configs.iter().map(|config| (&config.name, config.quick)))?;
         if let Some(baseline) = self.baseline.as_ref().filter(|name| !configs.contains(name)) {
@@ -85,6 +86,16 @@ fn sized(key: &str, size: Option<[u32; 2]>) -> Result<(), String> {
     size.map_or(Ok(()), |[width, height]| check_size(width, height).map_err(|e| format!("{key}: {e}")))
 }
 
+/// The most runs, as of `epsplat bench --runs`, cameras of a scene, and rays across a pixel: their
+/// times and frames are kept.
+const MOST_RUNS: u32 = 10_000;
+const MOST_VIEWS: u32 = 1000;
+const MOST_RAYS: u32 = 256;
+
+fn within(key: &str, value: u32, most: u32) -> Result<(), String> {
+    if (1..=most).contains(&value) { Ok(()) } else { Err(format!("{key}: it is 1 to {most}, not {value}")) }
+}
+
 fn positive(key: &str, value: Option<f64>) -> Result<(), String> {
     match value {
         Some(value) if !(value.is_finite() && value > 0.0) => Err(format!("{key}: it must be positive, not {value}")),
@@ -119,9 +130,7 @@ impl SceneEntry {
         if self.eye.is_none() && (self.target.is_some() || self.up.is_some()) {
             return Err("eye: target and up need it".into());
         }
-        if self.views == 0 {
-            return Err("views: at least one is needed".into());
-        }
+        within("views", self.views, MOST_VIEWS)?;
         sized("size", self.size)?;
         positive("radius", self.radius)?;
         positive("noise", self.noise)?;
@@ -322,6 +331,14 @@ mod tests {
             ("runs = \"x\"\n", &["line 3, runs:", "invalid type"]),
             ("runz = 1\n", &["line 3", "runz"]),
             ("runs = 0\n", &["runs:"]),
+            ("runs = 2147483647\n", &["runs: it is 1 to 10000, not 2147483647"]),
+            ("[quick]\nruns = 10001\n", &["quick.runs: it is 1 to 10000"]),
+            ("rays = 0\n", &["rays: it is 1 to 256"]),
+            ("rays = 4294967295\n", &["rays: it is 1 to 256"]),
+            (
+                "[[scene]]\nname = \"t\"\nshape = \"torus\"\ncount = 1\nviews = 1000000000\n",
+                &["scene \"t\": views: it is 1 to 1000, not 1000000000"],
+            ),
             ("size = [0, 5]\n", &["size:"]),
             ("baseline = \"d\"\n", &["baseline:", "\"d\""]),
             ("[quick]\nruns = 0\n", &["runs:"]),

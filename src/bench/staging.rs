@@ -12,6 +12,7 @@ use super::in_part;
 use super::view::{cameras, footprint};
 use crate::error::{Error, Result};
 use crate::io::{self, Mesh, Points, ReadOptions, Texture};
+use crate::memory;
 use crate::progress::Progress;
 use crate::random::Random;
 use crate::scene::{Camera, Colors, Scene, Surfel};
@@ -49,6 +50,10 @@ pub(super) struct Staged {
     pub footprint_px: f64,
 }
 
+/// Memory that a surfel of a shape takes until it is in a scene, and a pixel of a frame, bytes.
+const OF_SURFEL: u64 = 250;
+const OF_PIXEL: u64 = 16;
+
 /// The points of a scene's sweep, each count with each footprint.
 pub(super) fn points(entry: &SceneEntry) -> Vec<Point> {
     fn each<T: Copy>(values: &Option<OneOrMany<T>>) -> Vec<Option<T>> {
@@ -81,6 +86,9 @@ pub(super) fn stage(
 }
 
 fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dyn Progress) -> Result<Staged> {
+    if let Some(count) = point.count.filter(|_| entry.shape.is_some()) {
+        memory::check(count.saturating_mul(OF_SURFEL), || format!("{count} surfels of the scene {:?}", entry.name))?;
+    }
     let texture = entry.texture.as_ref().map(|file| Texture::read(&present(definition, entry, file)?)).transpose()?;
     let (points, surface, left) = match (&entry.file, entry.shape) {
         (Some(file), _) => {
@@ -131,7 +139,12 @@ fn made(definition: &Definition, entry: &SceneEntry, point: Point, progress: &dy
         (scene, _) = with_triangles(Some(scene), &[mesh])?;
         surface = surface.zip(of_triangles).map(|(first, second)| Surface::Both(Box::new([first, second])));
     }
-    let mut cameras = cameras(entry.size.unwrap_or(definition.size), entry, &scene)?;
+    let [width, height] = entry.size.unwrap_or(definition.size);
+    let frames = u64::from(entry.views) * definition.configs_of(entry).count() as u64;
+    memory::check(frames * u64::from(width) * u64::from(height) * OF_PIXEL, || {
+        format!("the {frames} frames of the scene {:?}", entry.name)
+    })?;
+    let mut cameras = cameras([width, height], entry, &scene)?;
     let mut footprint_px = footprint(&scene, &cameras);
     if let (Making::Triangles, Some(shape), Some(wanted)) = (entry.surfels, entry.shape, point.footprint_px) {
         let scale = wanted * (PI * scene.triangles.len() as f64 / shape.area()).sqrt();
@@ -220,9 +233,11 @@ fn of_file(
         }
         false => None,
     };
+    // What is measured is the whole file.
+    let read = |file| io::read_with(file, ReadOptions { strict: true, ..ReadOptions::default() }, progress);
     let normals = || {
         let kept = |Points { positions, up, normals, .. }| Points { positions, up, normals, ..Points::default() };
-        io::read(file, progress).map(kept)
+        read(file).map(kept)
     };
     let bare = || normals().map(|points| Points { normals: None, ..points });
     let sized = |size| {
@@ -240,7 +255,8 @@ fn of_file(
         // Gaussians and triangles are made of shapes, as reading a definition makes sure, and parts of files are staged otherwise.
         Making::File | Making::Gaussians | Making::Triangles | Making::Levels => {
             let classes = entry.classes.unwrap_or_default();
-            let points = io::read_with(file, ReadOptions { classes, ..ReadOptions::default() }, progress)?;
+            let points =
+                io::read_with(file, ReadOptions { classes, strict: true, ..ReadOptions::default() }, progress)?;
             if entry.classes.is_some() && points.classes.is_empty() {
                 return Err(Error::malformed(file, "its points have no classes, which LAS files have"));
             }
@@ -253,7 +269,7 @@ fn of_file(
         Making::Bsp => sized(Size::Bsp(Triangle::default()))?,
         Making::BspGlobal => sized(Size::BspGlobal(Triangle::default()))?,
         Making::Qsplat => {
-            let bare = Points { faces: io::read(file, progress)?.faces, ..bare()? };
+            let bare = Points { faces: read(file)?.faces, ..bare()? };
             let options = FromPoints { size: Size::Qsplat, ..FromPoints::default() };
             from_points(vec![bare], &options, progress)?.points
         }

@@ -27,7 +27,7 @@ struct List {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    outputs::check([""; 0], &arguments.json)?;
+    outputs::check([], &arguments.json)?;
     let adapters = adapters();
     let auto = adapters.iter().find(|a| a.usable).map(|a| a.name.clone());
     if let Some(path) = &arguments.json {

@@ -10,6 +10,7 @@ use epsplat::io::atomic;
 use epsplat::render::Backend;
 use epsplat::{Error, Result, report};
 
+use super::outputs::Source;
 use super::progress::Bars;
 use super::{note, outputs, print};
 
@@ -55,7 +56,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     if let Some(folder) = &arguments.out {
         let (read, written) = (definition.files(), report::FILES.map(|name| folder.join(name)));
-        outputs::check_distinct(read.iter().chain([&arguments.definition]), &written)?;
+        let read = read.iter().map(Source::cloud).chain([Source::other(&arguments.definition)]);
+        outputs::check_distinct(read, &written)?;
         atomic::try_folder(folder)?;
         written.iter().filter(|file| file.exists()).try_for_each(|file| atomic::try_output(file))?;
     }

@@ -9,6 +9,7 @@ use epsplat::bench::{Definition, machine};
 use epsplat::io::atomic;
 use epsplat::{Error, Result, report};
 
+use super::outputs::Source;
 use super::progress::Bars;
 use super::{note, outputs, print};
 
@@ -91,7 +92,8 @@ fn check_outputs(out: &Path, files: &[PathBuf], studies: &[Definition]) -> Resul
     let folders: Vec<PathBuf> = studies.iter().map(|study| out.join(&study.name)).collect();
     let reports = folders.iter().flat_map(|folder| report::FILES.map(|name| folder.join(name)));
     let written: Vec<PathBuf> = card::FILES.iter().map(|name| out.join(name)).chain(reports).collect();
-    let read = studies.iter().flat_map(Definition::files).chain(files.iter().cloned());
+    let named: Vec<PathBuf> = studies.iter().flat_map(Definition::files).collect();
+    let read = named.iter().map(Source::cloud).chain(files.iter().map(Source::other));
     outputs::check_distinct(read, &written)?;
     atomic::try_folder(out)?;
     folders.iter().try_for_each(|folder| atomic::try_folder(folder))?;

@@ -26,7 +26,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    outputs::check([&arguments.a, &arguments.b], &arguments.json)?;
+    outputs::check([&arguments.a, &arguments.b].map(outputs::Source::other), &arguments.json)?;
     let (a, b) = (read(&arguments.a)?, read(&arguments.b)?);
     io::image::check_room(&arguments.b, a.color.len() as u64 * BYTES_PER_PIXEL)?;
     let comparison = compare(&a, &b)?;

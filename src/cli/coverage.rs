@@ -11,6 +11,7 @@ use epsplat::truth::TriangleTree;
 use epsplat::{Error, Progress, Result, io};
 use serde::Serialize;
 
+use super::outputs::Source;
 use super::progress::Bars;
 use super::reading::{Reading, help_of, named};
 use super::{note, outputs, print, write_json};
@@ -55,7 +56,8 @@ struct Outcome {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    outputs::check(arguments.surfels.iter().chain([&arguments.mesh]), &arguments.json)?;
+    let read = arguments.reading.sources(&arguments.surfels).chain([Source::cloud(&arguments.mesh)]);
+    outputs::check(read, &arguments.json)?;
     let bars = Bars::new();
     let mesh = io::read_mesh(&arguments.mesh, &bars)?;
     let triangles = TriangleTree::new(&mesh)?;

@@ -40,7 +40,7 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> Result<()> {
     ply::check_extension(&arguments.output)?;
-    outputs::check([""; 0], [&arguments.output])?;
+    outputs::check([], [&arguments.output])?;
     let bars = Bars::new();
     if arguments.gaussians {
         ply::write_points(&arguments.output, &gaussians(arguments.shape, arguments.count), &bars)?;

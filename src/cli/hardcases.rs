@@ -45,7 +45,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             return Err(Error::Usage(format!("no hard case's name contains {part:?}")));
         }
     }
-    outputs::check([""; 0], &arguments.json)?;
+    outputs::check([], &arguments.json)?;
     let gpu = Gpu::open(arguments.adapter.as_deref()).map_err(|error| match error {
         Error::NoAdapter(why) => Error::NoAdapter(format!("hard cases judge an adapter by the reference, but {why}")),
         other => other,

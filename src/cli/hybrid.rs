@@ -3,10 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use epsplat::io::{self, Material, Texture};
+use epsplat::io::{self, Material, Mesh, Texture};
 use epsplat::surfels::hybrid::{Report, hybrid, pixel};
 use epsplat::{Error, Result};
+use serde::Serialize;
 
+use super::outputs::Source;
 use super::progress::Bars;
 use super::reading::{InputFormat, named};
 use super::{note, outputs, print, write_json};
@@ -14,7 +16,8 @@ use super::{note, outputs, print, write_json};
 /// Write a mesh as surfels where its triangles are much smaller than pixels, and as triangles elsewhere.
 ///
 /// Where triangles have less than a twentieth of a square pixel they become surfels, four for each pixel; larger ones stay as they are. Surfels are written to OUT.ply, triangles beside it to OUT.mesh.ply, and their images to
-/// OUT.mesh-1.png and so on; `epsplat render OUT.ply` draws both.
+/// OUT.mesh-1.png and so on; `epsplat render OUT.ply` draws both. Of files with these names only
+/// those of an earlier run are replaced, or removed where nothing is left to be written to them.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  epsplat hybrid dragon.ply -o far.ply --pixels 400\n  epsplat render far.ply -o far.png"
@@ -43,30 +46,36 @@ fn pixels(text: &str) -> std::result::Result<f64, String> {
     number.ok_or_else(|| "it is a number of pixels from 1 to 1000000".into())
 }
 
+/// What came of it.
+#[derive(Serialize)]
+struct Outcome {
+    #[serde(flatten)]
+    report: Report,
+    /// The file of the triangles, if any stay, and those of their images.
+    files: Vec<PathBuf>,
+}
+
 pub fn run(arguments: &Arguments) -> Result<()> {
     io::ply::check_extension(&arguments.output)?;
     let beside = arguments.output.with_extension("mesh.ply");
     outputs::check_named_in_ply(beside.file_name().map_or(Path::new(""), Path::new))?;
-    let inputs = || [&arguments.mesh].into_iter().chain(&arguments.texture);
+    let earlier = Earlier::of(&arguments.output, &beside)?;
+    let read = || [&arguments.mesh].into_iter().chain(&arguments.texture).map(Source::other);
     let written = || [&arguments.output, &beside].into_iter().chain(&arguments.json);
-    outputs::check(inputs(), written())?;
+    outputs::check(read(), written())?;
+    let second = outputs::all_named([arguments.input.source(&arguments.mesh)])?;
+    let read = || read().chain(second.iter().map(Source::other));
+    outputs::check_distinct(read(), written())?;
     let bars = Bars::new();
-    let mut mesh = arguments.input.mesh(&arguments.mesh, &bars)?;
-    mesh.notes.iter().for_each(|line| note(line));
-    if let Some(path) = &arguments.texture {
-        if mesh.texture.is_none() {
-            return Err(Error::malformed(&arguments.mesh, "it has no texture coordinates, so it cannot be textured"));
-        }
-        mesh.paint(Texture::read(path)?);
-    }
+    let mesh = mesh(arguments, &bars)?;
     let pixel = pixel(&mesh, arguments.pixels)
         .ok_or_else(|| Error::malformed(&arguments.mesh, "it has no triangles whose corners are finite and apart"))?;
     let divided = hybrid(&mesh, pixel, &bars).map_err(|error| named(error, std::slice::from_ref(&arguments.mesh)))?;
     let painted = divided.triangles.iter().filter(|mesh| mesh.texture.is_some());
     let images: Vec<_> = painted.flat_map(|mesh| &mesh.materials).filter_map(Material::painted).collect();
-    let paths: Vec<PathBuf> =
-        (1..=images.len()).map(|k| arguments.output.with_extension(format!("mesh-{k}.png"))).collect();
-    outputs::check(inputs(), written().chain(&paths))?;
+    let paths: Vec<PathBuf> = (1..=images.len()).map(|k| image(&arguments.output, k)).collect();
+    paths.iter().try_for_each(|path| earlier.check_image(path))?;
+    outputs::check(read(), written().chain(&paths))?;
     if divided.triangles.iter().flat_map(|mesh| &mesh.materials).any(Material::clamps) {
         note("materials say -clamp on, which a PLY file cannot: their images are repeated beyond their edges");
     }
@@ -79,10 +88,75 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut points = divided.surfels.unwrap_or_default();
     points.beside = divided.triangles.is_some().then(|| name(&beside).into());
     io::ply::write_points(&arguments.output, &points, &bars)?;
-    match &arguments.json {
-        Some(path) => write_json(path, &divided.report),
-        None => print(&summary(&divided.report, &arguments.output)),
+    let files: Vec<PathBuf> = divided.triangles.iter().map(|_| beside.clone()).chain(paths).collect();
+    earlier.remove_but(&files)?;
+    for (index, file) in files.iter().enumerate() {
+        let what = if index == 0 { "the triangles that stay" } else { "an image of these triangles" };
+        note(&format!("{}: {what}", file.display()));
     }
+    let outcome = Outcome { report: divided.report, files };
+    match &arguments.json {
+        Some(path) => write_json(path, &outcome),
+        None => print(&summary(&outcome.report, &arguments.output)),
+    }
+}
+
+/// The mesh, painted as the arguments say.
+fn mesh(arguments: &Arguments, bars: &Bars) -> Result<Mesh> {
+    let mut mesh = arguments.input.mesh(&arguments.mesh, bars)?;
+    mesh.notes.iter().for_each(|line| note(line));
+    if let Some(path) = &arguments.texture {
+        if mesh.texture.is_none() {
+            return Err(Error::malformed(&arguments.mesh, "it has no texture coordinates, so it cannot be textured"));
+        }
+        mesh.paint(Texture::read(path)?);
+    }
+    Ok(mesh)
+}
+
+/// The file of image number `k`, from 1.
+fn image(output: &Path, k: usize) -> PathBuf {
+    output.with_extension(format!("mesh-{k}.png"))
+}
+
+/// The files of triangles and images that an earlier run left beside the output: no option names
+/// them, so they alone are replaced.
+struct Earlier(Vec<PathBuf>);
+
+impl Earlier {
+    /// Refuses a file of triangles that `epsplat hybrid` did not write.
+    fn of(output: &Path, beside: &Path) -> Result<Self> {
+        let textures = io::ply::textures_of_hybrid(beside);
+        if textures.is_none() && beside.symlink_metadata().is_ok() {
+            return Err(not_ours(beside));
+        }
+        let own = |(k, texture): (usize, &PathBuf)| (image(output, k) == *texture).then(|| texture.clone());
+        let images = textures.iter().flatten().enumerate().map(|(index, texture)| (index + 1, texture)).filter_map(own);
+        Ok(Self(textures.iter().map(|_| beside.to_owned()).chain(images).collect()))
+    }
+
+    /// Refuses to replace an image that is not of that run.
+    fn check_image(&self, path: &Path) -> Result<()> {
+        let known = self.0.iter().any(|file| file == path);
+        if known || path.symlink_metadata().is_err() { Ok(()) } else { Err(not_ours(path)) }
+    }
+
+    /// Removes those that are not written again, which nothing names any more.
+    fn remove_but(&self, written: &[PathBuf]) -> Result<()> {
+        for file in self.0.iter().filter(|file| !written.contains(file) && file.symlink_metadata().is_ok()) {
+            std::fs::remove_file(file).map_err(|error| Error::write(file, error))?;
+            note(&format!("{}: removed, as nothing of an earlier run stays in it", file.display()));
+        }
+        Ok(())
+    }
+}
+
+fn not_ours(path: &Path) -> Error {
+    Error::Usage(format!(
+        "{} would be written too, and is there already, not written by `epsplat hybrid` for this output: choose another name for the output, \
+         or remove that file",
+        path.display()
+    ))
 }
 
 fn name(path: &Path) -> String {

@@ -133,7 +133,7 @@ impl Gaussians {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    outputs::check([&arguments.input], &arguments.json)?;
+    outputs::check(arguments.reading.sources(std::slice::from_ref(&arguments.input)), &arguments.json)?;
     let bars = Bars::new();
     let mut points = arguments.reading.described(&arguments.input, &bars)?;
     let about = points.about.take().map(|about| *about).unwrap_or_default();

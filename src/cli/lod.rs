@@ -27,7 +27,7 @@ pub struct Arguments {
     #[arg(required = true, help = help_of_all("Surfels, point clouds or meshes"))]
     pub(super) inputs: Vec<PathBuf>,
     #[command(flatten)]
-    reading: Reading,
+    pub(super) reading: Reading,
     /// The file: .ply
     #[arg(short, long)]
     output: PathBuf,
@@ -64,7 +64,8 @@ struct Report {
 
 pub fn run(arguments: &Arguments) -> Result<()> {
     ply::check_extension(&arguments.output)?;
-    outputs::check(&arguments.inputs, [&arguments.output].into_iter().chain(&arguments.json))?;
+    let written = [&arguments.output].into_iter().chain(&arguments.json);
+    outputs::check(arguments.reading.sources(&arguments.inputs), written)?;
     let bars = Bars::new();
     let report = match arguments.memory {
         Some(memory) => out_of_core(arguments, memory, &bars)?,

@@ -62,11 +62,16 @@ enum Command {
 pub fn run() -> ExitCode {
     signals::watch();
     let outcome = match Arguments::parse().command {
-        Command::Render(mut arguments) => with_folders(&mut arguments.inputs).and_then(|()| render::run(&arguments)),
+        Command::Render(mut arguments) => {
+            let render::Arguments { inputs, reading, .. } = &mut *arguments;
+            with_folders(inputs, reading).and_then(|()| render::run(&arguments))
+        }
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Coverage(arguments) => coverage::run(&arguments),
         Command::Generate(arguments) => generate::run(&arguments),
-        Command::Surfels(mut arguments) => with_folders(&mut arguments.inputs).and_then(|()| surfels::run(&arguments)),
+        Command::Surfels(mut arguments) => {
+            with_folders(&mut arguments.inputs, &mut arguments.reading).and_then(|()| surfels::run(&arguments))
+        }
         Command::Sample(arguments) => sample::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Adapters(arguments) => adapters::run(&arguments),
@@ -75,7 +80,9 @@ pub fn run() -> ExitCode {
         Command::Card(arguments) => card::run(&arguments),
         Command::Simplify(arguments) => simplify::run(&arguments),
         Command::Hybrid(arguments) => hybrid::run(&arguments),
-        Command::Lod(mut arguments) => with_folders(&mut arguments.inputs).and_then(|()| lod::run(&arguments)),
+        Command::Lod(mut arguments) => {
+            with_folders(&mut arguments.inputs, &mut arguments.reading).and_then(|()| lod::run(&arguments))
+        }
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

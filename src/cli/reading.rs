@@ -1,5 +1,6 @@
 //! How commands read their inputs, and what their help says of them.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -10,7 +11,12 @@ use epsplat::io::{self, ClassOpacities, ColorRules, Format, Input, Mesh, Points,
 use epsplat::surfels::Limits;
 use epsplat::{Error, Progress, Result};
 
+use super::note;
+use super::outputs::Source;
 use super::progress::Bars;
+
+/// Files of folders that a sentence names where they cannot be read.
+const MOST_NAMED: usize = 8;
 
 /// What inputs are, whatever they are called.
 #[derive(Args)]
@@ -38,6 +44,13 @@ pub(super) struct Reading {
     /// Draw the Gaussians of a 3DGS file as surfels, without their shortest axis, even if they are not flat
     #[arg(long)]
     flatten: bool,
+    /// Refuse inputs of which a part cannot be read: a file of a folder, a scan of an E57 file, a
+    /// chunk of a LAZ or a node of a COPC file; else that part is left out, and told
+    #[arg(long)]
+    strict: bool,
+    /// Inputs that were found in folders.
+    #[arg(skip)]
+    of_folders: BTreeSet<PathBuf>,
 }
 
 /// Which points become surfels, and how large those may be.
@@ -66,13 +79,17 @@ fn formats() -> impl TypedValueParser<Value = Format> {
     PossibleValuesParser::new(names).try_map(|name| name.parse::<Format>())
 }
 
-/// Puts the files of a folder in its place, in the order of their names: those that are read by these names.
+/// Puts the files of a folder in its place, in the order of their names: those that are read by
+/// these names, and do not begin with a dot, as what programs and systems keep for themselves does.
 ///
 /// # Errors
 ///
 /// [`Error::Read`] where the system cannot list them, [`Error::Usage`] where there is none.
-pub(super) fn with_folders(inputs: &mut Vec<PathBuf>) -> Result<()> {
+pub(super) fn with_folders(inputs: &mut Vec<PathBuf>, reading: &mut Reading) -> Result<()> {
     let is_read = |path: &PathBuf| {
+        if path.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(b".")) {
+            return false;
+        }
         let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
         path.is_file() && Format::READ.iter().any(|(name, _)| name.eq_ignore_ascii_case(extension))
     };
@@ -89,6 +106,7 @@ pub(super) fn with_folders(inputs: &mut Vec<PathBuf>) -> Result<()> {
             let formats = Format::sentence();
             return Err(Error::Usage(format!("the folder {} has no {formats} files", folder.display())));
         }
+        reading.of_folders.extend(files.iter().cloned());
         inputs.append(&mut files);
     }
     Ok(())
@@ -114,6 +132,11 @@ pub(super) fn named(error: Error, inputs: &[PathBuf]) -> Error {
 }
 
 impl InputFormat {
+    /// A file that is read as this says.
+    pub(super) fn source<'a>(&self, path: &'a Path) -> Source<'a> {
+        Source::Cloud(path, self.input_format)
+    }
+
     /// The triangles of a mesh.
     pub(super) fn mesh(&self, path: &Path, bars: &Bars) -> Result<Mesh> {
         let format = self.input_format;
@@ -128,6 +151,12 @@ impl InputFormat {
 }
 
 impl Reading {
+    /// The files that are read as this says.
+    pub(super) fn sources<'a>(&self, paths: &'a [PathBuf]) -> impl Iterator<Item = Source<'a>> + use<'a> {
+        let format = self.input.input_format;
+        paths.iter().map(move |path| Source::Cloud(path, format))
+    }
+
     /// The points of a file, with what it says of itself.
     pub(super) fn described(&self, path: &Path, bars: &Bars) -> Result<Points> {
         let points = io::read_with(path, ReadOptions { describe: true, ..self.options() }, bars)?;
@@ -148,19 +177,54 @@ impl Reading {
             classes: self.class_opacity.unwrap_or_default(),
             ignore_alpha: self.input.ignore_alpha,
             describe: false,
+            strict: self.strict,
         }
+    }
+
+    /// What was opened or read of each of some files, and a sentence for those that were left out,
+    /// for which `stands_in` is there: files of folders that cannot be read.
+    fn each<T>(
+        &self,
+        paths: &[PathBuf],
+        open: impl Fn(&Path) -> Result<T>,
+        stands_in: impl Fn() -> Option<T>,
+    ) -> Result<(Vec<T>, Option<String>)> {
+        let (mut all, mut failed) = (Vec::new(), Vec::new());
+        for path in paths {
+            match open(path) {
+                Ok(opened) => all.push(opened),
+                Err(error @ (Error::Read { .. } | Error::Malformed { .. }))
+                    if !self.strict && self.of_folders.contains(path) =>
+                {
+                    failed.push(error);
+                    all.extend(stands_in());
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        if failed.len() == paths.len()
+            && let Some(first) = failed.pop()
+        {
+            return Err(failed.into_iter().next().unwrap_or(first));
+        }
+        let told = failed.iter().take(MOST_NAMED).map(ToString::to_string).collect::<Vec<_>>().join("; ");
+        let more = failed.len().saturating_sub(MOST_NAMED);
+        let more = if more > 0 { format!("; and {more} more") } else { String::new() };
+        let (count, files) = (failed.len(), self.of_folders.len());
+        let sentence = format!("{count} of {files} files of folders left out: {told}{more} (--strict refuses them)");
+        Ok((all, (count > 0).then_some(sentence)))
     }
 
     /// The files, if all of them are COPC and can be read in parts: standard input is read once.
     pub(super) fn octrees(&self, paths: &[PathBuf]) -> Result<Option<Vec<Copc>>> {
-        let mut files = Vec::new();
-        for path in paths {
+        let open = |path: &Path| {
             let is_file = path.is_file() && path != Path::new("-");
-            let opened = if is_file { Copc::open(Input::open(path, self.input.input_format)?)? } else { None };
-            let Some(file) = opened else { return Ok(None) };
-            files.push(file);
-        }
-        Ok(Some(files))
+            if is_file { Copc::open(Input::open(path, self.input.input_format)?) } else { Ok(None) }
+        };
+        let (files, left_out) = self.each(paths, open, || None)?;
+        let files: Option<Vec<Copc>> = files.into_iter().collect();
+        left_out.iter().filter(|_| files.is_some()).for_each(|line| note(line));
+        Ok(files)
     }
 
     /// The file, if it has levels of detail and can be read in parts.
@@ -171,7 +235,7 @@ impl Reading {
 
     /// The files, whose points are read piece by piece.
     pub(super) fn rows(&self, paths: &[PathBuf]) -> Result<Vec<Rows>> {
-        let open = |path: &PathBuf| {
+        let open = |path: &Path| {
             let is_file = path.is_file() && path != Path::new("-");
             let input = if is_file { Some(Input::open(path, self.input.input_format)?) } else { None };
             let rows = input.map_or(Ok(None), |input| Rows::open(input, self.input.ignore_alpha))?;
@@ -182,7 +246,8 @@ impl Reading {
                 ))
             })
         };
-        let mut files = paths.iter().map(open).collect::<Result<Vec<_>>>()?;
+        let (mut files, left_out) = self.each(paths, open, || None)?;
+        left_out.iter().for_each(|line| note(line));
         Rows::settle_colors(&mut files)?;
         Ok(files)
     }
@@ -217,8 +282,10 @@ impl Reading {
         if paths.iter().filter(|path| *path == Path::new("-")).count() > 1 {
             return Err(Error::Usage("standard input can be read once only: name - once".into()));
         }
-        let read = |path| io::read_raw(path, self.options(), bars);
-        let mut inputs = paths.iter().map(|path| read(path)).collect::<Result<Vec<_>>>()?;
+        let read = |path: &Path| io::read_raw(path, self.options(), bars);
+        let (mut inputs, left_out) = self.each(paths, read, || Some(Points::default()))?;
+        // Inputs keep their numbers, so that one without points stands for each that is left out.
+        inputs.iter_mut().take(1).for_each(|first| first.unread.extend(left_out.clone()));
         // Two tiles of one scan have one white.
         io::settle_colors(&mut inputs);
         self.check_classes(&inputs)?;
@@ -233,6 +300,7 @@ impl Reading {
         let classes = self.class_opacity.filter(|opacities| !opacities.are_plain());
         let classes = classes.map_or(String::new(), |opacities| format!(" --class-opacity {opacities}"));
         let alpha = if self.input.ignore_alpha { " --ignore-alpha" } else { "" };
-        format + withheld + if self.flatten { " --flatten" } else { "" } + alpha + &classes
+        let strict = if self.strict { " --strict" } else { "" };
+        format + withheld + if self.flatten { " --flatten" } else { "" } + alpha + &classes + strict
     }
 }

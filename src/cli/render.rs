@@ -30,10 +30,11 @@ use serde::Serialize;
 
 use self::levels::MeasureName;
 use self::options::{for_scene, options};
-use self::output::{Format, note_overflows, summary};
+use self::output::{Format, note_cut, note_overflows, summary};
 use self::parts::{Part, Parts, Read};
 use self::scene::{Made, scene};
 use self::view::{ChosenView, View};
+use super::outputs::Source;
 use super::parse::{
     parse_color, parse_intrinsics, parse_memory, parse_pixels, parse_scale, parse_size, parse_up, parse_vector,
 };
@@ -77,7 +78,7 @@ pub struct Arguments {
     #[arg(long)]
     separate: bool,
     #[command(flatten)]
-    reading: Reading,
+    pub(super) reading: Reading,
     #[command(flatten)]
     limits: LimitArguments,
     /// The image: .png (8-bit sRGB) or .exr (linear f32, every map a layer); with --cameras the folder of the images
@@ -214,7 +215,8 @@ pub struct Arguments {
     #[arg(long, value_name = "SIZE", group = "cut")]
     lod: Option<Detail>,
     /// Draw a cut of no more surfels and nodes than this, and hardly fewer: --lod by a size that is found for each view. What reaches the
-    /// camera's plane is always drawn by its surfels; of COPC files whole nodes are read, the root at least
+    /// camera's plane is always drawn by its surfels, and at the outline of a closed mesh nodes are
+    /// divided at any size, which is told; of COPC files whole nodes are read, the root at least
     #[arg(long, value_name = "N", group = "cut")]
     splats: Option<NonZeroU64>,
     /// How nodes are measured: extent, by the balls around them and all below them, and as larger where these lie off their caps, or area, by their images, as in Pajarola 2003
@@ -306,13 +308,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 
 impl Arguments {
     /// The files that are read, but those of `--cameras`.
-    fn files(&self) -> impl Iterator<Item = &PathBuf> {
-        self.inputs
-            .iter()
-            .chain(&self.triangles)
-            .chain(&self.triangle_texture)
-            .chain(&self.camera)
-            .chain(&self.textures)
+    fn files(&self) -> impl Iterator<Item = Source<'_>> {
+        let others = self.triangle_texture.iter().chain(&self.camera).chain(&self.textures);
+        let meshes = self.triangles.iter().map(Source::cloud);
+        self.reading.sources(&self.inputs).chain(meshes).chain(others.map(Source::other))
     }
 }
 
@@ -332,6 +331,7 @@ fn one(arguments: &Arguments) -> Result<()> {
     read.iter().for_each(|read| note(&read.sentence()));
     let (frame, report) = render(&scene, &camera, &options, &backend, &bars)?;
     note_overflows(&report);
+    note_cut([&report], arguments.splats);
     if is_empty(&frame, &options) {
         note(&Unseen::of(&scene, &camera, &options).sentence());
     }

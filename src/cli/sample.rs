@@ -9,6 +9,7 @@ use epsplat::surfels::curve;
 use epsplat::surfels::sampling::{MOST, MeshSurface, Method, Priority, sample, voxels::Voxel};
 use epsplat::{Error, Result};
 
+use super::outputs::Source;
 use super::progress::Bars;
 use super::reading::{InputFormat, named};
 use super::{note, outputs};
@@ -70,7 +71,8 @@ enum Shape {
 
 pub fn run(arguments: &Arguments) -> Result<()> {
     io::ply::check_extension(&arguments.output)?;
-    outputs::check([&arguments.mesh].into_iter().chain(&arguments.texture), [&arguments.output])?;
+    let texture = arguments.texture.iter().map(Source::other);
+    outputs::check([arguments.input.source(&arguments.mesh)].into_iter().chain(texture), [&arguments.output])?;
     let bars = Bars::new();
     if arguments.shape == Shape::Cap && matches!(arguments.method, Placement::Uniform) {
         return Err(Error::Usage("uniform samples have no half-axes to curve: leave --shape cap out".into()));

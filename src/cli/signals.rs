@@ -1,14 +1,25 @@
 //! Signals that end a run: what it was writing goes with it.
 
-/// From here on SIGINT, SIGTERM and SIGHUP remove the temporary files and end the run with the exit code that a shell gives
-/// them: 130, 143, 129. What was ignored at the start, as `nohup` has it, stays so.
+#[cfg(unix)]
+use std::sync::{Arc, atomic::AtomicBool};
+
+/// From here on SIGINT, SIGTERM, SIGHUP and SIGXCPU, of a limit of processor time, remove the
+/// temporary files and end the run with the exit code that a shell gives them: 130, 143, 129, 152.
+/// What was ignored at the start, as `nohup` has it, stays so. At a limit of the size of files,
+/// whose SIGXFSZ would end the run at once, writing fails instead. An abort, as where memory ends,
+/// exits with 1.
 #[cfg(unix)]
 pub fn watch() {
-    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    use signal_hook::consts::{SIGABRT, SIGHUP, SIGINT, SIGTERM, SIGXCPU, SIGXFSZ};
     use signal_hook::iterator::Signals;
 
+    // An allocation that fails says so, and aborts: a run that failed has the exit code 1, as
+    // others do.
+    let _ = signal_hook::flag::register_conditional_shutdown(SIGABRT, 1, Arc::new(AtomicBool::new(true)));
+    // Nobody looks at the flag: with a handler the system call returns an error.
+    let _ = signal_hook::flag::register(SIGXFSZ, Arc::default());
     let ignored = ignored();
-    let watched = [SIGHUP, SIGINT, SIGTERM].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
+    let watched = [SIGHUP, SIGINT, SIGTERM, SIGXCPU].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
     // Without its handler a signal ends the run as it always did.
     let Ok(mut signals) = Signals::new(watched) else { return };
     std::thread::spawn(move || {

@@ -86,7 +86,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             "the thesis has disks and no relaxation: leave --shape and --relax out with --cover thesis:R".into(),
         ));
     }
-    outputs::check(&arguments.inputs, [&arguments.output].into_iter().chain(&arguments.json))?;
+    let written = [&arguments.output].into_iter().chain(&arguments.json);
+    outputs::check(arguments.reading.sources(&arguments.inputs), written)?;
     let bars = Bars::new();
     let inputs = arguments.reading.all(&arguments.inputs, &bars)?;
     let beside = outputs::beside(&inputs, &arguments.output)?;

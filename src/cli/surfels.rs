@@ -22,7 +22,7 @@ pub struct Arguments {
     #[arg(required = true, help = help_of_all("Point clouds, or meshes, of which the vertices are taken"))]
     pub(super) inputs: Vec<PathBuf>,
     #[command(flatten)]
-    reading: Reading,
+    pub(super) reading: Reading,
     /// The file: .ply
     #[arg(short, long)]
     output: PathBuf,
@@ -51,7 +51,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         estimate_normals: arguments.estimate_normals,
         limits: arguments.limits.limits(),
     };
-    outputs::check(&arguments.inputs, [&arguments.output])?;
+    outputs::check(arguments.reading.sources(&arguments.inputs), [&arguments.output])?;
     let bars = Bars::new();
     let inputs = arguments.reading.all(&arguments.inputs, &bars)?;
     let beside = outputs::beside(&inputs, &arguments.output)?;

@@ -15,7 +15,8 @@ use glam::{DMat3, DVec3};
 use serde::Deserialize;
 
 use crate::error::{Error, Result};
-use crate::io::values::{one_line, read_text};
+use crate::io::input::text;
+use crate::io::values::one_line;
 use crate::scene::Lens;
 use crate::scene::camera::DEFAULT_FOV;
 
@@ -72,7 +73,7 @@ enum Model {
 
 /// Reads a camera file.
 pub fn read(path: &Path) -> Result<CameraFile> {
-    let text = read_text(path).map_err(|e| Error::read(path, e))?;
+    let text = text(path)?;
     parse(&text).map_err(|what| Error::malformed(path, what))
 }
 

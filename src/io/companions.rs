@@ -1,43 +1,69 @@
-//! The files that a mesh names: material libraries, and images.
+//! The files that a file names, and those that they name: meshes, material libraries, images.
 
-use std::fs::{self, File};
-use std::io::{self, BufRead, BufReader};
+use std::collections::BTreeSet;
+use std::io::Seek;
 use std::path::{Path, PathBuf};
 
-use super::{obj, ply};
+use super::{Format, Input, obj, ply};
+use crate::{Error, Result};
 
-/// The files that the mesh at `path` names, whether they exist or not: the material libraries of an OBJ file and the images that
-/// these name, the textures of a PLY file. None for other files, and for what cannot be read.
-pub fn companions(path: &Path) -> Vec<PathBuf> {
-    // A pipe can be read only once.
-    if !fs::metadata(path).is_ok_and(|there| there.is_file()) {
-        return Vec::new();
+/// All files that are read at second hand with the one at `path`, whether they exist or not: the
+/// mesh and the textures that a PLY file names, the material libraries of an OBJ file and the
+/// images that these name, and all that such a mesh names in turn. None for other files, and for
+/// what cannot be read. The file is opened as [`Input::open`] does; a pipe is read to its end, and
+/// [`Input::open`] goes on from the copy.
+///
+/// # Errors
+///
+/// Those of [`Input::open`] for a pipe, which cannot be opened again.
+pub fn companions(path: &Path, format: Option<Format>) -> Result<Vec<PathBuf>> {
+    let mut found = names_in(path, format, is_stream(path))?;
+    let mut known: BTreeSet<PathBuf> = found.iter().cloned().collect();
+    let mut looked_at = 0;
+    while looked_at < found.len() {
+        // An image names nothing, and its first bytes say that it is no mesh.
+        for named in names_in(&found[looked_at], None, false).unwrap_or_default() {
+            if known.insert(named.clone()) {
+                found.push(named);
+            }
+        }
+        looked_at += 1;
     }
-    let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
-    match extension.as_deref() {
-        Some("obj") => libraries(path).map_or(Vec::new(), |libraries| obj::companions(path, &libraries)),
-        Some("ply") => ply::companions(path),
-        _ => Vec::new(),
-    }
+    Ok(found)
 }
 
-/// What the lines `mtllib` of an OBJ file name.
-fn libraries(path: &Path) -> io::Result<Vec<String>> {
-    let mut reader = BufReader::with_capacity(1 << 18, File::open(path)?);
-    let (mut line, mut libraries) = (Vec::new(), Vec::new());
-    while reader.read_until(b'\n', &mut line)? > 0 {
-        if let Some(names) = line.trim_ascii().strip_prefix(b"mtllib") {
-            libraries.push(String::from_utf8_lossy(names.trim_ascii()).into_owned());
-        }
-        line.clear();
+fn is_stream(path: &Path) -> bool {
+    path == Path::new("-") || std::fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir())
+}
+
+/// What a file names by itself.
+fn names_in(path: &Path, format: Option<Format>, stream: bool) -> Result<Vec<PathBuf>> {
+    // A pipe that another file names is never read.
+    if !stream && !std::fs::metadata(path).is_ok_and(|there| there.is_file()) {
+        return Ok(Vec::new());
     }
-    Ok(libraries)
+    let mut input = match Input::open(path, format) {
+        Ok(input) => input,
+        Err(error) if stream => return Err(error),
+        Err(_) => return Ok(Vec::new()),
+    };
+    // Names are relative to the folder that readers take: for standard input the current one.
+    let own = if path == Path::new("-") { Path::new("") } else { path };
+    let named = match input.format {
+        Format::Ply => ply::companions(&mut input.file, own),
+        Format::Obj => obj::companions(&mut input.file, own),
+        _ => Vec::new(),
+    };
+    let ready = if stream { input.keep(path) } else { input.file.rewind() };
+    ready.map_err(|error| Error::read(path, error))?;
+    Ok(named)
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use std::fs;
 
     #[test]
     fn meshes_name_their_libraries_and_images() {
@@ -45,7 +71,7 @@ mod tests {
         let at = |name: &str| folder.path().join(name);
         let of = |name: &str, text: &str| {
             fs::write(at(name), text).unwrap();
-            companions(&at(name))
+            companions(&at(name), None).unwrap()
         };
         fs::write(at("a.mtl"), "newmtl x\nmap_Kd -s 2 2 wood fine.png\n\tbump  sub\\b.jpg\nKd 1 1 1\n").unwrap();
         let named = of("m.OBJ", "mtllib lost.mtl\nv 0 0 0\n  mtllib a.mtl\r\n");
@@ -54,6 +80,31 @@ mod tests {
             "ply\nformat ascii 1.0\ncomment TextureFile t.png\nelement vertex 0\nproperty float x\nend_header\n";
         assert_eq!(of("m.ply", header), [at("t.png")]);
         assert!(of("m.las", header).is_empty() && of("bad.ply", "ply\n").is_empty());
-        assert!(companions(&at("none.obj")).is_empty() && companions(folder.path()).is_empty());
+        assert!(companions(&at("none.obj"), None).unwrap().is_empty());
+        assert!(companions(folder.path(), None).unwrap().is_empty());
+        // Whatever a file is called, and in UTF-16 too.
+        let utf16: Vec<u8> = "\u{feff}mtllib a.mtl\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+        fs::write(at("m.dat"), utf16).unwrap();
+        assert!(companions(&at("m.dat"), None).unwrap().is_empty());
+        assert_eq!(companions(&at("m.dat"), Some(Format::Obj)).unwrap(), named[1..]);
+        assert_eq!(of("p.dat", header), [at("t.png")]);
+    }
+
+    #[test]
+    fn what_is_named_names_others_in_turn_and_a_circle_ends() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let ply = |comments: &str| {
+            format!(
+                "ply\nformat ascii 1.0\ncomment epsplat 1\n{comments}element vertex 0\nproperty float x\nend_header\n"
+            )
+        };
+        fs::write(at("a.ply"), ply("comment triangles b.obj\n")).unwrap();
+        fs::write(at("b.obj"), "mtllib c.mtl\n").unwrap();
+        fs::write(at("c.mtl"), "newmtl x\nMAP_KD d.png\n").unwrap();
+        assert_eq!(companions(&at("a.ply"), None).unwrap(), ["b.obj", "c.mtl", "d.png"].map(at));
+        fs::write(at("e.ply"), ply("comment triangles f.ply\n")).unwrap();
+        fs::write(at("f.ply"), ply("comment triangles e.ply\ncomment TextureFile g.png\n")).unwrap();
+        assert_eq!(companions(&at("e.ply"), None).unwrap(), ["f.ply", "g.png", "e.ply"].map(at));
     }
 }

@@ -8,8 +8,8 @@ use glam::{DQuat, DVec3};
 
 use crate::io::about::{About, Attribute, Role};
 use crate::io::color_range::{Kind, Number, Numbers, RawColors, Run, Shades, Values};
-use crate::io::fault::{self, Fault, reserve, surviving};
-use crate::io::values::one_line;
+use crate::io::fault::{self, Fault, Unread, reserve, surviving};
+use crate::io::values::{one_line, shown};
 use crate::io::{Input, Points, ReadOptions, Up};
 use crate::{Progress, Result};
 
@@ -22,6 +22,9 @@ const MOST_ATTRIBUTES: usize = 64;
 /// scan has the extension `nor` for them, are turned with its pose, and zero where it has none. Colours are sRGB codes, in the range that the scan
 /// gives or else its type, unless the values say otherwise ([`RawColors`]). The intensities of scans without colours become grey. Up is z.
 ///
+/// A scan that has no points or cannot be read is left out, and told by [`Points::unread`], if
+/// another one can be read and [`ReadOptions::strict`] is not said.
+///
 /// # Errors
 ///
 /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where the file
@@ -30,26 +33,34 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
     let Input { file, length, path, .. } = input;
     let opened = surviving(|| {
         let reader = E57Reader::new(BufReader::with_capacity(1 << 18, file)).map_err(of_e57)?;
-        let scans = reader.pointclouds();
-        let (mut promised, mut left) = (0u64, length.saturating_mul(8));
-        for (number, scan) in (1..).zip(&scans) {
-            left = check(scan, left).map_err(|what| Fault::Malformed(format!("its scan {number} {what}")))?;
-            promised = promised.saturating_add(scan.records);
-        }
-        Ok((reader, scans, promised))
+        let mut unread = Unread::default();
+        let scans = usable(reader.pointclouds(), length.saturating_mul(8), (&mut unread, options.strict))?;
+        Ok((reader, scans, unread))
     });
-    let (mut reader, scans, promised) = opened.map_err(|fault| fault.of(&path))?;
+    let (mut reader, (scans, all), mut unread) = opened.map_err(|fault| fault.of(&path))?;
+    let promised = scans.iter().map(|(_, scan)| scan.records).fold(0, u64::saturating_add);
     progress.begin(&format!("reading {}", fault::name(&path)), promised);
     let points = surviving(|| {
-        let any_normals = scans.iter().any(|scan| normal(scan).is_some());
+        let any_normals = scans.iter().any(|(_, scan)| normal(scan).is_some());
         let mut reading = Reading { normals: any_normals.then(Vec::new), ..Reading::default() };
-        scans.iter().try_for_each(|scan| reading.scan(&mut reader, scan, progress))?;
-        Ok(reading.into_points())
+        let mut read = unread.is_empty();
+        for (name, scan) in &scans {
+            let before = reading.state();
+            match surviving(|| reading.scan(&mut reader, scan, progress)) {
+                Ok(()) => read = true,
+                Err(fault) => {
+                    reading.go_back(before, scan.records);
+                    unread.add(|what| format!("{name}: {what}"), scan.records, fault, options.strict)?;
+                }
+            }
+        }
+        let unread = unread.told(&path, ("scans", all), read)?;
+        Ok(Points { unread, ..reading.into_points() })
     });
     progress.end();
     let mut points = points.map_err(|fault| fault.of(&path))?;
     points.raw.iter_mut().for_each(|raw| raw.name = fault::name(&path));
-    points.about = options.describe.then(|| Box::new(about(&reader, &scans)));
+    points.about = options.describe.then(|| Box::new(about(&reader, &reader.pointclouds())));
     Ok(points)
 }
 
@@ -94,6 +105,39 @@ fn name_of(name: &RecordName) -> String {
     let name = format!("{name:?}");
     let (first, rest) = name.split_at(1);
     first.to_ascii_lowercase() + rest
+}
+
+/// The scans that have points, by their names, and how many there are in all: those that have none,
+/// or promise more than is left of so many bits of the file, are left out.
+fn usable(
+    scans: Vec<PointCloud>,
+    mut left: u64,
+    (unread, strict): (&mut Unread, bool),
+) -> Result<(Vec<(String, PointCloud)>, u64), Fault> {
+    let (mut usable, all) = (Vec::new(), scans.len() as u64);
+    for (number, scan) in (1..).zip(scans) {
+        let name = match scan.name.as_deref().map(str::trim).filter(|name| !name.is_empty()) {
+            Some(name) => format!("scan {number} '{}'", shown(name.as_bytes())),
+            None => format!("scan {number}"),
+        };
+        match check(&scan, left) {
+            // One scan without points is a file without points, which is no fault.
+            Ok(_) if scan.records == 0 && all > 1 => {
+                let fault = Fault::Malformed(format!("its scan {number} has no points"));
+                unread.add(|_| format!("{name} has no points"), 0, fault, strict)?;
+            }
+            Ok(_) if scan.records == 0 => {}
+            Ok(rest) => {
+                left = rest;
+                usable.push((name, scan));
+            }
+            Err(what) => {
+                let fault = Fault::Malformed(format!("its scan {number} {what}"));
+                unread.add(|_| format!("{name} {what}"), scan.records, fault, strict)?;
+            }
+        }
+    }
+    Ok((usable, all))
 }
 
 /// The crate's failures that are the file's fault, told from the system's.
@@ -191,6 +235,21 @@ struct Reading {
 }
 
 impl Reading {
+    /// Points so far, and those that are left out.
+    fn state(&self) -> (usize, usize) {
+        (self.positions.len(), self.left_out.len())
+    }
+
+    /// Leaves out all points of a scan of so many, since which this was the state.
+    fn go_back(&mut self, (positions, left_out): (usize, usize), records: u64) {
+        self.positions.truncate(positions);
+        self.normals.iter_mut().for_each(|normals| normals.truncate(positions));
+        self.left_out.truncate(left_out);
+        // Their numbers stay those of the file.
+        let first = (positions + left_out) as u64;
+        self.left_out.extend(first..first.saturating_add(records));
+    }
+
     fn scan(
         &mut self,
         reader: &mut E57Reader<BufReader<File>>,

@@ -16,6 +16,7 @@ use exr::prelude::*;
 
 use super::atomic::write_whole;
 use super::image::check;
+use super::input::check_regular;
 use crate::error::Error as EpsplatError;
 use crate::frame::Frame;
 use crate::scene::Map;
@@ -58,7 +59,7 @@ pub fn write(path: &Path, frame: &Frame) -> Outcome<()> {
 /// called so; others are ignored.
 pub fn read(path: &Path) -> Outcome<Frame> {
     // exr reports a missing file as an I/O error of its own kind; asking first keeps the sentence plain.
-    std::fs::File::open(path).map_err(|e| EpsplatError::read(path, e))?;
+    check_regular(path).and_then(|()| std::fs::File::open(path).map(drop)).map_err(|e| EpsplatError::read(path, e))?;
     let unreadable = |e: Error| EpsplatError::malformed(path, format!("not a readable EXR: {e}"));
     let metadata = MetaData::read_from_file(path, false).map_err(unreadable)?;
     for header in &metadata.headers {

@@ -38,6 +38,66 @@ pub(super) fn reserve<T>(items: &mut Vec<T>, more: u64) -> Result<(), Fault> {
     items.try_reserve_exact(more).map_err(|_| Fault::Io(io::ErrorKind::OutOfMemory.into()))
 }
 
+/// Parts of a file that could not be read: scans, nodes, chunks.
+#[derive(Debug, Default)]
+pub(super) struct Unread {
+    /// The first of them, each with its reason.
+    named: Vec<String>,
+    parts: u64,
+    points: u64,
+    first: Option<Fault>,
+}
+
+impl Unread {
+    /// Parts that a sentence names, each with its reason.
+    const MOST_NAMED: usize = 8;
+
+    /// Leaves out a part of so many points, of which a clause says what is wrong with it. Fails if
+    /// files are read strictly, and for what is not the file's fault.
+    pub(super) fn add(
+        &mut self,
+        clause: impl FnOnce(&str) -> String,
+        points: u64,
+        fault: Fault,
+        strict: bool,
+    ) -> Result<(), Fault> {
+        let Fault::Malformed(what) = &fault else { return Err(fault) };
+        if strict {
+            return Err(fault);
+        }
+        if self.named.len() < Self::MOST_NAMED {
+            self.named.push(clause(what));
+        }
+        self.parts += 1;
+        self.points = self.points.saturating_add(points);
+        self.first.get_or_insert(fault);
+        Ok(())
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.parts == 0
+    }
+
+    /// What is told of the file at `path`, which has `all` parts of this kind; where none of them
+    /// was `read`, the first one's fault.
+    pub(super) fn told(self, path: &Path, (kind, all): (&str, u64), read: bool) -> Result<Vec<String>, Fault> {
+        match self.first {
+            None => return Ok(Vec::new()),
+            Some(fault) if !read => return Err(fault),
+            Some(_) => {}
+        }
+        let more = self.parts - self.named.len() as u64;
+        let more = if more > 0 { format!("; and {more} more") } else { String::new() };
+        Ok(vec![format!(
+            "{}: {} of {all} {kind} left out, with {} points: {}{more} (--strict refuses the file)",
+            path.display(),
+            self.parts,
+            self.points,
+            self.named.join("; ")
+        )])
+    }
+}
+
 /// The name of a file for a progress line.
 pub(super) fn name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()

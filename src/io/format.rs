@@ -86,6 +86,22 @@ impl Format {
     }
 }
 
+impl Format {
+    /// What is wrong with the first bytes of a stream that is said to be of this format; None if
+    /// they may be those of one.
+    pub(super) fn fault_of_start(self, start: &[u8]) -> Option<String> {
+        let name = format!("{self:?}").to_ascii_uppercase();
+        let fits = match self {
+            Self::Ply | Self::Las | Self::E57 => Self::of_start(start) == Some(self),
+            // Their texts begin with anything, but not with zeros: of UTF-16 every other byte may
+            // be one.
+            Self::Obj | Self::Pcd => !start.starts_with(&[0, 0]),
+        };
+        let first = if self == Self::Ply { "line is not 'ply'" } else { "bytes are of no such file" };
+        (!fits).then(|| format!("it is not a {name} file: its first {first}"))
+    }
+}
+
 impl FromStr for Format {
     type Err = String;
 

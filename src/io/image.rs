@@ -6,6 +6,7 @@ use std::path::Path;
 
 use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 
+use super::input::check_regular;
 use crate::error::{Error, Result};
 
 /// The most pixels of an image that is read: a picture of 16384x16384, as textures of scans are.
@@ -42,12 +43,9 @@ pub fn check_room(path: &Path, bytes: u64) -> Result<()> {
 ///
 /// # Errors
 ///
-/// [`Error::Read`] where there is none, [`Error::Malformed`] for what is no file.
+/// [`Error::Read`].
 pub(super) fn check_file(path: &Path) -> Result<()> {
-    let metadata = fs::metadata(path).map_err(|error| Error::read(path, error))?;
-    // A folder says what it is when it is read.
-    let is_file = metadata.is_file() || metadata.is_dir();
-    if is_file { Ok(()) } else { Err(Error::malformed(path, "an image is a file, and this is a device or a pipe")) }
+    check_regular(path).map_err(|error| Error::read(path, error))
 }
 
 /// The bytes of a file.
@@ -80,6 +78,7 @@ fn opened(path: &Path, format: Option<ImageFormat>) -> Result<Opened> {
     let called = if format.is_some() { "PNG" } else { PAINT };
     let of = path.to_owned();
     let unreadable = move |e: ImageError| Error::malformed(&of, format!("not a readable {called}: {e}"));
+    check_file(path)?;
     let mut reader = ImageReader::open(path).map_err(|e| Error::read(path, e))?;
     match format {
         Some(format) => reader.set_format(format),

@@ -1,14 +1,19 @@
 //! What is read: a file, or a copy of what cannot be sought in.
 
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::Format;
+use super::values::text_of;
 use crate::{Error, Result};
 
 /// Bytes from the start by which formats are told apart.
 const START: u64 = 32;
+
+/// The most bytes that are copied of what cannot be sought in: 4 GiB. A pipe may have no end.
+pub const MOST_COPIED: u64 = 1 << 32;
 
 /// A file that is open to be read: it can be sought in, and how long it is is known.
 #[derive(Debug)]
@@ -19,36 +24,107 @@ pub struct Input {
     /// What errors call it; files that it names lie beside it.
     pub(super) path: PathBuf,
     pub(super) format: Format,
+    /// The file is a copy: the original cannot be read again.
+    copied: bool,
+}
+
+/// Copies that were looked at before they are read, each under the path that it will be opened by.
+static LOOKED_AT: Mutex<Vec<(PathBuf, Input)>> = Mutex::new(Vec::new());
+
+fn looked_at() -> MutexGuard<'static, Vec<(PathBuf, Input)>> {
+    LOOKED_AT.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Input {
     /// Opens the file at `path`, or for `-` standard input, and tells its format: the one that is given, or else that of its name's
     /// extension in either case, or else that of its first bytes.
     ///
-    /// Pipes and devices are read to their end into a temporary file without a name, which goes when the input does.
+    /// Pipes are read to their end into a temporary file without a name, which goes when the input
+    /// does. Devices are refused.
     ///
     /// # Errors
     ///
-    /// [`Error::Read`] where the system cannot read or has no room for the copy, [`Error::Malformed`] where nothing tells the format.
+    /// [`Error::Read`] where the system cannot read or has no room for the copy, or it would be
+    /// longer than [`MOST_COPIED`],
+    /// [`Error::Malformed`] where nothing tells the format.
     pub fn open(path: &Path, format: Option<Format>) -> Result<Self> {
+        let mut looked_at = looked_at();
+        if let Some(at) = looked_at.iter().position(|(known, _)| known == path) {
+            return Ok(looked_at.swap_remove(at).1);
+        }
+        drop(looked_at);
         let standard = path == Path::new("-");
-        let path = if standard { Path::new("standard input") } else { path };
+        let called = if standard { Path::new("standard input") } else { path };
         let named = format.or_else(|| if standard { None } else { Format::of_name(path) });
-        let opened = || {
-            if standard {
-                return Ok(Opened::Stream(Box::new(io::stdin().lock())));
-            }
-            let file = File::open(path)?;
-            let metadata = file.metadata()?;
-            // A directory can be opened, and says what it is when it is read.
-            if metadata.is_file() || metadata.is_dir() {
-                return Ok(Opened::File(file, metadata.len()));
-            }
-            Ok(Opened::Stream(Box::new(file)))
-        };
-        let opened = opened().map_err(|error| Error::read(path, error))?;
-        opened.into_input(path, named)
+        let opened = Opened::of(path, standard).map_err(|error| Error::read(called, error))?;
+        opened.into_input(called, named)
     }
+
+    /// Goes back to the start, and keeps a copy for the next that opens `path`, since the original
+    /// is read; what can be opened again is dropped. Standard input has one place for all.
+    pub(super) fn keep(mut self, path: &Path) -> io::Result<()> {
+        self.file.rewind()?;
+        if self.copied {
+            looked_at().push((path.to_owned(), self));
+        }
+        Ok(())
+    }
+}
+
+/// Refuses a device, which may have no end, and of which reading may do something.
+pub(crate) fn check_kind(there: &Metadata) -> io::Result<()> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt;
+        let kind = there.file_type();
+        if kind.is_char_device() || kind.is_block_device() {
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is a device, not a file"));
+        }
+    }
+    let _ = there;
+    Ok(())
+}
+
+/// Refuses what is not a regular file, for files that the content of another names: opening a pipe
+/// would wait for who writes to it.
+pub(crate) fn check_regular(path: &Path) -> io::Result<()> {
+    let there = std::fs::metadata(path)?;
+    check_kind(&there)?;
+    if there.is_dir() {
+        return Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a directory"));
+    }
+    if there.is_file() { Ok(()) } else { Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file")) }
+}
+
+/// The most bytes of a file of text that is read as a whole: cameras, studies.
+const MOST_TEXT: u64 = 1 << 28;
+
+/// The text of a file or a pipe, in UTF-8 or UTF-16.
+///
+/// # Errors
+///
+/// [`Error::Read`] for a device, for more than 256 MiB, and where the system cannot read.
+pub(crate) fn text(path: &Path) -> Result<String> {
+    let read = || {
+        check_kind(&std::fs::metadata(path)?)?;
+        let mut bytes = Vec::new();
+        File::open(path)?.take(MOST_TEXT + 1).read_to_end(&mut bytes)?;
+        if bytes.len() as u64 > MOST_TEXT {
+            return Err(io::Error::new(
+                io::ErrorKind::FileTooLarge,
+                format!("it is longer than {} MiB", MOST_TEXT >> 20),
+            ));
+        }
+        text_of(&bytes)
+    };
+    read().map_err(|error| Error::read(path, error))
+}
+
+/// Standard input as a file; its place in the stream is that of the original.
+#[cfg(unix)]
+pub(crate) fn standard_input() -> io::Result<File> {
+    use std::os::fd::AsFd;
+    Ok(io::stdin().as_fd().try_clone_to_owned()?.into())
 }
 
 /// What was opened.
@@ -58,9 +134,43 @@ enum Opened {
 }
 
 impl Opened {
+    fn of(path: &Path, standard: bool) -> io::Result<Self> {
+        if standard {
+            return Self::standard();
+        }
+        // A device is not opened either, which may do something by itself.
+        let there = std::fs::metadata(path)?;
+        check_kind(&there)?;
+        let file = File::open(path)?;
+        let metadata = file.metadata()?;
+        // A directory can be opened, and says what it is when it is read.
+        if metadata.is_file() || metadata.is_dir() {
+            return Ok(Self::File(file, metadata.len()));
+        }
+        Ok(Self::Stream(Box::new(file)))
+    }
+
+    #[cfg(unix)]
+    fn standard() -> io::Result<Self> {
+        let mut file = standard_input()?;
+        let metadata = file.metadata()?;
+        check_kind(&metadata)?;
+        // Who comes after others reads from where they left off.
+        if metadata.is_file() && file.stream_position()? == 0 {
+            return Ok(Self::File(file, metadata.len()));
+        }
+        Ok(Self::Stream(Box::new(file)))
+    }
+
+    #[cfg(not(unix))]
+    fn standard() -> io::Result<Self> {
+        Ok(Self::Stream(Box::new(io::stdin().lock())))
+    }
+
     fn into_input(self, path: &Path, named: Option<Format>) -> Result<Input> {
         let failed = |error| Error::read(path, error);
         let mut start = Vec::new();
+        let copied = matches!(self, Self::Stream(_));
         let (file, length, format) = match self {
             Self::File(mut file, length) => {
                 let format = match named {
@@ -77,11 +187,14 @@ impl Opened {
                 // The format is told first: what is no cloud may have no end.
                 (&mut stream).take(START).read_to_end(&mut start).map_err(failed)?;
                 let format = named.or_else(|| Format::of_start(&start)).ok_or_else(|| unknown(path, &start))?;
-                let (file, length) = copied(&start, stream).map_err(failed)?;
+                if let Some(what) = format.fault_of_start(&start) {
+                    return Err(Error::malformed(path, what));
+                }
+                let (file, length) = self::copied(&start, stream, MOST_COPIED).map_err(failed)?;
                 (file, length, format)
             }
         };
-        Ok(Input { file, length, path: path.to_owned(), format })
+        Ok(Input { file, length, path: path.to_owned(), format, copied })
     }
 }
 
@@ -97,8 +210,9 @@ fn unknown(path: &Path, start: &[u8]) -> Error {
     )
 }
 
-/// All bytes of a stream, of which `start` is read, in a temporary file; and how many.
-fn copied(start: &[u8], mut rest: impl Read) -> io::Result<(File, u64)> {
+/// All bytes of a stream, of which `start` is read and there are no more than `most`, in a
+/// temporary file; and how many.
+fn copied(start: &[u8], rest: impl Read, most: u64) -> io::Result<(File, u64)> {
     let no_room = |error: io::Error| {
         let folder = std::env::temp_dir();
         io::Error::new(
@@ -108,10 +222,68 @@ fn copied(start: &[u8], mut rest: impl Read) -> io::Result<(File, u64)> {
     };
     let mut file = tempfile::tempfile().map_err(no_room)?;
     file.write_all(start).map_err(no_room)?;
-    let copied = io::copy(&mut rest, &mut file).map_err(|error| match error.kind() {
-        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge => no_room(error),
-        _ => error,
-    })?;
+    let read = start.len() as u64;
+    let mut rest = rest.take((most + 1).saturating_sub(read));
+    let length = read
+        + io::copy(&mut rest, &mut file).map_err(|error| match error.kind() {
+            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge => no_room(error),
+            _ => error,
+        })?;
+    if length > most {
+        let most = if most < 1 << 20 { format!("{most} bytes") } else { format!("{} MiB", most >> 20) };
+        let what = format!("it is longer than {most}, the most that is copied of a pipe: name a file instead");
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, what));
+    }
     file.rewind()?;
-    Ok((file, start.len() as u64 + copied))
+    Ok((file, length))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_pipe_is_copied_up_to_a_length_that_is_told() {
+        let copy = |length: u64| copied(b"ply\n", io::repeat(7).take(length), 100);
+        for length in [0, 1, 96] {
+            let (mut file, copied) = copy(length).unwrap();
+            let mut bytes = Vec::new();
+            file.read_to_end(&mut bytes).unwrap();
+            assert_eq!((copied, bytes.len() as u64), (4 + length, 4 + length));
+        }
+        for length in [97, 1 << 20, u64::MAX] {
+            let told = copy(length).unwrap_err().to_string();
+            assert!(told.contains("longer than 100 bytes") && told.contains("name a file instead"), "{told}");
+        }
+    }
+
+    #[test]
+    fn a_stream_of_another_format_is_refused_by_its_first_bytes() {
+        let open = |format: Format, start: &[u8]| {
+            let stream = Opened::Stream(Box::new(io::Cursor::new(start.to_vec())));
+            stream.into_input(Path::new("a"), Some(format)).map(|input| input.length)
+        };
+        let zeros = [0; 64];
+        for format in [Format::Ply, Format::Las, Format::E57, Format::Obj, Format::Pcd] {
+            let endless = Opened::Stream(Box::new(io::repeat(0)));
+            let told = endless.into_input(Path::new("a"), Some(format)).unwrap_err().to_string();
+            assert!(told.starts_with("a: it is not a") && told.contains("its first"), "{told}");
+            assert!(open(format, &zeros).is_err());
+        }
+        let utf16: Vec<u8> = "\u{feff}v 0 0 0\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+        for (format, start) in [
+            (Format::Ply, &b"ply\nformat"[..]),
+            (Format::Ply, b"\xef\xbb\xbfply\r\n"),
+            (Format::Las, b"LASF"),
+            (Format::E57, b"ASTM-E57"),
+            (Format::Obj, b"# a comment"),
+            (Format::Obj, &utf16),
+            (Format::Pcd, b"# a comment\nVERSION"),
+            // Too short for any: their readers say it.
+            (Format::Obj, b""),
+        ] {
+            assert_eq!(open(format, start).unwrap(), start.len() as u64, "{format:?}");
+        }
+    }
 }

@@ -17,7 +17,7 @@ pub mod exr;
 mod fault;
 mod format;
 pub mod image;
-mod input;
+pub(crate) mod input;
 pub mod las;
 pub mod mesh;
 pub mod obj;
@@ -40,7 +40,7 @@ pub use classes::{ClassOpacities, class_name};
 pub use color_range::{ColorRules, RawColors, settle_colors};
 pub use companions::companions;
 pub use format::Format;
-pub use input::Input;
+pub use input::{Input, MOST_COPIED};
 pub use mesh::{Material, Mesh};
 pub use paint::Paint;
 pub use points::{Points, Up};
@@ -65,6 +65,9 @@ pub struct ReadOptions {
     pub ignore_alpha: bool,
     /// What the file says of itself is kept ([`Points::about`]).
     pub describe: bool,
+    /// A file of which a part cannot be read is an error: a scan of an E57 file, a chunk of a LAZ
+    /// file, a node of a COPC file. Else that part is left out, and told by [`Points::unread`].
+    pub strict: bool,
 }
 
 /// Reads any supported file: PLY, LAS, LAZ (COPC too), OBJ, and with the features of those names E57 and PCD; see [`Input::open`].

@@ -74,6 +74,9 @@ pub struct Points {
     pub stranded: u64,
     /// Surfels of a mesh that have the mean of an image over them.
     pub averaged: u64,
+    /// Parts of the file that could not be read and were left out, named and counted: a sentence
+    /// each.
+    pub unread: Vec<String>,
     /// The numbers, in order, of all points that the file holds and that were left out; they start at 0.
     pub left_out: Vec<u64>,
     /// The number of the point of the file that each one is, where several are one; they start at 0.

@@ -2,25 +2,23 @@
 
 use crate::scene::color::srgb_to_linear;
 use std::io::{self, BufRead};
-use std::path::Path;
 use std::sync::LazyLock;
 
 /// What some editors begin UTF-8 text with; it belongs to no word.
 pub(super) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// The text of a file in UTF-8, or where it begins with the byte order mark of UTF-16 in that, without its mark: some
+/// The text of bytes in UTF-8, or where it begins with the byte order mark of UTF-16 in that, without its mark: some
 /// editors, and redirections on Windows, write one.
 ///
 /// # Errors
 ///
-/// Those of the system, and `InvalidData` for what is no text.
-pub(super) fn read_text(path: &Path) -> io::Result<String> {
-    let bytes = std::fs::read(path)?;
-    let code: fn([u8; 2]) -> u16 = match bytes[..] {
+/// `InvalidData` for what is no text.
+pub(super) fn text_of(bytes: &[u8]) -> io::Result<String> {
+    let code: fn([u8; 2]) -> u16 = match *bytes {
         [0xff, 0xfe, ..] => u16::from_le_bytes,
         [0xfe, 0xff, ..] => u16::from_be_bytes,
         _ => {
-            let text = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&bytes);
+            let text = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
             let text = std::str::from_utf8(text).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))?;
             return Ok(text.to_owned());
         }

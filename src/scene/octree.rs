@@ -53,6 +53,12 @@ impl OctreeNode {
     pub fn key(&self) -> (u32, [u32; 3]) {
         (self.level, self.place)
     }
+
+    /// As COPC names it: `level-x-y-z`.
+    pub fn name(&self) -> String {
+        let Self { level, place: [x, y, z], .. } = self;
+        format!("{level}-{x}-{y}-{z}")
+    }
 }
 
 impl PointOctree {

@@ -41,6 +41,7 @@ pub(crate) fn gather(inputs: Vec<Points>) -> Result<Gathered> {
         preparation.unseen += input.unseen;
         preparation.loose += input.loose;
         preparation.told.append(&mut input.notes);
+        preparation.unread.append(&mut input.unread);
         preparation.stranded += input.stranded;
         preparation.broken += input.broken;
         preparation.averaged += input.averaged;

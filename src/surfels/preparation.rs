@@ -15,6 +15,8 @@ pub struct Preparation {
     pub withheld: u64,
     /// Points that are in the files but not among `points`: their class has the opacity 0.
     pub unseen: u64,
+    /// Parts of files that could not be read and were left out, named and counted: a sentence each.
+    pub unread: Vec<String>,
     /// Vertices that are in the meshes but not among `points`: no triangle names them.
     pub loose: u64,
     /// The same, but their triangles have no area, or a corner that is not finite or exceeds [`LARGEST_COORDINATE`].
@@ -134,7 +136,7 @@ impl Preparation {
         let rounding = self.rounding.map(|error| {
             format!("the smallest surfels lie so far from others that their coordinates err by up to {error:.2e} world units")
         });
-        let told = self.told.iter().cloned();
+        let told = self.unread.iter().chain(&self.told).cloned();
         let notes = notes.into_iter().chain(images);
         told.chain(notes.chain([common, strays, by_neighbours, random, limited, rounding]).flatten()).collect()
     }

@@ -102,6 +102,78 @@ fn what_the_system_has_no_room_for_is_said() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
+/// What asks for memory in many parts asks for all of it first.
+#[cfg(target_os = "linux")]
+#[test]
+fn counts_that_memory_has_no_room_for_are_said() {
+    let folder = Folder::new();
+    let (cube, out) = (format!("{}/cube.obj", super::common::command::DATA), folder.path("out.ply"));
+    let scene = |shape: &str| {
+        let text = format!(
+            "name = \"n\"\nabout = \"a\"\nsize = [8, 8]\nruns = 1\n[[scene]]\nname = \"s\"\n{shape}\n\
+             [[config]]\nname = \"c\"\nbackend = \"reference\"\n"
+        );
+        folder.file("study.toml", text)
+    };
+    let sample = |count: &str| {
+        let output = within(2_000_000, &["sample", &cube, "--count", count, "-o", text(&out)]);
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    for count in ["3000000", "30000000", "268435456"] {
+        let (code, said) = sample(count);
+        assert_eq!(code, Some(1), "{said}");
+        assert!(
+            said.contains(&format!("error: the system has no memory for {count} samples of a mesh: about ")),
+            "{said}"
+        );
+    }
+    for (shape, words) in [
+        ("shape = \"sphere\"\ncount = 1000000000", "1000000000 surfels of the scene \"s\""),
+        ("shape = \"torus\"\ncount = 4294967295", "4294967295 surfels of the scene \"s\""),
+        ("shape = \"sphere\"\ncount = 99\nviews = 900\nsize = [4000, 4000]", "the 900 frames of the scene \"s\""),
+    ] {
+        let output = within(2_000_000, &["bench", text(&scene(shape))]);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(said.contains(words) && said.contains("no memory"), "{said}");
+    }
+    // Control: fewer have room there.
+    assert_eq!(sample("3000").0, Some(0));
+    let output = within(2_000_000, &["bench", text(&scene("shape = \"sphere\"\ncount = 99"))]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// A limit of the size of files ends no run at once: what was written goes, and it is told.
+#[cfg(unix)]
+#[test]
+fn at_a_limit_of_the_size_of_files_nothing_is_left() {
+    let folder = Folder::new();
+    let rows: String = (0..6400).map(|i| format!("{} {} {}\n", i % 80, i / 80, (i % 7) as f64 * 0.01)).collect();
+    let cloud = folder.file("c.ply", ply("x y z", 6400, &rows));
+    let (old, bunny) = (folder.file("o.ply", "old"), format!("{}/bunny.obj", super::common::command::DATA));
+    let out = text(&old).to_owned();
+    for arguments in [
+        &["generate", "sphere", "--count", "100000", "-o", &out][..],
+        &["surfels", text(&cloud), "-o", &out],
+        &["sample", &bunny, "--count", "9000", "-o", &out],
+        &["lod", text(&cloud), "-o", &out],
+        &["simplify", text(&cloud), "-o", &out, "--tolerance", "abs:1e-9"],
+        &["render", &bunny, "-o", text(&folder.path("o.exr")), "--backend", "reference", "--size", "300x300"],
+    ] {
+        // In blocks of 512 bytes or of a kilobyte, as the shell has it.
+        let script = "ulimit -f 40 && exec \"$0\" \"$@\"";
+        let mut command = Command::new("sh");
+        let output = command.args(["-c", script, env!("CARGO_BIN_EXE_epsplat")]).args(arguments).output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {said}");
+        assert!(said.contains("error: cannot write ") && said.contains("o."), "{arguments:?}: {said}");
+        let mut names = folder.names();
+        names.sort();
+        assert_eq!(names, ["c.ply", "o.ply"], "{arguments:?}");
+        assert_eq!(std::fs::read(&old).unwrap(), b"old", "{arguments:?}");
+    }
+}
+
 #[test]
 fn compare_names_what_only_one_image_has_and_prints_no_largest_number() {
     let folder = Folder::new();

@@ -8,7 +8,10 @@ mod common;
 
 mod limits;
 mod rule;
+mod second_hand;
 #[cfg(unix)]
 mod signals;
+#[cfg(unix)]
+mod strangers;
 #[cfg(target_os = "linux")]
 mod tried;

@@ -31,7 +31,7 @@ fn refusal(folder: &Folder, bytes: &[u8]) -> String {
     let read = open(&path).and_then(|copc| {
         let mut copc = copc.unwrap();
         let all: Vec<usize> = (0..copc.octree.nodes.len()).collect();
-        copc.read(&all, &ReadOptions::default(), &())
+        copc.read(&all, &ReadOptions { strict: true, ..ReadOptions::default() }, &())
     });
     sentence(&read.unwrap_err(), &path)
 }
@@ -174,5 +174,63 @@ fn damaged_nodes_are_survived() {
             bytes[at] = random.below(256) as u8;
         }
         look(&bytes);
+    }
+}
+
+/// The file, some nodes of which have layers that do not fit in them.
+fn with_broken(nodes: &[usize]) -> Vec<u8> {
+    let mut bytes = bytes();
+    let record = usize::from(u16::from_le_bytes(*bytes[105..].first_chunk().unwrap()));
+    let copc = open(&data("simple.copc.laz")).unwrap().unwrap();
+    let page = page(&bytes);
+    let place =
+        |entry: usize, word: usize| i32::from_le_bytes(*bytes[page + 32 * entry + 4 * word..].first_chunk().unwrap());
+    let offsets: Vec<usize> = nodes
+        .iter()
+        .map(|&node| {
+            let (level, [x, y, z]) = copc.octree.nodes[node].key();
+            let own = [level, x, y, z].map(|number| number as i32);
+            let entry = (0..65).find(|&entry| own == [0, 1, 2, 3].map(|word| place(entry, word))).unwrap();
+            u64::from_le_bytes(*bytes[page + 32 * entry + 16..].first_chunk().unwrap()) as usize
+        })
+        .collect();
+    for offset in offsets {
+        let at = offset + record + 4;
+        bytes[at..at + 4].copy_from_slice(&0x7fff_ff00u32.to_le_bytes());
+    }
+    bytes
+}
+
+/// Broken nodes are left out and told, by nodes and as chunks of the whole file; the others are
+/// what they were.
+#[test]
+fn broken_nodes_are_left_out_and_the_rest_is_read() {
+    let folder = Folder::new();
+    let path = folder.path("a.copc.laz");
+    let whole = open(&data("simple.copc.laz")).unwrap().unwrap();
+    let (all, whole_file) = ((0..65).collect::<Vec<_>>(), io::read(&data("simple.copc.laz"), &()).unwrap());
+    for broken in [&[3usize][..], &[0], &[64], &[7, 8, 9], &[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]] {
+        let broken: Vec<usize> = broken.iter().copied().filter(|&node| whole.octree.nodes[node].points > 0).collect();
+        let lost: u64 = broken.iter().map(|&node| whole.octree.nodes[node].points).sum();
+        std::fs::write(&path, with_broken(&broken)).unwrap();
+        let mut copc = open(&path).unwrap().unwrap();
+        let read = copc.read(&all, &ReadOptions::default(), &()).unwrap();
+        let by_chunks = io::read(&path, &()).unwrap();
+        for (points, kind) in [(&read, "nodes"), (&by_chunks, "chunks")] {
+            assert_eq!(points.positions.len() as u64, 1065 - lost, "{broken:?}");
+            let numbers = points.numbers.as_ref().unwrap().iter();
+            let expected = numbers.map(|&number| whole_file.positions[number as usize]);
+            assert!(expected.eq(points.positions.iter().copied()), "{broken:?} {kind}");
+            let [told] = &points.unread[..] else { panic!("{:?}", points.unread) };
+            let (count, name) = (broken.len(), whole.octree.nodes[broken[0]].name());
+            assert!(told.contains(&format!("a.copc.laz: {count} of ")), "{told}");
+            assert!(told.contains(&format!("{kind} left out, with {lost} points: ")), "{told}");
+            assert!(kind == "chunks" || told.contains(&format!("node {name}: ")), "{told}");
+            assert_eq!(told.contains("; and "), count > 8, "{told}");
+        }
+        let strict = ReadOptions { strict: true, ..ReadOptions::default() };
+        assert!(copc.read(&all, &strict, &()).is_err() && io::read_with(&path, strict, &()).is_err());
+        // Of broken nodes alone nothing is left.
+        sentence(&copc.read(&broken, &ReadOptions::default(), &()).unwrap_err(), &path);
     }
 }

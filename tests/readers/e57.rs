@@ -6,7 +6,7 @@ use e57::{
     ColorLimits, E57Writer, Extension, Quaternion, Record, RecordDataType, RecordName, RecordValue, Transform,
     Translation,
 };
-use epsplat::io::Up;
+use epsplat::io::{self, Points, ReadOptions, Up};
 use epsplat::scene::Colors;
 use epsplat::scene::color::srgb_to_linear;
 use std::io::Cursor;
@@ -26,6 +26,7 @@ fn file(scans: Vec<Scan>) -> Vec<u8> {
     for (number, scan) in scans.into_iter().enumerate() {
         let mut of_scan = writer.add_pointcloud(&format!("scan {number}"), scan.prototype).unwrap();
         of_scan.set_transform(scan.pose);
+        of_scan.set_name((number == 1).then(|| "a room".into()));
         if scan.limits.is_some() {
             of_scan.set_color_limits(scan.limits);
         }
@@ -196,7 +197,7 @@ fn colours_of_other_ranges_become_linear() {
         point.splice(4.., wider);
     }
     let light = |share: f64| srgb_to_linear(share) as f32;
-    let colors = |points: epsplat::io::Points| match points.colors {
+    let colors = |points: Points| match points.colors {
         Some(Colors::Linear(colors)) => colors[1],
         other => panic!("{other:?}"),
     };
@@ -275,4 +276,86 @@ fn cut_and_flipped_files_are_refused_or_read() {
         }
     }
     assert!((1..300).contains(&read), "{read} of 300 were read");
+}
+
+/// What a file that is left out in parts says of them; strictly read it is refused.
+fn left_out(folder: &Folder, bytes: &[u8]) -> (Points, String) {
+    let points = folder.read("a.e57", bytes).unwrap();
+    let [told] = &points.unread[..] else { panic!("{:?}", points.unread) };
+    let path = folder.path("a.e57");
+    let strict = ReadOptions { strict: true, ..ReadOptions::default() };
+    assert!(!sentence(&io::read_with(&path, strict, &()).unwrap_err(), &path).is_empty());
+    let told = told.strip_prefix(&format!("{}: ", path.display())).unwrap().to_owned();
+    (points, told)
+}
+
+/// Points on a line, all of them valid.
+fn line(count: i64) -> Scan {
+    let mut scan = cartesian(count);
+    scan.points.iter_mut().for_each(|point| point[3] = RecordValue::Integer(0));
+    scan
+}
+
+fn replaced(bytes: &mut [u8], from: &str, to: &str) {
+    let at = bytes.windows(from.len()).position(|window| window == from.as_bytes()).unwrap();
+    bytes[at..at + to.len()].copy_from_slice(to.as_bytes());
+    seal(bytes);
+}
+
+#[test]
+fn scans_without_points_are_left_out_and_told() {
+    let folder = Folder::new();
+    for (counts, named) in [
+        (&[0, 5][..], "1 of 2 scans left out, with 0 points: scan 1 has no points"),
+        (&[5, 0], "1 of 2 scans left out, with 0 points: scan 2 'a room' has no points"),
+        (&[4, 0, 1], "1 of 3 scans left out, with 0 points: scan 2 'a room' has no points"),
+        (&[0, 5, 0], "2 of 3 scans left out, with 0 points: scan 1 has no points; scan 3 has no points"),
+    ] {
+        let bytes = file(counts.iter().map(|&count| line(count)).collect());
+        let (points, told) = left_out(&folder, &bytes);
+        assert_eq!(points.positions.len(), 5, "{counts:?}");
+        assert_eq!(told, format!("{named} (--strict refuses the file)"));
+    }
+    // One that lies nowhere in the file, as some programs write it.
+    let mut nowhere = file(vec![line(0), line(9)]);
+    replaced(&mut nowhere, "fileOffset=\"48\"", "fileOffset=\"00\"");
+    assert_eq!(left_out(&folder, &nowhere).0.positions.len(), 9);
+    // Alone it is a file without points, and a file of nothing else is refused.
+    assert_eq!(folder.read("a.e57", &file(vec![line(0)])).unwrap().positions.len(), 0);
+    assert!(folder.refusal("a.e57", &file(vec![line(0), line(0)])).contains("no points"));
+    // Control: nothing is told of scans that are whole.
+    assert!(folder.read("a.e57", &file(vec![line(3), line(4)])).unwrap().unread.is_empty());
+}
+
+#[test]
+fn a_scan_that_cannot_be_read_is_left_out_whole_and_told() {
+    let folder = Folder::new();
+    let pose = |w: f64| {
+        let rotation = Quaternion { w, x: 0.0, y: 0.0, z: 0.0 };
+        Some(Transform { rotation, translation: Translation { x: 0.0, y: 0.0, z: 0.0 } })
+    };
+    let bent = || Scan { pose: pose(2.0), ..line(7) };
+    let (points, told) = left_out(&folder, &file(vec![bent(), line(3)]));
+    assert!(told.starts_with("1 of 2 scans left out, with 7 points: scan 1: the quaternion"), "{told}");
+    // The numbers of those that are read are those of the file.
+    assert_eq!((points.positions.len(), &points.left_out[..]), (3, &[0, 1, 2, 3, 4, 5, 6][..]));
+    assert!(
+        points
+            .colors
+            .is_some_and(|colors| colors == folder.read("b.e57", &file(vec![line(3)])).unwrap().colors.unwrap())
+    );
+    // A page of the first scan is torn: what was read of it goes too.
+    let mut torn = file(vec![line(9000), line(50), line(2)]);
+    torn[60_000] ^= 1;
+    let (points, told) = left_out(&folder, &torn);
+    assert_eq!((points.positions.len(), points.left_out.len()), (52, 9000), "{told}");
+    assert!(told.contains("with 9000 points") && told.contains("checksum"), "{told}");
+    // More than the file holds.
+    let mut promising = file(vec![line(2000), line(1000)]);
+    replaced(&mut promising, "recordCount=\"1000\"", "recordCount=\"9999\"");
+    let (points, told) = left_out(&folder, &promising);
+    assert_eq!(points.positions.len(), 2000);
+    assert!(told.contains("scan 2 'a room' promises 9999 points, the file holds "), "{told}");
+    // Where none can be read the first one's fault is that of the file.
+    assert!(folder.refusal("a.e57", &file(vec![bent(), bent()])).contains("quaternion"));
 }

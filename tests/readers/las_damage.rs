@@ -3,6 +3,7 @@
 use super::las::{KINDS, file, point};
 use super::las_forms::{pointwise, with_another_record};
 use super::{Folder, Random, data, sentence};
+use epsplat::io::{self, ReadOptions};
 
 /// Where a header has the number of its points: the legacy field, and that of LAS 1.4.
 const COUNT: usize = 107;
@@ -165,4 +166,39 @@ fn layers_outside_chunks_of_layers_are_refused() {
 fn a_record_after_one_of_nearly_its_name_is_checked() {
     let message = Folder::new().refusal("a.laz", &with_another_record(&sample((2, 3, true))));
     assert_eq!(message, "its LASzip record does not describe its points");
+}
+
+/// Of a file whose points are compressed one after the other, three chunks of 50,000 and fewer,
+/// damage to one chunk costs at most that one: it may be decoded to other points, too, as such
+/// chunks have no checksum.
+#[test]
+fn a_chunk_that_cannot_be_decoded_is_left_out_and_told() {
+    let folder = Folder::new();
+    let path = folder.path("a.laz");
+    let whole = std::fs::read(data("autzen.laz")).unwrap();
+    let points = io::read(&data("autzen.laz"), &()).unwrap();
+    let start = u32::from_le_bytes(*whole[96..].first_chunk().unwrap()) as usize;
+    let table = u64::from_le_bytes(*whole[start..].first_chunk().unwrap()) as usize;
+    let (mut told_of, mut random) = (0, Random(0xc4a));
+    for round in 0..8 {
+        let mut bytes = whole.clone();
+        let at = start + 8 + (table - start - 8) * (2 * round + 1) / 16;
+        let length = [4000, 40_000][round % 2].min(table - at);
+        bytes[at..at + length].iter_mut().for_each(|byte| *byte = random.below(256) as u8);
+        let read = folder.read("a.laz", &bytes).unwrap();
+        let (strict, lost) = (ReadOptions { strict: true, ..ReadOptions::default() }, 110_000 - read.positions.len());
+        assert_eq!(io::read_with(&path, strict, &()).is_err(), lost > 0, "{round}");
+        assert!([0, 10_000, 50_000, 60_000, 100_000].contains(&lost), "{round}: {lost}");
+        assert_eq!(read.unread.len(), usize::from(lost > 0));
+        if let [told] = &read.unread[..] {
+            assert!(told.contains(" of 3 chunks left out") && told.contains(&format!("with {lost} points")), "{told}");
+            told_of += 1;
+            // The first chunk, where it was spared, is what it was.
+            let numbers = read.numbers.as_ref().unwrap();
+            let same = |(number, at): (&u32, &[f64; 3])| points.positions[*number as usize] == *at;
+            let first = numbers.iter().zip(&read.positions).take_while(|(number, _)| **number < 50_000);
+            assert!(round < 4 || first.clone().count() == 50_000 && first.clone().all(same), "{round}");
+        }
+    }
+    assert!(told_of >= 3, "{told_of} of 8 chunks could not be decoded");
 }

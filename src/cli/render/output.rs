@@ -1,5 +1,6 @@
 //! What a render leaves: images, a report, and lines on stderr.
 
+use std::num::NonZeroU64;
 use std::path::Path;
 
 use clap::ValueEnum;
@@ -50,6 +51,18 @@ pub(super) fn note_overflows(report: &Report) {
         note(&format!(
             "{} sums overflowed: rendered again with the accumulator {}",
             report.overflows, report.accumulator
+        ));
+    }
+}
+
+/// Tells of the first of some pictures that draws more surfels and nodes than the `most` that are
+/// asked for.
+pub(super) fn note_cut<'a>(reports: impl IntoIterator<Item = &'a Report>, most: Option<NonZeroU64>) {
+    let Some(most) = most.map(NonZeroU64::get) else { return };
+    if let Some(cut) = reports.into_iter().filter_map(|report| report.cut).find(|cut| *cut > most) {
+        note(&format!(
+            "{cut} surfels and nodes are drawn, not the {most} of --splats: nodes at the camera's plane, and at the outline of a closed mesh, are \
+             divided at any size (--cull none keeps the latter whole)"
         ));
     }
 }

@@ -45,8 +45,14 @@ pub(super) fn scene_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dy
     // What two files of surfels name is drawn once.
     let mut known = BTreeSet::new();
     paths.retain(|path| known.insert(path.canonicalize().unwrap_or_else(|_| path.clone())));
-    let has_points = inputs.iter().any(|points| !points.positions.is_empty() || points.beside.is_none());
-    let of_surfels = if has_points { Some(surfels_of(arguments, inputs, progress)?) } else { None };
+    // What has neither points nor triangles is told as that.
+    let none = !inputs.is_empty() && inputs.iter().all(|points| points.beside.is_none());
+    let of_surfels = if none || inputs.iter().any(|points| !points.positions.is_empty()) {
+        Some(surfels_of(arguments, inputs, progress)?)
+    } else {
+        inputs.iter().flat_map(|points| &points.unread).for_each(|line| note(line));
+        None
+    };
     if paths.is_empty() {
         if arguments.join.is_some() || arguments.triangle_texture.is_some() {
             let what = "--join and --triangle-texture are of triangles, and there are none: name some by --triangles";

@@ -16,10 +16,11 @@ use epsplat::scene::{Camera, Maps, Scene};
 use epsplat::{Error, Progress, Result};
 use serde::Serialize;
 
+use super::super::outputs::Source;
 use super::super::progress::Bars;
 use super::super::{note, outputs, write_json};
 use super::options::{for_scene, options};
-use super::output::{Format, note_overflows};
+use super::output::{Format, note_cut, note_overflows};
 use super::parts::{Part, Parts, Read};
 use super::scene::scene;
 use super::view::{DEFAULT_SIZE, View};
@@ -173,6 +174,7 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
 /// Tells of all pictures, since the scene was there.
 fn tell(arguments: &Arguments, views: Vec<Picture>, writers: NonZeroUsize, start: Instant) -> Result<()> {
     views.iter().for_each(|view| note_overflows(&view.report));
+    note_cut(views.iter().map(|view| &view.report), arguments.splats);
     let reports = Reports {
         writers: writers.get(),
         render_ms: views.iter().map(|view| view.report.total_ms).sum(),
@@ -217,9 +219,8 @@ fn views(arguments: &Arguments, path: &Path, format: Format) -> Result<Vec<(Path
 /// Refuses pictures, before anything is rendered, that would overwrite something or could not be written.
 fn check_outputs(arguments: &Arguments, cameras: &Path, views: &[(PathBuf, View)]) -> Result<()> {
     check_folder(&arguments.output, cameras)?;
-    let read = arguments.files().map(PathBuf::as_path).chain([cameras]);
     let of_colmap = ["cameras.txt", "images.txt"].map(|name| cameras.join(name));
-    let read = read.chain(of_colmap.iter().map(PathBuf::as_path));
+    let read = arguments.files().chain([Source::other(cameras)]).chain(of_colmap.iter().map(Source::other));
     let pictures = views.iter().map(|(file, _)| file.as_path());
     outputs::check_distinct(read, pictures.clone().chain(arguments.json.as_deref()))?;
     arguments.json.iter().try_for_each(|json| outputs::try_output(json))?;

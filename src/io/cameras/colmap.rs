@@ -9,7 +9,7 @@
 
 use std::collections::HashMap;
 use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::{self, BufRead, BufReader};
 use std::path::Path;
 
 use glam::{DMat3, DQuat, DVec3};
@@ -18,6 +18,7 @@ use super::{NamedCamera, name_of};
 use crate::error::{Error, Result};
 use crate::io::camera::{CameraFile, Pose};
 use crate::io::fault::Fault;
+use crate::io::input::check_regular;
 use crate::io::values::{parse_number, shown};
 use crate::scene::Lens;
 
@@ -26,8 +27,8 @@ pub(super) const IMAGES: &str = "images.txt";
 
 pub(super) fn read(folder: &Path) -> Result<Vec<NamedCamera>> {
     let path = folder.join(CAMERAS);
-    let file = File::open(&path).map_err(|error| {
-        if error.kind() == std::io::ErrorKind::NotFound && folder.join("cameras.bin").exists() {
+    let file = opened(&path).map_err(|error| {
+        if error.kind() == io::ErrorKind::NotFound && folder.join("cameras.bin").exists() {
             let what = "only COLMAP's text is read: make it with 'colmap model_converter --output_type TXT'";
             return Error::malformed(folder, what);
         }
@@ -35,12 +36,17 @@ pub(super) fn read(folder: &Path) -> Result<Vec<NamedCamera>> {
     })?;
     let lenses = lenses(&mut Lines::of(BufReader::new(file))).map_err(|fault| fault.of(&path))?;
     let path = folder.join(IMAGES);
-    let file = File::open(&path).map_err(|error| Error::read(&path, error))?;
+    let file = opened(&path).map_err(|error| Error::read(&path, error))?;
     images(&mut Lines::of(BufReader::new(file)), &lenses).map_err(|fault| fault.of(&path))
 }
 
 /// The cameras by their identifiers; of one that cannot be used why, and on which line: that matters to images of it alone.
 type Lenses = HashMap<u64, Result<Camera, String>>;
+
+fn opened(path: &Path) -> io::Result<File> {
+    check_regular(path)?;
+    File::open(path)
+}
 
 /// What a line of `cameras.txt` says.
 struct Camera {
@@ -181,7 +187,7 @@ impl<R: BufRead> Lines<R> {
             self.line.drain(..'\u{feff}'.len_utf8());
         }
         read.map(|bytes| bytes > 0).map_err(|error| match error.kind() {
-            std::io::ErrorKind::InvalidData => self.fault("it is not UTF-8 text"),
+            io::ErrorKind::InvalidData => self.fault("it is not UTF-8 text"),
             _ => Fault::Io(error),
         })
     }

@@ -7,10 +7,11 @@ use glam::{DMat3, DVec3};
 use serde_json::Value;
 
 use super::{NamedCamera, name_of};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::io::camera::{CameraFile, Pose, rigid};
 use crate::io::fault::Fault;
-use crate::io::values::{one_line, read_text, shown};
+use crate::io::input::text;
+use crate::io::values::{one_line, shown};
 use crate::scene::Lens;
 
 /// Lens models that are a pinhole's where nothing is distorted.
@@ -19,7 +20,7 @@ const PINHOLES: [&str; 6] = ["PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADI
 const DISTORTIONS: [&str; 8] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
 
 pub(super) fn read(path: &Path, size: (u32, u32)) -> Result<Vec<NamedCamera>> {
-    let text = read_text(path).map_err(|e| Error::read(path, e))?;
+    let text = text(path)?;
     parse(&text, size).map_err(|what| Fault::Malformed(what).of(path))
 }
 

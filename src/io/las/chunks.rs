@@ -216,16 +216,16 @@ impl Scheme {
 
 /// One separately compressed run of points.
 #[derive(Clone, Copy, Debug)]
-struct Chunk {
-    points: u64,
-    bytes: u64,
+pub(super) struct Chunk {
+    pub(super) points: u64,
+    pub(super) bytes: u64,
 }
 
 fn early(promised: u64, length: u64) -> String {
     format!("the header promises {promised} points, but the file ends at byte {length}, before")
 }
 
-fn chunk_table(
+pub(super) fn chunk_table(
     file: &mut (impl Read + Seek),
     start: u64,
     length: u64,

@@ -4,7 +4,7 @@ use super::chunks::{MOST_A_BYTE, Scheme, laszip_record, malformed, promised};
 use super::extra::Normals;
 use super::layers::Layers;
 use super::shown::Shown;
-use super::{Looks, early, header, of_las};
+use super::{Looks, early, header, of_las, shape_of};
 use crate::io::fault::{self, Fault, surviving};
 use crate::io::{ColorRules, Format, Input, degrees};
 use crate::scene::Bounds;
@@ -78,7 +78,7 @@ impl Copc {
     ///
     /// [`Error::Read`] where the system cannot read, [`Error::Malformed`] where the file says that it is COPC and is not.
     pub fn open(input: Input) -> Result<Option<Self>> {
-        let Input { file, length, path, format } = input;
+        let Input { file, length, path, format, .. } = input;
         let opened = surviving(|| {
             if format != Format::Las || !says_copc(&file)? {
                 return Ok(None);
@@ -126,17 +126,15 @@ fn opened(mut file: File, path: PathBuf, length: u64) -> Result<Copc, Fault> {
     let legacy = file.get_ref().legacy;
     let header = raw::Header::read_from(&mut file).map_err(of_las)?;
     let record = u64::from(header.point_data_record_length);
-    let format = header.point_data_record_format & 0x3f;
     let laszip = laszip_record(&mut file, &header)?.map(|(_, data)| data);
     let scheme = laszip.as_deref().and_then(Scheme::parse);
     let (Some(laszip), Some(mut scheme)) = (laszip, scheme.filter(|scheme| scheme.compressor == 3)) else {
         return malformed("it says that it is COPC, but its points are not compressed in layers");
     };
-    let mut format = las::point::Format::new(format).map_err(of_las)?;
-    if scheme.record != record || record < u64::from(format.len()) {
+    let (format, transforms) = shape_of(&header)?;
+    if scheme.record != record {
         return malformed("its LASzip record does not describe its points");
     }
-    format.extra_bytes = (record - u64::from(format.len())) as u16;
     if !format.is_extended || scheme.has_color != format.has_color {
         // The decoder takes for something else what colours are taken from.
         scheme.needed.fill(true);
@@ -159,12 +157,6 @@ fn opened(mut file: File, path: PathBuf, length: u64) -> Result<Copc, Fault> {
     if count != promised(&header) {
         return malformed(format!("its octree has {count} points, and its header promises {}", promised(&header)));
     }
-    let transform = |scale, offset| Transform { scale, offset };
-    let transforms = Vector {
-        x: transform(header.x_scale_factor, header.x_offset),
-        y: transform(header.y_scale_factor, header.y_offset),
-        z: transform(header.z_scale_factor, header.z_offset),
-    };
     let [min, max] =
         [DVec3::new(header.min_x, header.min_y, header.min_z), DVec3::new(header.max_x, header.max_y, header.max_z)];
     let bounds = if min.is_finite() && max.is_finite() { Bounds { min, max } } else { Bounds::EMPTY };

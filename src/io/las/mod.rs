@@ -7,6 +7,7 @@ mod extra;
 mod header;
 mod layers;
 mod nodes;
+mod rest;
 mod shown;
 mod system;
 
@@ -14,14 +15,17 @@ use crate::io::color_range::{Kind, Number, Numbers, RawColors, Shades, Values};
 use crate::io::fault::{self, Fault, reserve, surviving};
 use crate::io::values::one_line;
 use crate::io::{Input, Points, ReadOptions, Up, degrees};
-use crate::{Progress, Result};
+use crate::{Error, Progress, Result};
 use extra::Normals;
 use header::Found;
 use las::reader::{LazParallelism, ReaderOptions};
-use las::{PointData, PointDataBuilder, Reader, raw};
+use las::{PointData, PointDataBuilder, Reader, Transform, Vector, raw};
 use shown::Shown;
 use std::collections::BTreeMap;
+use std::fs::File;
 use std::io::{self, BufReader, Seek};
+use std::ops::Range;
+use std::path::Path;
 
 pub use copc::Copc;
 
@@ -37,13 +41,39 @@ const BLOCK: u64 = 1 << 25;
 /// which zeros alone mean none, and without them intensities ([`RawColors`]). Where two fields of the header disagree,
 /// [`Points::notes`] says it.
 ///
+/// A chunk of a compressed file that cannot be decoded is left out, and told by [`Points::unread`],
+/// if another one can be decoded and
+/// [`ReadOptions::strict`] is not said.
+///
 /// # Errors
 ///
 /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where
 /// the file is not LAS, ends early, or cannot be decoded.
 pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
     let Input { file, length, path, .. } = input;
-    let name = fault::name(&path);
+    let again = file.try_clone().map_err(|error| Error::read(&path, error))?;
+    match whole((file, length), &path, options, progress) {
+        Err(Fault::Malformed(what)) if !options.strict => {
+            let points = deep(|| rest::read((again, length), &path, options, progress));
+            // What is wrong was told already.
+            points.map_err(|fault| match fault {
+                Fault::Malformed(_) => Fault::Malformed(what),
+                of_system => of_system,
+            })
+        }
+        points => points,
+    }
+    .map_err(|fault| fault.of(&path))
+}
+
+/// All points of a file that is what its header says.
+fn whole(
+    (file, length): (File, u64),
+    path: &Path,
+    options: &ReadOptions,
+    progress: &dyn Progress,
+) -> Result<Points, Fault> {
+    let name = fault::name(path);
     let opened = surviving(|| {
         let mut file = BufReader::with_capacity(1 << 20, Shown::new(file)?);
         let legacy = file.get_ref().legacy;
@@ -52,22 +82,15 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
         let found = header::look(&mut file, (&header, legacy), (length, &name)).map_err(early)?;
         Ok((file, decoding, chunks::promised(&header), found))
     });
-    let (file, decoding, promised, found) = opened.map_err(|fault| fault.of(&path))?;
-    let about = options.describe.then(|| Box::new(found.about.clone()));
+    let (file, decoding, promised, found) = opened?;
     if promised == 0 {
         // The decoder would still take the length of a chunk table for true, which nothing here vouches for.
-        return Ok(Points { up: Some(Up::Z), about, notes: found.notes, ..Points::default() });
+        return Ok(described(Points { up: Some(Up::Z), ..Points::default() }, found, &name, options));
     }
     progress.begin(&format!("reading {name}"), promised);
     let points = deep(|| decode(file, decoding, promised.min(length), (options, &found), progress));
     progress.end();
-    let mut points = points.map_err(|fault| fault.of(&path))?;
-    points.notes.extend(found.notes.iter().cloned());
-    points.notes.extend(found.outside(&name, &points.positions));
-    points.notes.extend(degrees::hint_of(&name, &points.positions, found.geographic));
-    points.about = about;
-    points.raw.iter_mut().for_each(|raw| raw.name.clone_from(&name));
-    Ok(points)
+    Ok(described(points?, found, &name, options))
 }
 
 /// Stack of the threads that decode, bytes; memory is taken only as far as it is used. The decoder calls itself for each
@@ -145,6 +168,33 @@ fn decode(
     Ok(kept.points(0..read, read_options))
 }
 
+/// Points with what the file of this name says of itself, and what is odd about it.
+fn described(mut points: Points, found: Found, name: &str, options: &ReadOptions) -> Points {
+    points.notes.extend(found.notes.iter().cloned());
+    points.notes.extend(found.outside(name, &points.positions));
+    points.notes.extend(degrees::hint_of(name, &points.positions, found.geographic));
+    points.about = options.describe.then(|| Box::new(found.about));
+    points.raw.iter_mut().for_each(|raw| name.clone_into(&mut raw.name));
+    points
+}
+
+/// What the records of a file are, as the decoder takes it.
+fn shape_of(header: &raw::Header) -> Result<(las::point::Format, Vector<Transform>), Fault> {
+    let record = header.point_data_record_length;
+    let mut format = las::point::Format::new(header.point_data_record_format & 0x3f).map_err(of_las)?;
+    let Some(extra) = record.checked_sub(format.len()) else {
+        return chunks::malformed("its LASzip record does not describe its points");
+    };
+    format.extra_bytes = extra;
+    let transform = |scale, offset| Transform { scale, offset };
+    let transforms = Vector {
+        x: transform(header.x_scale_factor, header.x_offset),
+        y: transform(header.y_scale_factor, header.y_offset),
+        z: transform(header.z_scale_factor, header.z_offset),
+    };
+    Ok((format, transforms))
+}
+
 /// What shows of the points of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Looks {
@@ -197,6 +247,19 @@ impl<'a> Kept<'a> {
         let mut points =
             Points { positions, normals, raw, up, classes: counts, withheld, left_out, ..Points::default() };
         leave_out_unseen(&mut points, numbers);
+        points
+    }
+
+    /// As points, of which those that were read have the numbers of these runs; `all` are in the
+    /// file. Points are numbered as in the file, if it has fewer than 2^32, else as they are kept.
+    fn numbered(self, runs: &[Range<u64>], all: u64, options: &ReadOptions) -> Points {
+        let numbers = || runs.iter().cloned().flatten();
+        let mut points = self.points(numbers(), options);
+        let mut left_out = std::mem::take(&mut points.left_out).into_iter().peekable();
+        if u32::try_from(all).is_ok() {
+            let kept = numbers().filter(|number| left_out.next_if_eq(number).is_none());
+            points.numbers = Some(kept.map(|number| number as u32).collect());
+        }
         points
     }
 

@@ -4,8 +4,9 @@ use super::chunks::{CHUNK_LIMIT, malformed};
 use super::copc::Copc;
 use super::layers::Layers;
 use super::{Kept, Looks, deep, early, of_las};
-use crate::io::fault::{self, Fault, reserve, surviving};
+use crate::io::fault::{self, Fault, Unread, reserve, surviving};
 use crate::io::{Points, ReadOptions};
+use crate::scene::octree::OctreeNode;
 use crate::{Progress, Result};
 use las::{PointData, PointDataBuilder};
 use laz::LazVlr;
@@ -21,11 +22,14 @@ impl Copc {
     /// Reads the points of these nodes, by their indices in the octree, as [`read`](super::read) reads those of a whole file: in the order in
     /// which the file has them. What 16-bit colours and intensities mean is told by the first nodes that are read, for all later ones too.
     ///
-    /// Points are numbered as in the file, if it has fewer than 2^32, else as they are kept.
+    /// Points are numbered as in the file, if it has fewer than 2^32, else as they are kept. A node
+    /// that cannot be decoded is left out, and told by
+    /// [`Points::unread`], if another one can be and [`ReadOptions::strict`] is not said.
     ///
     /// # Errors
     ///
-    /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where a node cannot be decoded.
+    /// [`Error::Read`](crate::Error::Read) where the system cannot read,
+    /// [`Error::Malformed`](crate::Error::Malformed) where nodes cannot be decoded.
     pub fn read(&mut self, nodes: &[usize], options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
         let mut points = self.read_raw(nodes, options, progress)?;
         self.rules.settle(std::slice::from_mut(&mut points));
@@ -41,23 +45,31 @@ impl Copc {
         let mut nodes: Vec<usize> = nodes.iter().copied().filter(|&node| self.octree.nodes[node].points > 0).collect();
         nodes.sort_unstable_by_key(|&node| self.chunks[node].offset);
         progress.begin(&format!("looking at {} nodes of {}", nodes.len(), fault::name(&self.path)), nodes.len() as u64);
-        let looked = self.look(&nodes, progress);
+        let mut unread = Unread::default();
+        let all = nodes.len() as u64;
+        let looked = self.look(&mut nodes, (&mut unread, options.strict), progress);
         progress.end();
         looked.map_err(|fault| self.fault(fault))?;
         let bytes = self.bytes_read(&nodes);
         progress.begin(&format!("reading {} MB of {}", bytes.div_ceil(1_000_000), fault::name(&self.path)), bytes);
-        let points = deep(|| self.decoded(&nodes, options, progress));
+        let points = deep(|| self.decoded(&nodes, (unread, all), options, progress));
         progress.end();
         let mut points = points.map_err(|fault| self.fault(fault))?;
         points.notes.extend(self.notes.iter().cloned());
         Ok(points)
     }
 
-    fn decoded(&mut self, nodes: &[usize], options: &ReadOptions, progress: &dyn Progress) -> Result<Points, Fault> {
+    fn decoded(
+        &mut self,
+        nodes: &[usize],
+        (mut unread, all): (Unread, u64),
+        options: &ReadOptions,
+        progress: &dyn Progress,
+    ) -> Result<Points, Fault> {
         let vlr = LazVlr::from_buffer(&self.laszip).map_err(|error| of_las(error.into()))?;
         let count = self.octree.points(nodes);
         let normals = self.normals.clone();
-        let mut kept = Kept::of(self.looks, normals.as_ref());
+        let (mut kept, mut read) = (Kept::of(self.looks, normals.as_ref()), Vec::new());
         // No longer than the file, whatever it promises.
         reserve(&mut kept.positions, count.min(self.bytes_read(nodes)))?;
         for together in self.batches(nodes) {
@@ -67,29 +79,27 @@ impl Copc {
             };
             let compressed = together.iter().map(compressed).collect::<Result<Vec<_>, _>>()?;
             let decode = |(&node, bytes): (&usize, Vec<u8>)| surviving(|| self.decode(node, &bytes, &vlr));
-            let decoded: Vec<PointData> =
-                together.par_iter().zip(compressed).map(decode).collect::<Result<_, Fault>>()?;
+            let decoded: Vec<Result<PointData, Fault>> = together.par_iter().zip(compressed).map(decode).collect();
             for (&node, block) in together.iter().zip(decoded) {
-                kept.take(&block, self.chunks[node].first, options);
+                let (first, points) = (self.chunks[node].first, self.octree.nodes[node].points);
+                match block {
+                    Ok(block) => {
+                        kept.take(&block, first, options);
+                        read.push(first..first + points);
+                    }
+                    Err(fault) => {
+                        let name = self.octree.nodes[node].name();
+                        unread.add(|what| format!("node {name}: {what}"), points, fault, options.strict)?;
+                    }
+                }
             }
             progress.advance(self.bytes_read(together));
         }
+        let unread = unread.told(&self.path, ("nodes", all), !read.is_empty())?;
         self.decide(&kept);
-        let numbers = || {
-            let of_node =
-                |&node: &usize| self.chunks[node].first..self.chunks[node].first + self.octree.nodes[node].points;
-            nodes.iter().flat_map(of_node)
-        };
-        let mut points = kept.points(numbers(), options);
-        if let Some(raw) = &mut points.raw {
-            raw.name = fault::name(&self.path);
-        }
-        let mut left_out = std::mem::take(&mut points.left_out).into_iter().peekable();
-        if u32::try_from(self.count).is_ok() {
-            let kept = numbers().filter(|number| left_out.next_if_eq(number).is_none());
-            points.numbers = Some(kept.map(|number| number as u32).collect());
-        }
-        Ok(points)
+        let mut points = kept.numbered(&read, self.count, options);
+        points.raw.iter_mut().for_each(|raw| raw.name = fault::name(&self.path));
+        Ok(Points { unread, ..points })
     }
 
     /// Decides what shows of all nodes by the first ones that are read: where that is colours, intensities are read no more.
@@ -118,12 +128,26 @@ impl Copc {
         batches
     }
 
-    /// Finds what is needed of these nodes, whose lengths are checked.
-    fn look(&mut self, nodes: &[usize], progress: &dyn Progress) -> Result<(), Fault> {
-        for &node in nodes {
+    /// Finds what is needed of these nodes, whose lengths are checked; only those of which it is
+    /// found remain.
+    fn look(
+        &mut self,
+        nodes: &mut Vec<usize>,
+        (unread, strict): (&mut Unread, bool),
+        progress: &dyn Progress,
+    ) -> Result<(), Fault> {
+        for node in std::mem::take(nodes) {
             if self.layers[node].is_none() {
-                self.layers[node] = Some(self.layers_of(node)?);
+                match self.layers_of(node) {
+                    Ok(layers) => self.layers[node] = Some(layers),
+                    Err(fault) => {
+                        let OctreeNode { points, .. } = self.octree.nodes[node];
+                        let name = self.octree.nodes[node].name();
+                        unread.add(|what| format!("node {name}: {what}"), points, fault, strict)?;
+                    }
+                }
             }
+            nodes.extend(self.layers[node].is_some().then_some(node));
             progress.advance(1);
         }
         Ok(())

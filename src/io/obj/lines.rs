@@ -105,6 +105,19 @@ impl Lines {
         Ok(lines)
     }
 
+    /// What the lines `mtllib` name, as far as lines can be read.
+    pub(super) fn libraries(reader: impl BufRead) -> Vec<String> {
+        let mut rest = Reader { reader, progress: &(), unreported: 0, count: 0, line: Vec::new(), line_end: b'\n' };
+        let mut libraries = Vec::new();
+        while rest.next_line().unwrap_or(false) {
+            let line = rest.line.trim_ascii_start();
+            if line.strip_prefix(b"mtllib").is_some_and(|rest| rest.first().is_none_or(u8::is_ascii_whitespace)) {
+                libraries.push(rest_of(line, b"mtllib"));
+            }
+        }
+        libraries
+    }
+
     /// The triangles of all faces.
     pub(super) fn triangles(&self) -> impl Iterator<Item = Triangle> + '_ {
         let named = Named { positions: &self.positions, texture: &self.texture, normals: &self.normals };

@@ -9,7 +9,7 @@ use super::encoding;
 use super::library::{ColorMap, Definition, color_map, definitions, first_word};
 use crate::Result;
 use crate::io::beside::Beside;
-use crate::io::image::check_file;
+use crate::io::input::check_regular;
 use crate::io::textures::Images;
 use crate::io::values::{BYTE_ORDER_MARK, finite, one_line, shown};
 use crate::io::{Material, Mesh};
@@ -91,7 +91,7 @@ fn defined(beside: &mut Beside, libraries: &[String], notes: &mut Vec<String>) -
 }
 
 /// The `libraries` that the OBJ file at `path` names, and the images that these name.
-pub(in crate::io) fn companions(path: &Path, libraries: &[String]) -> Vec<PathBuf> {
+pub(super) fn companions(path: &Path, libraries: &[String]) -> Vec<PathBuf> {
     let mut beside = Beside::of(path);
     let mut files = Vec::new();
     for library in libraries.iter().flat_map(|line| names_in(&mut beside, line)).collect::<Vec<_>>() {
@@ -112,10 +112,7 @@ pub(in crate::io) fn companions(path: &Path, libraries: &[String]) -> Vec<PathBu
 }
 
 fn text_of(path: &Path) -> io::Result<String> {
-    check_file(path).map_err(|error| match error {
-        crate::Error::Read { source, .. } => source,
-        _ => io::Error::other("it is a device or a pipe, not a file"),
-    })?;
+    check_regular(path)?;
     let mut bytes = Vec::new();
     let (reader, _) = encoding::decoded(BufReader::new(File::open(path)?), LONGEST)?;
     reader.take(LONGEST).read_to_end(&mut bytes)?;

@@ -6,8 +6,6 @@ mod library;
 mod lines;
 mod material;
 
-pub(super) use material::companions;
-
 use crate::io::about::About;
 use crate::io::closed::is_closed;
 use crate::io::fault::{self, Fault};
@@ -16,8 +14,9 @@ use crate::io::triangles::Triangles;
 use crate::io::{Input, Mesh, Paint, Points, RawColors, ReadOptions, Up, settle_colors};
 use crate::{Progress, Result};
 use lines::Lines;
+use std::fs::File;
 use std::io::BufReader;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Reads the vertices of an OBJ file, one point for each `v` line and in their order, whatever groups and materials
 /// the faces are in.
@@ -72,6 +71,13 @@ pub fn read_mesh(input: Input, options: &ReadOptions, progress: &dyn Progress) -
         material::give(&mut mesh, &path, &libraries, names)?;
         Ok(mesh)
     })
+}
+
+/// The libraries that an OBJ file at `path` names, and the images that these name.
+pub(super) fn companions(file: &mut File, path: &Path) -> Vec<PathBuf> {
+    let length = file.metadata().map_or(0, |there| there.len());
+    let named = file.try_clone().and_then(|file| encoding::decoded(BufReader::with_capacity(1 << 18, file), length));
+    named.map_or(Vec::new(), |(reader, _)| material::companions(path, &Lines::libraries(reader)))
 }
 
 /// Opens the file and makes of its lines and faces what is asked for.

@@ -118,6 +118,8 @@ pub(super) struct Comments {
     pub(super) closed: bool,
     /// Normals tell no sides, as it says too.
     pub(super) unsided: bool,
+    /// It is the mesh that `epsplat hybrid` writes beside surfels, as it says too.
+    pub(super) hybrid: bool,
     /// It is epsplat's.
     own: bool,
 }
@@ -130,6 +132,7 @@ impl Comments {
         self.closed |= comment == "closed";
         self.unsided |= comment == "unsided";
         self.own |= comment.starts_with("epsplat ");
+        self.hybrid |= self.own && comment == "hybrid";
         // Others may mean something else by it.
         let named = comment.strip_prefix("triangles ").filter(|_| self.own);
         self.beside = named.map(|name| name.trim().to_owned()).or(self.beside.take());

@@ -63,7 +63,7 @@ impl Levels {
     ///
     /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where what the file says of all points is no number.
     pub fn open(input: Input) -> Result<Option<Self>> {
-        let Input { file, length, path, format } = input;
+        let Input { file, length, path, format, .. } = input;
         if format != Format::Ply {
             return Ok(None);
         }

@@ -20,7 +20,8 @@
 //! element `scene` says of all vertices together what one who reads a part must know: origin, bounds, ranges ([`Whole`](crate::scene::Whole)).
 //!
 //! The header has a comment `up y` or `up z` where that is known, `closed` for surfels that cover a closed surface, `unsided` where normals tell no sides, and `triangles NAME`
-//! for those that are drawn beside a mesh: no other program says it in a PLY file, and none stumbles over it.
+//! for those that are drawn beside a mesh in the same folder, which has the comment `hybrid`: no
+//! other program says it in a PLY file, and none stumbles over it.
 //!
 //! Files of Gaussians, whose vertices have other names, are read too ([`read`]), and SuperSplat's
 //! compressed ones.
@@ -51,7 +52,7 @@ mod write_scene;
 pub(crate) use kept_nodes::KeptNodes;
 pub use levels::Levels;
 pub(super) use read::companions;
-pub use read::{read, read_mesh};
+pub use read::{read, read_mesh, textures_of_hybrid};
 pub use rows::Rows;
 pub(crate) use rows::position;
 pub use write::{Color, ColorProperties, Properties, Vertex, check_extension, write, write_points};

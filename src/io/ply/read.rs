@@ -8,14 +8,16 @@ use super::{ascii, binary, gaussian, packed};
 use crate::io::about::About;
 use crate::io::beside::Beside;
 use crate::io::fault::{self, Fault};
+use crate::io::input::check_regular;
 use crate::io::textures::Images;
+use crate::io::values::shown;
 use crate::io::{Input, Material, Mesh, Paint, Points, ReadOptions, settle_colors};
 use crate::io::{closed, triangles};
 use crate::scene::{Colors, Whole};
 use crate::{Progress, Result};
 use std::fs::File;
 use std::io::BufReader;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// Reads the vertices of a PLY file: ASCII, or binary of either byte order.
 ///
@@ -38,7 +40,7 @@ use std::path::{Path, PathBuf};
 /// With `flatten` ellipsoids lose their shortest axis, however thick they are.
 ///
 /// A comment `up y` or `up z` in the header says which way is up, `closed` that surfels cover a closed surface, and `triangles NAME` which
-/// mesh they are drawn beside.
+/// mesh in the same folder they are drawn beside.
 ///
 /// Other properties are skipped, and so are other elements: those before the last one that is read by their declared
 /// shape, those after it without being looked at. Zero vertices are no error here.
@@ -47,7 +49,8 @@ use std::path::{Path, PathBuf};
 ///
 /// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where
 /// the header is not PLY's, `x`, `y` or `z` is missing, the file ends before the vertices or faces that its header
-/// promises, a number in text is none, a list has a negative length, or a face names a vertex that does not exist.
+/// promises, a number in text is none, a list has a negative length, a face names a vertex that
+/// does not exist, or the mesh that it is drawn beside is no regular file in its folder.
 pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
     let path = input.path.clone();
     let (mut points, mut faces, textures) = contents(input, options, progress)?;
@@ -170,19 +173,55 @@ fn about(header: &header::Header, vertex: &Element) -> Result<About, Fault> {
     Ok(About { format: format!("PLY, {encoding}"), attributes, ..About::default() })
 }
 
-/// The textures, and the mesh, that the PLY file at `path` names.
-pub(in crate::io) fn companions(path: &Path) -> Vec<PathBuf> {
-    let header = File::open(path).map_err(Fault::Io).and_then(|file| header::read(&mut BufReader::new(file)));
+/// The textures, and the mesh, that a PLY file at `path` names.
+pub(in crate::io) fn companions(file: &mut File, path: &Path) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
-    let Ok(header) = header else { return Vec::new() };
+    let Ok(header) = header::read(&mut BufReader::new(file)) else { return Vec::new() };
     let mut files = Beside::of(path);
     let images = header.comments.textures.iter().map(|name| files.file(name));
     images.chain(header.comments.beside.map(|name| beside(folder, &name))).collect()
 }
 
+/// The textures of the mesh at `path` if `epsplat hybrid` wrote it; None of any other file.
+pub fn textures_of_hybrid(path: &Path) -> Option<Vec<PathBuf>> {
+    check_regular(path).ok()?;
+    let comments = header::read(&mut BufReader::new(File::open(path).ok()?)).ok()?.comments;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    comments.hybrid.then(|| comments.textures.iter().map(|name| beside(folder, name)).collect())
+}
+
 /// A file that is named in the one at `path`, as Windows may write it.
 fn beside(folder: &Path, name: &str) -> PathBuf {
     folder.join(name.replace('\\', "/"))
+}
+
+/// The mesh that the header of the file at `path` names, which lies in the same folder: a file may
+/// come from anywhere, and must not say what else of the machine is read. Whether the mesh exists
+/// is told when it is read.
+fn mesh_beside(path: &Path, name: &str) -> Result<PathBuf, Fault> {
+    let refused = |what: &str| {
+        let name = shown(name.as_bytes());
+        Err(Fault::Malformed(format!(
+            "its header names the triangles of '{name}', {what}: only a file in its own folder is drawn beside it; --triangles names any"
+        )))
+    };
+    let mut parts = Path::new(name).components();
+    let plain = matches!((parts.next(), parts.next()), (Some(Component::Normal(part)), None) if part == name);
+    if !plain || name.contains(['/', '\\', '\0']) {
+        return refused("which is a path and no name");
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mesh = path.parent().unwrap_or(Path::new("")).join(name);
+    if mesh.symlink_metadata().is_err() {
+        return Ok(mesh);
+    }
+    if check_regular(&mesh).is_err() {
+        return refused("which is no file");
+    }
+    match (mesh.canonicalize(), folder.canonicalize()) {
+        (Ok(end), Ok(folder)) if end.parent() == Some(&folder) => Ok(mesh),
+        _ => refused("which leads out of its folder"),
+    }
 }
 
 /// The vertices, the triangles, which name vertices that exist, and the names of textures. Colours of vertices are as the file has
@@ -196,6 +235,8 @@ fn contents(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
     let Some(vertex) = header.elements.iter().find(|element| element.name == "vertex") else {
         return Err(in_file(Fault::Malformed("its header has no element 'vertex'".into())));
     };
+    let mesh = header.comments.beside.as_ref().map(|name| mesh_beside(&path, name));
+    let mesh = mesh.transpose().map_err(in_file)?;
     progress.begin(&format!("reading {}", fault::name(&path)), vertex.count);
     let mut packed = || {
         let points = packed::read(&mut reader, &header, length, progress)?;
@@ -226,7 +267,7 @@ fn contents(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
         points.whole = whole.map(|whole| Box::new(Whole { surfels, nodes, ..whole }));
         points.tree = Some(tree);
     }
-    points.beside = header.comments.beside.map(|name| beside(path.parent().unwrap_or(Path::new("")), &name));
+    points.beside = mesh;
     let triangles = faces.finish(&points.positions).map_err(in_file)?;
     Ok((points, triangles, header.comments.textures))
 }

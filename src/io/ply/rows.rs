@@ -50,7 +50,7 @@ impl Rows {
     ///
     /// [`Error::Read`] where the system cannot read, [`Error::Malformed`] where the header is not PLY's, or promises more points than there are.
     pub fn open(input: Input, ignore_alpha: bool) -> Result<Option<Self>> {
-        let Input { file, length, path, format } = input;
+        let Input { file, length, path, format, .. } = input;
         if format != Format::Ply {
             return Ok(None);
         }

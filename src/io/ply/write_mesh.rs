@@ -18,6 +18,7 @@ type Key = ([u64; 3], [u32; 3], [u32; 4]);
 /// Writes the triangles of `mesh`, whose parts fit each other ([`Mesh::check`]), so that [`read_mesh`](super::read_mesh) gives them back:
 /// with normals, and with colours in linear light, those of materials too. Materials with an image have those that `images` name, one each
 /// in the order of the mesh's materials, beside the file, times what an image is multiplied with ([`Material::painted`](crate::io::Material)).
+/// By a comment [`textures_of_hybrid`](super::textures_of_hybrid) knows the file again.
 ///
 /// # Errors
 ///
@@ -50,7 +51,8 @@ pub fn write_mesh(path: &Path, mesh: &Mesh, images: &[String], progress: &dyn Pr
         ..Properties::default()
     };
     let painted = mesh.texture.is_some();
-    let comments: Vec<String> = images.iter().map(|image| format!("TextureFile {image}")).collect();
+    let textures = images.iter().map(|image| format!("TextureFile {image}"));
+    let comments: Vec<String> = ["hybrid".to_owned()].into_iter().chain(textures).collect();
     let written = write_whole(path, |out| {
         properties.write_header(out, vertices.len() as u64, &comments)?;
         write!(out, "element face {}\nproperty list uchar uint vertex_indices\n", corners.len())?;

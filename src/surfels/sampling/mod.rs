@@ -35,6 +35,7 @@ use self::voxels::Voxel;
 use crate::error::{Error, Result};
 use crate::io::closed::is_closed;
 use crate::io::{Mesh, Points};
+use crate::memory;
 use crate::progress::Progress;
 use crate::scene::{Colors, Up, body};
 use crate::surfels::guess_up;
@@ -48,6 +49,11 @@ const FOR_EACH_VOXEL: usize = 4;
 
 /// The most voxels, unless there are more samples: they take 600 bytes each.
 const MOST_VOXELS: usize = 1 << 21;
+
+/// Memory that a sample takes, bytes at most: of voxels, of points of the surface around it, of its
+/// cell; and of an independent point.
+const OF_SAMPLE: u64 = 1500;
+const OF_UNIFORM: u64 = 250;
 
 /// How samples are placed.
 pub enum Method<'a> {
@@ -121,7 +127,7 @@ impl Sampling {
 /// # Errors
 ///
 /// [`Error::EmptyScene`] for a mesh without a triangle that has an area, [`Error::Usage`] for a count of none or more than
-/// [`MOST`], or for a mesh whose parts do not fit each other.
+/// [`MOST`], or for a mesh whose parts do not fit each other, and [`Error::NoMemory`].
 pub fn sample(
     mesh: &Mesh,
     count: usize,
@@ -132,6 +138,8 @@ pub fn sample(
     if !(1..=MOST).contains(&count) {
         return Err(Error::Usage(format!("a mesh is sampled at 1 to {MOST} points, not {count}")));
     }
+    let each = if matches!(method, Method::Uniform) { OF_UNIFORM } else { OF_SAMPLE };
+    memory::check(count as u64 * each, || format!("{count} samples of a mesh"))?;
     let surface = MeshSurface::new(mesh)?;
     let mut sampling = Sampling {
         samples: count as u64,

@@ -41,6 +41,9 @@ const OF_THREAD: u64 = 48 << 20;
 /// Memory of a surfel of a subtree beside what the scene has of it, bytes: its place, its part of the nodes and of their sums.
 const OF_SURFEL: u64 = 150;
 
+/// What a scene has at most of a surfel, bytes ([`Survey::surfel_bytes`]).
+const LARGEST_SURFEL: u64 = 112;
+
 /// Points that memory must have room for.
 const FEWEST: u64 = 1 << 16;
 
@@ -72,10 +75,10 @@ pub fn write_levels(
     (path, folder): (&Path, &Path),
     progress: &dyn Progress,
 ) -> Result<Report> {
-    let fixed = PROGRAM + OF_THREAD * rayon::current_num_threads() as u64;
-    let least = fixed + FEWEST * OF_SURFEL;
-    if memory < least {
-        return Err(too_little(least));
+    let fixed = fixed();
+    if memory < fixed + FEWEST * OF_SURFEL {
+        // Enough for points of any kind, as nobody has looked at these.
+        return Err(too_little(fixed + FEWEST * (LARGEST_SURFEL + OF_SURFEL)));
     }
     let sources = Sources { files, progress };
     let survey = Survey::of(&sources)?;
@@ -85,7 +88,12 @@ pub fn write_levels(
         return Err(too_little(fixed + FEWEST * of_surfel));
     }
     let runs = Runs { survey: &survey, folder, path, progress };
-    made(&sources, runs, fits)
+    made(&sources, runs, (fits, of_surfel))
+}
+
+/// Memory that is taken however few points there are, bytes.
+fn fixed() -> u64 {
+    PROGRAM + OF_THREAD * rayon::current_num_threads() as u64
 }
 
 fn too_little(least: u64) -> Error {
@@ -94,11 +102,11 @@ fn too_little(least: u64) -> Error {
 }
 
 /// The file, where memory has room for the tree of so many points at once.
-fn made(sources: &Sources<'_>, runs: Runs<'_>, fits: u64) -> Result<Report> {
+fn made(sources: &Sources<'_>, runs: Runs<'_>, (fits, of_surfel): (u64, u64)) -> Result<Report> {
     let Runs { survey, folder, path, progress } = runs;
     let root = Lattice::over(&survey.bounds);
     let kept = Kept::new(survey, folder, path)?;
-    let mut divider = Divider { runs, kept, fits, lattices: vec![root] };
+    let mut divider = Divider { runs, kept, fits, of_surfel, lattices: vec![root] };
     if survey.preparation.surfels <= fits {
         let scene = divider.loaded(survey.preparation.surfels, &sources.pieces(), Survey::part)?;
         divider.subtree(scene_as_in_a_file(scene), 0)?;
@@ -126,6 +134,8 @@ struct Divider<'a> {
     kept: Kept<'a>,
     /// Points that memory has room for.
     fits: u64,
+    /// Memory of each, bytes.
+    of_surfel: u64,
     /// Those of the sets that the one which is looked at is in, each on the last.
     lattices: Vec<Lattice>,
 }
@@ -145,8 +155,9 @@ impl Divider<'_> {
         let count = run.rows.count();
         let below = if depth < DEEPEST { self.runs.divided(run, &lattice)? } else { Vec::new() };
         if below.len() < 2 {
+            let enough = (fixed() + count * self.of_surfel).div_ceil(1 << 20);
             return Err(Error::Usage(format!(
-                "{count} points are too near each other to be divided, and --memory has room for {}: give more",
+                "{count} points are too near each other to be divided, and --memory has room for {}: give {enough}MiB",
                 self.fits
             )));
         }

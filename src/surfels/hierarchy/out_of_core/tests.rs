@@ -78,7 +78,7 @@ fn made_of(files: &[Rows], fits: u64, path: &Path) -> Result<Report> {
     let sources = Sources { files, progress: &() };
     let survey = Survey::of(&sources)?;
     let folder = path.parent().unwrap();
-    made(&sources, Runs { survey: &survey, folder, path, progress: &() }, fits)
+    made(&sources, Runs { survey: &survey, folder, path, progress: &() }, (fits, 100))
 }
 
 /// Scenes with all that a scene of surfels may have, near and far, in one file and in several.

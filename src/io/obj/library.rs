@@ -40,25 +40,32 @@ impl ColorMap {
 }
 
 /// The materials of a library with their names, in order. Keywords may be in any case, and what cannot be read is passed
-/// over.
+/// over. At one line that it cannot read the parser gives up on all materials, so it gets no lines but those that it can.
 pub(super) fn definitions(text: &str) -> Vec<(String, Definition)> {
-    let mut all: Vec<(String, Definition)> = Vec::new();
+    let (mut lines, mut named) = (String::new(), false);
     for line in text.lines() {
         let (keyword, rest) = first_word(line.trim());
-        let keyword = keyword.to_ascii_lowercase();
-        if keyword == "newmtl" {
-            all.push((rest.to_owned(), Definition::default()));
-            continue;
-        }
-        let Some((_, material)) = all.last_mut() else { continue };
-        match keyword.as_str() {
-            "kd" => material.diffuse = color(rest).or(material.diffuse),
-            "d" => material.dissolve = rest.split_whitespace().find_map(number).or(material.dissolve),
-            "map_kd" => material.map = color_map(rest).or(material.map.take()),
-            _ => {}
+        let line = match keyword.to_ascii_lowercase().as_str() {
+            "newmtl" => {
+                named = !rest.is_empty();
+                named.then(|| format!("newmtl {rest}"))
+            }
+            "kd" => color(rest).map(|[r, g, b]| format!("Kd {r:?} {g:?} {b:?}")),
+            "d" => rest.split_whitespace().find_map(number).map(|alpha| format!("d {alpha:?}")),
+            "map_kd" => color_map(rest).map(|_| format!("map_Kd {rest}")),
+            _ => None,
+        };
+        if let Some(line) = line.filter(|_| named) {
+            lines.push_str(&line);
+            lines.push('\n');
         }
     }
-    all
+    let (materials, _) = tobj::load_mtl_buf(&mut lines.as_bytes()).unwrap_or_default();
+    let definition = |material: tobj::Material| {
+        let map = material.diffuse_texture.as_deref().and_then(color_map);
+        (material.name, Definition { diffuse: material.diffuse, dissolve: material.dissolve, map })
+    };
+    materials.into_iter().map(definition).collect()
 }
 
 fn number(word: &str) -> Option<f64> {

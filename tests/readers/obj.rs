@@ -223,6 +223,7 @@ fn text_may_be_in_utf_16() {
     let text =
         "# \u{fc}ber \u{1f430}\r\nmtllib m\u{e4}rz.mtl\r\nv 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\nusemtl rot\r\nf 1 2 3\r\n";
     let library = "newmtl rot\nKd 1 0 0\n";
+    std::fs::write(folder.path("m\u{e4}rz.mtl"), library).unwrap();
     let expected = folder.read("a.obj", text.as_bytes()).unwrap();
     for (bytes, library) in in_utf_16(text).into_iter().zip(in_utf_16(library)) {
         assert_eq!(folder.read("a.obj", &bytes).unwrap(), expected);

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use epsplat::io::{self, Mesh, Points, ReadOptions, Texture};
-use epsplat::scene::Scene;
+use epsplat::plan::{Facts, RenderOptions, composited};
+use epsplat::scene::{Colors, Composite, Maps, Scene};
 use epsplat::surfels::{Preparation, with_triangles};
 use epsplat::{Error, Progress, Result, surfels};
 
@@ -29,7 +30,7 @@ pub(super) fn scene_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dy
         let what = "--texture paints surfels, and there are none: take --triangle-texture for triangles";
         return Err(Error::Usage(what.into()));
     }
-    if arguments.separate && arguments.inputs.len() < 2 {
+    if arguments.separate && arguments.is_one_file() {
         note(
             "--separate keeps the surfels of several files apart, and here is one of them at most: it changes nothing",
         );
@@ -80,17 +81,40 @@ fn painted(mut meshes: Vec<Mesh>, paths: &[PathBuf], arguments: &Arguments) -> R
 /// The surfels of all inputs.
 fn surfels_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dyn Progress) -> Result<Made> {
     let textures = arguments.textures.iter().map(|image| Texture::read(image)).collect::<Result<Vec<_>>>()?;
-    let mut read = arguments.inputs.iter().zip(&inputs);
-    if !textures.is_empty()
-        && let Some((path, _)) = read.find(|(_, points)| points.texture.is_none() && !points.positions.is_empty())
-    {
-        let what = "its points have no texture coordinates, so they cannot be textured; `epsplat sample` gives surfels of a mesh some";
-        return Err(Error::malformed(path, what));
+    let bare = |points: &Points| points.texture.is_none() && !points.positions.is_empty();
+    if !textures.is_empty() && inputs.iter().any(bare) {
+        let paths = arguments.inputs.iter().zip(&inputs).filter(|(_, points)| bare(points)).map(|(path, _)| path);
+        if inputs.iter().all(|points| points.texture.is_none())
+            && let Some(path) = paths.clone().next()
+        {
+            let what = "its points have no texture coordinates, so they cannot be textured; `epsplat sample` gives surfels of a mesh some";
+            return Err(Error::malformed(path, what));
+        }
+        let names = paths.map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
+        note(&format!("{names}: no texture coordinates, so that --texture leaves the points in their own colours"));
     }
     let limits = arguments.limits.limits();
     let built = match arguments.facing {
         Some(_) => surfels::build_facing(inputs, arguments.point_size, &limits, progress),
         None => surfels::build_within(inputs, textures, &limits, progress),
     };
-    built.map_err(|error| named(error, &arguments.inputs))
+    let (scene, preparation) = built.map_err(|error| named(error, &arguments.inputs))?;
+    Ok((seen_through(scene, arguments), preparation))
+}
+
+/// Takes the mean of the texture over each surfel where surfaces show through each other: lists of
+/// fragments keep no texture coordinates.
+fn seen_through(scene: Scene, arguments: &Arguments) -> Scene {
+    let Colors::Textured(textured) = &scene.colors else { return scene };
+    let options = RenderOptions {
+        composite: arguments.composite.unwrap_or_default(),
+        opacity: arguments.opacity,
+        maps: Maps::of(&arguments.aov),
+        ..RenderOptions::default()
+    };
+    if options.composite == Composite::Opaque || composited(&Facts::of(&scene), &options) == Composite::Opaque {
+        return scene;
+    }
+    note("where surfaces show through each other each surfel has the mean colour of its texture");
+    Scene { colors: Colors::Linear(textured.colors().to_vec()), ..scene }
 }

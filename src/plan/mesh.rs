@@ -65,7 +65,9 @@ impl MeshFacts {
 
 /// The box of the corners of `triangles`, world units relative to the scene's origin.
 pub(crate) fn bounds_of(triangles: &Triangles) -> Bounds {
-    let corners = triangles.vertices().iter().map(|corner| DVec3::from_array(corner.map(f64::from)));
+    let wide = |part: &[f32; 3]| DVec3::from_array(part.map(f64::from));
+    let low = |vertex: usize| triangles.low().get(vertex).map_or(DVec3::ZERO, wide);
+    let corners = triangles.vertices().iter().enumerate().map(|(vertex, high)| wide(high) + low(vertex));
     corners.fold(Bounds::EMPTY, Bounds::with_point)
 }
 

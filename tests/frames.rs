@@ -298,7 +298,8 @@ fn refused(row: &Row<'_>, gpu: &Gpu) -> Option<&'static str> {
     lacks.into_iter().find(|(lacks, _)| *lacks).map(|(_, why)| why)
 }
 
-/// A disk in the first of many blocks of pixels, alone in the image: blocks without a splat may be left as the image was cleared.
+/// A disk in the first of many blocks of pixels, alone in the image: blocks without a splat may be
+/// left as the image was cleared.
 #[test]
 fn maps_are_right_where_nothing_is() {
     let Some(gpu) = common::gpu() else { return };

@@ -191,7 +191,7 @@ fn a_cut_is_drawn() {
     for (arguments, words) in [
         (&["--lod", "4"][..], "no size"),
         (&["--lod", "1px", "--facing", "sphere"], "face the camera"),
-        (&["--lod", "1px", "--separate"], "--separate"),
+        (&["--lod", "1px", "--separate", &surfels], "--separate"),
         (&["--lod", "1px", "--aov", "index"], "index"),
     ] {
         let output = path(if arguments.contains(&"--aov") { "refused.exr" } else { "refused.png" });
@@ -256,7 +256,6 @@ fn memory_is_bounded() {
         (&["--lod", "0", "--memory", "2GiB"], "above 0"),
         (&["--memory", "2GiB"], "--lod"),
         (&["--lod", "10px", "--memory", "2GiB", "--outliers", "3"], "--outliers"),
-        (&["--lod", "10px", "--memory", "2GiB", "--separate"], "--separate"),
         (&["--lod", "10px", "--memory", "2GiB", &surfels], "one file"),
     ] {
         let output = path("refused.png");

@@ -13,7 +13,7 @@ fn joined(splats: Surface, pixel: u32, x: u32, row: u32) -> Surface {
     if (placed.w == 0.0 || share == 1.0) {
         return splats;
     }
-    let of_triangle = Surface(beside[2u * pixel], placed.xyz, placed.w, 1.0, 1.0, vec2<f32>(0.0), placed.w, true);
+    let of_triangle = Surface(color_beside(beside[2u * pixel]), placed.xyz, placed.w, 1.0, 1.0, vec2<f32>(0.0), placed.w, true);
     if (share == 0.0) {
         return of_triangle;
     }

@@ -112,7 +112,8 @@ fn shape_with_attributes(@builtin(vertex_index) vertex: u32) -> ShapeCorner {
 fn fragment_of(corner: ShapeCorner) -> Fragment {
     hold();
     let record = projected[corner.index];
-    // A constructor names every field, so that none is left out unseen. Those of the record are read only where there are any.
+    // A constructor names every field, so that none is forgotten. The record's own are read only
+    // where there are any.
     let splat = Splat(
         corner.anchor.x,
         corner.anchor.y,

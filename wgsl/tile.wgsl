@@ -84,7 +84,8 @@ fn handed_row(row: array<f32, 3>, from_: u32) -> array<f32, 3> {
     );
 }
 
-// What the footprint is made of. A constructor names every field, so that none is left out unseen.
+// The splat that a footprint is made of. A constructor names every field, so that none is
+// forgotten.
 fn handed_splat(from_: u32) -> Splat {
     return Splat(
         bitcast<i32>(handed(bitcast<u32>(own_splat.anchor_x), from_)),

@@ -1,6 +1,7 @@
 // Caps in tiles: of a splat that another invocation fetched (tile.wgsl).
 
-// bounds_last, whose AWAY bit softened() reads wherever there is a low-pass; without one sides are those of the roots.
+// bounds_last, whose AWAY bit softened() reads wherever there is a low-pass; without one sides are
+// those of the roots.
 fn handed_side(own: u32, from_: u32) -> u32 {
     var last = 0u;
     if (FILTERED) {

@@ -249,7 +249,9 @@ impl Config {
         };
         check::chosen(Some(self.backend), chosen).map_err(|error| error.to_string())?;
         let reference = self.backend == BackendName::Reference;
-        check::options(&self.options(None), reference).map_err(|error| error.to_string())?;
+        let options = self.options(None);
+        check::options(&options, reference).map_err(|error| error.to_string())?;
+        check::by_tiles(&options).map_err(|error| error.to_string())?;
         match self.error_limit {
             Some(limit) if limit.is_nan() || limit < 0.0 => Err(format!("error_limit: it must not be {limit}")),
             _ => Ok(()),

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use epsplat::frame::Frame;
 use epsplat::metrics::{BYTES_PER_PIXEL, Comparison, DECISION_MARGIN, compare};
-use epsplat::{Result, io};
+use epsplat::{Error, Result, io};
 
 use super::{outputs, print, write_json};
 
@@ -14,7 +14,8 @@ use super::{outputs, print, write_json};
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat compare gpu.exr reference.exr --json -\n\n\
     If B has a `decision` map (--backend reference --aov decision), pixels in which a fragment lies within 1e-6 of a\n\
-    yes-or-no decision are excused in a second maximum, and their share is printed.")]
+    yes-or-no decision are excused in a second maximum, and their share is printed. Ends with 1 where a value that is\n\
+    not finite stands against another, so that measures mean nothing.")]
 pub struct Arguments {
     /// The image in question: .png or .exr
     a: PathBuf,
@@ -31,9 +32,18 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     io::image::check_room(&arguments.b, a.color.len() as u64 * BYTES_PER_PIXEL)?;
     let comparison = compare(&a, &b)?;
     match &arguments.json {
-        Some(path) => write_json(path, &comparison),
-        None => print(&(table(&comparison) + &unshared(arguments, &comparison))),
+        Some(path) => write_json(path, &comparison)?,
+        None => print(&(table(&comparison) + &unshared(arguments, &comparison)))?,
     }
+    if comparison.is_finite() {
+        return Ok(());
+    }
+    let maps = comparison.maps.iter().filter(|map| map.not_finite > 0);
+    let maps = maps.map(|map| format!("{} of {}", map.not_finite, map.map)).collect::<Vec<_>>().join(", ");
+    let what = format!(
+        "pixels in which a value that is not finite stands against another: {maps}; no measure of these means anything"
+    );
+    Err(Error::malformed(&arguments.a, what))
 }
 
 /// What stands for an error where a value that is not finite stands against another.
@@ -72,6 +82,11 @@ fn table(c: &Comparison) -> String {
     for map in &c.maps {
         let of_range = |error: f64| if map.range > 0.0 { format!("{error:.3e}") } else { "-".to_owned() };
         let range = format!("{:.4e}", map.range);
+        let in_one = if map.in_one > 0 {
+            format!("  ({} pixels have nothing in one image alone)", map.in_one)
+        } else {
+            String::new()
+        };
         let [max, of_range, decided] = match map.not_finite {
             0 => [
                 format!("{:.3e}", map.max_abs),
@@ -80,7 +95,7 @@ fn table(c: &Comparison) -> String {
             ],
             pixels => [NOT_FINITE.to_owned(), format!("({pixels} pixels)"), String::new()],
         };
-        let line = format!("{:<8} {range:>11}    {max:<9}    {of_range:<9}    {decided}", map.map);
+        let line = format!("{:<8} {range:>11}    {max:<9}    {of_range:<9}    {decided}{in_one}", map.map);
         let _ = writeln!(text, "{}", line.trim_end());
     }
     text

@@ -33,7 +33,7 @@ use self::options::{for_scene, options};
 use self::output::{Format, note_cut, note_overflows, summary};
 use self::parts::{Part, Parts, Read};
 use self::scene::{Made, scene};
-use self::view::{ChosenView, View};
+use self::view::{Seen, ToldView, View};
 use super::outputs::Source;
 use super::parse::{
     parse_color, parse_intrinsics, parse_memory, parse_pixels, parse_scale, parse_size, parse_up, parse_vector,
@@ -324,10 +324,10 @@ fn one(arguments: &Arguments) -> Result<()> {
     let backend = backend(arguments)?;
 
     let bars = Bars::new();
-    let Staged { made: (scene, preparation), options, camera, chosen, read } =
-        staged(arguments, options, &view, &bars)?;
-    let chosen = chosen.map(|view| ChosenView::new(view, &scene, arguments.up, preparation.guessed_up));
-    chosen.iter().for_each(|view| note(&view.sentence()));
+    let Staged { made: (scene, preparation), options, camera, seen, read } = staged(arguments, options, &view, &bars)?;
+    let view = ToldView::new(&camera, &seen, &scene, preparation.guessed_up);
+    note(&view.sentence());
+    view.warning().iter().for_each(|warning| note(warning));
     read.iter().for_each(|read| note(&read.sentence()));
     let (frame, report) = render(&scene, &camera, &options, &backend, &bars)?;
     note_overflows(&report);
@@ -337,7 +337,7 @@ fn one(arguments: &Arguments) -> Result<()> {
     }
     format.write(&arguments.output, &frame)?;
     match &arguments.json {
-        Some(path) => write_json(path, &Outcome { report: &report, view: chosen, read }),
+        Some(path) => write_json(path, &Outcome { report: &report, view, read }),
         None => {
             note(&summary(&report, &arguments.output));
             Ok(())
@@ -350,9 +350,7 @@ fn one(arguments: &Arguments) -> Result<()> {
 struct Outcome<'a> {
     #[serde(flatten)]
     report: &'a Report,
-    /// None where the arguments say where the camera is.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    view: Option<ChosenView>,
+    view: ToldView,
     /// None where the inputs were not read in parts.
     #[serde(skip_serializing_if = "Option::is_none")]
     read: Option<Read>,
@@ -363,8 +361,7 @@ struct Staged {
     made: Made,
     options: RenderOptions,
     camera: Camera,
-    /// Eye and target, where they were chosen.
-    chosen: Option<[DVec3; 2]>,
+    seen: Seen,
     /// Of files that were read in parts.
     read: Option<Read>,
 }
@@ -373,18 +370,18 @@ struct Staged {
 fn staged(arguments: &Arguments, options: RenderOptions, view: &View, bars: &Bars) -> Result<Staged> {
     let told = |(_, preparation): &Made| preparation.notes().iter().for_each(|line| note(line));
     if let Some(mut parts) = Parts::of(arguments, &options, bars)? {
-        let (camera, chosen) = view.camera(parts.overview(), Camera::default_near(parts.overview()))?;
+        let (camera, seen) = view.camera(parts.overview(), Camera::default_near(parts.overview()))?;
         let Part { made, options, read } = parts.scene(arguments, (&camera, 1), &options, bars)?;
         told(&made);
-        return Ok(Staged { made, options, camera, chosen, read: Some(read) });
+        return Ok(Staged { made, options, camera, seen, read: Some(read) });
     }
     let made = scene(arguments, bars)?;
     told(&made);
     let (scene, preparation) = made;
     let options = for_scene(arguments, options, &scene)?;
     let scene = levels::made(scene, &options, bars)?;
-    let (camera, chosen) = view.camera(&scene, Camera::default_near(&scene))?;
-    Ok(Staged { made: (scene, preparation), options, camera, chosen, read: None })
+    let (camera, seen) = view.camera(&scene, Camera::default_near(&scene))?;
+    Ok(Staged { made: (scene, preparation), options, camera, seen, read: None })
 }
 
 fn backend(arguments: &Arguments) -> Result<Backend> {

@@ -16,7 +16,8 @@ pub const DECISION_MARGIN: f32 = 1e-6;
 pub const BYTES_PER_PIXEL: u64 = 48;
 
 /// The error of image A against image B. Colours are compared as linear RGBA. A value that is not finite against any other is as
-/// far from it as the largest f32; [`MapError::not_finite`] says whether there are any.
+/// far from it as the largest f32; [`MapError::not_finite`] says whether there are any, and
+/// [`Comparison::is_finite`] whether there are none.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
     /// Largest absolute difference of a value.
@@ -52,18 +53,33 @@ pub struct Comparison {
 pub struct MapError {
     /// color (RGB), alpha, depth, normal, weight or count.
     pub map: &'static str,
-    /// Largest minus smallest finite value of B.
+    /// Largest minus smallest finite value of B; where they are nearly one, a range under 1/1000 of
+    /// the largest magnitude, that magnitude.
     pub range: f64,
-    /// Pixels in which a value that is not finite stands against another.
+    /// Pixels in which a value that is not finite stands against another, and none of both says
+    /// that nothing is there.
     pub not_finite: u64,
-    /// Largest absolute difference; of depths, over pixels that both cover.
+    /// Pixels in which one image has the values of a pixel where nothing is, an infinite depth, and
+    /// the other has something.
+    pub in_one: u64,
+    /// Largest absolute difference, over pixels of which neither of these is said.
     pub max_abs: f64,
-    /// [`max_abs`](Self::max_abs) as a fraction of the range; 1 for any error where B's values span none.
+    /// [`max_abs`](Self::max_abs) as a fraction of the range; 1 for any error where B's values are all 0.
     pub max_of_range: f64,
     /// [`max_of_range`](Self::max_of_range) over the pixels that are not excused; only if there is a `decision` map.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_of_range_decided: Option<f64>,
 }
+
+impl Comparison {
+    /// No value that is not finite stands against another: all measures mean something.
+    pub fn is_finite(&self) -> bool {
+        self.maps.iter().all(|map| map.not_finite == 0)
+    }
+}
+
+/// B's values are nearly one if they span no more than this part of the largest.
+const NEARLY_ONE: f64 = 1e-3;
 
 /// Compares `a` with `b`, which must have the same size.
 pub fn compare(a: &Frame, b: &Frame) -> Result<Comparison> {
@@ -82,13 +98,13 @@ pub fn compare(a: &Frame, b: &Frame) -> Result<Comparison> {
     });
     let excused = excused.as_deref();
     let mut maps = vec![
-        map_error("color", pixels, |pixel| (&a.color[pixel][..3], &b.color[pixel][..3]), excused),
-        map_error("alpha", pixels, |pixel| (&a.color[pixel][3..], &b.color[pixel][3..]), excused),
+        map_error("color", pixels, |pixel| (&a.color[pixel][..3], &b.color[pixel][..3]), &[], excused),
+        map_error("alpha", pixels, |pixel| (&a.color[pixel][3..], &b.color[pixel][3..]), &[], excused),
     ];
     for row in MAPS.iter().filter(|row| row.compared) {
         let Some((a, b)) = a.map(row.map).zip(b.map(row.map)) else { continue };
         let of = |pixel: usize| pixel * row.map.width()..(pixel + 1) * row.map.width();
-        maps.push(map_error(row.name, pixels, |pixel| (&a[of(pixel)], &b[of(pixel)]), excused));
+        maps.push(map_error(row.name, pixels, |pixel| (&a[of(pixel)], &b[of(pixel)]), row.nothing, excused));
     }
     Ok(Comparison {
         max_abs: color.max_abs,
@@ -110,22 +126,30 @@ fn only_in(a: &Frame, b: &Frame) -> Vec<&'static str> {
     a.maps().iter().filter(|map| !b.maps().has(*map)).map(|map| map.row().name).collect()
 }
 
-/// The error of a map of which `at` gives the values of A and of B in each of the `pixels`.
+/// The error of a map of which `at` gives the values of A and of B in each of the `pixels`, and
+/// that has the values `nothing` where nothing is.
 fn map_error<'a>(
     map: &'static str,
     pixels: usize,
     at: impl Fn(usize) -> (&'a [f32], &'a [f32]),
+    nothing: &[f32],
     excused: Option<&[bool]>,
 ) -> MapError {
-    let (mut low, mut high, mut not_finite) = (f32::INFINITY, f32::NEG_INFINITY, 0);
+    let (mut low, mut high, mut not_finite, mut in_one) = (f32::INFINITY, f32::NEG_INFINITY, 0, 0);
+    let marks = nothing.contains(&f32::INFINITY);
     let (mut max_abs, mut max_decided) = (0f64, 0f64);
     for pixel in 0..pixels {
         let (a, b) = at(pixel);
         for &value in b.iter().filter(|value| value.is_finite()) {
             (low, high) = (low.min(value), high.max(value));
         }
-        // Infinite depth marks the background; whether the two agree on it is what the coverage says.
-        if map == "depth" && a.iter().chain(b).any(|v| *v == f32::INFINITY) {
+        // Infinite depth marks the background.
+        let [empty, other_empty] = [a, b].map(|values| marks && values == nothing);
+        if empty && other_empty {
+            continue;
+        }
+        if (empty || other_empty) && (if empty { b } else { a }).iter().all(|value| value.is_finite()) {
+            in_one += 1;
             continue;
         }
         let other = |(a, b): (&f32, &f32)| a != b && !(a.is_finite() && b.is_finite());
@@ -136,7 +160,14 @@ fn map_error<'a>(
             max_decided = max_decided.max(difference);
         }
     }
-    let range = if high > low { f64::from(high) - f64::from(low) } else { 0.0 };
+    let (span, most) = (f64::from(high) - f64::from(low), f64::from(high.abs().max(low.abs())));
+    let range = if high < low {
+        0.0
+    } else if span < NEARLY_ONE * most {
+        most
+    } else {
+        span
+    };
     let of_range = |error: f64| match error > 0.0 && range == 0.0 {
         true => 1.0,
         false => (error / range.max(f64::MIN_POSITIVE)).min(f32::MAX.into()),
@@ -145,6 +176,7 @@ fn map_error<'a>(
         map,
         range,
         not_finite,
+        in_one,
         max_abs,
         max_of_range: of_range(max_abs),
         max_of_range_decided: excused.map(|_| of_range(max_decided)),
@@ -213,10 +245,33 @@ mod tests {
         b = b.with(Map::Depth, vec![1.5, 1.5]).with(Map::Count, vec![1.0, 1.0]);
         let c = compare(&a, &b).unwrap();
         assert_eq!((c.only_in_a, c.only_in_b), (vec!["weight"], vec!["count"]));
-        // The background counts for the coverage, not for the depth; all depths of B are one.
+        // The background counts for itself, not for the depth; all depths of B are one.
         let depth = &c.maps[2];
-        assert_eq!((depth.map, depth.range, depth.max_abs, depth.max_of_range), ("depth", 0.0, 0.5, 1.0));
+        assert_eq!((depth.map, depth.range, depth.max_abs, depth.max_of_range), ("depth", 1.5, 0.5, 0.5 / 1.5));
+        assert_eq!((depth.in_one, compare(&b, &a).unwrap().maps[2].in_one, depth.not_finite), (1, 1, 0));
         assert!(c.maps.iter().all(|map| map.not_finite == 0 && map.max_of_range <= 1.0), "{:?}", c.maps);
         assert_eq!(compare(&a, &a).unwrap().maps[2].max_of_range, 0.0);
+        // An alpha that hardly varies is no map of errors.
+        let [one, other] = [1.0, 1.0 - f32::EPSILON].map(|alpha| {
+            Frame::of_colors(2, 1, vec![[0.5, 0.5, 0.5, alpha], [0.5, 0.5, 0.5, 1.0 - 0.5 * f32::EPSILON]])
+        });
+        let alpha = &compare(&one, &other).unwrap().maps[1];
+        assert!(alpha.max_abs > 1e-8 && alpha.max_of_range < 2e-7, "{alpha:?}");
+        let zero = |value: f32| frame(&[value, value]);
+        assert_eq!(compare(&zero(0.5), &zero(0.0)).unwrap().maps[0].max_of_range, 1.0);
+    }
+
+    #[test]
+    fn maps_in_which_one_image_has_nothing_are_told_apart_from_what_is_not_finite() {
+        let texz = |values: [f32; 6]| frame(&[0.5, 0.5]).with(Map::TexZ, values.to_vec());
+        let right = texz([0.25, 0.5, 3.0, 0.0, 0.0, f32::INFINITY]);
+        let zeros = texz([0.25, 0.5, 3.0, 0.0, 0.0, 0.0]);
+        for (a, b) in [(&right, &zeros), (&zeros, &right)] {
+            let map = compare(a, b).unwrap().maps.pop().unwrap();
+            assert_eq!((map.map, map.in_one, map.not_finite, map.max_abs), ("texz", 1, 0, 0.0));
+        }
+        let wrong = texz([0.25, 0.5, f32::NAN, 0.0, 0.0, f32::NAN]);
+        let found = compare(&wrong, &right).unwrap();
+        assert_eq!((found.maps[2].in_one, found.maps[2].not_finite, found.is_finite()), (0, 2, false));
     }
 }

@@ -175,7 +175,7 @@ pub fn reference<'a>(
     let width = camera.width as usize;
     let rows = (nearest.len() / width) as u32;
     let mut sums = vec![PixelSums::ZERO; nearest.len()];
-    let compares_depth = join::compares_depth(scene, options);
+    let compares_depth = join::compares_depth(scene, camera, options);
     for splat in splats {
         let surfel = &scene.surfels[splat.surfel as usize];
         let center = scene.origin + scene.center(splat.surfel as usize);

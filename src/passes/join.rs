@@ -6,9 +6,10 @@
 
 use super::resolve::Surface;
 use super::triangles::Shown;
-use crate::plan::RenderOptions;
 use crate::plan::pass::Pass;
-use crate::scene::{Join, Scene};
+use crate::plan::{RenderOptions, bounds_of, in_view};
+use crate::scene::color::linear_to_srgb;
+use crate::scene::{Camera, Join, Scene};
 
 /// What triangles show in the rows of a strip, and what of its splats they are joined by.
 #[derive(Clone, Copy, Debug, Default)]
@@ -19,6 +20,8 @@ pub struct Beside<'a> {
     pub largest_shorter: f64,
     /// No surfel lies deeper ([`farthest`](crate::plan::farthest)), world units.
     pub farthest: f64,
+    /// Colours of splats are codes of sRGB.
+    pub coded: bool,
 }
 
 /// The twin: what shows of a pixel's splats and of its triangle.
@@ -29,7 +32,7 @@ pub(super) fn joined(splats: &Surface, triangle: &Shown, beside: &Beside<'_>, op
         return Surface { decision, ..*splats };
     }
     let of_triangle = Surface {
-        color: triangle.color,
+        color: if beside.coded { coded(triangle.color) } else { triangle.color },
         normal: triangle.normal,
         place: [0.0; 2],
         depth: triangle.depth,
@@ -39,6 +42,12 @@ pub(super) fn joined(splats: &Surface, triangle: &Shown, beside: &Beside<'_>, op
         decision,
     };
     if share > 0.0 { mean(&of_triangle, splats, share) } else { of_triangle }
+}
+
+/// A straight linear colour as codes of sRGB: the twin of `color_beside` in `wgsl/join_coded.wgsl`.
+fn coded([r, g, b, alpha]: [f64; 4]) -> [f64; 4] {
+    let [r, g, b] = [r, g, b].map(linear_to_srgb);
+    [r, g, b, alpha]
 }
 
 /// The mean of a triangle and of splats, which have a `share` of it.
@@ -55,10 +64,10 @@ fn mean(triangle: &Surface, splats: &Surface, share: f64) -> Surface {
     Surface { color, normal, depth: mix(triangle.depth, splats.depth), decision: triangle.decision, ..*splats }
 }
 
-/// Whether the depth that a scene's splats blend to decides what shows.
-pub(super) fn compares_depth(scene: &Scene, options: &RenderOptions) -> bool {
+/// Whether the depth that a scene's splats blend to decides what shows in the view of `camera`.
+pub(super) fn compares_depth(scene: &Scene, camera: &Camera, options: &RenderOptions) -> bool {
     let apart = options.separate && scene.provenance.ranges(scene.surfels.len() as u64).nth(1).is_some();
-    apart || (!scene.triangles.is_empty() && options.join != Join::Nearest)
+    apart || (options.join != Join::Nearest && in_view(&bounds_of(&scene.triangles), scene.origin, camera))
 }
 
 /// The part of the pixel that splats have beside a triangle, and its relative distance to a decision.
@@ -81,13 +90,18 @@ fn share_of_splats(splats: &Surface, triangle: &Shown, beside: &Beside<'_>, opti
 /// The pass's files.
 pub const PASS: Pass = Pass {
     name: "join",
-    files: |needs| match needs.mesh.map(|mesh| mesh.join) {
+    files: |needs| {
         // What shows through is made of lists.
-        _ if needs.lists.is_some() || needs.peels.is_some() => Vec::new(),
-        None => vec!["join_absent.wgsl"],
-        Some(Join::Corrected) => vec!["join.wgsl", "join_corrected.wgsl"],
-        Some(Join::Nearest) => vec!["join.wgsl", "join_nearest.wgsl"],
-        Some(Join::Blended) => vec!["join.wgsl", "join_blended.wgsl"],
+        if needs.lists.is_some() || needs.peels.is_some() {
+            return Vec::new();
+        }
+        let Some(mesh) = needs.mesh else { return vec!["join_absent.wgsl"] };
+        let join = match mesh.join {
+            Join::Corrected => "join_corrected.wgsl",
+            Join::Nearest => "join_nearest.wgsl",
+            Join::Blended => "join_blended.wgsl",
+        };
+        vec!["join.wgsl", join, if mesh.coded { "join_coded.wgsl" } else { "join_linear.wgsl" }]
     },
     kernels: |_| Vec::new(),
     constants: |_| Vec::new(),

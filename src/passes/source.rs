@@ -245,6 +245,7 @@ impl ScenePage<'_> {
         let low = self.scene.low.get(index);
         match (self.needs.color, &self.scene.colors) {
             (ColorNeed::Srgb8, Colors::Srgb8(codes)) => into[0] = u32::from_le_bytes(codes[index]),
+            (ColorNeed::Srgb8, Colors::Linear(colors)) => into[0] = u32::from_le_bytes(srgb8(colors[index])),
             (ColorNeed::Linear, colors) => bits(&[colors.linear(index)], into),
             (ColorNeed::Harmonics(_), Colors::Harmonics(harmonics)) => {
                 bits(&[harmonics.colors()[index]], into);

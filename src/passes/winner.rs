@@ -3,7 +3,8 @@
 //!
 //! A pixel shows the least (depth, colour): of fragments at one depth that of the greatest colour, as a word of four bytes, so the order
 //! of the surfels shows nowhere. With 64-bit atomics both are one number and the visibility pass is the only one over the fragments; else
-//! a second pass keeps the colours of those at the nearest depth, which makes the same bits. Where all surfels have one colour, the
+//! a second pass keeps the colours of those at the nearest depth, which makes the same bits. Finer
+//! colours are rounded to such words. Where all surfels have one colour, the
 //! nearest depth is all there is.
 
 use super::accumulate::{PixelSums, decision};
@@ -12,6 +13,7 @@ use super::splat::Splat;
 use crate::plan::pass::Pass;
 use crate::plan::steps::Clear;
 use crate::plan::{Oit, Plan, RenderOptions, Winner};
+use crate::scene::color::{decoded, srgb8};
 use crate::scene::{Camera, Colors, Scene};
 
 /// The files.
@@ -56,11 +58,14 @@ pub fn reference<'a>(
     options: &RenderOptions,
     (first_row, rows): (u32, u32),
 ) -> Vec<PixelSums> {
-    let word = |surfel: usize| match &scene.colors {
-        Colors::Srgb8(codes) => u32::from_le_bytes(codes[surfel]),
-        // One for all (src/plan/check.rs).
-        _ => 0,
+    let (low, high) = scene.color_range();
+    // Finer ones are rounded, unless one is for all (src/plan/check.rs).
+    let code = |surfel: usize| match &scene.colors {
+        Colors::Srgb8(codes) => Some(codes[surfel]),
+        Colors::Linear(colors) if low != high => Some(srgb8(colors[surfel])),
+        _ => None,
     };
+    let word = |surfel: usize| code(surfel).map_or(0, u32::from_le_bytes);
     let mut best: Vec<Option<Best>> = vec![None; camera.width as usize * rows as usize];
     let fragments = |visit: &mut dyn FnMut(usize, &Splat, super::splat::Intersection)| {
         for splat in splats.clone() {
@@ -92,7 +97,8 @@ pub fn reference<'a>(
     });
     for (sum, best) in sums.iter_mut().zip(best) {
         let Some(best) = best else { continue };
-        let [r, g, b, alpha] = scene.colors.linear(best.surfel).map(f64::from);
+        let color = code(best.surfel).map_or_else(|| scene.colors.linear(best.surfel), decoded);
+        let [r, g, b, alpha] = color.map(f64::from);
         let color = [r * alpha, g * alpha, b * alpha, alpha];
         *sum = PixelSums { weight: 1.0, color, depth: best.depth, depth_weight: 1.0, count: 1, ..*sum };
     }

@@ -3,7 +3,9 @@
 mod adapter;
 
 pub use self::adapter::{on_adapter, sums};
-use super::{Accumulator, BackendName, BlendFormat, ColorNeed, Facts, Organisation, RasterDepth, RenderOptions};
+use super::{
+    Accumulator, BackendName, BlendFormat, ColorNeed, Facts, Organisation, RasterDepth, RenderOptions, composited,
+};
 use crate::error::{Error, Result};
 use crate::passes::peel::MOST_LAYERS;
 use crate::scene::composite::ALL_LAYERS;
@@ -69,7 +71,22 @@ pub fn options(options: &RenderOptions, reference: bool) -> Result<()> {
         Some(raster) if raster.format == BlendFormat::Rgba8Unorm && options.maps.has(Map::Count) => {
             usage("an 8-bit target cannot count fragments: leave count out, or take rgba16float")
         }
-        None if options.organisation == Organisation::Tile && options.accumulator != Accumulator::Fixed => {
+        _ => Ok(()),
+    }
+}
+
+/// Fails for options that no tiles draw, where tiles are asked for: a study measures what it names.
+///
+/// # Errors
+/// [`Error::Usage`].
+pub fn by_tiles(options: &RenderOptions) -> Result<()> {
+    match options {
+        _ if options.organisation != Organisation::Tile || options.raster.is_some() => Ok(()),
+        _ if options.composite != Composite::Opaque => {
+            usage("the organisation tile shows the nearest surface alone: leave it out with --composite")
+        }
+        _ if options.blend == Blend::Nearest => usage("the organisation tile sums: leave it out with --blend nearest"),
+        _ if options.accumulator != Accumulator::Fixed => {
             usage("the organisation tile needs the accumulator fixed: leave one of them out")
         }
         _ => Ok(()),
@@ -82,9 +99,10 @@ fn levels(options: &RenderOptions) -> Result<()> {
         _ if options.facing.is_some() => {
             usage("points that face the camera have a size each and no levels of detail: leave --lod and --splats out")
         }
-        _ if options.separate => {
-            usage("levels of detail are of all inputs together: leave --separate out, or --lod and --splats")
-        }
+        _ if options.separate => usage(
+            "levels of detail are of all inputs together: leave --separate out, or --lod and --splats; or make a picture of each \
+                 input with a depth map and keep the nearer pixel",
+        ),
         _ if options.maps.has(Map::Index) => {
             usage("the map index names points, and nodes are none: leave the map out, or --lod and --splats")
         }
@@ -142,9 +160,6 @@ fn composite(options: &RenderOptions, reference: bool) -> Result<()> {
         _ if options.accumulator != Accumulator::Fixed => {
             usage("surfaces are composited of sums of the accumulator fixed: leave the accumulator out")
         }
-        _ if options.organisation == Organisation::Tile => {
-            usage("the organisation tile shows the nearest surface alone: leave it out with --composite")
-        }
         _ => Ok(()),
     }
 }
@@ -162,9 +177,6 @@ fn order_free(options: &RenderOptions, reference: bool) -> Result<()> {
         RenderOptions { accumulator: Accumulator::Fixed32 | Accumulator::Packed64, .. } => usage(
             "far fragments weigh too little for sums of 32 bits: take the accumulator fixed, fixed64, float or cas",
         ),
-        _ if options.organisation == Organisation::Tile => {
-            usage("the organisation tile shows the nearest surface alone: leave it out with --composite")
-        }
         _ => Ok(()),
     }
 }
@@ -210,9 +222,6 @@ fn nearest(options: &RenderOptions, reference: bool) -> Result<()> {
         _ if reference => Ok(()),
         _ if options.accumulator != Accumulator::Fixed => {
             usage("--blend nearest sums nothing: leave the accumulator out")
-        }
-        _ if options.organisation == Organisation::Tile => {
-            usage("the organisation tile sums: leave it out with --blend nearest")
         }
         _ if options.maps.has(Map::Depth) && !exact => {
             usage("the rasteriser tells depths with raster-depth exact alone: take that, or leave the depth map out")
@@ -300,14 +309,20 @@ pub fn scene(facts: &Facts, options: &RenderOptions, reference: bool) -> Result<
             "the map surfaces is of surfaces that are told apart: take --composite layers, sorted or gaussians with it",
         );
     }
-    if facts.mesh.triangles > 0 && facts.encoded {
-        return usage("Gaussians are composited as codes and triangles are lit: draw one of them");
+    if facts.mesh.triangles > 0 && facts.encoded && options.composite != Composite::Opaque {
+        return usage(
+            "Gaussians show through each other, and triangles are drawn on the nearest surface alone: take --composite opaque, or \
+             leave the triangles out",
+        );
     }
     if facts.mesh.triangles > 0 {
         triangles(options, reference)?;
     }
-    if options.separate && facts.encoded {
-        return usage("Gaussians are sorted and not blended with each other: leave --separate out");
+    if options.separate && facts.encoded && options.composite != Composite::Opaque {
+        return usage(
+            "Gaussians show through each other, and inputs are kept apart on the nearest surface alone: take --composite opaque, or \
+             leave --separate out",
+        );
     }
     if facts.encoded && options.shading != Shading::Unlit {
         return usage("Gaussians have the colours that pictures of them show, light and all: take --shading unlit");
@@ -316,21 +331,23 @@ pub fn scene(facts: &Facts, options: &RenderOptions, reference: bool) -> Result<
         return usage("points that face the camera have no plane to paint: leave the texture out");
     }
     match facts.colors {
-        ColorNeed::Linear | ColorNeed::Textured | ColorNeed::Harmonics(_) if options.blend == Blend::Nearest => {
+        ColorNeed::Textured | ColorNeed::Harmonics(_) if options.blend == Blend::Nearest => {
             return usage(
-                "--blend nearest keeps colours of 8 bits, and these are finer: take --epsilon abs:0 --kernel constant, which \
+                "--blend nearest keeps one colour a surfel, and these have more: take --epsilon abs:0 --kernel constant, which \
                  averages what lies at one depth",
             );
         }
         _ => {}
     }
     if facts.colors == ColorNeed::Textured {
-        return textured(options, reference);
+        // Opaque surfaces are drawn as if nothing was composited.
+        return textured(&RenderOptions { composite: composited(facts, options), ..options.clone() }, reference);
     }
     match options.maps.has(Map::TexZ) {
-        true => {
-            usage("the map texz holds texture coordinates of painted surfels: paint them by --texture, or leave it out")
-        }
+        true => usage(
+            "the map texz holds texture coordinates of painted surfels, on the nearest surface alone: paint them by --texture and \
+                 leave --composite out, or leave the map out",
+        ),
         false => Ok(()),
     }
 }

@@ -2,10 +2,12 @@
 
 use std::borrow::Cow;
 
-use crate::scene::{Join, Mipmap, Triangles};
+use glam::DVec3;
+
+use crate::scene::{Bounds, Camera, Join, Mipmap, Projection, Triangles};
 
 /// The counts of a scene's triangles, and what they have.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MeshFacts {
     /// Different places of corners.
     pub vertices: u64,
@@ -19,6 +21,31 @@ pub struct MeshFacts {
     pub textured: bool,
     /// Corners have trailing parts, [`Triangles::low`].
     pub doubled: bool,
+    /// The box of all corners, world units relative to the scene's origin.
+    pub bounds: Bounds,
+}
+
+/// Pixels about the image in which a box still counts as seen.
+const BORDER: f64 = 1.0;
+
+/// Whether the view of `camera` may show something of a box at `origin`: not if all of it lies
+/// before the near depth or beyond one side of the image.
+pub(crate) fn in_view(bounds: &Bounds, origin: DVec3, camera: &Camera) -> bool {
+    let corner = |k: usize| {
+        let [x, y, z] = [0, 1, 2].map(|axis| if k >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] });
+        camera.to_camera(origin + DVec3::new(x, y, z))
+    };
+    let [width, height] = [camera.width, camera.height].map(f64::from);
+    // How far inside each limit a corner lies, in pixels times depth for a pinhole: linear, so that
+    // corners tell of the whole box.
+    let inside = |p: DVec3| {
+        let depth = if camera.projection == Projection::Pinhole { p.z } else { 1.0 };
+        let (x, y) = (camera.fx * p.x + camera.cx * depth, camera.fy * p.y + camera.cy * depth);
+        let border = BORDER * depth;
+        [p.z - camera.near, x + border, (width * depth + border) - x, y + border, (height * depth + border) - y]
+    };
+    let corners: [[f64; 5]; 8] = std::array::from_fn(|k| inside(corner(k)));
+    !bounds.is_empty() && (0..5).all(|limit| corners.iter().any(|inside| inside[limit] >= 0.0))
 }
 
 impl MeshFacts {
@@ -31,8 +58,17 @@ impl MeshFacts {
             colored: triangles.colors().len() > 1,
             textured: !triangles.paint().is_empty(),
             doubled: !triangles.low().is_empty(),
+            bounds: bounds_of(triangles),
         }
     }
+}
+
+/// The box of the corners of `triangles`, world units relative to the scene's origin.
+pub(crate) fn bounds_of(triangles: &Triangles) -> Bounds {
+    let wide = |part: &[f32; 3]| DVec3::from_array(part.map(f64::from));
+    let low = |vertex: usize| triangles.low().get(vertex).map_or(DVec3::ZERO, wide);
+    let corners = triangles.vertices().iter().enumerate().map(|(vertex, high)| wide(high) + low(vertex));
+    corners.fold(Bounds::EMPTY, Bounds::with_point)
 }
 
 /// What triangles need.
@@ -50,6 +86,9 @@ pub struct MeshNeeds {
     pub doubled: bool,
     /// The nearest one is found in one pass, by 64-bit atomics.
     pub once: bool,
+    /// The surfels' colours are codes of sRGB, and so those of triangles become codes before they
+    /// are joined.
+    pub coded: bool,
 }
 
 impl MeshNeeds {

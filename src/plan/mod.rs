@@ -27,6 +27,7 @@ pub use facts::{ColorNeed, Facts};
 pub use fragment::{FragmentLayout, KEY_WORDS};
 pub use known::Known;
 pub use mesh::{MeshFacts, MeshNeeds, texture_words};
+pub(crate) use mesh::{bounds_of, in_view};
 pub use needs::{EpsilonForm, SMALL_WEIGHT, SceneNeeds, Sides, Winner, culls_back};
 pub use optimisation::Optimisation;
 pub use options::{BackendName, Organisation, RenderOptions};

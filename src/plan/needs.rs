@@ -2,7 +2,7 @@
 
 use super::{
     Accumulator, ColorNeed, Facts, Lists, MeshNeeds, Oit, Optimisation, Organisation, Raster, RasterDepth,
-    RenderOptions, composited, tuning,
+    RenderOptions, composited, in_view, tuning,
 };
 use crate::gpu::adapter::AdapterDescription;
 use crate::passes::peel;
@@ -137,17 +137,20 @@ pub enum Winner {
     Rasterised,
 }
 
-/// What the triangles of a scene need, if there are any. Without splats nothing is joined.
-fn mesh(facts: &Facts, options: &RenderOptions) -> Option<MeshNeeds> {
+/// The needs of a scene's triangles, if the view may show any: beside some, depths of splats are
+/// weighted differently. Without splats nothing is joined.
+fn mesh(facts: &Facts, camera: &Camera, options: &RenderOptions) -> Option<MeshNeeds> {
     let of = facts.mesh;
+    let shows = of.triangles > 0 && in_view(&of.bounds, facts.origin, camera);
     let join = if facts.surfels > 0 { options.join } else { Join::Nearest };
-    (of.triangles > 0).then_some(MeshNeeds {
+    shows.then_some(MeshNeeds {
         join,
         normals: of.normals,
         colored: of.colored,
         textured: of.textured,
         doubled: of.doubled,
         once: false,
+        coded: facts.encoded,
     })
 }
 
@@ -234,7 +237,7 @@ impl SceneNeeds {
             subgroups: false,
             raster: options.raster,
             winner: (!blends).then_some(unblended),
-            mesh: mesh(facts, options),
+            mesh: mesh(facts, camera, options),
             separate,
             lists: if options.raster.is_some() { None } else { lists },
             oit,
@@ -252,6 +255,8 @@ impl SceneNeeds {
             // Surfels of one colour differ once they are lit.
             color: match facts.colors {
                 ColorNeed::Constant if options.lights_splats() => ColorNeed::Linear,
+                // Where nothing is blended colours are words.
+                ColorNeed::Linear if !blends => ColorNeed::Srgb8,
                 colors => colors,
             },
             alpha: low[3] != high[3],

@@ -48,7 +48,8 @@ pub enum Organisation {
     Auto,
     /// One by one, large ones by a workgroup each.
     Scatter,
-    /// All by tiles.
+    /// All by tiles, where the nearest surface is summed by the accumulator `fixed`; what is drawn
+    /// in another way is drawn as by `Auto`.
     Tile,
 }
 

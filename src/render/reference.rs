@@ -138,7 +138,7 @@ fn strip_by(strip: &Strip<'_>, twins: &[Twin], spent: &Spent) -> Frame {
             Twin::Triangles => shown = triangles::reference(strip),
             Twin::Resolve => {
                 let Strip { largest_shorter, farthest, .. } = *strip;
-                let beside = Beside { triangles: &shown, largest_shorter, farthest };
+                let beside = Beside { triangles: &shown, largest_shorter, farthest, coded: scene.encoded };
                 let blended = || resolve::surfaces(&sums, &nearest, (scene, camera, options), first_row);
                 resolve::reference(&kept.take().unwrap_or_else(blended), &beside, options, &mut frame);
             }

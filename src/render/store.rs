@@ -89,13 +89,16 @@ struct Uploading {
     splat_words: u64,
     /// The numbers of the surfels are kept.
     order: bool,
+    /// There are triangles.
+    mesh: bool,
 }
 
 impl Uploading {
     fn of(needs: &SceneNeeds) -> Self {
         let (surfel, splat_words) = (SurfelLayout::of(needs), splat_words(needs));
         let order = asks_for_order(needs) && !needs.levels;
-        Self { copies: needs.copies, separate: needs.separate, levels: needs.levels, surfel, splat_words, order }
+        let mesh = needs.mesh.is_some();
+        Self { copies: needs.copies, separate: needs.separate, levels: needs.levels, surfel, splat_words, order, mesh }
     }
 }
 
@@ -163,11 +166,11 @@ impl Store {
     }
 
     /// Whether the scene was uploaded for a render with such needs: whether copies are drawn once depends on the accumulator, and maps
-    /// may need more of a surfel than colours do.
+    /// may need more of a surfel than colours do; triangles that no view showed yet are not there.
     pub fn serves(&self, needs: &SceneNeeds) -> bool {
         let wanted = Uploading::of(needs);
-        let numbered = self.uploaded.order || !wanted.order;
-        numbered && self.uploaded == Uploading { order: self.uploaded.order, ..wanted }
+        let Uploading { order, mesh, .. } = self.uploaded;
+        (order || !wanted.order) && (mesh || !wanted.mesh) && self.uploaded == Uploading { order, mesh, ..wanted }
     }
 
     /// Makes the buffers that `plan` asks for.

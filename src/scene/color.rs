@@ -30,6 +30,12 @@ pub fn srgb8([r, g, b, a]: [f32; 4]) -> [u8; 4] {
     [srgb8_of(r), srgb8_of(g), srgb8_of(b), (f64::from(a) * 255.0 + 0.5) as u8]
 }
 
+/// The linear colour of 8-bit sRGB codes, alpha straight.
+pub fn decoded([r, g, b, a]: [u8; 4]) -> [f32; 4] {
+    let table = &*SRGB8_TO_LINEAR;
+    [table[r as usize], table[g as usize], table[b as usize], f32::from(a) / 255.0]
+}
+
 impl Default for Colors {
     /// All of [`DEFAULT_COLOR`].
     fn default() -> Self {
@@ -42,11 +48,7 @@ impl Colors {
     pub fn linear(&self, index: usize) -> [f32; 4] {
         match self {
             Self::Constant(color) => *color,
-            Self::Srgb8(codes) => {
-                let [r, g, b, a] = codes[index];
-                let table = &*SRGB8_TO_LINEAR;
-                [table[r as usize], table[g as usize], table[b as usize], f32::from(a) / 255.0]
-            }
+            Self::Srgb8(codes) => decoded(codes[index]),
             Self::Linear(colors) => colors[index],
             Self::Textured(textured) => textured.colors()[index],
             Self::Harmonics(harmonics) => {

@@ -69,8 +69,8 @@ pub struct MapRow {
     pub numbers: bool,
     /// Two images are compared in it.
     pub compared: bool,
-    /// Its values where nothing is, if they are not all 0: as many as [`channels`](Self::channels), or their first ones over and over. Of
-    /// numbers those that a device writes.
+    /// Its values where nothing is, if they are not all 0: as many as [`channels`](Self::channels),
+    /// or their first ones over and over. Of numbers those that a device writes.
     pub nothing: &'static [f32],
 }
 

@@ -48,7 +48,8 @@ pub fn build(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Pre
 ///
 /// # Errors
 ///
-/// Those of [`build`], and [`Error::Usage`] if an input has no texture coordinates, or there are more or fewer textures.
+/// Those of [`build`], and [`Error::Usage`] if no input has texture coordinates, or there are more
+/// or fewer textures. Points of inputs without coordinates keep their colours.
 pub fn build_textured(
     inputs: Vec<Points>,
     textures: Vec<Texture>,
@@ -76,9 +77,6 @@ pub fn build_within(
     let mut inputs: Vec<Points> = inputs.into_iter().map(|input| mesh::of_mesh(input, By::Looks, painting)).collect();
     if textures.is_empty() {
         return built(gather::gather(inputs)?, limits, progress).map(|(made, _)| made);
-    }
-    if inputs.iter().any(|input| input.texture.is_none() && !input.positions.is_empty()) {
-        return Err(Error::Usage("a texture paints points that have texture coordinates, and some have none".into()));
     }
     painting::number(&mut inputs, textures.len())?;
     painting::painted(inputs, textures.into_iter().map(Arc::new).collect(), limits, progress)

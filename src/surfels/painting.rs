@@ -17,13 +17,18 @@ const MOST: u64 = 1024;
 
 /// Numbers the points of all inputs by their textures, of which there are so many: one for all, one for each input, or in the order of the inputs
 /// as many as the numbers of its points name.
+///
+/// # Errors
+///
+/// [`Error::Usage`] if there are more or fewer textures than that, or no input has texture coordinates.
 pub(super) fn number(inputs: &mut [Points], textures: usize) -> Result<()> {
+    let bare = bare_inputs(inputs)?;
     let named = named_by_all(inputs)?;
     let (all, one_each) = (named.iter().sum::<u64>(), named.iter().all(|named| *named <= 1));
     if textures == 1 && one_each {
         return Ok(());
     }
-    if textures == inputs.len() && one_each {
+    if textures == inputs.len() && one_each && !bare {
         offset(inputs, &vec![1; inputs.len()]);
         return Ok(());
     }
@@ -41,6 +46,32 @@ pub(super) fn number(inputs: &mut [Points], textures: usize) -> Result<()> {
     }
     offset(inputs, &named);
     Ok(())
+}
+
+/// Gives the points of inputs without texture coordinates the number of no texture, so that they
+/// keep their colours beside painted ones; and tells whether there are such inputs.
+///
+/// # Errors
+///
+/// [`Error::Usage`] if none has any.
+fn bare_inputs(inputs: &mut [Points]) -> Result<bool> {
+    let lacks = |input: &Points| input.texture.is_none() && !input.positions.is_empty();
+    let bare = inputs.iter().any(lacks);
+    if bare && inputs.iter().all(|input| input.texture.is_none()) {
+        let what = "a texture paints points that have texture coordinates, and none has any: leave --texture out, or take an input \
+                    with coordinates, as `epsplat sample` gives surfels of a mesh";
+        return Err(Error::Usage(what.into()));
+    }
+    for input in inputs.iter_mut().filter(|_| bare) {
+        let (count, bare) = (input.positions.len(), lacks(input));
+        if bare {
+            input.texture = Some(vec![[0.0; 2]; count]);
+            input.texture_numbers = Some(vec![u32::MAX; count]);
+        } else {
+            input.texture_numbers.get_or_insert_with(|| vec![0; count]);
+        }
+    }
+    Ok(bare)
 }
 
 /// Numbers the points of several inputs by their textures, if any of them has numbers: else all are taken to be in one.
@@ -182,6 +213,7 @@ fn offset(inputs: &mut [Points], textures: &[u64]) {
     for (input, own) in inputs.iter_mut().zip(textures) {
         let count = input.positions.len();
         let numbers = input.texture_numbers.get_or_insert_with(|| vec![0; count]);
+        // The number of no texture saturates, and stays.
         numbers.iter_mut().for_each(|number| *number = number.saturating_add(first));
         // None of them is more than MOST.
         first = first.saturating_add(*own as u32);

@@ -278,7 +278,7 @@ fn beside_triangles(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
         let [normals, colored, once, textured, doubled] = [1, 2, 4, 8, 16].map(|bit| (step / 3) & bit != 0);
         let once = once && needs.raster.is_none();
         SceneNeeds {
-            mesh: Some(MeshNeeds { join, normals, colored, textured, doubled, once }),
+            mesh: Some(MeshNeeds { join, normals, colored, textured, doubled, once, coded: step % 5 < 2 }),
             maps: needs.maps.but(&[Map::Index]),
             ..*needs
         }

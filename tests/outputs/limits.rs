@@ -1,6 +1,6 @@
 //! Images too large are refused by their headers, and what the system has no room for ends in a sentence.
 
-use super::common::command::{Folder, fails, ply, succeeds, text};
+use super::common::command::{Folder, epsplat, fails, ply, succeeds, text};
 use epsplat::frame::Frame;
 use epsplat::scene::Map;
 use std::path::{Path, PathBuf};
@@ -192,20 +192,26 @@ fn compare_names_what_only_one_image_has_and_prints_no_largest_number() {
     let b = written("b.exr", &frame(Some(vec![1.5, 1.5]), None, 0.75));
     let c = written("c.exr", &frame(Some(vec![1.0, f32::NAN]), None, 1.0));
     let table = |a: &Path, b: &Path| String::from_utf8(succeeds(&["compare", text(a), text(b)]).stdout).unwrap();
+    // A value that is not finite gives no measure: the table is printed, and the run fails.
+    let failed = |a: &Path, b: &Path| {
+        fails(&["compare", text(a), text(b)], 1, &["a value that is not finite stands against another"]);
+        String::from_utf8(epsplat(&["compare", text(a), text(b)]).stdout).unwrap()
+    };
     let said = table(&a, &b);
     assert!(said.contains("a.exr has: weight\n") && !said.contains("e38") && said.lines().count() == 11, "{said}");
-    // Alpha and depth of B have no range that their errors could be a part of.
+    // All alphas of B are one, and so are its depths: errors are parts of them.
     let row =
         |name: &str| said.lines().find(|line| line.starts_with(name)).unwrap().split_whitespace().collect::<Vec<_>>();
-    assert_eq!(row("alpha")[2..], ["2.500e-1", "-"]);
-    assert_eq!(row("depth")[2..], ["5.000e-1", "-"]);
-    let said = table(&b, &c);
+    assert_eq!(row("alpha")[1..], ["7.5000e-1", "2.500e-1", "3.333e-1"]);
+    assert_eq!(row("depth")[1..4], ["1.5000e0", "5.000e-1", "3.333e-1"]);
+    assert!(said.contains("(1 pixels have nothing in one image alone)"), "{said}");
+    let said = failed(&b, &c);
     assert!(said.contains("not finite  (1 pixels)") || said.contains("not finite    (1 pixels)"), "{said}");
     assert!(!said.contains("e38") && !table(&a, &a).contains("has:"), "{said}");
     let json = succeeds(&["compare", text(&a), text(&b), "--json", "-"]).stdout;
     let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
     assert_eq!((&json["only_in_a"][0], &json["only_in_b"]), (&"weight".into(), &serde_json::json!([])));
-    assert_eq!(json["maps"][1]["max_of_range"], 1.0);
-    let colored = table(&a, &written("d.exr", &frame(None, None, f32::NAN)));
+    assert_eq!((&json["maps"][1]["max_of_range"], &json["maps"][2]["in_one"]), (&(1.0 / 3.0).into(), &1.into()));
+    let colored = failed(&a, &written("d.exr", &frame(None, None, f32::NAN)));
     assert!(colored.contains("rmse               not finite") && !colored.contains("e38"), "{colored}");
 }

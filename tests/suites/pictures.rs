@@ -42,6 +42,8 @@ mod points;
 mod properties;
 #[path = "../raster.rs"]
 mod raster;
+#[path = "../refusals.rs"]
+mod refusals;
 #[path = "../samples.rs"]
 mod samples;
 #[path = "../separate.rs"]

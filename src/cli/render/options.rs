@@ -1,9 +1,10 @@
 //! What the arguments of `epsplat render` say about a picture, and what a scene of Gaussians takes where they say nothing.
 
-use epsplat::plan::{BackendName, Raster, RenderOptions, check};
+use epsplat::plan::{Accumulator, BackendName, Organisation, Raster, RenderOptions, check};
 use epsplat::scene::composite::ALL_LAYERS;
 use epsplat::scene::{
-    Blend, Composite, Detail, Facing, Kernel, LowPass, Maps, PointSize, Samples, Scene, Shading, ShadingAt, gaussian,
+    Blend, Colors, Composite, Detail, Facing, Kernel, LowPass, Maps, PointSize, Samples, Scene, Shading, ShadingAt,
+    Tail, gaussian,
 };
 use epsplat::{Error, Result};
 
@@ -15,6 +16,11 @@ use super::{Arguments, LowPassName, NodeShape, ShadingAtName, ShadingName};
 const SAMPLES: Samples = Samples { across: 2, down: 2 };
 
 impl Arguments {
+    /// The surfels are those of one file, which is no folder.
+    pub(super) fn is_one_file(&self) -> bool {
+        self.inputs.len() < 2 && self.inputs.iter().all(|path| !path.is_dir())
+    }
+
     /// Points that face the camera have no normals, and of what is not blended none is kept.
     fn shading(&self) -> ShadingName {
         let unlit = self.facing.is_some() || self.blend == Some(Blend::Nearest);
@@ -49,7 +55,9 @@ pub(super) fn options(arguments: &Arguments, format: Format) -> Result<RenderOpt
             "all fragments are summed, near and far: leave --epsilon out with --composite weighted or moments".into(),
         ));
     }
-    if arguments.tail.is_some() && !matches!(arguments.composite, Some(Composite::Layers(most)) if most < ALL_LAYERS) {
+    // Without a last layer there is none to leave out, and the default says nothing.
+    let layered = matches!(arguments.composite, Some(Composite::Layers(most)) if most < ALL_LAYERS);
+    if arguments.tail.is_some_and(|tail| tail != Tail::default()) && !layered {
         return Err(Error::Usage("a tail lies behind a last layer: give --tail with --composite layers:L".into()));
     }
     if arguments.shading_at == ShadingAtName::Splat && arguments.shading() == ShadingName::Unlit {
@@ -68,7 +76,8 @@ pub(super) fn options(arguments: &Arguments, format: Format) -> Result<RenderOpt
         opacity: arguments.opacity,
         tail: arguments.tail.unwrap_or_default(),
         join: arguments.join.unwrap_or_default(),
-        separate: arguments.separate,
+        // The surfels of one file stay together, with levels of detail too.
+        separate: arguments.separate && !arguments.is_one_file(),
         cull: arguments.cull,
         detail: arguments.splats.map(|splats| Detail::Splats(splats.get())).or(arguments.lod).unwrap_or(default.detail),
         detail_measure: arguments.lod_measure.into(),
@@ -97,7 +106,9 @@ pub(super) fn options(arguments: &Arguments, format: Format) -> Result<RenderOpt
         return Err(Error::Usage("points that face the camera have no plane to paint: leave --texture out".into()));
     }
     if !arguments.textures.is_empty() {
-        check::textured(&options, arguments.backend.0 == Some(BackendName::Reference))?;
+        // Surfels have the mean of their texture where surfaces show through (scene.rs).
+        let opaque = RenderOptions { composite: Composite::Opaque, ..options.clone() };
+        check::textured(&opaque, arguments.backend.0 == Some(BackendName::Reference))?;
     }
     Ok(faded(arguments, options))
 }
@@ -113,6 +124,9 @@ fn faded(arguments: &Arguments, options: RenderOptions) -> RenderOptions {
 /// # Errors
 /// [`Error::Usage`] for choices that do not go with Gaussians.
 pub(super) fn for_scene(arguments: &Arguments, options: RenderOptions, scene: &Scene) -> Result<RenderOptions> {
+    if options.blend == Blend::Nearest && matches!(scene.colors, Colors::Linear(_)) {
+        note("--blend nearest keeps colours of 8 bits: finer ones are rounded, and what lies beyond white is cut");
+    }
     if !scene.encoded {
         return Ok(options);
     }
@@ -174,8 +188,9 @@ fn shininess(arguments: &Arguments) -> Result<Option<f32>> {
 /// Fails for a choice that the backend does not have.
 fn check_chosen(arguments: &Arguments) -> Result<()> {
     let chosen = check::Chosen {
-        accumulator: arguments.accumulator.is_some(),
-        organisation: arguments.organisation.is_some(),
+        // A default that is given is no choice.
+        accumulator: arguments.accumulator.is_some_and(|accumulator| accumulator != Accumulator::default()),
+        organisation: arguments.organisation.is_some_and(|organisation| organisation != Organisation::default()),
         without: false,
         raster: arguments.blend_format.is_some() || arguments.raster_depth.is_some(),
     };

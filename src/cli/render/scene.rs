@@ -4,10 +4,9 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use epsplat::io::{self, Mesh, Points, ReadOptions, Texture};
-use epsplat::plan::BackendName;
 use epsplat::plan::check::textured;
-use epsplat::scene::color::srgb8;
-use epsplat::scene::{Blend, Colors, Scene};
+use epsplat::plan::{BackendName, Facts, RenderOptions, composited};
+use epsplat::scene::{Blend, Colors, Composite, Maps, Scene};
 use epsplat::surfels::{Preparation, with_triangles};
 use epsplat::{Error, Progress, Result, surfels};
 
@@ -34,7 +33,7 @@ pub(super) fn scene_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dy
         let what = "--texture paints surfels, and there are none: take --triangle-texture for triangles";
         return Err(Error::Usage(what.into()));
     }
-    if arguments.separate && arguments.inputs.len() < 2 {
+    if arguments.separate && arguments.is_one_file() {
         note(
             "--separate keeps the surfels of several files apart, and here is one of them at most: it changes nothing",
         );
@@ -100,12 +99,17 @@ fn paints(arguments: &Arguments) -> bool {
 /// The surfels of all inputs.
 fn surfels_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dyn Progress) -> Result<Made> {
     let textures = arguments.textures.iter().map(|image| Texture::read(image)).collect::<Result<Vec<_>>>()?;
-    let mut read = arguments.inputs.iter().zip(&inputs);
-    if !textures.is_empty()
-        && let Some((path, _)) = read.find(|(_, points)| !points.has_places() && !points.positions.is_empty())
-    {
-        let what = "its points have no texture coordinates, so they cannot be textured; `epsplat sample` gives surfels of a mesh some";
-        return Err(Error::malformed(path, what));
+    let bare = |points: &Points| !points.has_places() && !points.positions.is_empty();
+    if !textures.is_empty() && inputs.iter().any(bare) {
+        let paths = arguments.inputs.iter().zip(&inputs).filter(|(_, points)| bare(points)).map(|(path, _)| path);
+        if !inputs.iter().any(Points::has_places)
+            && let Some(path) = paths.clone().next()
+        {
+            let what = "its points have no texture coordinates, so they cannot be textured; `epsplat sample` gives surfels of a mesh some";
+            return Err(Error::malformed(path, what));
+        }
+        let names = paths.map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
+        note(&format!("{names}: no texture coordinates, so that --texture leaves the points in their own colours"));
     }
     let limits = arguments.limits.limits();
     let built = match arguments.facing {
@@ -114,14 +118,22 @@ fn surfels_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dyn Progres
         None => surfels::build_within(inputs, textures, &limits, progress),
     };
     let (scene, preparation) = built.map_err(|error| named(error, &arguments.inputs))?;
-    Ok((if arguments.blend == Some(Blend::Nearest) { rounded(scene) } else { scene }, preparation))
+    Ok((seen_through(scene, arguments), preparation))
 }
 
-/// A scene whose colours have 8 bits, which is what `--blend nearest` keeps.
-fn rounded(mut scene: Scene) -> Scene {
-    if let Colors::Linear(colors) = &scene.colors {
-        note("colours are rounded to the 8 bits that --blend nearest keeps");
-        scene.colors = Colors::Srgb8(colors.iter().map(|color| srgb8(*color)).collect());
+/// Takes the mean of the texture over each surfel where surfaces show through each other: lists of
+/// fragments keep no texture coordinates.
+fn seen_through(scene: Scene, arguments: &Arguments) -> Scene {
+    let Colors::Textured(textured) = &scene.colors else { return scene };
+    let options = RenderOptions {
+        composite: arguments.composite.unwrap_or_default(),
+        opacity: arguments.opacity,
+        maps: Maps::of(&arguments.aov),
+        ..RenderOptions::default()
+    };
+    if options.composite == Composite::Opaque || composited(&Facts::of(&scene), &options) == Composite::Opaque {
+        return scene;
     }
-    scene
+    note("where surfaces show through each other each surfel has the mean colour of its texture");
+    Scene { colors: Colors::Linear(textured.colors().to_vec()), ..scene }
 }

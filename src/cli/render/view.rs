@@ -103,23 +103,31 @@ impl View {
         }
     }
 
-    /// The camera of the view, and what it looks at, world coordinates, where nobody said so; `default_near` is
-    /// [`Camera::default_near`] of the scene.
-    pub(super) fn camera(&self, scene: &Scene, default_near: f64) -> Result<(Camera, Option<[DVec3; 2]>)> {
+    /// The camera of the view, and what it looks at; `default_near` is [`Camera::default_near`] of
+    /// the scene.
+    pub(super) fn camera(&self, scene: &Scene, default_near: f64) -> Result<(Camera, Seen)> {
         let near = self.near.unwrap_or(default_near);
-        let camera = match &self.place {
+        let (pose, up, by) = match &self.place {
             Place::Framed(up) => {
                 let (camera, target) = Camera::framing_up(self.size, self.lens, scene, near, *up)?;
-                let eye = camera.eye;
-                return Ok((camera, Some([eye, target])));
+                return Ok((camera, Seen { target, up: *up, by: By::Choice }));
             }
             Place::Eye(eye, up) => {
                 let center = scene.origin + scene.framed().0.center();
-                self.posed(&Pose::LookAt(*eye, center, *up), scene.up, near)
+                (&Pose::LookAt(*eye, center, *up), *up, By::Choice)
             }
-            Place::Pose(pose) => self.posed(pose, scene.up, near),
+            Place::Pose(pose @ Pose::LookAt(.., up)) => (pose, *up, By::Arguments),
+            Place::Pose(pose @ Pose::Rigid(..)) => (pose, None, By::File),
         };
-        Ok((camera?, None))
+        let camera = self.posed(pose, scene.up, near)?;
+        Ok(match *pose {
+            Pose::LookAt(_, target, _) => (camera, Seen { target, up, by }),
+            Pose::Rigid(rotation, eye) => {
+                let distance = camera.to_camera(scene.origin + scene.framed().0.center()).z.max(near);
+                let target = eye + camera.rotation.row(2) * distance;
+                (camera, Seen { target, up: Some(-rotation.row(1)), by })
+            }
+        })
     }
 
     /// Pixels of the picture.
@@ -128,27 +136,64 @@ impl View {
     }
 }
 
-/// A view that was chosen to show the scene, in the words of the options that give it again.
+/// The point that a camera looks at, and its up.
+#[derive(Clone, Copy)]
+pub(super) struct Seen {
+    /// World coordinates.
+    pub target: DVec3,
+    /// Up as it was given, or as it follows from a pose.
+    up: Option<DVec3>,
+    by: By,
+}
+
+/// The source of a view.
+#[derive(Clone, Copy, PartialEq)]
+enum By {
+    /// It was chosen to show the scene, up apart.
+    Choice,
+    /// The options or a file.
+    Arguments,
+    /// A file, as a pose.
+    File,
+}
+
+/// Degrees: where the line of sight is nearer to up than this, up says little of how the picture is
+/// turned.
+const NEARLY_UP: f64 = 5.0;
+
+/// Degrees by which a picture may be turned without a word.
+const TURNED: f64 = 1.0;
+
+/// A view in the words of the options that give it again.
 #[derive(Serialize)]
-pub(super) struct ChosenView {
+pub(super) struct ToldView {
     eye: [f64; 3],
     target: [f64; 3],
     up: [f64; 3],
     /// Why up is what it is.
     because: &'static str,
+    /// How the picture is turned, where up says little of it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    turned: Option<String>,
 }
 
-impl ChosenView {
-    /// From `eye` to `target`; up is `given` or the scene's, which may have been `guessed`.
-    pub(super) fn new([eye, target]: [DVec3; 2], scene: &Scene, given: Option<DVec3>, guessed: bool) -> Self {
-        let because = match (given, guessed, scene.up) {
+impl ToldView {
+    /// The words for `camera`, which looks at `seen`; the scene's up may have been `guessed`.
+    pub(super) fn new(camera: &Camera, seen: &Seen, scene: &Scene, guessed: bool) -> Self {
+        let because = match (seen.up, guessed, scene.up) {
+            (Some(_), ..) if seen.by == By::File => "as the file of the camera says",
             (Some(_), ..) => "as asked for",
             (None, false, _) => "as the file or its format says",
             (None, true, Up::Z) => "a guess, as the points lie flat",
             (None, true, Up::Y) => "a guess",
         };
-        let up = given.unwrap_or(scene.up.axis());
-        Self { eye: eye.into(), target: target.into(), up: up.into(), because }
+        let given = seen.up.unwrap_or(scene.up.axis());
+        let forward = camera.rotation.row(2);
+        // Along up itself the camera takes the other axis.
+        let is_along = seen.up.is_none() && forward.cross(given).length() <= 1e-3;
+        let up = if is_along { scene.up.other() } else { given };
+        let turned = if is_along || seen.by == By::File { None } else { turned(camera, up, scene.up) };
+        Self { eye: camera.eye.into(), target: seen.target.into(), up: up.into(), because, turned }
     }
 
     /// The options, and why.
@@ -156,6 +201,34 @@ impl ChosenView {
         let [eye, target] = [self.eye, self.target].map(|v| vector_argument(v.into()));
         format!("view: --eye {eye} --target {target} --up {} ({})", up_argument(self.up.into()), self.because)
     }
+
+    /// How the picture is turned, where that may surprise.
+    pub(super) fn warning(&self) -> Option<String> {
+        self.turned.as_ref().map(|turned| format!("warning: {turned}"))
+    }
+}
+
+/// How the picture of a view nearly along `up` is turned: what lies across up decides that, however
+/// little it is.
+fn turned(camera: &Camera, up: DVec3, scene_up: Up) -> Option<String> {
+    let up = up.normalize();
+    let (forward, top) = (camera.rotation.row(2), -camera.rotation.row(1));
+    let off = forward.dot(up).abs().min(1.0).acos().to_degrees();
+    let (axis, name, option) = match scene_up {
+        Up::Z => (DVec3::Y, "north (+y)", "--up y"),
+        Up::Y => (-DVec3::Z, "-z", "--up=-z"),
+    };
+    let shown = axis.reject_from_normalized(forward);
+    if off > NEARLY_UP || shown.length() < 0.5 {
+        return None;
+    }
+    let angle = shown.angle_between(top).to_degrees();
+    (angle > TURNED).then(|| {
+        format!(
+            "the view is {off:.1} degrees off the direction of up, which so says little of how the picture is turned: {name} lies \
+             {angle:.0} degrees from its top; {option} puts it there"
+        )
+    })
 }
 
 /// An error of a value, with the option or the file that gave it.

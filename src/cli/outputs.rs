@@ -20,8 +20,8 @@ pub(super) enum Source<'a> {
 }
 
 impl<'a> Source<'a> {
-    pub(super) fn cloud(path: &'a PathBuf) -> Self {
-        Self::Cloud(path, None)
+    pub(super) fn cloud(path: &'a (impl AsRef<Path> + ?Sized)) -> Self {
+        Self::Cloud(path.as_ref(), None)
     }
 
     pub(super) fn other(path: &'a (impl AsRef<Path> + ?Sized)) -> Self {

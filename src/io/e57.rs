@@ -43,7 +43,7 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
     let points = surviving(|| {
         let any_normals = scans.iter().any(|(_, scan)| normal(scan).is_some());
         let mut reading = Reading { normals: any_normals.then(Vec::new), ..Reading::default() };
-        let mut read = unread.is_empty();
+        let mut read = false;
         for (name, scan) in &scans {
             let before = reading.state();
             match surviving(|| reading.scan(&mut reader, scan, progress)) {

@@ -10,7 +10,7 @@ use crate::surfels::graph::NeighbourGraph;
 /// than [`LARGEST_MEDIAN_RATIO`] times that of all, in the unit of `radii`. Where a radius is zero, the position has none, and says
 /// nothing of others.
 ///
-/// No disk is larger than what `lone` says of its position.
+/// No disk is larger than `lone` says of its position, unless `factor` is infinite.
 ///
 /// At a boundary and around an outlier, points have neighbours on one side only, or far away, and so large radii; their
 /// neighbours' do not, wherever those have points around them. Densities that differ from place to place do not matter.
@@ -31,7 +31,7 @@ pub(crate) fn local_limits(
                 let of_near = graph.of(index).iter().take(RADIUS_NEIGHBOURS).map(|&other| radii[other as usize]);
                 near.extend(of_near.filter(|radius| *radius > 0.0));
             }
-            let own = if radii[index as usize] > 0.0 { lone(index) } else { None };
+            let own = if factor.is_finite() && radii[index as usize] > 0.0 { lone(index) } else { None };
             median(near).map_or(f64::INFINITY, |median| median * factor).min(global).min(own.unwrap_or(f64::INFINITY))
         })
         .collect()

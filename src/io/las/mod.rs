@@ -47,7 +47,7 @@ const BLOCK: u64 = 1 << 25;
 ///
 /// # Errors
 ///
-/// [`Error::Read`](crate::Error::Read) where the system cannot read, [`Error::Malformed`](crate::Error::Malformed) where
+/// [`Error::Read`] where the system cannot read, [`Error::Malformed`] where
 /// the file is not LAS, ends early, or cannot be decoded.
 pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Points> {
     let Input { file, length, path, .. } = input;

@@ -179,7 +179,7 @@ fn unusable_arguments_exit_with_2() {
         render(&["--kernel", bad], &["gaussian", "ellipse:A,N", "hat", "constant"]);
     }
     render(&["--accumulator", "double"], &["fixed", "fixed32", "fixed64", "packed64", "float", "cas"]);
-    render(&["--accumulator", "fixed"], &["accumulator", "backend gpu"]);
+    render(&["--accumulator", "fixed32"], &["accumulator", "backend gpu"]);
     render(&["--light", "0,0,0"], &["light"]);
     render(&["--aov", "depth"], &[".exr"]);
     render(&["--background", "1,2"], &["R,G,B"]);

@@ -191,7 +191,7 @@ mod tests {
     #[test]
     fn every_accumulator_has_its_row_its_file_and_its_own_name() {
         for row in ACCUMULATORS {
-            assert!(std::ptr::eq(row.of.row(), row), "{}", row.name);
+            assert_eq!(row.of.row().name, row.name);
             assert!(crate::gpu::sources::FILES.iter().any(|(name, _)| *name == row.file), "{}", row.file);
             assert_eq!(row.name.parse::<Accumulator>().ok(), Some(row.of));
         }

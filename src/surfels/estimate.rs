@@ -111,7 +111,7 @@ pub(crate) fn estimate(
             s.cross(t).normalize_or_zero()
         };
         // Radii are in world units.
-        lone_radius((distinct, &graph), position, normal).map(|radius| radius / distinct.scale())
+        lone_radius((distinct, &graph), position, normal).map(|radius| (radius / distinct.scale()).max(RADIUS_RANGE.0))
     });
     let limited = limits.par_iter().zip(&radii).map(|(limit, radius)| radius > limit).collect();
     of_position.par_iter_mut().zip(limits).for_each(|(e, limit)| e.axes = e.axes.map(|axis| at_most(axis, limit)));

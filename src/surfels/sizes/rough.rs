@@ -104,8 +104,8 @@ mod tests {
     use crate::surfels::positions::DistinctPositions;
     use rayon::prelude::*;
 
-    /// The mean growth in the middle of a grid of the spacing 1 with these heights, by their exact plane.
-    fn growth(height: impl Fn(f64, f64) -> f64) -> f64 {
+    /// The mean growth on a grid of the spacing 1 with these heights over a surface, and its slopes.
+    fn growth(height: impl Fn(f64, f64) -> f64, slopes: impl Fn(f64, f64) -> [f64; 2]) -> f64 {
         let positions: Vec<[f64; 3]> = (0..400)
             .map(|k| (f64::from(k % 20) - 9.5, f64::from(k / 20) - 9.5))
             .map(|(x, y)| [x, y, height(x, y)])
@@ -116,7 +116,9 @@ mod tests {
         let rough = |index: u32| {
             let own = distinct.position(index);
             let at: Vec<DVec3> = graph.of(index).iter().map(|other| distinct.position(*other) - own).collect();
-            Rough::of(&at, DVec3::Z)
+            let [x, y] = [own.x, own.y].map(|coordinate| coordinate / distinct.scale());
+            let [along_x, along_y] = slopes(x, y);
+            Rough::of(&at, DVec3::new(-along_x, -along_y, 1.0).normalize())
         };
         let grown = (0..400).map(|index| Rough::growth(&graph, index, rough) / distinct.scale());
         grown.sum::<f64>() / 400.0
@@ -127,14 +129,17 @@ mod tests {
         let noise = |sigma: f64| {
             let mut random = Random::stream(3, 0);
             let heights: Vec<f64> = (0..400).map(|_| sigma * 3.46 * (random.number() - 0.5)).collect();
-            growth(move |x, y| heights[((x + 9.5) + 20.0 * (y + 9.5)) as usize])
+            growth(move |x, y| heights[((x + 9.5) + 20.0 * (y + 9.5)) as usize], |_, _| [0.0; 2])
         };
         let (slight, rough) = (noise(0.02), noise(0.06));
         assert!(slight > 0.02 && rough > 2.0 * slight && rough < 0.4, "{slight} {rough}");
         // Beyond, nobody knows where the surface is.
         assert!(noise(2.0) < 1e-9);
-        assert!(growth(|_, _| 0.0) == 0.0);
-        let bowl = growth(|x, y| 0.04 * (x * x + 0.3 * x * y) + 0.02 * y * y);
+        assert!(growth(|_, _| 0.0, |_, _| [0.0; 2]) == 0.0);
+        let bowl = growth(
+            |x, y| 0.004 * (x * x + 0.3 * x * y) + 0.002 * y * y,
+            |x, y| [0.008 * x + 0.0012 * y, 0.0012 * x + 0.004 * y],
+        );
         assert!(bowl < 0.1 * slight, "{bowl}");
     }
 }

@@ -271,7 +271,9 @@ mod tests {
         assert_eq!(halvings(&[[4096, 2048], [1024, 1024]]), [0, 0]);
         assert_eq!(halvings(&[[4096, 4096], [16, 16]]), [1, 0]);
         assert_eq!(halvings(&[[16384, 16384]]), [2]);
-        assert_eq!(halvings(&[[8192, 4096], [8192, 4096], [64, 64]]), [1, 1, 0]);
+        assert_eq!(halvings(&[[8192, 4096], [8192, 4096]]), [1, 1]);
+        // Both halves fill the room, which a small one then passes.
+        assert_eq!(halvings(&[[8192, 4096], [8192, 4096], [64, 64]]), [1, 2, 0]);
         assert!(halvings(&[]).is_empty());
     }
 }

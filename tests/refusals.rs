@@ -228,7 +228,7 @@ fn an_input_without_coordinates_keeps_its_colours_beside_a_painted_one() {
     fails(
         &[&["render", text(&painted), text(&plain), "-o", text(&output)][..], &two].concat(),
         2,
-        &["2 textures are given", "one is needed"],
+        &["2 textures are given", "1 is needed"],
     );
 }
 

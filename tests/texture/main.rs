@@ -149,7 +149,7 @@ fn the_device_paints_as_its_twin_does() {
         assert!(found[0] == 0 && found[1] > 8000, "{found:?}");
     }
     for (file, from, to) in [
-        ("textures.wgsl", "fract(vec2<f32>(place.x,", "fract(vec2<f32>(place.x + 0.001,"),
+        ("textures.wgsl", "select(fract(turns),", "select(fract(turns + vec2<f32>(0.001, 0.0)),"),
         ("texture.wgsl", "clamp(2.0 -", "clamp(200.0 -"),
         ("texture.wgsl", "(point - place.position) * held.world", "(point - place.position) * (0.9 * held.world)"),
         ("textures.wgsl", "column + 1, row + 1), share.x)", "column + 1, row + 1), 0.99 * share.x)"),

@@ -137,7 +137,7 @@ fn a_wrong_tile_is_noticed() {
         ("tile.wgsl", "d = nearer(d, splat, filter_, column.x, column.y + 12u);", ""),
         ("tile.wgsl", "deepest_accepted(farthest_of(a, b))", "farthest_of(a, b)"),
         ("tile.wgsl", "gather_eight(8u, next", "gather_eight(0u, next"),
-        ("tile_reach.wgsl", "length + s.slack + sqrt", "0.9 * length + s.slack + 0.5 * sqrt"),
+        ("tile_reach.wgsl", "length + half_width(s)", "0.9 * length + 0.5 * half_width(s)"),
         ("tile.wgsl", "select(Term(0), weight_of(fragment), accepted)", "weight_of(fragment)"),
         ("tile_small.wgsl", "small_lists[end]) +", "small_lists[end - 1u]) +"),
         ("tile_sums.wgsl", "high + select(0u, 1u, sum < low)", "high"),

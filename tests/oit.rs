@@ -9,7 +9,7 @@ use common::scenes::{cases, crowded, shuffled, sphere, sphere_camera, stack};
 use epsplat::frame::Frame;
 use epsplat::gpu::{Gpu, Sources};
 use epsplat::metrics::{DECISION_MARGIN, compare};
-use epsplat::plan::{Accumulator, Facts, Organisation, Raster, RenderOptions, depths};
+use epsplat::plan::{Accumulator, Facts, Raster, RenderOptions, depths};
 use epsplat::render::{Backend, render};
 use epsplat::scene::{Camera, Colors, Composite, Kernel, Map, Maps, Projection, Samples, Scene, Shading};
 
@@ -229,7 +229,6 @@ fn what_does_not_go_with_sums_of_all_is_refused() {
     let own = options(Composite::Weighted);
     for (of, says) in [
         (RenderOptions { accumulator: Accumulator::Fixed32, ..own.clone() }, "sums of 32 bits"),
-        (RenderOptions { organisation: Organisation::Tile, ..own.clone() }, "the organisation tile"),
         (RenderOptions { raster: Some(Raster::default()), ..own.clone() }, "the rasteriser sums one surface"),
     ] {
         assert!(refused(of).contains(says), "{says}");

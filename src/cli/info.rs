@@ -8,7 +8,7 @@ use clap::Args;
 use epsplat::Result;
 use epsplat::io::{About, Points, class_name};
 use epsplat::scene::{Colors, Scene, gaussian};
-use epsplat::surfels::{self, Coverage, Preparation};
+use epsplat::surfels::{self, ASLANT, Coverage, Preparation};
 use serde::Serialize;
 
 use super::progress::Bars;
@@ -232,12 +232,24 @@ fn table(input: &std::path::Path, info: &Info) -> String {
     held(&mut text, info);
     let _ = writeln!(text, "  box       {} to {}", vector(info.min), vector(info.max));
     let _ = writeln!(text, "  up        {}{}", info.up, if info.preparation.guessed_up { " (a guess)" } else { "" });
-    if let Some(Coverage { spacing, covered, open }) = info.coverage {
+    if let Some(Coverage { spacing, covered, open, lone, covered_aslant }) = info.coverage {
         let _ = writeln!(text, "  spacing   {spacing:.4} (median distance to the nearest other point)");
         // Rounded down: 100 % are all.
-        let percent = (1e4 * covered).floor() / 100.0;
+        let percent = |share: f64| (1e4 * share).floor() / 100.0;
         let open = if open > 0 { format!("; next to {open} one is open") } else { String::new() };
-        let _ = writeln!(text, "  coverage  {percent} % of the surfels have no open gap to their neighbours{open}");
+        let _ = writeln!(
+            text,
+            "  coverage  {} % of the surfels have no open gap to their neighbours{open}",
+            percent(covered)
+        );
+        let _ = writeln!(
+            text,
+            "            {} % have none seen from {ASLANT} degrees over their plane",
+            percent(covered_aslant)
+        );
+        if lone > 0 {
+            let _ = writeln!(text, "            {lone} more have no surface around them");
+        }
     }
     if !info.lacks.is_empty() {
         let _ = writeln!(text, "  lacks     {}", info.lacks.join(", "));

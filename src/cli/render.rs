@@ -24,6 +24,7 @@ use epsplat::scene::{
     Blend, Camera, Composite, Cull, Detail, Epsilon, Join, Kernel, Light, MAPS, Map, Outline, PointShape, PointSize,
     Samples, Tail,
 };
+use epsplat::surfels::Size;
 use epsplat::{Error, Result};
 use glam::DVec3;
 use serde::Serialize;
@@ -81,6 +82,9 @@ pub struct Arguments {
     pub(super) reading: Reading,
     #[command(flatten)]
     limits: LimitArguments,
+    /// Measure the surfels anew, as `epsplat surfels --size HOW` does: knn, ellipse, bsp, qsplat and others
+    #[arg(long, value_name = "HOW", conflicts_with_all = ["facing", "separate", "textures"])]
+    surfel_size: Option<Size>,
     /// The image: .png (8-bit sRGB) or .exr (linear f32, every map a layer); with --cameras the folder of the images
     #[arg(short, long)]
     output: PathBuf,

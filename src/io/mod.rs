@@ -109,7 +109,7 @@ pub fn read_raw(path: &Path, options: ReadOptions, progress: &dyn Progress) -> R
         Format::E57 => read_e57(input, &options, progress),
         Format::Pcd => read_pcd(input, &options, progress),
     }?;
-    if format != Format::Las && format != Format::Obj && points.faces.is_none() {
+    if format != Format::Las && points.faces.is_none() {
         points.notes.extend(degrees::hint_of(&name, &points.positions, None));
     }
     Ok(points)

@@ -132,7 +132,7 @@ impl Gathered {
 }
 
 /// Whether a Gaussian has a surface, an opacity and a colour: what others lack is estimated, but of a Gaussian nothing can be.
-fn has_shape(points: &Points, index: usize) -> bool {
+pub(crate) fn has_shape(points: &Points, index: usize) -> bool {
     let color = match &points.colors {
         Some(Colors::Linear(colors)) => colors.get(index),
         Some(Colors::Harmonics(harmonics)) => harmonics.colors().get(index),

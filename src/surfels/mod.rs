@@ -47,7 +47,7 @@ use rayon::prelude::*;
 
 pub use self::build::{Coordinates, build, build_at_vertices, build_textured, build_within};
 pub use self::caps::curve;
-pub use self::coverage::{Coverage, coverage};
+pub use self::coverage::{ASLANT, Coverage, coverage};
 pub use self::facing::build_facing;
 pub use self::from_points::{FromPoints, Surfels, from_points};
 pub use self::limits::Limits;
@@ -93,11 +93,15 @@ fn usable_axes(axes: [[f32; 3]; 2]) -> Option<[Vec3; 2]> {
     sound.then(|| axes.map(Vec3::from_array))
 }
 
-/// The box of the points whose coordinates are usable, world coordinates as they were read.
+/// The box of the points that a scene keeps, world coordinates as they were read: those whose
+/// coordinates are usable, and of Gaussians those that have a shape.
 pub fn bounds(points: &Points) -> Bounds {
-    let usable = points.positions.par_iter().filter(|position| gather::is_usable(position));
+    let is_kept = |(index, position): &(usize, &[f64; 3])| {
+        gather::is_usable(position) && (!points.encoded || gather::has_shape(points, *index))
+    };
+    let kept = points.positions.par_iter().enumerate().filter(is_kept);
     // Adding +0 makes -0 the same coordinate as 0.
-    Bounds::of(usable.map(|position| DVec3::from_array(*position) + DVec3::ZERO))
+    Bounds::of(kept.map(|(_, position)| DVec3::from_array(*position) + DVec3::ZERO))
 }
 
 /// The scene's origin for positions in `bounds`, world units, axis by axis.

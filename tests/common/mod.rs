@@ -275,7 +275,8 @@ fn beside_triangles(all: &[SceneNeeds]) -> Vec<SceneNeeds> {
         |needs: &&SceneNeeds| (needs.raster.is_none() && needs.lists.is_none() && needs.oit.is_none()) || drawn(needs);
     let of = |(step, needs): (usize, &SceneNeeds)| {
         let join = [Join::Corrected, Join::Nearest, Join::Blended][step % 3];
-        let [normals, colored, once, textured, doubled] = [1, 2, 4, 8, 16].map(|bit| (step / 3) & bit != 0);
+        let [normals, colored, once, textured] = [1, 2, 4, 8].map(|bit| (step / 3) & bit != 0);
+        let doubled = step % 7 < 3;
         let once = once && needs.raster.is_none();
         SceneNeeds {
             mesh: Some(MeshNeeds { join, normals, colored, textured, doubled, once, coded: step % 5 < 2 }),

@@ -4,6 +4,8 @@
 mod bench;
 #[path = "../card.rs"]
 mod card;
+#[path = "../cases/main.rs"]
+mod cases;
 #[path = "../cli.rs"]
 mod cli;
 #[path = "../common/mod.rs"]

@@ -30,6 +30,8 @@ mod invariance;
 mod layers;
 #[path = "../materials.rs"]
 mod materials;
+#[path = "../matrix/main.rs"]
+mod matrix;
 #[path = "../nearest.rs"]
 mod nearest;
 #[path = "../oit.rs"]

@@ -28,7 +28,9 @@ impl Octrees {
     /// The inputs, if a picture that asks for levels of detail takes parts of them: if all are COPC files, and nothing is asked that
     /// only all of their points tell: which of them are outliers, or where they are beside triangles.
     pub fn of(arguments: &Arguments, bars: &Bars) -> Result<Option<Self>> {
-        let all = arguments.limits.limits().outliers.is_some() || !arguments.triangles.is_empty();
+        let all = arguments.limits.limits().outliers.is_some()
+            || arguments.surfel_size.is_some()
+            || !arguments.triangles.is_empty();
         if arguments.inputs.is_empty() || all {
             return Ok(None);
         }

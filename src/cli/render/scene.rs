@@ -7,7 +7,7 @@ use epsplat::io::{self, Mesh, Points, ReadOptions, Texture};
 use epsplat::plan::check::textured;
 use epsplat::plan::{BackendName, Facts, RenderOptions, composited};
 use epsplat::scene::{Blend, Colors, Composite, Maps, Scene};
-use epsplat::surfels::{Preparation, with_triangles};
+use epsplat::surfels::{FromPoints, Preparation, Surfels, from_points, with_triangles};
 use epsplat::{Error, Progress, Result, surfels};
 
 use super::super::note;
@@ -112,12 +112,21 @@ fn surfels_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dyn Progres
         note(&format!("{names}: no texture coordinates, so that --texture leaves the points in their own colours"));
     }
     let limits = arguments.limits.limits();
+    let in_file = |error| named(error, &arguments.inputs);
+    if let Some(size) = arguments.surfel_size {
+        let options = FromPoints { size, limits, ..FromPoints::default() };
+        let Surfels { points, preparation, .. } = from_points(inputs, &options, progress).map_err(in_file)?;
+        // Outliers are dropped, and half-axes limited, once.
+        let (scene, of_scene) = surfels::build(vec![points], progress).map_err(in_file)?;
+        let Preparation { guessed_up, strays, rounding, .. } = of_scene;
+        return Ok((seen_through(scene, arguments), Preparation { guessed_up, strays, rounding, ..preparation }));
+    }
     let built = match arguments.facing {
         Some(_) => surfels::build_facing(inputs, arguments.point_size, &limits, progress),
         None if textures.is_empty() && paints(arguments) => surfels::build_painted(inputs, &limits, progress),
         None => surfels::build_within(inputs, textures, &limits, progress),
     };
-    let (scene, preparation) = built.map_err(|error| named(error, &arguments.inputs))?;
+    let (scene, preparation) = built.map_err(in_file)?;
     Ok((seen_through(scene, arguments), preparation))
 }
 

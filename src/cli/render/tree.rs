@@ -87,6 +87,7 @@ fn asks_for_all(arguments: &Arguments) -> Option<&'static str> {
     let all = [
         (limits.outliers.is_some(), "--outliers"),
         (limits.largest_ratio != Limits::default().largest_ratio, "--max-radius"),
+        (arguments.surfel_size.is_some(), "--surfel-size"),
         (arguments.reading.class_opacity.is_some(), "--class-opacity"),
         (arguments.reading.ignores_alpha(), "--ignore-alpha"),
         (!arguments.triangles.is_empty(), "--triangles"),

@@ -27,7 +27,7 @@ const CHUNK: usize = 256;
 const BLOCK: usize = 1 << 20;
 
 /// Words of a row.
-const WORDS: [&str; 4] = ["packed_position", "packed_rotation", "packed_scale", "packed_color"];
+pub(super) const WORDS: [&str; 4] = ["packed_position", "packed_rotation", "packed_scale", "packed_color"];
 
 /// Smallest and largest values of a chunk: positions, scales, and colours, which may be missing.
 const RANGES: [[[&str; 3]; 2]; 3] = [

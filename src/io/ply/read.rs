@@ -5,7 +5,7 @@ use super::faces::{Faces, Triangles};
 use super::header::{self, Element, Encoding};
 use super::vertex::Layout;
 use super::{ascii, binary, gaussian, packed};
-use crate::io::about::About;
+use crate::io::about::{About, Attribute, Role};
 use crate::io::beside::Beside;
 use crate::io::fault::{self, Fault};
 use crate::io::input::check_regular;
@@ -169,7 +169,10 @@ fn about(header: &header::Header, vertex: &Element) -> Result<About, Fault> {
         Encoding::LittleEndian => "binary, little-endian",
         Encoding::BigEndian => "binary, big-endian",
     };
-    let attributes = Layout::of(vertex)?.attributes(vertex);
+    let attributes = match packed::is_packed(header) {
+        true => packed::WORDS.map(|word| Attribute::new(word, true, Role::Other)).to_vec(),
+        false => Layout::of(vertex)?.attributes(vertex),
+    };
     Ok(About { format: format!("PLY, {encoding}"), attributes, ..About::default() })
 }
 

@@ -21,6 +21,14 @@ const LOWEST: f64 = 0.5;
 /// they are random.
 const PART: f64 = 0.5;
 
+/// All neighbours of a point lie on a line with it if none is farther from the line to the farthest one than this part of the way to it.
+/// Of a surface with 16 neighbours none does, unless its scan lines lie as far apart as eight of their points.
+const LINE: f64 = 0.12;
+
+/// The disk of a point on a line has this part of its mean distance to [`RADIUS_NEIGHBOURS`] neighbours: three quarters of the spacing, where
+/// that is even.
+const PART_OF_LINE: f64 = 0.3;
+
 /// The largest radius of the disk of a lone position, in the unit of positions; None for one that has a surface around it, and where
 /// there are too few points to tell. `normal` gives the unit normal at a position, of any side; zero where it is not known.
 pub(crate) fn lone_radius(
@@ -29,20 +37,49 @@ pub(crate) fn lone_radius(
     normal: impl Fn(u32) -> DVec3,
 ) -> Option<f64> {
     let near = graph.of(index);
-    if near.len() < NORMAL_NEIGHBOURS {
-        return None;
-    }
-    let own = normal(index);
-    let on_surface = |(offset, other): (DVec3, &u32)| {
-        let other = normal(*other);
-        let low = LOWEST * offset.length();
-        let agrees = own.dot(other).abs() > ONE_SURFACE && other.dot(offset).abs() < low;
-        own.dot(offset).abs() < low && (agrees || other == DVec3::ZERO)
-    };
     let all = offsets(distinct, graph, index, near.len());
-    let beside = all.clone().zip(near).filter(|pair| on_surface(*pair)).count();
+    let around = all.clone().zip(near.iter().map(|other| normal(*other)));
     let mean = all.take(RADIUS_NEIGHBOURS).map(DVec3::length).sum::<f64>() / RADIUS_NEIGHBOURS as f64;
-    (beside <= MOST_BESIDE).then_some(PART * mean)
+    surroundings(normal(index), around).part().map(|part| part * mean)
+}
+
+/// What surrounds a point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Surroundings {
+    /// A surface, or too few neighbours to tell.
+    Surface,
+    /// A line: a wire, or one scan line without another beside it.
+    Line,
+    /// Points on all sides.
+    Volume,
+}
+
+impl Surroundings {
+    /// The part of the mean distance of neighbours that is the largest radius of a disk; None for any.
+    fn part(self) -> Option<f64> {
+        match self {
+            Self::Surface => None,
+            Self::Line => Some(PART_OF_LINE),
+            Self::Volume => Some(PART),
+        }
+    }
+}
+
+/// The surroundings of a point of this unit normal, by the offsets and the unit normals of its neighbours, the nearest first, of any side
+/// and zero where they are not known.
+pub(crate) fn surroundings(own: DVec3, around: impl Iterator<Item = (DVec3, DVec3)> + Clone) -> Surroundings {
+    let around = around.take(NORMAL_NEIGHBOURS);
+    let Some((farthest, _)) = around.clone().nth(NORMAL_NEIGHBOURS - 1) else { return Surroundings::Surface };
+    let most = (LINE * farthest.length_squared()).powi(2);
+    if around.clone().all(|(offset, _)| offset.cross(farthest).length_squared() <= most) {
+        return Surroundings::Line;
+    }
+    let on_surface = |(offset, other): &(DVec3, DVec3)| {
+        let low = LOWEST * offset.length();
+        let agrees = own.dot(*other).abs() > ONE_SURFACE && other.dot(*offset).abs() < low;
+        own.dot(*offset).abs() < low && (agrees || *other == DVec3::ZERO)
+    };
+    if around.filter(on_surface).count() <= MOST_BESIDE { Surroundings::Volume } else { Surroundings::Surface }
 }
 
 #[cfg(test)]
@@ -87,5 +124,19 @@ mod tests {
         let distinct = DistinctPositions::new(&positions, &bounds, DVec3::ZERO).unwrap();
         let graph = NeighbourGraph::new(&distinct, NORMAL_NEIGHBOURS, &());
         assert_eq!(lone_radius((&distinct, &graph), 0, |_| DVec3::Z), None);
+    }
+
+    #[test]
+    fn wires_are_lines_and_dense_scan_lines_are_not() {
+        let of = |spacing: [f64; 2]| {
+            let at = |k: i32| DVec3::new(spacing[0] * f64::from(k / 99 - 9), spacing[1] * f64::from(k % 99 - 49), 0.0);
+            let mut offsets: Vec<DVec3> = (0..19 * 99).map(at).filter(|offset| *offset != DVec3::ZERO).collect();
+            offsets.sort_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
+            surroundings(DVec3::Z, offsets.into_iter().map(|offset| (offset, DVec3::Z)))
+        };
+        assert_eq!([1.0, 3.0, 7.0, 12.0].map(|apart| of([apart, 1.0])), {
+            use Surroundings::{Line, Surface};
+            [Surface, Surface, Surface, Line]
+        });
     }
 }

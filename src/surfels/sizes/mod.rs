@@ -17,7 +17,7 @@ pub(crate) use self::cell::{RADIUS_NEIGHBOURS, cell_ellipse, open_radius};
 pub(crate) use self::ellipse::shape;
 use self::ellipse::{ELLIPSE_NEIGHBOURS, bounding_ellipse};
 pub(crate) use self::limit::local_limits;
-pub(crate) use self::lone::lone_radius;
+pub(crate) use self::lone::{Surroundings, lone_radius, surroundings};
 pub(crate) use self::qsplat::measure as measure_triangles;
 pub(crate) use self::rough::{Rough, grown};
 use super::estimate::NORMAL_NEIGHBOURS;

@@ -1,0 +1,86 @@
+//! The demands on the frames of one combination: the same bits however they are drawn, and the
+//! reference's values where it decides.
+
+use epsplat::frame::Frame;
+use epsplat::plan::{Accumulator, RenderOptions};
+use epsplat::scene::Map;
+
+/// Pixels with a fragment nearer to a yes-or-no decision than this are left to rounding.
+const DECIDED: f32 = 1e-4;
+
+/// How far values may lie apart, relative to one and to themselves.
+const APART: f32 = 3e-4;
+
+/// The same of painted surfels: coordinates on a texture err with the inverse square of the cosine at which a surfel is seen, as
+/// `tests/texture` bounds.
+const APART_OF_TEXTURES: f32 = 3e-3;
+
+/// The same of sums of 24 bits, of which weights of 2^-10 keep 14.
+const APART_OF_WORDS: f32 = 4e-3;
+
+/// All bits of a frame, by what they are of.
+fn parts(frame: &Frame, but: Option<Map>) -> Vec<(&'static str, Vec<u32>)> {
+    let color = frame.color.iter().flatten().map(|value| value.to_bits()).collect();
+    let maps = frame.maps();
+    let of_map = |map: Map| (map.row().name, frame.map(map).unwrap().iter().map(|value| value.to_bits()).collect());
+    [("color", color)].into_iter().chain(maps.iter().filter(|map| Some(*map) != but).map(of_map)).collect()
+}
+
+/// In how many values of what two frames differ, but for a map; empty if they are the same.
+pub fn bits_apart(one: &Frame, other: &Frame, but: Option<Map>) -> String {
+    let pairs = parts(one, but).into_iter().zip(parts(other, but));
+    let told = pairs.filter_map(|((name, a), (other_name, b))| {
+        assert_eq!((name, a.len()), (other_name, b.len()));
+        let each = a.len() / one.color.len();
+        let differing: Vec<usize> = (0..a.len()).filter(|&k| a[k] != b[k]).collect();
+        let first = *differing.first()?;
+        let (x, y) = (first / each % one.width as usize, first / each / one.width as usize);
+        let values = (f32::from_bits(a[first]), f32::from_bits(b[first]));
+        Some(format!("{} of {} values of {name} ({values:?} at {x},{y})", differing.len(), a.len()))
+    });
+    told.collect::<Vec<_>>().join(", ")
+}
+
+/// Pixels that the reference leaves to rounding.
+pub fn undecided(reference: &Frame) -> usize {
+    reference.map(Map::Decision).unwrap().iter().filter(|decision| **decision < DECIDED).count()
+}
+
+/// In which decided pixels `frame` is not what the `reference` says; empty if in none.
+pub fn wrong(frame: &Frame, reference: &Frame, options: &RenderOptions, painted: bool) -> String {
+    let decision = reference.map(Map::Decision).unwrap();
+    let of_words = matches!(options.accumulator, Accumulator::Fixed32 | Accumulator::Packed64);
+    let limit = match (of_words, painted) {
+        (true, _) => APART_OF_WORDS,
+        (false, true) => APART_OF_TEXTURES,
+        (false, false) => APART,
+    };
+    let near = |a: f32, b: f32| a == b || (b.is_finite() && (a - b).abs() <= limit * b.abs().max(1.0));
+    let shown = |[r, g, b, a]: [f32; 4]| [r * a, g * a, b * a, a];
+    let mut told = Vec::new();
+    let mut tell = |name: &str, pixels: Vec<usize>, values: &dyn Fn(usize) -> String| {
+        let Some(first) = pixels.first() else { return };
+        let place = (first % frame.width as usize, first / frame.width as usize);
+        told.push(format!("{} pixels of {name} ({} at {place:?})", pixels.len(), values(*first)));
+    };
+    let decided = |pixel: &usize| decision[*pixel] >= DECIDED;
+    let colors = |pixel: usize| (shown(frame.color[pixel]), shown(reference.color[pixel]));
+    let differs = |pixel: &usize| {
+        let (ours, theirs) = colors(*pixel);
+        ours.into_iter().zip(theirs).any(|(a, b)| !near(a, b))
+    };
+    let pixels = (0..decision.len()).filter(decided);
+    tell("color", pixels.clone().filter(differs).collect(), &|pixel| format!("{:?}", colors(pixel)));
+    // Which of two surfels weighs more is no decision of the map.
+    for map in frame.maps().iter().filter(|map| *map != Map::Index) {
+        let width = map.width();
+        let of = |frame: &Frame, pixel: usize| frame.map(map).unwrap()[pixel * width..(pixel + 1) * width].to_vec();
+        let differs = |pixel: &usize| {
+            let (ours, theirs) = (of(frame, *pixel), of(reference, *pixel));
+            ours.into_iter().zip(theirs).any(|(a, b)| !near(a, b))
+        };
+        let values = |pixel: usize| format!("{:?}", (of(frame, pixel), of(reference, pixel)));
+        tell(map.row().name, pixels.clone().filter(differs).collect(), &values);
+    }
+    told.join(", ")
+}

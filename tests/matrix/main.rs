@@ -1,0 +1,293 @@
+//! A random sample of the combinations of options, by a seed: shapes, colours, filters, samples,
+//! composites, joins, maps, accumulators and organisations. Each combination is drawn in every
+//! organisation and in another form (another order of surfels, small buffers, an adapter that lacks
+//! what can be lacked, optimisations left out), which must give the same bits; and it is compared
+//! with the f64 reference wherever that decides.
+//!
+//! `EPSPLAT_MATRIX_FRAMES` frames of the device are drawn, from the combination
+//! `EPSPLAT_MATRIX_SEED` on, whose number is its seed:
+//!
+//! ```text
+//! EPSPLAT_MATRIX_FRAMES=4000 EPSPLAT_MATRIX_SEED=1000 \
+//!   cargo test --release --test pictures matrix::every -- --nocapture
+//! ```
+//!
+//! Refused options are counted, by sentence, and others are drawn in their place.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod choices;
+mod judge;
+mod scenes;
+
+use std::collections::BTreeMap;
+
+use epsplat::frame::Frame;
+use epsplat::gpu::{Gpu, Sources};
+use epsplat::plan::{Accumulator, Facts, Organisation, RenderOptions, check};
+use epsplat::render::{Backend, render};
+use epsplat::scene::{Camera, Colors, Map, Maps, Scene};
+
+use crate::common;
+use common::Random;
+use scenes::Sampled;
+
+/// Frames of the device that the suite draws.
+const FRAMES: usize = 300;
+
+/// Views of each combination.
+const VIEWS: usize = 3;
+
+/// Combinations that are drawn before it is looked how many frames that were.
+const AT_ONCE: u64 = 8;
+
+/// Threads that draw.
+const WORKERS: usize = 2;
+
+/// Draws of options until some go together: one in a few does.
+const DRAWS: usize = 400;
+
+/// Devices: all that the adapter has, and what every WebGPU implementation has.
+struct Devices {
+    whole: Gpu,
+    core: Gpu,
+}
+
+/// A scene, a view and options that go together.
+struct Combination {
+    seed: u64,
+    sampled: Sampled,
+    options: RenderOptions,
+    random: Random,
+}
+
+/// The outcome of some combinations.
+#[derive(Default)]
+struct Tally {
+    combinations: usize,
+    frames: usize,
+    pixels: usize,
+    undecided: usize,
+    /// Options that were drawn, and those that were refused, by sentence.
+    drawn: usize,
+    refused: BTreeMap<String, usize>,
+    failures: Vec<String>,
+}
+
+impl Tally {
+    fn and(mut self, other: Self) -> Self {
+        self.combinations += other.combinations;
+        self.frames += other.frames;
+        self.pixels += other.pixels;
+        self.undecided += other.undecided;
+        self.drawn += other.drawn;
+        other.refused.into_iter().for_each(|(why, count)| *self.refused.entry(why).or_default() += count);
+        self.failures.extend(other.failures);
+        self
+    }
+
+    /// The counts, and each refusal with its share of all that was drawn.
+    fn print(&self) {
+        let refused: usize = self.refused.values().sum();
+        eprintln!(
+            "{} combinations, {} frames, {:.1} % of {} pixels left to rounding; {refused} of {} drawn options refused",
+            self.combinations,
+            self.frames,
+            100.0 * self.undecided as f64 / self.pixels.max(1) as f64,
+            self.pixels,
+            self.drawn,
+        );
+        let mut sorted: Vec<_> = self.refused.iter().collect();
+        sorted.sort_by_key(|(_, count)| std::cmp::Reverse(**count));
+        for (why, count) in sorted {
+            eprintln!("  {:6.2} %  {why}", 100.0 * *count as f64 / self.drawn.max(1) as f64);
+        }
+    }
+}
+
+fn checked(scene: &Scene, options: &RenderOptions) -> epsplat::Result<()> {
+    check::options(options, false)?;
+    check::scene(&Facts::of(scene), options, false)
+}
+
+/// The combination of a seed: options are drawn until some are accepted.
+fn combination(seed: u64, tally: &mut Tally) -> Option<Combination> {
+    let mut random = Random(seed);
+    let sampled = scenes::sampled(&mut random);
+    for _ in 0..DRAWS {
+        let options = choices::sampled(&sampled.scene, &mut random);
+        tally.drawn += 1;
+        match checked(&sampled.scene, &options) {
+            Ok(()) => return Some(Combination { seed, sampled, options, random }),
+            Err(why) => *tally.refused.entry(why.to_string()).or_default() += 1,
+        }
+    }
+    tally.failures.push(format!("seed {seed}: nothing goes with {:?}", sampled.about));
+    None
+}
+
+/// How else a combination is drawn.
+fn another_form(combination: &mut Combination, devices: &Devices) -> (&'static str, Scene, RenderOptions, Gpu) {
+    let Combination { sampled: Sampled { scene, .. }, options, random, .. } = combination;
+    let (scene, options, whole) = (scene.clone(), options.clone(), devices.whole.clone());
+    match random.below(5) {
+        0 => ("another order", scenes::shuffled(&scene, random), options, whole),
+        1 => ("small buffers", scene, options, whole.with_buffer_limit([300_000, 900_000][random.below(2)])),
+        2 => ("core WebGPU", scene, options, devices.core.clone()),
+        3 => {
+            let mut lacking = whole;
+            (lacking.adapter.subgroups, lacking.adapter.atomics_u64) = (random.one_in(2), random.one_in(2));
+            ("an adapter that lacks some", scene, options, lacking)
+        }
+        _ => ("no optimisations", scene, RenderOptions { without: choices::without(random), ..options }, whole),
+    }
+}
+
+/// Draws a combination in all its forms and views, and judges it.
+fn drawn(mut combination: Combination, devices: &Devices, sources: &Sources, tally: &mut Tally) {
+    let form = another_form(&mut combination, devices);
+    let views = views(&mut combination);
+    let Combination { seed, sampled: Sampled { scene, about, .. }, options, .. } = &combination;
+    let mut forms = vec![form];
+    for (name, organisation) in [("scatter", Organisation::Scatter), ("tile", Organisation::Tile)] {
+        let other = RenderOptions { organisation, ..options.clone() };
+        match checked(scene, &other) {
+            Ok(()) => forms.push((name, scene.clone(), other, devices.whole.clone())),
+            // Sums of one word are scattered alone.
+            Err(_) if options.accumulator != Accumulator::Fixed => {}
+            Err(why) => *tally.refused.entry(format!("by {name}: {why}")).or_default() += 1,
+        }
+    }
+    tally.combinations += 1;
+    for camera in &views {
+        let wrong = wrong((scene, camera, options), &forms, (&devices.whole, sources), tally);
+        if !wrong.is_empty() {
+            let size = (camera.width, camera.height, camera.projection);
+            let failure = format!("seed {seed}: {about:?}, {size:?}, {options:?}:\n    {}", wrong.join("\n    "));
+            // A long run tells it at once.
+            eprintln!("{failure}");
+            tally.failures.push(failure);
+            return;
+        }
+    }
+}
+
+/// The combination's view, and others that differ by parts of a pixel and a little in size: kernels are built once for all of them.
+fn views(combination: &mut Combination) -> Vec<Camera> {
+    let Combination { sampled: Sampled { camera, .. }, random, .. } = combination;
+    let mut another = || {
+        let [x, y, zoom] = [random.between(-3.0, 3.0), random.between(-3.0, 3.0), random.between(0.9, 1.1)];
+        Camera { cx: camera.cx + x, cy: camera.cy + y, fx: camera.fx * zoom, fy: camera.fy * zoom, ..camera.clone() }
+    };
+    let others: Vec<Camera> = (1..VIEWS).map(|_| another()).collect();
+    std::iter::once(camera.clone()).chain(others).collect()
+}
+
+/// What is wrong with a picture, drawn as it is and in other forms.
+fn wrong(
+    (scene, camera, options): (&Scene, &Camera, &RenderOptions),
+    forms: &[(&'static str, Scene, RenderOptions, Gpu)],
+    (whole, sources): (&Gpu, &Sources),
+    tally: &mut Tally,
+) -> Vec<String> {
+    let on = |gpu: &Gpu| Backend::Gpu { gpu: Box::new(gpu.clone()), sources: sources.clone() };
+    let frame = |scene: &Scene, options: &RenderOptions, backend: &Backend| -> Result<Frame, String> {
+        render(scene, camera, options, backend, &()).map(|(frame, _)| frame).map_err(|error| error.to_string())
+    };
+    let reference = RenderOptions { maps: options.maps.and(&[Map::Decision]), ..options.clone() };
+    let own = frame(scene, options, &on(whole));
+    let (own, reference) = match own.and_then(|own| Ok((own, frame(scene, &reference, &Backend::Reference)?))) {
+        Ok(both) => both,
+        Err(why) => return vec![why],
+    };
+    tally.frames += 1;
+    tally.pixels += own.color.len();
+    tally.undecided += judge::undecided(&reference);
+    let apart = judge::wrong(&own, &reference, options, matches!(scene.colors, Colors::Textured(_)));
+    let mut wrong = Vec::new();
+    wrong.extend((!apart.is_empty()).then(|| format!("reference: {apart}")));
+    for (name, scene, options, gpu) in forms {
+        // Numbers are those of another order.
+        let but = (*name == "another order").then_some(Map::Index);
+        tally.frames += 1;
+        match frame(scene, options, &on(gpu)) {
+            // Sums of other forms take atomics that an adapter may lack.
+            Err(why) if why.contains("which this adapter lacks") => {
+                *tally.refused.entry(format!("by {name}: {why}")).or_default() += 1;
+            }
+            Err(why) => wrong.push(format!("{name}: {why}")),
+            Ok(other) => {
+                let apart = judge::bits_apart(&own, &other, but);
+                wrong.extend((!apart.is_empty()).then(|| format!("{name}: {apart}")));
+            }
+        }
+    }
+    wrong
+}
+
+fn devices() -> Option<Devices> {
+    Some(Devices { whole: common::gpu()?, core: common::core_gpu()? })
+}
+
+/// The outcome of the combinations of `seeds`.
+fn of_seeds(seeds: &[u64], devices: &Devices) -> Tally {
+    let mut tally = Tally::default();
+    for seed in seeds {
+        if let Some(combination) = combination(*seed, &mut tally) {
+            drawn(combination, devices, &Sources::default(), &mut tally);
+        }
+    }
+    tally
+}
+
+fn number(name: &str, unless_given: u64) -> u64 {
+    std::env::var(name).map_or(unless_given, |text| text.parse().unwrap_or_else(|_| panic!("{name} is {text:?}")))
+}
+
+#[test]
+fn every_combination_is_drawn_alike_and_right() {
+    let Some(devices) = devices() else { return };
+    let frames = number("EPSPLAT_MATRIX_FRAMES", FRAMES as u64) as usize;
+    let mut seed = number("EPSPLAT_MATRIX_SEED", 1);
+    let (mut tally, devices) = (Tally::default(), &devices);
+    while tally.frames < frames {
+        let seeds: Vec<u64> = (seed..seed + AT_ONCE).collect();
+        // Threads of their own: those of a pool would take another render up while one waits.
+        let workers = seeds.chunks(AT_ONCE as usize / WORKERS).map(|seeds| move || of_seeds(seeds, devices));
+        let tallies = std::thread::scope(|scope| {
+            let running: Vec<_> = workers.map(|worker| scope.spawn(worker)).collect();
+            running.into_iter().map(|worker| worker.join().unwrap()).collect::<Vec<_>>()
+        });
+        tally = tallies.into_iter().fold(tally, Tally::and);
+        seed += AT_ONCE;
+    }
+    tally.print();
+    assert!(tally.failures.is_empty(), "{} failed:\n{}", tally.failures.len(), tally.failures.join("\n"));
+    assert!(tally.undecided * 4 < tally.pixels, "the reference decides too little");
+}
+
+/// Faults of the kind that the matrix is for are found in few combinations that could show them.
+#[test]
+fn a_fault_in_one_organisation_is_found() {
+    let Some(devices) = devices() else { return };
+    let curved = |of: &Combination| {
+        let filtered = of.options.low_pass == epsplat::scene::LowPass::Max && of.options.maps != Maps::NONE;
+        filtered && of.sampled.about.contains(&"caps") && of.sampled.scene.oriented
+    };
+    type Fits<'a> = &'a dyn Fn(&Combination) -> bool;
+    let faults: [(&str, &str, &str, Fits<'_>); 2] = [
+        ("tile_curved.wgsl", "if (FILTERED)", "if (false)", &curved),
+        ("covered.wgsl", "LIST_EMPTY != 0u ||", "false ||", &|of| of.options.maps.has(Map::TexZ)),
+    ];
+    for (file, from, to, fits) in faults {
+        let sources = Sources::default().replace(file, from, to).unwrap();
+        let found =
+            (0..4000).filter_map(|seed| combination(seed, &mut Tally::default())).filter(|of| fits(of)).take(24);
+        let is_found = found.into_iter().any(|of| {
+            let mut tally = Tally::default();
+            drawn(of, &devices, &sources, &mut tally);
+            !tally.failures.is_empty()
+        });
+        assert!(is_found, "{file}: {from}");
+    }
+}

@@ -132,6 +132,20 @@ fn each_backend_has_its_error_its_memory_and_its_ratio() {
     assert!(!outcome.study.machine.adapter.is_empty());
 }
 
+/// A page of a web site that stands where the report's would is no report.
+#[test]
+fn a_page_that_no_report_has_is_not_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, page) = (folder.path().join("small.toml"), folder.path().join("index.html"));
+    std::fs::write(&file, SCENES).unwrap();
+    std::fs::write(&page, "mine").unwrap();
+    let output = bench(&[file.to_str().unwrap(), "--quick", "--out", folder.path().to_str().unwrap()]);
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{stderr}");
+    assert!(stderr.contains("index.html is no report's") && stderr.contains("no results.csv beside it"), "{stderr}");
+    assert_eq!(std::fs::read_to_string(&page).unwrap(), "mine");
+}
+
 #[test]
 fn a_missed_limit_fails_after_everything_is_written() {
     let folder = tempfile::tempdir().unwrap();

@@ -58,6 +58,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let (read, written) = (definition.files(), report::FILES.map(|name| folder.join(name)));
         let read = read.iter().map(Source::cloud).chain([Source::other(&arguments.definition)]);
         outputs::check_distinct(read, &written)?;
+        let (there, missing): (Vec<_>, Vec<_>) = written.iter().partition(|file| file.exists());
+        if let (Some(foreign), Some(missing)) = (there.first(), missing.first()) {
+            let missing = missing.file_name().unwrap_or_default().display();
+            return Err(Error::Usage(format!(
+                "{} is no report's, as there is no {missing} beside it: name another folder for --out",
+                foreign.display()
+            )));
+        }
         atomic::try_folder(folder)?;
         written.iter().filter(|file| file.exists()).try_for_each(|file| atomic::try_output(file))?;
     }

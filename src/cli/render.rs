@@ -179,8 +179,8 @@ pub struct Arguments {
     /// Filter for splats near a pixel in size or below [default: none, of Gaussians gaussians]
     #[arg(long, value_enum)]
     lowpass: Option<LowPassName>,
-    /// Samples of a pixel: 1, 4, 8 or 16. Edges are as smooth as they are many; maps are of the pixel's centre
-    /// [default: 4, of Gaussians 1]
+    /// Samples of a pixel: 1, 4, 8 or 16. Edges are as smooth as they are many; maps are of the pixel's centre. They are averaged in
+    /// linear light, those of Gaussians as the codes that their files are trained to [default: 4, of Gaussians 1]
     #[arg(long, value_name = "N", help_heading = "Surface")]
     samples: Option<Samples>,
     /// auto: surfels that face away from the eye are left out where the scene is a closed mesh seen from outside, as nobody

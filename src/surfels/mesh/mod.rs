@@ -43,7 +43,8 @@ struct Made {
     s: DVec3,
     t: DVec3,
     clip: Clip,
-    look: Look,
+    /// None of a mesh that has no other colours than those of its vertices.
+    look: Option<Box<Look>>,
 }
 
 /// What the surfels of a mesh stand for.
@@ -127,7 +128,7 @@ fn at_triangles(facets: &[Option<Facet>], around: &Around, skin: Option<&Skin<'_
         let ends = around.ends(number, skin.is_none_or(|skin| skin.is_flat(number)));
         let mut made = facet.as_ref().map(|facet| triangles::surfels(number, facet, ends)).unwrap_or_default();
         for made in &mut made {
-            made.look = skin.map_or(Look::default(), |skin| skin.of_triangle(number, made.center));
+            made.look = skin.map(|skin| Box::new(skin.of_triangle(number, made.center)));
         }
         made
     };
@@ -146,8 +147,8 @@ fn at_vertices(
         let of_fan = |fan: Fan| {
             let normal = fan.seen_normal(faces.normals.as_ref());
             let mut made = surfels((vertex, normal), &fan, &points.positions, facets);
-            let look = skin.map_or(Look::default(), |skin| skin.of_fan(&fan));
-            made.iter_mut().for_each(|made| made.look = look);
+            let look = skin.map(|skin| skin.of_fan(&fan));
+            made.iter_mut().for_each(|made| made.look = look.map(Box::new));
             made
         };
         fans.into_iter().flat_map(of_fan).collect::<Vec<_>>()
@@ -157,15 +158,16 @@ fn at_vertices(
 
 /// `points`, one for each surfel, with the surfels' looks.
 fn dressed(mut points: Points, all: &[Made], painting: Painting) -> Points {
-    points.averaged = all.iter().filter(|made| made.look.averaged).count() as u64;
-    if all.iter().any(|made| made.look.color.is_some()) {
+    let look = |made: &Made| made.look.as_deref().copied().unwrap_or_default();
+    points.averaged = all.iter().filter(|made| look(made).averaged).count() as u64;
+    if all.iter().any(|made| look(made).color.is_some()) {
         let of_vertex = |index: usize| points.colors.as_ref().map_or(DEFAULT_COLOR, |colors| colors.linear(index));
-        let color = |(index, made): (usize, &Made)| made.look.color.unwrap_or_else(|| of_vertex(index));
+        let color = |(index, made): (usize, &Made)| look(made).color.unwrap_or_else(|| of_vertex(index));
         points.colors = Some(Colors::Linear(all.iter().enumerate().map(color).collect()));
     }
-    let is_placed = all.iter().any(|made| made.look.placed.is_some());
+    let is_placed = all.iter().any(|made| look(made).placed.is_some());
     if is_placed && (painting == Painting::Own || points.texture.is_none()) {
-        let placed = || all.iter().map(|made| made.look.placed);
+        let placed = || all.iter().map(|made| look(made).placed);
         points.texture = Some(placed().map(|placed| placed.map_or([0.0; 2], |placed| placed.center)).collect());
         points.texture_slopes = Some(placed().map(|placed| placed.map_or([[0.0; 3]; 2], |of| of.slopes)).collect());
         points.texture_numbers = Some(placed().map(|placed| placed.map_or(u32::MAX, |of| of.number)).collect());
@@ -227,7 +229,7 @@ fn surfels((vertex, normal): (u32, DVec3), fan: &Fan, positions: &[[f64; 3]], fa
         for (line, of_disk) in lines.iter().zip(&mut clip.0) {
             *of_disk = line.on_disk(major, minor, MARGIN * minor.length());
         }
-        Made { of: vertex, center, normal, s: world(major), t: world(minor), clip, look: Look::default() }
+        Made { of: vertex, center, normal, s: world(major), t: world(minor), clip, look: None }
     };
     cover::lines(fan, &corners, major.length()).into_iter().map(made).collect()
 }

@@ -9,7 +9,6 @@
 use glam::{DVec2, DVec3};
 
 use super::cover::Facet;
-use super::skin::Look;
 use super::{MARGIN, Made};
 use crate::io::Points;
 use crate::io::points::Faces;
@@ -77,5 +76,5 @@ fn surfel(number: u32, normal: DVec3, [a, b, c]: [DVec3; 3]) -> Option<Made> {
         Some(Clip::line(inward, inward.dot(from) - margin, [DVec2::X * s.length(), DVec2::Y * t.length()]))
     };
     let clip = Clip([line(b, c)?, line(c, a)?]);
-    Some(Made { of: number, center, normal, s, t, clip, look: Look::default() })
+    Some(Made { of: number, center, normal, s, t, clip, look: None })
 }

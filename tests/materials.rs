@@ -1,4 +1,5 @@
-//! Meshes whose colours are not on vertices: surfels look as triangles do, whichever way a file says what they look like.
+//! Meshes whose colours are not on vertices: surfels look as triangles do, whichever way a file
+//! says what they look like.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -50,7 +51,8 @@ fn seen(scene: &Scene, eye: DVec3) -> Frame {
     render(scene, &camera, &options, &Backend::Reference, &()).unwrap().0
 }
 
-/// The share of pixels that differ by more than a code or so in the picture of the surfels and in that of the triangles of a file.
+/// The share of pixels that differ by more than a code or so in the picture of the surfels and in
+/// that of the triangles of a file.
 fn apart(path: &Path, eye: DVec3) -> f64 {
     let [surfels, triangles] = [painted(path), as_triangles(path)].map(|scene| seen(&scene, eye));
     let covered = triangles.color.iter().filter(|color| color[3] > 0.5).count();
@@ -125,7 +127,8 @@ fn a_black_colour_with_an_image_is_black_and_told() {
     }
 }
 
-/// With seams, several images, colours without images, triangles without a material, and an image as BMP and TGA.
+/// With seams, several images, colours without images, triangles without a material, and an image
+/// as BMP and TGA.
 #[test]
 fn surfels_look_as_triangles_do() {
     let folder = Folder::new();
@@ -156,7 +159,8 @@ fn surfels_look_as_triangles_do() {
         format!("mtllib m.mtl\n{corners}{places}usemtl a\n{}", (0..6).map(|k| face(k, true)).collect::<String>());
     let colours_alone =
         format!("mtllib m.mtl\n{corners}{}usemtl red\n{}", face(1, false), face(5, false) + &face(3, false));
-    // A flat square of four triangles, of which each corner of the middle has another place: a seam on every side.
+    // A flat square of four triangles, of which each corner of the middle has another place: a seam
+    // on every side.
     let seams = "mtllib m.mtl\nv -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nv 0 0 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvt .2 .9\nvt .5 .5\n\
                  usemtl a\nf 1/1 2/2 5/3\nf 2/2 3/3 5/4\nf 3/4 4/1 5/5\nf 4/6 1/2 5/6\n";
     // Smooth: normals of its own at each corner.
@@ -195,7 +199,8 @@ fn surfels_look_as_triangles_do() {
     }
 }
 
-/// Where no image can be painted, surfels have its mean, which is told; a given image takes the place of all.
+/// Where no image can be painted, surfels have its mean, which is told; a given image takes the
+/// place of all.
 #[test]
 fn means_stand_for_images_and_given_ones_take_their_place() {
     let folder = Folder::new();

@@ -113,15 +113,17 @@ fn curve(h: ptr<function, Homography>, index: u32, center: array<Double, 3>, s: 
     return Cap(heights, spread_of(r, depth), r, depth, max(depths.x, held.near) * (1.0 - 1e-5));
 }
 
-// The first and last point of the image (xy, zw) that sheared boxes about a cap have in common, for which see the twin: of the disk p, s,
-// t whose centre moves between two heights along the normal, at these depths.
+// The first and last point of the image (xy, zw) that sheared boxes about a cap have in common, for
+// which see the twin: of the disk p, s, t whose centre moves between two heights along the normal,
+// at these depths.
 fn box_extent(h: Homography, disk: array<vec3<f32>, 5>, depths: vec2<f32>) -> vec4<f32> {
     let along_ray = sheared_extent(h, disk, depths, shear(disk[0]), h.centered);
     let straight = sheared_extent(h, disk, depths, vec2<f32>(0.0), false);
     return vec4<f32>(max(along_ray.xy, straight.xy), min(along_ray.zw, straight.zw));
 }
 
-// The extent of the box that is sheared along the ray (ratio, 1), which is the `centered` one's through its centre.
+// The extent of the box that is sheared along the ray (ratio, 1), which is the `centered` one's
+// through its centre.
 fn sheared_extent(
     h: Homography,
     disk: array<vec3<f32>, 5>,
@@ -265,9 +267,10 @@ fn is_away(splat: Splat, fragment: Fragment) -> bool {
     return fragment.spot.away;
 }
 
-// A depth in front of every fragment of the splat itself between the pixels `first` and `last`, from the anchor. A ray meets the plane of a
-// height h over the disk's plane at sigma = (h - W) / (D_w + spread W), which grows or falls with W, and with h, wherever the divisor keeps
-// its sign: so one of the four ends is the nearest.
+// A depth in front of every fragment of the splat itself between the pixels `first` and `last`,
+// from the anchor. A ray meets the plane of a height h over the disk's plane at sigma = (h - W) /
+// (D_w + spread W), which grows or falls with W, and with h, wherever the divisor keeps its sign:
+// so one of the four ends is the nearest.
 fn nearest_on(splat: Splat, first: vec2<f32>, last: vec2<f32>) -> f32 {
     let cap = splat.cap;
     let row = vec2<f32>(splat.c[0], splat.c[1]);

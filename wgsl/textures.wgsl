@@ -27,7 +27,8 @@ fn level_texel(level: Level, column: i32, row: i32) -> vec4<f32> {
     return premultiplied_of(textures[level.texels + u32(at.y * level.size.x + at.x)]);
 }
 
-// Premultiplied linear colour. Between the middles of texels interpolated, beyond [0, 1] repeated or clamped; origin bottom left.
+// Premultiplied linear colour. Between the middles of texels interpolated, beyond [0, 1] repeated
+// or clamped; origin bottom left.
 fn level_color(level: Level, place: vec2<f32>) -> vec4<f32> {
     let turns = vec2<f32>(place.x, 1.0 - place.y);
     let within = select(fract(turns), clamp(turns, vec2<f32>(0.0), vec2<f32>(1.0)), level.clamps);

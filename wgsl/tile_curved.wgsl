@@ -25,9 +25,11 @@ fn handed_bend(own: Bend, from_: u32) -> Bend {
     return Bend(handed_vector(own.u, from_), handed_vector(own.v, from_));
 }
 
-// Whether the splat has no fragment at `pixels`, which lie in its bounds. A ray meets the plane of a height h over the disk's plane where
-// (u, v) (D_w + spread W) = (U, V) D_w - W (D_u, D_v) + h N, N = (D_u, D_v) + spread (U, V): both sides are affine in the pixel. The cap
-// lies between its least and its largest height, so the side at the middle of these is off by half their difference times N at most.
+// Whether the splat has no fragment at `pixels`, which lie in its bounds. A ray meets the plane of
+// a height h over the disk's plane where (u, v) (D_w + spread W) = (U, V) D_w - W (D_u, D_v) + h N,
+// N = (D_u, D_v) + spread (U, V): both sides are affine in the pixel. The cap lies between its
+// least and its largest height, so the side at the middle of these is off by half their difference
+// times N at most.
 fn misses(splat: Splat, filter_: Filter, pixels: Rectangle) -> bool {
     let low = vec2<f32>(vec2<i32>(pixels.first) - vec2<i32>(splat.anchor_x, splat.anchor_y));
     let high = vec2<f32>(vec2<i32>(pixels.last) - vec2<i32>(splat.anchor_x, splat.anchor_y));
@@ -53,7 +55,8 @@ fn misses(splat: Splat, filter_: Filter, pixels: Rectangle) -> bool {
     let sideways = abs(along.x) + abs(along.y);
     at.slack += 4e-6 * (size.x + size.y) * (abs(along.z) + abs(middle) * spread)
         + 4e-6 * sideways * (size.z + abs(middle));
-    // Where a ray touches the cap its root is exact to the root of f32's precision: a thousandth is left for that.
+    // Where a ray touches the cap its root is exact to the root of f32's precision: a thousandth is
+    // left for that.
     return exceeds(at, 1.001 * (longest(scale) + 0.5 * (heights.y - heights.x) * longest(turn)))
         && filter_misses(filter_, low, high);
 }

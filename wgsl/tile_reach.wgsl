@@ -17,7 +17,8 @@ fn span(x: vec2<f32>, y: vec2<f32>, rest: vec2<f32>, low: vec2<f32>, high: vec2<
     return Span(x * middle.x + y * middle.y + rest, x * half.x, y * half.y, 4e-6 * (magnitude.x + magnitude.y));
 }
 
-// The longer of the ways from the middle to two corners: no value is farther from that of the middle, as the map is affine.
+// The longer of the ways from the middle to two corners: no value is farther from that of the
+// middle, as the map is affine.
 fn half_width(s: Span) -> f32 {
     let one = s.right + s.down;
     let other = s.right - s.down;

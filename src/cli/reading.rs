@@ -24,7 +24,8 @@ pub(super) struct InputFormat {
     /// The format of the inputs [default: what their names say, or else their first bytes]
     #[arg(long, value_name = "FORMAT", value_parser = formats())]
     input_format: Option<Format>,
-    /// Leave out the alphas of the inputs' colours, which some programs fill with something else; not the opacities of Gaussians
+    /// Leave out the alphas of the inputs' colours, which some programs fill with something else;
+    /// not the opacities of Gaussians
     #[arg(long)]
     ignore_alpha: bool,
 }
@@ -252,7 +253,8 @@ impl Reading {
         Ok(files)
     }
 
-    /// The points of some nodes of each of several files; what their colours mean is told by the first ones that are read with these `rules`.
+    /// The points of some nodes of each of several files; what their colours mean is told by the
+    /// first ones that are read with these `rules`.
     pub(super) fn nodes<'a>(
         &self,
         files: impl Iterator<Item = (&'a mut Copc, &'a Vec<usize>)>,

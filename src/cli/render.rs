@@ -67,7 +67,8 @@ pub struct Arguments {
     /// Meshes whose triangles are drawn as they are, beside the surfels, whose files come before, or alone: .obj or .ply
     #[arg(long, value_name = "MESH", num_args = 1.., help_heading = "Triangles")]
     triangles: Vec<PathBuf>,
-    /// An image to paint the meshes with none of whose materials has one, by their texture coordinates: .png, .jpg, .bmp or .tga
+    /// An image to paint the meshes with none of whose materials has one, by their texture
+    /// coordinates: .png, .jpg, .bmp or .tga
     #[arg(long, value_name = "IMAGE", help_heading = "Triangles")]
     triangle_texture: Option<PathBuf>,
     /// What shows where surfels meet triangles: corrected (the nearer one, surfels by the depth that they blend to), nearest (the nearer
@@ -82,7 +83,8 @@ pub struct Arguments {
     pub(super) reading: Reading,
     #[command(flatten)]
     limits: LimitArguments,
-    /// Measure the surfels anew, as `epsplat surfels --size HOW` does: knn, ellipse, bsp, qsplat and others
+    /// Measure the surfels anew, as `epsplat surfels --size HOW` does: knn, ellipse, bsp, qsplat
+    /// and others
     #[arg(long, value_name = "HOW", conflicts_with_all = ["facing", "separate", "textures"])]
     surfel_size: Option<Size>,
     /// The image: .png (8-bit sRGB) or .exr (linear f32, every map a layer); with --cameras the folder of the images
@@ -179,8 +181,9 @@ pub struct Arguments {
     /// Filter for splats near a pixel in size or below [default: none, of Gaussians gaussians]
     #[arg(long, value_enum)]
     lowpass: Option<LowPassName>,
-    /// Samples of a pixel: 1, 4, 8 or 16. Edges are as smooth as they are many; maps are of the pixel's centre. They are averaged in
-    /// linear light, those of Gaussians as the codes that their files are trained to [default: 4, of Gaussians 1]
+    /// Samples of a pixel: 1, 4, 8 or 16. Edges are as smooth as they are many; maps are of the
+    /// pixel's centre. They are averaged in linear light, those of Gaussians as the codes that
+    /// their files are trained to [default: 4, of Gaussians 1]
     #[arg(long, value_name = "N", help_heading = "Surface")]
     samples: Option<Samples>,
     /// auto: surfels that face away from the eye are left out where the scene is a closed mesh seen from outside, as nobody
@@ -210,8 +213,9 @@ pub struct Arguments {
     /// Exponent of the highlights of --shading phong, 1 to 1000: the higher, the smaller they are [default: 32]
     #[arg(long, value_name = "EXPONENT")]
     shininess: Option<f32>,
-    /// An image to paint the surfels with, by their texture coordinates (`epsplat sample` writes them), in place of their own
-    /// colours: .png, .jpg, .bmp or .tga. Given again it is the next input's, or that of the next number (texnumber) of an input's points
+    /// An image to paint the surfels with, by their texture coordinates (`epsplat sample` writes
+    /// them), in place of their own colours: .png, .jpg, .bmp or .tga. Given again it is the next
+    /// input's, or that of the next number (texnumber) of an input's points
     #[arg(long = "texture", value_name = "IMAGE")]
     textures: Vec<PathBuf>,
     /// Draw a cut of levels of detail: nodes that are seen smaller than this in place of the surfels below them. Square pixels, 16px, or a part of

@@ -1,12 +1,14 @@
 //! What programs call the attributes of points, in PLY and PCD files alike.
 //!
-//! The names are those that these programs write, or read as such: PDAL (`normalx`, `intensity`, `red` of 16 bits), CloudCompare
-//! (`scalar_` before the name of a scalar field), the Point Cloud Library (`normal_x`, `rgb`, `rgba`, `intensity`), Open3D
-//! (`normal_x` and `rgb` in PCD), MeshLab (`nx`, `red`, `quality`, `radius`, `texture_u`), Blender (`s`, `t`), Houdini (`Cd`, `N`,
-//! `pscale`), Stanford's scans (`diffuse_red`, `confidence`, `intensity`), 3D Gaussian splatting (`nxx ny nz`), and CGAL, Agisoft
-//! and Metashape with names of these.
+//! The names are those that these programs write, or read as such: PDAL (`normalx`, `intensity`,
+//! `red` of 16 bits), CloudCompare (`scalar_` before the name of a scalar field), the Point Cloud
+//! Library (`normal_x`, `rgb`, `rgba`, `intensity`), Open3D (`normal_x` and `rgb` in PCD), MeshLab
+//! (`nx`, `red`, `quality`, `radius`, `texture_u`), Blender (`s`, `t`), Houdini (`Cd`, `N`,
+//! `pscale`), Stanford's scans (`diffuse_red`, `confidence`, `intensity`), 3D Gaussian splatting
+//! (`nxx ny nz`), and CGAL, Agisoft and Metashape with names of these.
 //!
-//! Capitals make no difference, but a name that is written as here comes first; `scalar_` before a name is left out.
+//! Capitals make no difference, but a name that is written as here comes first; `scalar_` before a
+//! name is left out.
 
 /// The names of each channel of a colour.
 pub(super) const COLOR: [&[&str]; 3] = [
@@ -159,7 +161,8 @@ pub(super) const NORMAL_VECTOR: &[&str] = &["normal", "normals", "N"];
 #[cfg(feature = "pcd")]
 pub(super) const COLOR_VECTOR: &[&str] = &["rgb", "rgba", "color", "colors", "colour", "Cd", "Col"];
 
-/// The first of `names` that is among `given`: as it is written, or else in capitals or without them, or else after `scalar_`.
+/// The first of `names` that is among `given`: as it is written, or else in capitals or without
+/// them, or else after `scalar_`.
 pub(super) fn find<'a>(names: &[&str], given: impl Iterator<Item = &'a str> + Clone) -> Option<usize> {
     let first =
         |is: &dyn Fn(&str, &str) -> bool| names.iter().find_map(|name| given.clone().position(|given| is(given, name)));
@@ -174,7 +177,8 @@ pub(super) fn find<'a>(names: &[&str], given: impl Iterator<Item = &'a str> + Cl
 
 /// The three of which each has a name of its list.
 pub(super) fn find_triple<'a>(names: [&[&str]; 3], given: impl Iterator<Item = &'a str> + Clone) -> Option<[usize; 3]> {
-    // Three that are called alike come first: a file may have `nx ny nz` and `normal_x` of something else.
+    // Three that are called alike come first: a file may have `nx ny nz` and `normal_x` of
+    // something else.
     let alike = (0..names[0].len()).find_map(|k| {
         let one = |channel: usize| find(names[channel].get(k..=k)?, given.clone());
         Some([one(0)?, one(1)?, one(2)?])

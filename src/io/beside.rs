@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub(super) struct Beside {
     folder: PathBuf,
-    /// Of each folder its entries by their names in lower case; of several in one case the first by its name.
+    /// Of each folder its entries by their names in lower case; of several in one case the first by
+    /// its name.
     listed: HashMap<PathBuf, HashMap<String, PathBuf>>,
 }
 
@@ -18,8 +19,8 @@ impl Beside {
         Self { folder: path.parent().unwrap_or(Path::new("")).to_owned(), listed: HashMap::new() }
     }
 
-    /// The file that is called `name`, which may be written as Windows does: with backslashes, and in another case than on
-    /// the disk. Where there is none, the path of the name as it is.
+    /// The file that is called `name`, which may be written as Windows does: with backslashes, and
+    /// in another case than on the disk. Where there is none, the path of the name as it is.
     pub(super) fn file(&mut self, name: &str) -> PathBuf {
         let name = name.replace('\\', "/");
         let as_written = self.folder.join(&name);

@@ -6,8 +6,8 @@ const TOO_HIGH: f64 = 50.0;
 /// Positions this many times farther from the origin than they are wide are no object about it.
 const FAR: f64 = 3.0;
 
-/// A sentence if the box of points looks like degrees of longitude and latitude with heights in metres, or if a coordinate system
-/// says so (`geographic`).
+/// A sentence if the box of points looks like degrees of longitude and latitude with heights in
+/// metres, or if a coordinate system says so (`geographic`).
 pub(super) fn hint(name: &str, [min, max]: [[f64; 3]; 2], geographic: Option<bool>) -> Option<String> {
     let extent = [0, 1, 2].map(|axis| max[axis] - min[axis]);
     let wide = extent[0].max(extent[1]);

@@ -18,9 +18,11 @@ const MOST_ATTRIBUTES: usize = 64;
 
 /// Reads the points of all scans of an E57 file, in the file's own system: each scan's pose is applied, in f64.
 ///
-/// Coordinates are Cartesian or, where a scan has none, spherical; points that are marked as invalid are left out. Normals, if any
-/// scan has the extension `nor` for them, are turned with its pose, and zero where it has none. Colours are sRGB codes, in the range that the scan
-/// gives or else its type, unless the values say otherwise ([`RawColors`]). The intensities of scans without colours become grey. Up is z.
+/// Coordinates are Cartesian or, where a scan has none, spherical; points that are marked as
+/// invalid are left out. Normals, if any scan has the extension `nor` for them, are turned with its
+/// pose, and zero where it has none. Colours are sRGB codes, in the range that the scan gives or
+/// else its type, unless the values say otherwise ([`RawColors`]). The intensities of scans without
+/// colours become grey. Up is z.
 ///
 /// A scan that has no points or cannot be read is left out, and told by [`Points::unread`], if
 /// another one can be read and [`ReadOptions::strict`] is not said.
@@ -388,7 +390,8 @@ fn pose(scan: &PointCloud) -> Result<(DQuat, DVec3), Fault> {
     Ok((rotation.normalize(), DVec3::new(t.x, t.y, t.z)))
 }
 
-/// Smallest and largest values of a scan's colours: those it gives, or else those of their types; floats have none.
+/// Smallest and largest values of a scan's colours: those it gives, or else those of their types;
+/// floats have none.
 fn limits(scan: &PointCloud, color: [usize; 3]) -> Option<[(f64, f64); 3]> {
     let limits = scan.color_limits.as_ref();
     let given = [

@@ -39,7 +39,8 @@ pub fn check_room(path: &Path, bytes: u64) -> Result<()> {
     room.map_err(|_| Error::read(path, std::io::ErrorKind::OutOfMemory.into()))
 }
 
-/// Makes sure that a file that is named by another one is a file: a pipe or a device may have no end.
+/// Makes sure that a file that is named by another one is a file: a pipe or a device may have no
+/// end.
 ///
 /// # Errors
 ///
@@ -90,12 +91,13 @@ fn opened(path: &Path, format: Option<ImageFormat>) -> Result<Opened> {
     Ok((reader, Box::new(unreadable)))
 }
 
-/// Decodes the image at `path`, a PNG, or without a `format` one that surfaces are painted with, by its first bytes or its name. `each` is how many bytes a pixel
-/// what is made of it will take.
+/// Decodes the image at `path`, a PNG, or without a `format` one that surfaces are painted with, by
+/// its first bytes or its name. `each` is how many bytes a pixel what is made of it will take.
 ///
 /// # Errors
 ///
-/// [`Error::Read`] where the system cannot read, [`Error::Malformed`] for what is no such image or too large.
+/// [`Error::Read`] where the system cannot read, [`Error::Malformed`] for what is no such image or
+/// too large.
 pub(super) fn decode(path: &Path, format: Option<ImageFormat>, each: u64) -> Result<DynamicImage> {
     let (reader, unreadable) = opened(path, format)?;
     let decoder = reader.into_decoder().map_err(&unreadable)?;

@@ -26,7 +26,8 @@ pub struct Mesh {
     pub colors: Option<Colors>,
     /// One linear colour with straight alpha for each triangle, where vertices have none.
     pub face_colors: Option<Vec<[f32; 4]>>,
-    /// Texture coordinates (u, v) for each corner of each triangle, origin bottom left; not a number for triangles without.
+    /// Texture coordinates (u, v) for each corner of each triangle, origin bottom left; not a
+    /// number for triangles without.
     pub texture: Option<Vec<[[f32; 2]; 3]>>,
     /// What triangles may be made of.
     pub materials: Vec<Material>,
@@ -169,8 +170,8 @@ impl Mesh {
         (textures.all, numbers)
     }
 
-    /// Texture coordinates on a triangle, by its index, at the point with these corner weights, whose sum is 1; if the
-    /// triangle has any.
+    /// Texture coordinates on a triangle, by its index, at the point with these corner weights,
+    /// whose sum is 1; if the triangle has any.
     pub fn texture_at(&self, triangle: usize, weights: DVec3) -> Option<[f32; 2]> {
         let [a, b, c] = self.texture.as_ref()?.get(triangle)?.map(|[u, v]| DVec2::new(u.into(), v.into()));
         let place = (a * weights.x + b * weights.y + c * weights.z).as_vec2();

@@ -93,8 +93,8 @@ pub fn read_with(path: &Path, options: ReadOptions, progress: &dyn Progress) -> 
     Ok(points)
 }
 
-/// Reads the points of a file whose colours stay as the file has them ([`Points::raw`]): [`settle_colors`] settles what they mean,
-/// by all inputs of a scene together.
+/// Reads the points of a file whose colours stay as the file has them ([`Points::raw`]):
+/// [`settle_colors`] settles what they mean, by all inputs of a scene together.
 ///
 /// # Errors
 ///

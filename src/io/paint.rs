@@ -8,15 +8,16 @@ use crate::scene::color::DEFAULT_COLOR;
 /// Colours and images of triangles.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Paint {
-    /// The linear colour of each, straight alpha: its own, or its material's, with which its image is multiplied. Where a
-    /// triangle has no image, the colours of its vertices hide it. None where no triangle has any.
+    /// The linear colour of each, straight alpha: its own, or its material's, with which its image
+    /// is multiplied. Where a triangle has no image, the colours of its vertices hide it. None
+    /// where no triangle has any.
     pub colors: Vec<[f32; 4]>,
     /// The images of the materials, each once.
     pub textures: Vec<Arc<Texture>>,
     /// Which of them each triangle has; [`u32::MAX`] means none. None where no triangle has any.
     pub numbers: Vec<u32>,
-    /// The corners' texture coordinates, origin bottom left; not a number for triangles without. None where no triangle has
-    /// any.
+    /// The corners' texture coordinates, origin bottom left; not a number for triangles without.
+    /// None where no triangle has any.
     pub places: Vec<[[f32; 2]; 3]>,
 }
 

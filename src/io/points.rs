@@ -31,7 +31,8 @@ pub struct Points {
     pub caps: Option<Vec<Cap>>,
     /// Colours, [`Colors::Srgb8`], [`Colors::Linear`] or [`Colors::Harmonics`].
     pub colors: Option<Colors>,
-    /// Colours and intensities as the file has them, until [`settle_colors`](super::settle_colors) makes [`colors`](Self::colors) of them.
+    /// Colours and intensities as the file has them, until [`settle_colors`](super::settle_colors)
+    /// makes [`colors`](Self::colors) of them.
     pub raw: Option<Box<RawColors>>,
     /// They are Gaussians, whose colours are codes of sRGB ([`Scene::encoded`](crate::scene::Scene::encoded)).
     pub encoded: bool,
@@ -70,7 +71,8 @@ pub struct Points {
     pub loose: u64,
     /// Triangles of a mesh that were left out, as a corner is nowhere that is drawn.
     pub broken: u64,
-    /// Vertices of a mesh that were left out, as their triangles have no area, or a corner that is nowhere.
+    /// Vertices of a mesh that were left out, as their triangles have no area, or a corner that is
+    /// nowhere.
     pub stranded: u64,
     /// Surfels of a mesh that have the mean of an image over them.
     pub averaged: u64,
@@ -81,10 +83,11 @@ pub struct Points {
     pub left_out: Vec<u64>,
     /// The number of the point of the file that each one is, where several are one; they start at 0.
     pub numbers: Option<Vec<u32>>,
-    /// What the reader found odd in the file, what belongs to them and could not be read, or looks other than somebody may expect, a
-    /// sentence each.
+    /// What the reader found odd in the file, what belongs to them and could not be read, or looks
+    /// other than somebody may expect, a sentence each.
     pub notes: Vec<String>,
-    /// What the file says of itself, if [`ReadOptions::describe`](super::ReadOptions::describe) asks for it.
+    /// What the file says of itself, if [`ReadOptions::describe`](super::ReadOptions::describe)
+    /// asks for it.
     pub about: Option<Box<About>>,
 }
 

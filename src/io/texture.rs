@@ -7,13 +7,14 @@ use crate::error::{Error, Result};
 pub use crate::scene::Texture;
 
 impl Texture {
-    /// Reads a PNG, JPEG, BMP or TGA file, whatever its name ends in, but for TGA, which nothing but its name tells; of
-    /// 16-bit values the upper byte counts.
+    /// Reads a PNG, JPEG, BMP or TGA file, whatever its name ends in, but for TGA, which nothing
+    /// but its name tells; of 16-bit values the upper byte counts.
     ///
     /// # Errors
     ///
-    /// [`Error::Read`] where the system cannot read or has no memory for it, [`Error::Malformed`] for what is none of these, is no file
-    /// but a device or a pipe, or has more than [`MOST_PIXELS`](image::MOST_PIXELS).
+    /// [`Error::Read`] where the system cannot read or has no memory for it, [`Error::Malformed`]
+    /// for what is none of these, is no file but a device or a pipe, or has more than
+    /// [`MOST_PIXELS`](image::MOST_PIXELS).
     pub fn read(path: &Path) -> Result<Self> {
         image::check_file(path)?;
         // Four bytes, which become the texel.

@@ -34,7 +34,8 @@ impl Numbers {
         if known.is_none() {
             alike.push(number);
         }
-        // Kept even if another one stands for it: what is at a place must stay there as long as the place is known.
+        // Kept even if another one stands for it: what is at a place must stay there as long as the
+        // place is known.
         self.by_place.insert(place, number);
         if known.is_none() {
             self.all.push(texture.clone());
@@ -54,8 +55,8 @@ pub(super) struct Images {
 }
 
 impl Images {
-    /// The image of a file, which is decoded if neither it nor a copy of it was before; its edges go on if it `clamps`. None
-    /// of one that cannot be read, which `notes` say once.
+    /// The image of a file, which is decoded if neither it nor a copy of it was before; its edges
+    /// go on if it `clamps`. None of one that cannot be read, which `notes` say once.
     ///
     /// # Errors
     ///

@@ -7,8 +7,8 @@ use std::sync::LazyLock;
 /// What some editors begin UTF-8 text with; it belongs to no word.
 pub(super) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// The text of bytes in UTF-8, or where it begins with the byte order mark of UTF-16 in that, without its mark: some
-/// editors, and redirections on Windows, write one.
+/// The text of bytes in UTF-8, or where it begins with the byte order mark of UTF-16 in that,
+/// without its mark: some editors, and redirections on Windows, write one.
 ///
 /// # Errors
 ///

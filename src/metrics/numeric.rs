@@ -64,7 +64,8 @@ pub struct MapError {
     pub in_one: u64,
     /// Largest absolute difference, over pixels of which neither of these is said.
     pub max_abs: f64,
-    /// [`max_abs`](Self::max_abs) as a fraction of the range; 1 for any error where B's values are all 0.
+    /// [`max_abs`](Self::max_abs) as a fraction of the range; 1 for any error where B's values are
+    /// all 0.
     pub max_of_range: f64,
     /// [`max_of_range`](Self::max_of_range) over the pixels that are not excused; only if there is a `decision` map.
     #[serde(skip_serializing_if = "Option::is_none")]

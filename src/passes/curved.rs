@@ -73,9 +73,10 @@ impl Seen {
         self.cap.extremes().map(|height| normal * height)
     }
 
-    /// The first and last point of the image that the cap can touch past the near depth, pixels: what boxes around it, each sheared along
-    /// a ray, have in common. Along the ray through the centre a box is tight, but beside the eye that ray is nearly across the axis, and
-    /// such a box fills the image. Along the axis it does not.
+    /// The first and last point of the image that the cap can touch past the near depth, pixels:
+    /// what boxes around it, each sheared along a ray, have in common. Along the ray through the
+    /// centre a box is tight, but beside the eye that ray is nearly across the axis, and such a box
+    /// fills the image. Along the axis it does not.
     pub fn extent(&self, camera: &Camera) -> [DVec2; 2] {
         let focal = DVec2::new(camera.fx, camera.fy);
         let image = |point: DVec2| point * focal + DVec2::new(camera.cx, camera.cy);
@@ -106,7 +107,8 @@ impl Seen {
         [of(self.p) - half + a.min(b), of(self.p) + half + a.max(b)]
     }
 
-    /// The least and the largest (X/Z, Y/Z) of the box that is sheared along the ray (`ratio`, 1), at these depths.
+    /// The least and the largest (X/Z, Y/Z) of the box that is sheared along the ray (`ratio`, 1),
+    /// at these depths.
     fn seen_around(&self, ratio: DVec2, [near, far]: [f64; 2]) -> [DVec2; 2] {
         let seen = |[low, high]: [f64; 2], ratio: f64| {
             [low / if low < 0.0 { near } else { far } + ratio, high / if high > 0.0 { near } else { far } + ratio]
@@ -240,7 +242,8 @@ mod tests {
     use crate::scene::{Lens, LowPass, Surfel};
     use glam::{DMat3, Vec3};
 
-    /// Pixels within the bounds of caps all around an eye, of all heights or flat; each that shows the cap lies within them.
+    /// Pixels within the bounds of caps all around an eye, of all heights or flat; each that shows
+    /// the cap lies within them.
     fn pixels_in_bounds(height: f64) -> u64 {
         let size = 48;
         let camera = Camera::posed((size, size), Lens::Fov(75.0), DVec3::ZERO, DMat3::IDENTITY, 1e-3).unwrap();

@@ -23,8 +23,9 @@
 //! other ends than above, and those that are long for their area and their depths, `L^2 / 2A (z_max - z_min) / z_min > 4`, as parts err
 //! by `2^-23 L^2 / 2A`; and those for which that is an eighth or more, `2A < 1e-6 L^2`, whose parts would be anybody's. So do those of the attribute pass, which is as exact for all.
 //!
-//! **Far corners**: f32 relative to the scene's origin has too few digits for a mesh far from it. Such
-//! scenes keep two f32 a coordinate (`vertex_doubled.wgsl`); others have neither the words nor the code.
+//! **Far corners**: f32 relative to the scene's origin has too few digits for a mesh far from it.
+//! Such scenes keep two f32 a coordinate (`vertex_doubled.wgsl`); others have neither the words nor
+//! the code.
 //!
 //! **The nearest** one is an atomic maximum of its depth, as what its bits lack to those of +inf, and of its number: the order of
 //! [`Triangles`](crate::scene::Triangles) depends on no order in files, so neither does any bit of the image. By the rasteriser, for

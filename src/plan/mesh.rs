@@ -137,8 +137,9 @@ impl MeshNeeds {
 /// The bit of a width that says that edges go on beyond [0, 1]. No image is so wide.
 const CLAMPS: u32 = 1 << 31;
 
-/// The words of textures on a device: where each one's head is, then the heads, the number of levels and of each its width, its height and where
-/// its texels are, then the texels. A width has `CLAMPS` beside it where the edges of the image go on.
+/// The words of textures on a device: where each one's head is, then the heads, the number of
+/// levels and of each its width, its height and where its texels are, then the texels. A width has
+/// `CLAMPS` beside it where the edges of the image go on.
 pub fn texture_words(textures: &[&Mipmap]) -> Vec<u32> {
     let mut words = vec![0; textures.len()];
     for (number, mipmap) in textures.iter().enumerate() {

@@ -27,7 +27,8 @@ impl Texture {
         (count > 0 && count == texels.len() as u64).then_some(Self { width, height, texels, clamps: false })
     }
 
-    /// The same image, whose edges go on beyond [0, 1] if it `clamps`, and which else is repeated there.
+    /// The same image, whose edges go on beyond [0, 1] if it `clamps`, and which else is repeated
+    /// there.
     #[must_use]
     pub fn clamped(self, clamps: bool) -> Self {
         Self { clamps, ..self }
@@ -63,9 +64,10 @@ impl Texture {
         &self.texels
     }
 
-    /// The colour at texture coordinates (u, v), origin bottom left: linear RGB premultiplied by alpha, and alpha. Between the
-    /// middles of texels it is interpolated; beyond [0, 1] the image is repeated, or its edges go on where it
-    /// [clamps](Self::clamped). The twin of `level_color` in `wgsl/textures.wgsl`.
+    /// The colour at texture coordinates (u, v), origin bottom left: linear RGB premultiplied by
+    /// alpha, and alpha. Between the middles of texels it is interpolated; beyond [0, 1] the image
+    /// is repeated, or its edges go on where it [clamps](Self::clamped). The twin of `level_color`
+    /// in `wgsl/textures.wgsl`.
     pub fn premultiplied_at(&self, [u, v]: [f64; 2]) -> [f64; 4] {
         // What is not a number has no place; that of 0 serves.
         let place = |turns: f64, size: u32| {

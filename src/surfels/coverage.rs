@@ -30,7 +30,8 @@ const MOST_ASLANT: usize = 50_000;
 /// Lines of sight aslant, from as many sides of a surfel.
 const SIDES: usize = 4;
 
-/// Directions in which there has to be a surfel next to a place, so that it lies among them and not past an outline.
+/// Directions in which there has to be a surfel next to a place, so that it lies among them and not
+/// past an outline.
 const OUTWARD: usize = 8;
 
 /// The sine of the angle under which a disk has to be seen to close a gap: 3 degrees.
@@ -46,10 +47,12 @@ pub struct Coverage {
     /// Surfels around which a gap is open: on the way to a corner of a centre's Voronoi cell, in the surfel's plane, is a place that
     /// neither its own disk nor one of its 32 nearest neighbours' reaches. Past a line at which the disk ends nothing is to be reached. At a ragged boundary such a place may lie outside.
     pub open: u64,
-    /// Surfels that no surface surrounds, such as those of leaves and wires: of them nothing is said.
+    /// Surfels that no surface surrounds, such as those of leaves and wires: of them nothing is
+    /// said.
     pub lone: u64,
-    /// The share of the surfels that a surface surrounds around which no gap is open to eyes that look along [`ASLANT`] degrees over the surfel's plane, from any of
-    /// four sides; measured at 50,000 positions. Disks are taken as flat.
+    /// The share of the surfels that a surface surrounds around which no gap is open to eyes that
+    /// look along [`ASLANT`] degrees over the surfel's plane, from any of four sides; measured at
+    /// 50,000 positions. Disks are taken as flat.
     pub covered_aslant: f64,
 }
 
@@ -200,9 +203,10 @@ impl<'a, 'n, At: Fn(u32) -> &'a [(&'a Surfel, Clip)]> Gaps<'a, 'n, At> {
         })
     }
 
-    /// Whether an eye that looks against `sight`, a unit vector, sees past all disks in a corner of the cell that the surfels have as
-    /// they lie in the image: each is moved along the line of sight into the own one's plane. Corners count that lie among surfels
-    /// that face the eye; others may lie past an outline.
+    /// Whether an eye that looks against `sight`, a unit vector, sees past all disks in a corner of
+    /// the cell that the surfels have as they lie in the image: each is moved along the line of
+    /// sight into the own one's plane. Corners count that lie among surfels that face the eye;
+    /// others may lie past an outline.
     fn is_open_along(&self, sight: DVec3) -> bool {
         let scale = self.distinct.scale();
         let into_plane = |offset: DVec3| offset - sight * (offset.dot(self.normal) / sight.dot(self.normal));
@@ -273,7 +277,8 @@ fn reaches((surfel, clip): (&Surfel, Clip), offset: DVec3) -> bool {
     within && at.length() <= 1.0 + ROUNDING && clip.inside(at.x, at.y) >= -ROUNDING
 }
 
-/// Whether the line along `sight` through the point at `offset` from the disk's centre meets the disk.
+/// Whether the line along `sight` through the point at `offset` from the disk's centre meets the
+/// disk.
 fn meets((surfel, clip): (&Surfel, Clip), offset: DVec3, sight: DVec3) -> bool {
     let normal = side(&(surfel, clip));
     let slope = sight.dot(normal);

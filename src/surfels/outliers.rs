@@ -38,10 +38,10 @@ pub(crate) fn drop_outliers(
     dropped
 }
 
-/// Which positions are no outliers: those whose mean distance to their neighbours is at most the mean of that over all
-/// positions plus `deviations` of its standard deviations (Rusu et al. 2008, "Towards 3D point cloud based object maps
-/// for household environments", section 3.1). The mean of equal distances may be rounded below them:
-/// none of them is an outlier.
+/// Which positions are no outliers: those whose mean distance to their neighbours is at most the
+/// mean of that over all positions plus `deviations` of its standard deviations (Rusu et al. 2008,
+/// "Towards 3D point cloud based object maps for household environments", section 3.1). The mean of
+/// equal distances may be rounded below them: none of them is an outlier.
 fn inliers(distances: &[f64], deviations: f64) -> Vec<bool> {
     // One after the other, so that the sums' rounding is the same for any number of threads.
     let count = distances.len() as f64;

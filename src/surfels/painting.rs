@@ -20,7 +20,8 @@ const MOST: u64 = 1024;
 ///
 /// # Errors
 ///
-/// [`Error::Usage`] if there are more or fewer textures than that, or no input has texture coordinates.
+/// [`Error::Usage`] if there are more or fewer textures than that, or no input has texture
+/// coordinates.
 pub(super) fn number(inputs: &mut [Points], textures: usize) -> Result<()> {
     let bare = bare_inputs(inputs)?;
     let named = named_by_all(inputs)?;
@@ -87,8 +88,8 @@ pub(super) fn number_together(inputs: &mut [Points]) -> Result<()> {
     Ok(())
 }
 
-/// The most texels of all images of meshes' materials together that surfels are painted with: with their halvings they fit into the
-/// 128 MiB that any device binds.
+/// The most texels of all images of meshes' materials together that surfels are painted with: with
+/// their halvings they fit into the 128 MiB that any device binds.
 const MOST_TEXELS: u64 = 1 << 24;
 
 /// The images that the materials of inputs name.
@@ -102,8 +103,9 @@ struct Own {
     halved: u64,
 }
 
-/// The images that the materials of the inputs' meshes name, whose triangles get their numbers among all. None, where there are more
-/// than a scene has, or Gaussians beside them, whose colours are codes.
+/// The images that the materials of the inputs' meshes name, whose triangles get their numbers
+/// among all. None, where there are more than a scene has, or Gaussians beside them, whose colours
+/// are codes.
 fn own(inputs: &mut [Points]) -> Own {
     fn painted(input: &mut Points) -> Option<&mut Paint> {
         let paint = input.faces.as_mut().filter(|_| input.of_mesh)?.paint.as_deref_mut();
@@ -145,7 +147,8 @@ fn own(inputs: &mut [Points]) -> Own {
     Own { textures: images.into_iter().zip(halvings).map(made).collect(), has_images, halved }
 }
 
-/// How often images of these sizes are halved until they have no more than [`MOST_TEXELS`]: always the largest.
+/// How often images of these sizes are halved until they have no more than [`MOST_TEXELS`]: always
+/// the largest.
 fn halvings(sizes: &[[u32; 2]]) -> Vec<u32> {
     let mut halvings = vec![0; sizes.len()];
     let texels =
@@ -159,7 +162,8 @@ fn halvings(sizes: &[[u32; 2]]) -> Vec<u32> {
     halvings
 }
 
-/// The surfels of an input beside those that are painted: what has no image of its own has no texture.
+/// The surfels of an input beside those that are painted: what has no image of its own has no
+/// texture.
 fn beside_painted(mut points: Points, has_images: bool) -> Points {
     if !has_images || points.texture_slopes.is_none() {
         let count = points.positions.len();
@@ -169,8 +173,9 @@ fn beside_painted(mut points: Points, has_images: bool) -> Points {
     points
 }
 
-/// [`build_within`], painted with the images that the materials of the inputs' meshes name; surfels of others have their colours. Without
-/// such images, or with more than can be told apart, it is the same: surfels have the means of the images over their triangles.
+/// [`build_within`], painted with the images that the materials of the inputs' meshes name; surfels
+/// of others have their colours. Without such images, or with more than can be told apart, it is
+/// the same: surfels have the means of the images over their triangles.
 ///
 /// # Errors
 ///

@@ -19,9 +19,11 @@ pub struct Preparation {
     pub unread: Vec<String>,
     /// Vertices that are in the meshes but not among `points`: no triangle names them.
     pub loose: u64,
-    /// The same, but their triangles have no area, or a corner that is not finite or exceeds [`LARGEST_COORDINATE`].
+    /// The same, but their triangles have no area, or a corner that is not finite or exceeds
+    /// [`LARGEST_COORDINATE`].
     pub stranded: u64,
-    /// Triangles of meshes left out because a coordinate of a corner is not finite or exceeds [`LARGEST_COORDINATE`].
+    /// Triangles of meshes left out because a coordinate of a corner is not finite or exceeds
+    /// [`LARGEST_COORDINATE`].
     pub broken: u64,
     /// Gaussians left out because their scales, rotation, opacity or colour are no numbers, or span no surface.
     pub shapeless: u64,

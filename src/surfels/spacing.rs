@@ -25,8 +25,8 @@ const FEW: usize = HELD * HELD;
 
 /// The square root of the area that a position stands for, in the units of `positions`, most of
 /// which lie in `body`: the side of the squares that would tile the surface. For a few positions it
-/// is the median distance to the nearest other one. Points at one place are one position. None where
-/// all lie at one place. It does not depend on the order of the points.
+/// is the median distance to the nearest other one. Points at one place are one position. None
+/// where all lie at one place. It does not depend on the order of the points.
 pub(super) fn spacing(positions: &[[f64; 3]], body: &Bounds) -> Option<f64> {
     let few = few_distinct(positions);
     if !few.is_empty() {

@@ -50,9 +50,10 @@ impl MeshPreparation {
     }
 }
 
-/// `scene`, which has none yet, with the triangles of `meshes` beside its surfels, or a scene of them alone. Corners
-/// are relative to the scene's origin, which is that of its surfels if it has some. Triangles have the colours of their corners, and
-/// their normals, or those of their planes where there are none.
+/// `scene`, which has none yet, with the triangles of `meshes` beside its surfels, or a scene of
+/// them alone. Corners are relative to the scene's origin, which is that of its surfels if it has
+/// some. Triangles have the colours of their corners, and their normals, or those of their planes
+/// where there are none.
 ///
 /// # Errors
 ///

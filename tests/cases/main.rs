@@ -1,5 +1,6 @@
-//! Files as strangers' programs write them, that were once drawn wrong or refused for the wrong reason: each a small one that stands for
-//! its kind, with the right value. Files of other formats and types of each kind are made in `tests/readers`.
+//! Files as strangers' programs write them, that were once drawn wrong or refused for the wrong
+//! reason: each a small one that stands for its kind, with the right value. Files of other formats
+//! and types of each kind are made in `tests/readers`.
 //!
 //! Two meshes far from each other, one of these kinds, are in `tests/far.rs`.
 
@@ -26,7 +27,8 @@ fn told(path: &str) -> String {
     String::from_utf8(succeeds(&["info", path]).stdout).unwrap()
 }
 
-/// The picture of these arguments of `epsplat render`, without light: sRGB codes and alphas, row by row; and what it told.
+/// The picture of these arguments of `epsplat render`, without light: sRGB codes and alphas, row by
+/// row; and what it told.
 fn drawn(folder: &Folder, arguments: &[&str]) -> (image::RgbaImage, String) {
     let path: PathBuf = folder.path("drawn.png");
     let fixed = ["--shading", "unlit", "-o", text(&path)];

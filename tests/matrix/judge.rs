@@ -11,8 +11,8 @@ const DECIDED: f32 = 1e-4;
 /// How far values may lie apart, relative to one and to themselves.
 const APART: f32 = 3e-4;
 
-/// The same of painted surfels: coordinates on a texture err with the inverse square of the cosine at which a surfel is seen, as
-/// `tests/texture` bounds.
+/// The same of painted surfels: coordinates on a texture err with the inverse square of the cosine
+/// at which a surfel is seen, as `tests/texture` bounds.
 const APART_OF_TEXTURES: f32 = 3e-3;
 
 /// The same of sums of 24 bits, of which weights of 2^-10 keep 14.

@@ -172,7 +172,8 @@ fn drawn(mut combination: Combination, devices: &Devices, sources: &Sources, tal
     }
 }
 
-/// The combination's view, and others that differ by parts of a pixel and a little in size: kernels are built once for all of them.
+/// The combination's view, and others that differ by parts of a pixel and a little in size: kernels
+/// are built once for all of them.
 fn views(combination: &mut Combination) -> Vec<Camera> {
     let Combination { sampled: Sampled { camera, .. }, random, .. } = combination;
     let mut another = || {

@@ -124,7 +124,8 @@ fn scans_are_put_where_their_poses_say() {
     }
     assert_eq!(points.colors, Some(Colors::Srgb8(vec![[128, 128, 128, 255], [255; 4]])));
 
-    // Without its pose the scan lies elsewhere; with another one the two are one file, and its intensities are beside the other's colours.
+    // Without its pose the scan lies elsewhere; with another one the two are one file, and its
+    // intensities are beside the other's colours.
     let control = folder.read("a.e57", &file(vec![Scan { pose: None, ..spherical() }])).unwrap();
     assert!(control.positions[0][0].abs() < 1e-9 && control.positions[0][1] == 2.0);
     let both = folder.read("a.e57", &file(vec![spherical(), cartesian(2)])).unwrap();

@@ -191,7 +191,8 @@ const RANGES: [&str; 18] = [
     "max_b",
 ];
 
-/// A chunk's ranges: positions `x` to `x + 2`, scales -4 to -3 (the last -9 to -8), colours -0.5 to 1.5.
+/// A chunk's ranges: positions `x` to `x + 2`, scales -4 to -3 (the last -9 to -8), colours -0.5 to
+/// 1.5.
 fn chunk(x: f64) -> Vec<f64> {
     let places = [x, -1.0, 10.0, x + 2.0, 1.0, 10.0];
     let scales = [-4.0, -4.0, -9.0, -3.0, -3.0, -8.0];

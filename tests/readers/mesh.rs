@@ -119,7 +119,8 @@ fn materials_textures_and_what_of_them_is_missing() {
         mesh.notes
     );
 
-    // A face without coordinates has none, and all others have theirs. The points of the file are what they were.
+    // A face without coordinates has none, and all others have theirs. The points of the file are
+    // what they were.
     let partly = read(&folder, "a.obj", format!("{text}f 1 2/1 3/2\n").as_bytes());
     assert_eq!(partly.texture.as_ref().unwrap()[..7], mesh.texture.as_ref().unwrap()[..]);
     assert!(partly.texture.as_ref().unwrap()[7].as_flattened().iter().all(|turns| turns.is_nan()));

@@ -1,4 +1,5 @@
-//! What the numbers of colours and intensities range over: one rule for all formats, and for all inputs together.
+//! What the numbers of colours and intensities range over: one rule for all formats, and for all
+//! inputs together.
 
 use super::las::{file as las_file, point};
 use super::{Folder, data};
@@ -39,7 +40,8 @@ fn rows(text: &mut String, count: usize, values: impl Fn(usize) -> Vec<f64>) {
     }
 }
 
-/// A PCD text of points with more fields than a place: names, sizes, types and counts, and their values.
+/// A PCD text of points with more fields than a place: names, sizes, types and counts, and their
+/// values.
 #[cfg(feature = "pcd")]
 fn pcd(fields: &[(&str, usize, char, usize)], count: usize, values: impl Fn(usize) -> Vec<f64>) -> Vec<u8> {
     let all = || [("x", 8, 'F', 1), ("y", 8, 'F', 1), ("z", 8, 'F', 1)].into_iter().chain(fields.iter().copied());
@@ -205,7 +207,8 @@ fn pcd_colours_are_channels_or_vectors_of_any_type() {
     assert_eq!(colors.linear(5), [light(305.0), light(40_001.0), 1.0, 1.0]);
 }
 
-/// A packed colour may be an integer, though its field is said to hold floats: by the digits of a text, or as the value of the float.
+/// A packed colour may be an integer, though its field is said to hold floats: by the digits of a
+/// text, or as the value of the float.
 #[cfg(feature = "pcd")]
 #[test]
 fn a_float_field_may_hold_an_integer() {
@@ -268,7 +271,8 @@ fn e57_colours_follow_their_limits_unless_the_values_contradict_them() {
     assert_eq!(stretched.linear(0)[0], srgb_to_linear(230.0 / 240.0) as f32);
 }
 
-/// At most one of a hundred numbers that are not zero is an outlier; one more, and all are of 16 bits.
+/// At most one of a hundred numbers that are not zero is an outlier; one more, and all are of 16
+/// bits.
 #[test]
 fn few_outliers_do_not_make_sixteen_bits() {
     let folder = Folder::new();
@@ -358,7 +362,8 @@ fn together(folder: &Folder, files: &[(&str, Vec<u8>)]) -> Vec<Points> {
     inputs
 }
 
-/// Two tiles of one scan, of which one is darker, have one white: at the same intensity the same grey.
+/// Two tiles of one scan, of which one is darker, have one white: at the same intensity the same
+/// grey.
 #[test]
 fn tiles_of_intensities_have_no_seam() {
     let folder = Folder::new();
@@ -401,7 +406,8 @@ fn tiles_of_intensities_have_no_seam() {
     }
 }
 
-/// A dark tile of a 16-bit scan is no 8-bit file: all of a scene have one rule, and what that makes black is told.
+/// A dark tile of a 16-bit scan is no 8-bit file: all of a scene have one rule, and what that makes
+/// black is told.
 #[test]
 fn tiles_of_colours_have_one_rule() {
     let folder = Folder::new();

@@ -87,8 +87,8 @@ fn painted(mut meshes: Vec<Mesh>, paths: &[PathBuf], arguments: &Arguments) -> R
     Ok(meshes)
 }
 
-/// Whether surfels can be painted with the images of their meshes' materials, as pictures are made; else they have the means of
-/// these.
+/// Whether surfels can be painted with the images of their meshes' materials, as pictures are made;
+/// else they have the means of these.
 fn paints(arguments: &Arguments) -> bool {
     let reference = arguments.backend.0 == Some(BackendName::Reference);
     let finest = arguments.lod.is_none() && arguments.splats.is_none();

@@ -40,7 +40,8 @@ pub(super) fn read(folder: &Path) -> Result<Vec<NamedCamera>> {
     images(&mut Lines::of(BufReader::new(file)), &lenses).map_err(|fault| fault.of(&path))
 }
 
-/// The cameras by their identifiers; of one that cannot be used why, and on which line: that matters to images of it alone.
+/// The cameras by their identifiers; of one that cannot be used why, and on which line: that
+/// matters to images of it alone.
 type Lenses = HashMap<u64, Result<Camera, String>>;
 
 fn opened(path: &Path) -> io::Result<File> {

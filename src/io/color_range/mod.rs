@@ -1,8 +1,9 @@
-//! How the numbers that files have for colours and intensities become colours: one rule for all formats, and one
-//! decision for all inputs of a scene, so that two tiles of one scan meet without a seam.
+//! How the numbers that files have for colours and intensities become colours: one rule for all
+//! formats, and one decision for all inputs of a scene, so that two tiles of one scan meet without
+//! a seam.
 //!
-//! Readers keep colours as they are in the file, with their type and the limits that the header states
-//! ([`RawColors`]). [`ColorRules`] then looks at all numbers of one kind together:
+//! Readers keep colours as they are in the file, with their type and the limits that the header
+//! states ([`RawColors`]). [`ColorRules`] then looks at all numbers of one kind together:
 //!
 //! | numbers | taken for |
 //! |---|---|
@@ -14,9 +15,9 @@
 //! | floats of which more are above 1 than between 0 and 1, and one is 2 or more | sRGB codes of 0 to 255, or of 0 to 65535 if more than 1 of 100 is above 255 |
 //! | other floats | shares of 1: linear light in a PLY file, else sRGB |
 //!
-//! Alphas are judged in the same way by themselves. Where the colours of a file are missing or all zero, its intensities
-//! become grey: the 99.9th percentile of all inputs is white, and zero is black, or where some are negative the 0.1th
-//! percentile.
+//! Alphas are judged in the same way by themselves. Where the colours of a file are missing or all
+//! zero, its intensities become grey: the 99.9th percentile of all inputs is white, and zero is
+//! black, or where some are negative the 0.1th percentile.
 
 mod apply;
 mod evidence;
@@ -64,7 +65,8 @@ impl Kind {
         Self { number, limits: None, light: false, zero_is_none: false }
     }
 
-    /// What others have to be to be judged together with these: a format's conventions are no matter of what numbers range over.
+    /// What others have to be to be judged together with these: a format's conventions are no
+    /// matter of what numbers range over.
     fn judged(self) -> Self {
         Self { light: self.light && self.number == Number::Float, zero_is_none: false, ..self }
     }
@@ -121,7 +123,8 @@ pub(super) struct Run {
     pub(super) shades: Option<Shades>,
 }
 
-/// The colours and intensities of an input as its file has them, before it is known what they range over.
+/// The colours and intensities of an input as its file has them, before it is known what they range
+/// over.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RawColors {
     /// What notes call the file.
@@ -154,8 +157,8 @@ impl RawColors {
     }
 }
 
-/// What numbers mean: decided by the first inputs that are settled, and kept for all later ones, such as other parts of the
-/// same files.
+/// What numbers mean: decided by the first inputs that are settled, and kept for all later ones,
+/// such as other parts of the same files.
 #[derive(Clone, Debug, Default)]
 pub struct ColorRules {
     colors: Vec<(Kind, Rule)>,

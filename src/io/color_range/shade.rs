@@ -63,8 +63,8 @@ impl Levels {
         }
     }
 
-    /// White is the 99.9th percentile, so that a few glints do not blacken the rest; black is zero, or where some are negative
-    /// the 0.1th percentile. None where all are the same.
+    /// White is the 99.9th percentile, so that a few glints do not blacken the rest; black is zero,
+    /// or where some are negative the 0.1th percentile. None where all are the same.
     pub fn shading(&self) -> Option<Shading> {
         let mut others = self.others.clone();
         others.par_sort_unstable_by(f32::total_cmp);

@@ -42,7 +42,8 @@ pub(super) struct Found {
     step: [f64; 3],
 }
 
-/// Reads what the header and its records say; `legacy` is the count of points of LAS 1.0 to 1.3 as the file has it.
+/// Reads what the header and its records say; `legacy` is the count of points of LAS 1.0 to 1.3 as
+/// the file has it.
 pub(super) fn look(
     file: &mut (impl Read + Seek),
     (header, legacy): (&Header, u32),
@@ -162,7 +163,8 @@ fn room(header: &Header, length: u64) -> Option<String> {
     (is_plain && held > count).then(|| format!("its header says {count} points, and the file has bytes for {held}"))
 }
 
-/// A version that does not have the point format, or a record that is longer than the format and says not why.
+/// A version that does not have the point format, or a record that is longer than the format and
+/// says not why.
 fn formats(header: &Header) -> Option<String> {
     let format = header.point_data_record_format & 0x3f;
     let since = match format {

@@ -37,9 +37,9 @@ const BLOCK: u64 = 1 << 25;
 /// [`Points::unseen`]. Synthetic, key and overlap points (legacy class 12 too) are points like
 /// any other, as they are to PDAL.
 ///
-/// Coordinates are scaled and offset in f64, in the file's own system; up is z. Colours are the 16-bit numbers of the format's RGB, of
-/// which zeros alone mean none, and without them intensities ([`RawColors`]). Where two fields of the header disagree,
-/// [`Points::notes`] says it.
+/// Coordinates are scaled and offset in f64, in the file's own system; up is z. Colours are the
+/// 16-bit numbers of the format's RGB, of which zeros alone mean none, and without them intensities
+/// ([`RawColors`]). Where two fields of the header disagree, [`Points::notes`] says it.
 ///
 /// A chunk of a compressed file that cannot be decoded is left out, and told by [`Points::unread`],
 /// if another one can be decoded and
@@ -229,7 +229,8 @@ impl<'a> Kept<'a> {
         Self { looks, decided: looks.is_some(), has_normals, ..Self::default() }
     }
 
-    /// As points, of which all that were read have these numbers, in order; colours are as they are in the file.
+    /// As points, of which all that were read have these numbers, in order; colours are as they are
+    /// in the file.
     fn points(self, numbers: impl Iterator<Item = u64>, options: &ReadOptions) -> Points {
         let Self { positions, has_normals, normals, codes, intensities, looks, decided, classes, counts, left_out } =
             self;
@@ -298,7 +299,8 @@ impl<'a> Kept<'a> {
     }
 }
 
-/// Leaves out the points whose class has the opacity 0, as soon as all of them have decided what colours mean; all have these numbers.
+/// Leaves out the points whose class has the opacity 0, as soon as all of them have decided what
+/// colours mean; all have these numbers.
 fn leave_out_unseen(points: &mut Points, numbers: impl Iterator<Item = u64>) {
     let Some(raw) = &mut points.raw else { return };
     let keep: Vec<bool> = raw.classes.iter().map(|class| raw.opacities.of(*class) > 0.0).collect();

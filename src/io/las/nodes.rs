@@ -36,7 +36,8 @@ impl Copc {
         Ok(points)
     }
 
-    /// The same with colours as the file has them ([`Points::raw`]), which are to be settled with those of other files.
+    /// The same with colours as the file has them ([`Points::raw`]), which are to be settled with
+    /// those of other files.
     ///
     /// # Errors
     ///
@@ -102,7 +103,8 @@ impl Copc {
         Ok(Points { unread, ..points })
     }
 
-    /// Decides what shows of all nodes by the first ones that are read: where that is colours, intensities are read no more.
+    /// Decides what shows of all nodes by the first ones that are read: where that is colours,
+    /// intensities are read no more.
     fn decide(&mut self, kept: &Kept) {
         if self.looks.is_none() && !kept.positions.is_empty() {
             self.looks = Some(kept.looks.unwrap_or(Looks::Intensities));

@@ -4,7 +4,8 @@ use crate::io::fault::Fault;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 
-/// Where a header has its version, its point format, and how many points there are by the count of LAS 1.0 to 1.3 and by that of 1.4.
+/// Where a header has its version, its point format, and how many points there are by the count of
+/// LAS 1.0 to 1.3 and by that of 1.4.
 const VERSION: u64 = 24;
 const FORMAT: usize = 104;
 const LEGACY_COUNTS: u64 = 107;
@@ -26,9 +27,10 @@ pub(super) struct Shown {
 }
 
 impl Shown {
-    /// The file from its start. One of LAS 1.5 is shown as of 1.4, whose header is the same but for times at its end, and without the
-    /// counts that 1.5 does away with; so is one of 1.4 whose point format is 6 or above, for which these have no meaning, if it has
-    /// another count. A version that is none of 1.0 to 1.5 is refused.
+    /// The file from its start. One of LAS 1.5 is shown as of 1.4, whose header is the same but for
+    /// times at its end, and without the counts that 1.5 does away with; so is one of 1.4 whose
+    /// point format is 6 or above, for which these have no meaning, if it has another count. A
+    /// version that is none of 1.0 to 1.5 is refused.
     pub(super) fn new(mut file: File) -> Result<Self, Fault> {
         let mut start = Vec::new();
         (&mut file).take(COUNTS_END).read_to_end(&mut start)?;

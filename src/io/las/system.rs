@@ -1,4 +1,5 @@
-//! The coordinate system that the records of a LAS file name: by a text (WKT), or by the keys of GeoTIFF.
+//! The coordinate system that the records of a LAS file name: by a text (WKT), or by the keys of
+//! GeoTIFF.
 
 use las::raw::Vlr;
 use std::io::{Read, Seek, SeekFrom};
@@ -78,7 +79,8 @@ impl Records {
     }
 }
 
-/// The code of the whole, which is the last thing in its brackets; those of its parts have more brackets behind them.
+/// The code of the whole, which is the last thing in its brackets; those of its parts have more
+/// brackets behind them.
 fn code_of_whole(text: &str) -> Option<&str> {
     let inner = text.strip_suffix("]]")?.trim_end_matches('"');
     let digits = inner.len() - inner.trim_end_matches(|c: char| c.is_ascii_digit()).len();

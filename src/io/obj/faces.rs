@@ -105,8 +105,9 @@ impl Faces {
         Ok(())
     }
 
-    /// Fails if a corner names what the file, which has so many of each, has not. Of texture coordinates or normals that a file has none of at
-    /// all none is missed: programs write their numbers anyway; nor is any of texture coordinates, if this is not `strict`.
+    /// Fails if a corner names what the file, which has so many of each, has not. Of texture
+    /// coordinates or normals that a file has none of at all none is missed: programs write their
+    /// numbers anyway; nor is any of texture coordinates, if this is not `strict`.
     pub(super) fn check(&mut self, counts: [usize; 3], strict: bool) -> Result<(), Fault> {
         self.has_texture &= counts[TEXTURE] > 0;
         self.lacks_normal |= counts[2] == 0;

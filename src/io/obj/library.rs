@@ -39,8 +39,9 @@ impl ColorMap {
     }
 }
 
-/// The materials of a library with their names, in order. Keywords may be in any case, and what cannot be read is passed
-/// over. At one line that it cannot read the parser gives up on all materials, so it gets no lines but those that it can.
+/// The materials of a library with their names, in order. Keywords may be in any case, and what
+/// cannot be read is passed over. At one line that it cannot read the parser gives up on all
+/// materials, so it gets no lines but those that it can.
 pub(super) fn definitions(text: &str) -> Vec<(String, Definition)> {
     let (mut lines, mut named) = (String::new(), false);
     for line in text.lines() {

@@ -87,8 +87,8 @@ impl<R: BufRead> Reader<'_, R> {
 }
 
 impl Lines {
-    /// Reads all of them. Texture coordinates that are none are an error only if `strict`: for points it matters little where
-    /// in a texture they are.
+    /// Reads all of them. Texture coordinates that are none are an error only if `strict`: for
+    /// points it matters little where in a texture they are.
     ///
     /// # Errors
     /// A number that is none, or a face that names what does not exist.
@@ -158,7 +158,8 @@ impl Lines {
     }
 }
 
-/// The codes of a line `#MRGB` of ZBrush: of each vertex a mask, red, green and blue, two digits of base 16 each.
+/// The codes of a line `#MRGB` of ZBrush: of each vertex a mask, red, green and blue, two digits of
+/// base 16 each.
 fn polypaint(digits: &[u8]) -> impl Iterator<Item = [u8; 4]> {
     let of_vertex = |digits: &[u8; 8]| {
         let code = u32::from_str_radix(std::str::from_utf8(digits).ok()?, 16).ok()?;
@@ -238,8 +239,8 @@ impl Lines {
 
     /// One colour for each position as the file has it, if any has one.
     ///
-    /// No standard says what colours range over: most programs write shares of 1, some codes of 0 to 255. Where no vertex has
-    /// one, those of lines `#MRGB`, in the vertices' order, count.
+    /// No standard says what colours range over: most programs write shares of 1, some codes of 0
+    /// to 255. Where no vertex has one, those of lines `#MRGB`, in the vertices' order, count.
     pub(super) fn colors(&self, ignore_alpha: bool) -> Option<RawColors> {
         let of = |values, number, alpha| {
             let numbers = Numbers { values, kind: Kind::of(number), alpha };

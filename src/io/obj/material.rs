@@ -17,9 +17,10 @@ use crate::io::{Material, Mesh};
 /// No material library is longer, in bytes.
 const LONGEST: u64 = 1 << 24;
 
-/// Gives `mesh`, whose triangles have the numbers of these `names`, their materials from the `libraries` that the OBJ file at
-/// `path` names, and moves texture coordinates as their images want it (`-s`, `-o`). What cannot be read is said in the mesh's
-/// notes; a material that no library defines is white, and where there is none at all, no triangle has any.
+/// Gives `mesh`, whose triangles have the numbers of these `names`, their materials from the
+/// `libraries` that the OBJ file at `path` names, and moves texture coordinates as their images
+/// want it (`-s`, `-o`). What cannot be read is said in the mesh's notes; a material that no
+/// library defines is white, and where there is none at all, no triangle has any.
 ///
 /// `Kd` is linear light, as a reflectivity is; `d` is alpha; an image of `map_Kd` is sRGB.
 ///

@@ -30,8 +30,9 @@ use std::path::{Path, PathBuf};
 ///   ([`RawColors`]); a fourth is alpha. Where no vertex has any, those of ZBrush's lines `#MRGB`.
 /// - What its triangles look like, by materials and images, as [`read_mesh`] reads them.
 ///
-/// Text may be in UTF-16, of either byte order, if a byte order mark says so. Up is y. Lines, points and curves are passed over,
-/// and a missing MTL file or image is no error, but named in [`Points::notes`].
+/// Text may be in UTF-16, of either byte order, if a byte order mark says so. Up is y. Lines,
+/// points and curves are passed over, and a missing MTL file or image is no error, but named in
+/// [`Points::notes`].
 ///
 /// # Errors
 ///
@@ -47,18 +48,20 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
 
 /// Reads the triangles of an OBJ file, those of all groups and materials as one mesh, with every `v` line a vertex.
 ///
-/// Polygons are made of triangles, concave ones too. Corners have the `vn` they name where every corner of the file names one, else the
-/// mesh is faceted; a triangle all of whose corners name a `vt` has those. Colours are read as by [`read`], and lines, points and
-/// curves are passed over too. A file without faces is a mesh without triangles, and no error here.
+/// Polygons are made of triangles, concave ones too. Corners have the `vn` they name where every
+/// corner of the file names one, else the mesh is faceted; a triangle all of whose corners name a
+/// `vt` has those. Colours are read as by [`read`], and lines, points and curves are passed over
+/// too. A file without faces is a mesh without triangles, and no error here.
 ///
-/// Of the materials in the MTL files beside it, whatever the case of their names and keywords, the diffuse colour `Kd`
-/// (linear light), the opacity `d` and the image `map_Kd` (PNG, JPEG, BMP or TGA, sRGB; with `-s`, `-o` and `-clamp`) are
-/// read. Files that cannot be read are left out and named in [`Mesh::notes`].
+/// Of the materials in the MTL files beside it, whatever the case of their names and keywords, the
+/// diffuse colour `Kd` (linear light), the opacity `d` and the image `map_Kd` (PNG, JPEG, BMP or
+/// TGA, sRGB; with `-s`, `-o` and `-clamp`) are read. Files that cannot be read are left out and
+/// named in [`Mesh::notes`].
 ///
 /// # Errors
 ///
-/// As [`read`], and where a face names texture coordinates that do not exist, in a file that has some, or images together have
-/// more pixels than [`MOST_PIXELS`](crate::io::image::MOST_PIXELS).
+/// As [`read`], and where a face names texture coordinates that do not exist, in a file that has
+/// some, or images together have more pixels than [`MOST_PIXELS`](crate::io::image::MOST_PIXELS).
 pub fn read_mesh(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Mesh> {
     let path = input.path.clone();
     read_with(input, true, progress, |lines| {

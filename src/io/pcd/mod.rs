@@ -23,8 +23,8 @@ use points::Columns;
 /// - `red green blue` with or without `alpha`, or one field of three numbers or four, become colours by what they range over.
 /// - `intensity` becomes grey where there are no colours, or all are zero.
 ///
-/// Names are those that programs write; other fields are skipped. Coordinates stay relative to the sensor whose pose the line `VIEWPOINT` gives, as most programs
-/// take them.
+/// Names are those that programs write; other fields are skipped. Coordinates stay relative to the
+/// sensor whose pose the line `VIEWPOINT` gives, as most programs take them.
 ///
 /// # Errors
 ///

@@ -152,7 +152,8 @@ impl Reading {
         self.positions.len() as u64
     }
 
-    /// Takes `rows` points; `value` gives the number of a cell in each, of a packed colour its bits.
+    /// Takes `rows` points; `value` gives the number of a cell in each, of a packed colour its
+    /// bits.
     pub(super) fn extend(&mut self, rows: usize, value: impl Fn(usize, usize) -> f64) {
         let columns = &self.columns;
         self.positions.extend((0..rows).map(|row| columns.position.map(|cell| value(cell, row))));
@@ -236,8 +237,8 @@ fn unsigned(value: f64, kind: Number) -> f32 {
     }
 }
 
-/// Some programs write a packed colour as the value of a float and not as its bits: then all of them are whole numbers, which bits of
-/// colours hardly are.
+/// Some programs write a packed colour as the value of a float and not as its bits: then all of
+/// them are whole numbers, which bits of colours hardly are.
 fn unpack_values(codes: &mut [[u8; 4]]) {
     let value = |[red, green, blue, alpha]: [u8; 4]| f32::from_le_bytes([blue, green, red, alpha]);
     let is_whole = |value: f32| (0.0..=u32::MAX as f32).contains(&value) && value.fract() == 0.0;

@@ -27,8 +27,9 @@ enum Full {
 }
 
 impl Full {
-    /// That of numbers of this type of which `largest` is the largest: floats up to 1 are linear light, all else are codes of
-    /// 8 bits, or where they are larger of 16 bits, or of as many as there are.
+    /// That of numbers of this type of which `largest` is the largest: floats up to 1 are linear
+    /// light, all else are codes of 8 bits, or where they are larger of 16 bits, or of as many as
+    /// there are.
     fn of(scalar: Scalar, largest: f32) -> Self {
         match scalar {
             Scalar::F32 | Scalar::F64 if largest <= 1.0 => Self::Light,
@@ -39,7 +40,8 @@ impl Full {
     }
 }
 
-/// Colours as the file has them, by the types of their channels, in linear light; those that are not numbers become the default.
+/// Colours as the file has them, by the types of their channels, in linear light; those that are
+/// not numbers become the default.
 pub(super) fn linear(mut colors: Vec<[f32; 4]>, channels: [Option<Scalar>; 4]) -> Vec<[f32; 4]> {
     let has_alpha = channels[3].is_some();
     for (channel, _) in channels.iter().enumerate().filter(|(_, scalar)| **scalar == Some(Scalar::I8)) {

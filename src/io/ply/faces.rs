@@ -41,9 +41,11 @@ pub(super) struct Faces {
     /// Whether rows may have texture coordinates, and numbers of textures.
     placed: bool,
     numbered: bool,
-    /// The types of the channels of colours, of which those of alpha may be absent; none where rows have no colours.
+    /// The types of the channels of colours, of which those of alpha may be absent; none where rows
+    /// have no colours.
     channels: Option<[Option<Scalar>; 4]>,
-    /// Colours of the triangles, one each, as the file has them; not a number for those without. None if no row has any.
+    /// Colours of the triangles, one each, as the file has them; not a number for those without.
+    /// None if no row has any.
     colors: Vec<[f32; 4]>,
     /// Texture coordinates of the triangles, one each, or as many as there were before the first face without.
     texture: Vec<[[f32; 2]; 3]>,

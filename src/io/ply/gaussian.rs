@@ -6,7 +6,8 @@
 //! spherical harmonics, red, green and blue one after the other. Normals `nx ny nz`, if there are any, are zeros.
 //!
 //! Without `f_dc_0` the colour is `red green blue`, as nerfstudio exports it: codes of sRGB, 0 to
-//! 255 (`ushort`: 65535; `float`: 1). With `f_dc_0` they are not used, as in the method's own viewer.
+//! 255 (`ushort`: 65535; `float`: 1). With `f_dc_0` they are not used, as in the method's own
+//! viewer.
 //!
 //! `filter_3D` is the filter's standard deviation f (Mip-Splatting, Yu et al. 2024). Each standard
 //! deviation s becomes `sqrt(s^2 + f^2)`, and the opacity is multiplied by

@@ -30,9 +30,10 @@ use std::path::{Component, Path, PathBuf};
 ///   `double` of 0 to 1 are linear light as they are. Alpha is straight and linear in each case.
 /// - `intensity` (also `scalar_Intensity ...`) becomes grey where there are no colours, or all are zero.
 ///
-/// In a mesh, a list `vertex_indices` (or `vertex_index`) in an element `face` or `tristrips`, vertices without normals and
-/// radii get them from the triangles around them, as in an OBJ file: normals weighted by area, and radii with which disks
-/// cover the triangles. What triangles look like, by colours of their own and by images, is read as [`read_mesh`] reads it.
+/// In a mesh, a list `vertex_indices` (or `vertex_index`) in an element `face` or `tristrips`,
+/// vertices without normals and radii get them from the triangles around them, as in an OBJ file:
+/// normals weighted by area, and radii with which disks cover the triangles. What triangles look
+/// like, by colours of their own and by images, is read as [`read_mesh`] reads it.
 ///
 /// Vertices with `scale_0` and `rot_0` are Gaussians, as 2D Gaussian splatting writes them, or flat ones of 3D Gaussian splatting: they get
 /// half-axes of so many standard deviations that nothing shows beyond ([`EXTENT`](crate::scene::gaussian::EXTENT)), and colours with alpha that
@@ -87,16 +88,19 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
 
 /// Reads the triangles of a PLY file: the polygons of the element `face`, concave ones too, and the strips of the element `tristrips`.
 ///
-/// Corners have what their vertices have: normals, colours, texture coordinates; the last from the list `texcoord` of the faces
-/// instead, as MeshLab writes it, where every face has one. Triangles have the colours of their faces, `red green blue` with or
-/// without `alpha`, if those of vertices do not hide them: integers are codes of sRGB, of 8 bits, or of 16 if there are larger
-/// ones than 255, and floats linear light up to 1, or such codes. What comments `TextureFile` name, PNG, JPEG, BMP or TGA beside
-/// the file, are the materials, of which a face's `texnumber` is one, or else the first; those that cannot be read are left out
-/// and named in [`Mesh::notes`]. A file without faces is a mesh without triangles, and no error here.
+/// Corners have what their vertices have: normals, colours, texture coordinates; the last from the
+/// list `texcoord` of the faces instead, as MeshLab writes it, where every face has one. Triangles
+/// have the colours of their faces, `red green blue` with or without `alpha`, if those of vertices
+/// do not hide them: integers are codes of sRGB, of 8 bits, or of 16 if there are larger ones than
+/// 255, and floats linear light up to 1, or such codes. What comments `TextureFile` name, PNG,
+/// JPEG, BMP or TGA beside the file, are the materials, of which a face's `texnumber` is one, or
+/// else the first; those that cannot be read are left out and named in [`Mesh::notes`]. A file
+/// without faces is a mesh without triangles, and no error here.
 ///
 /// # Errors
 ///
-/// As [`read`], and where images together have more pixels than [`MOST_PIXELS`](crate::io::image::MOST_PIXELS).
+/// As [`read`], and where images together have more pixels than
+/// [`MOST_PIXELS`](crate::io::image::MOST_PIXELS).
 pub fn read_mesh(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<Mesh> {
     let path = input.path.clone();
     let options = ReadOptions { flatten: true, ..*options };
@@ -125,8 +129,8 @@ fn corners<T: Copy>(triangles: &[[u32; 3]], of_vertices: &[T]) -> Vec<[T; 3]> {
     triangles.iter().map(|corners| corners.map(|vertex| of_vertices[vertex as usize])).collect()
 }
 
-/// Leaves the colours of vertices or those of faces: of vertices those count, as they are finer, unless all are one colour, which
-/// programs write without being asked.
+/// Leaves the colours of vertices or those of faces: of vertices those count, as they are finer,
+/// unless all are one colour, which programs write without being asked.
 fn choose_colors(points: &mut Points, faces: &mut Triangles) {
     if faces.colors.is_none() {
         return;
@@ -146,7 +150,8 @@ fn choose_colors(points: &mut Points, faces: &mut Triangles) {
     }
 }
 
-/// Gives a mesh the images of these `names` beside the file at `path` as materials, of which each triangle has one by its number.
+/// Gives a mesh the images of these `names` beside the file at `path` as materials, of which each
+/// triangle has one by its number.
 fn paint(mesh: &mut Mesh, path: &Path, names: Vec<String>, numbers: Vec<u32>) -> Result<()> {
     let (mut beside, mut images) = (Beside::of(path), Images::default());
     let mut materials = Vec::new();
@@ -227,8 +232,8 @@ fn mesh_beside(path: &Path, name: &str) -> Result<PathBuf, Fault> {
     }
 }
 
-/// The vertices, the triangles, which name vertices that exist, and the names of textures. Colours of vertices are as the file has
-/// them.
+/// The vertices, the triangles, which name vertices that exist, and the names of textures. Colours
+/// of vertices are as the file has them.
 fn contents(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Result<(Points, Triangles, Vec<String>)> {
     let Input { file, length, path, .. } = input;
     let in_file = |fault: Fault| fault.of(&path);

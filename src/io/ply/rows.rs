@@ -185,7 +185,8 @@ impl Rows {
         read.map(|(points, _)| points).map_err(|fault| fault.of(&self.path))
     }
 
-    /// Settles what the colours of files mean that are one scene, by all rows where not each tells it for itself.
+    /// Settles what the colours of files mean that are one scene, by all rows where not each tells
+    /// it for itself.
     ///
     /// # Errors
     ///

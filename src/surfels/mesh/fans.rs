@@ -100,8 +100,8 @@ enum Beyond {
 }
 
 impl Around {
-    /// Those of a mesh of so many `vertices`; triangles without an area are none. Two with a side in common look like one surface
-    /// where they `go_on`.
+    /// Those of a mesh of so many `vertices`; triangles without an area are none. Two with a side
+    /// in common look like one surface where they `go_on`.
     pub fn new(
         vertices: usize,
         triangles: &[[u32; 3]],
@@ -163,8 +163,9 @@ impl Around {
         }
     }
 
-    /// The sides of a triangle, each from its corner on, past which the surface does not go on, or looks otherwise. With
-    /// `is_flat`, if all three are such sides, those where it goes on are none.
+    /// The sides of a triangle, each from its corner on, past which the surface does not go on, or
+    /// looks otherwise. With `is_flat`, if all three are such sides, those where it goes on are
+    /// none.
     pub fn ends(&self, triangle: u32, is_flat: bool) -> [bool; 3] {
         let beyond = self.beyond[triangle as usize];
         let ends = beyond.map(|beyond| !matches!(beyond, Beyond::Surface(_)));

@@ -1,11 +1,12 @@
 //! Surfels of a mesh, which cover it and end where the surface does.
 //!
-//! Where the mesh says nothing of its vertices but where they are, each triangle has a surfel, cut along its sides ([`triangles`]), and the
-//! look of the triangle ([`skin`]). Where
-//! vertices have colours or normals of their own, surfels at them blend those from one to the next: the triangles around a vertex make a
-//! fan, or several where the surface has an edge or a border there ([`fans`]). Each fan has a surfel in its own plane, the least ellipse
-//! with which those of all corners cover the triangles ([`cover`]), cut along the fan's two sides ([`Clip`]): else disks would stand out
-//! past edges and borders by up to their radius.
+//! Where the mesh says nothing of its vertices but where they are, each triangle has a surfel, cut
+//! along its sides ([`triangles`]), and the look of the triangle ([`skin`]). Where vertices have
+//! colours or normals of their own, surfels at them blend those from one to the next: the triangles
+//! around a vertex make a fan, or several where the surface has an edge or a border there
+//! ([`fans`]). Each fan has a surfel in its own plane, the least ellipse with which those of all
+//! corners cover the triangles ([`cover`]), cut along the fan's two sides ([`Clip`]): else disks
+//! would stand out past edges and borders by up to their radius.
 
 mod cover;
 mod fans;
@@ -56,8 +57,9 @@ pub(super) enum By {
     Vertices,
 }
 
-/// The surfels of a mesh, painted as `painting` says; the vertices that no triangle with an area names cover nothing. A cloud, or
-/// one with a few triangles, stays as it is, and so does a mesh whose file says radii: its points have the colours of its triangles.
+/// The surfels of a mesh, painted as `painting` says; the vertices that no triangle with an area
+/// names cover nothing. A cloud, or one with a few triangles, stays as it is, and so does a mesh
+/// whose file says radii: its points have the colours of its triangles.
 pub(super) fn of_mesh(mut points: Points, by: By, painting: Painting) -> Points {
     let Some(faces) = points.faces.as_ref().filter(|_| points.of_mesh) else { return uncovered(points) };
     let triangles = &faces.triangles;

@@ -1,8 +1,10 @@
-//! What the surfels of a mesh look like: the colours and images of the triangles that they stand for.
+//! What the surfels of a mesh look like: the colours and images of the triangles that they stand
+//! for.
 //!
-//! Surfels end where the look of triangles changes, as they do at edges: at the sides between two colours or images, and at the
-//! seams of one image, where the places of a corner differ. Within a piece of an image a surfel has the place of its centre, and what
-//! places gain along its plane, which tell a pixel's place in the image.
+//! Surfels end where the look of triangles changes, as they do at edges: at the sides between two
+//! colours or images, and at the seams of one image, where the places of a corner differ. Within a
+//! piece of an image a surfel has the place of its centre, and what places gain along its plane,
+//! which tell a pixel's place in the image.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -178,7 +180,8 @@ impl<'a> Skin<'a> {
     }
 }
 
-/// What u and v gain for a world unit along x, y and z on a triangle whose corners have these places.
+/// What u and v gain for a world unit along x, y and z on a triangle whose corners have these
+/// places.
 fn gains(facet: &Facet, places: [[f32; 2]; 3]) -> [DVec3; 2] {
     let [p, q] = facet.sides(0);
     let normal = p.cross(q);
@@ -215,7 +218,8 @@ fn times(color: [f32; 4], factor: Option<[f32; 4]>) -> [f32; 4] {
     factor.map_or(color, |factor| std::array::from_fn(|k| color[k] * factor[k]))
 }
 
-/// Gives the vertices of a mesh, whose triangles nobody draws, the means of what these look like there.
+/// Gives the vertices of a mesh, whose triangles nobody draws, the means of what these look like
+/// there.
 pub(in crate::surfels) fn color_vertices(points: &mut Points) {
     let Some((paint, triangles)) =
         points.faces.as_mut().and_then(|faces| Some((faces.paint.take()?, &faces.triangles)))

@@ -107,8 +107,8 @@ impl<'a> MeshSurface<'a> {
         self.triangles[at.triangle as usize].index
     }
 
-    /// The number of each of the mesh's triangles' texture, if there are several, or some triangles have none or no place in
-    /// it; [`u32::MAX`] means none.
+    /// The number of each of the mesh's triangles' texture, if there are several, or some triangles
+    /// have none or no place in it; [`u32::MAX`] means none.
     pub(super) fn texture_numbers(&self) -> Option<Vec<u32>> {
         let places = self.mesh.texture.as_ref()?;
         let (textures, numbers) = self.mesh.textures();

@@ -7,8 +7,9 @@ use crate::surfels::estimate::NORMAL_NEIGHBOURS;
 use crate::surfels::graph::NeighbourGraph;
 use crate::surfels::positions::DistinctPositions;
 
-/// A point is lone if no more of its [`NORMAL_NEIGHBOURS`] neighbours lie on one surface with it. In a crown of random leaves 55 % of the
-/// points are, on noisy ground one of 2,000, of the vertices of the Stanford bunny none.
+/// A point is lone if no more of its [`NORMAL_NEIGHBOURS`] neighbours lie on one surface with it.
+/// In a crown of random leaves 55 % of the points are, on noisy ground one of 2,000, of the
+/// vertices of the Stanford bunny none.
 const MOST_BESIDE: usize = 4;
 
 /// The cosine of the angle between two planes of one surface: 45 degrees.
@@ -17,20 +18,22 @@ const ONE_SURFACE: f64 = 0.7;
 /// The sine of the elevation of a point over the plane of another one of its surface: 30 degrees.
 const LOWEST: f64 = 0.5;
 
-/// The disk of a lone point has this part of its mean distance to [`RADIUS_NEIGHBOURS`] neighbours: about what the nearest one is away, where
-/// they are random.
+/// The disk of a lone point has this part of its mean distance to [`RADIUS_NEIGHBOURS`] neighbours:
+/// about what the nearest one is away, where they are random.
 const PART: f64 = 0.5;
 
-/// All neighbours of a point lie on a line with it if none is farther from the line to the farthest one than this part of the way to it.
-/// Of a surface with 16 neighbours none does, unless its scan lines lie as far apart as eight of their points.
+/// All neighbours of a point lie on a line with it if none is farther from the line to the farthest
+/// one than this part of the way to it. Of a surface with 16 neighbours none does, unless its scan
+/// lines lie as far apart as eight of their points.
 const LINE: f64 = 0.12;
 
-/// The disk of a point on a line has this part of its mean distance to [`RADIUS_NEIGHBOURS`] neighbours: three quarters of the spacing, where
-/// that is even.
+/// The disk of a point on a line has this part of its mean distance to [`RADIUS_NEIGHBOURS`]
+/// neighbours: three quarters of the spacing, where that is even.
 const PART_OF_LINE: f64 = 0.3;
 
-/// The largest radius of the disk of a lone position, in the unit of positions; None for one that has a surface around it, and where
-/// there are too few points to tell. `normal` gives the unit normal at a position, of any side; zero where it is not known.
+/// The largest radius of the disk of a lone position, in the unit of positions; None for one that
+/// has a surface around it, and where there are too few points to tell. `normal` gives the unit
+/// normal at a position, of any side; zero where it is not known.
 pub(crate) fn lone_radius(
     (distinct, graph): (&DistinctPositions, &NeighbourGraph),
     index: u32,
@@ -55,7 +58,8 @@ pub(crate) enum Surroundings {
 }
 
 impl Surroundings {
-    /// The part of the mean distance of neighbours that is the largest radius of a disk; None for any.
+    /// The part of the mean distance of neighbours that is the largest radius of a disk; None for
+    /// any.
     fn part(self) -> Option<f64> {
         match self {
             Self::Surface => None,
@@ -65,8 +69,8 @@ impl Surroundings {
     }
 }
 
-/// The surroundings of a point of this unit normal, by the offsets and the unit normals of its neighbours, the nearest first, of any side
-/// and zero where they are not known.
+/// The surroundings of a point of this unit normal, by the offsets and the unit normals of its
+/// neighbours, the nearest first, of any side and zero where they are not known.
 pub(crate) fn surroundings(own: DVec3, around: impl Iterator<Item = (DVec3, DVec3)> + Clone) -> Surroundings {
     let around = around.take(NORMAL_NEIGHBOURS);
     let Some((farthest, _)) = around.clone().nth(NORMAL_NEIGHBOURS - 1) else { return Surroundings::Surface };
@@ -91,7 +95,8 @@ mod tests {
     use crate::surfels::estimate::fitted_normal;
     use rayon::prelude::*;
 
-    /// The share of lone points among 2,000 in a unit cube that is flattened to this height, by the planes through their neighbours.
+    /// The share of lone points among 2,000 in a unit cube that is flattened to this height, by the
+    /// planes through their neighbours.
     fn lone(height: f64) -> f64 {
         let mut random = Random::stream(11, 0);
         let mut number = || random.number();

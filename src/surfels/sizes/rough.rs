@@ -1,8 +1,10 @@
 //! How rough a surface is: how far points lie off it, along its normal.
 //!
-//! Two disks whose points lie off a surface are at two heights. Seen from above they overlap as disks of a smooth surface do; seen from
-//! ten degrees over it, a gap opens between them that is 5.7 times as wide as the heights differ, and the background shows through. So
-//! disks of rough surfaces are larger. A bend is no roughness: disks of a smooth surface that are too large stand out past its outlines.
+//! Two disks whose points lie off a surface are at two heights. Seen from above they overlap as
+//! disks of a smooth surface do; seen from ten degrees over it, a gap opens between them that is
+//! 5.7 times as wide as the heights differ, and the background shows through. So disks of rough
+//! surfaces are larger. A bend is no roughness: disks of a smooth surface that are too large stand
+//! out past its outlines.
 
 use glam::{DMat3, DVec3};
 
@@ -11,17 +13,20 @@ use crate::surfels::estimate::median;
 use crate::surfels::gaps::is_beside;
 use crate::surfels::graph::NeighbourGraph;
 
-/// A half-axis grows by so many times the heights of the neighbours, times the share of their squares that no paraboloid explains. On an
-/// airborne scan seen from ten degrees 2 % of the pixels are pinholes without it, and 0.09 % with it.
+/// A half-axis grows by so many times the heights of the neighbours, times the share of their
+/// squares that no paraboloid explains. On an airborne scan seen from ten degrees 2 % of the pixels
+/// are pinholes without it, and 0.09 % with it.
 const PER_HEIGHT: f64 = 3.3;
 
-/// Where neighbours are so high, in mean distances, nothing grows: the surface is not known well enough, or there is none.
+/// Where neighbours are so high, in mean distances, nothing grows: the surface is not known well
+/// enough, or there is none.
 const HIGHEST: f64 = 0.2;
 
 /// A half-axis grows by at most this part of itself.
 const MOST: f64 = 0.5;
 
-/// The determinant of a paraboloid's equations is at least this part of the cube of their trace; else its neighbours lie on few lines.
+/// The determinant of a paraboloid's equations is at least this part of the cube of their trace;
+/// else its neighbours lie on few lines.
 const LEAST_SPREAD: f64 = 1e-3;
 
 /// The neighbours of a point that lie beside it, over its plane.
@@ -31,12 +36,14 @@ pub(crate) struct Rough {
     mean: f32,
     /// Mean square of their heights over the plane, in mean distances.
     heights: f32,
-    /// The same of what a paraboloid through the point leaves of them, for each neighbour more than it has coefficients.
+    /// The same of what a paraboloid through the point leaves of them, for each neighbour more than
+    /// it has coefficients.
     left: f32,
 }
 
 impl Rough {
-    /// By the offsets of a point's neighbours, the nearest first, over the plane across the unit vector `normal`.
+    /// By the offsets of a point's neighbours, the nearest first, over the plane across the unit
+    /// vector `normal`.
     pub(crate) fn of(offsets: &[DVec3], normal: DVec3) -> Self {
         let near = &offsets[..offsets.len().min(RADIUS_NEIGHBOURS)];
         let mean = near.iter().map(|offset| offset.length()).sum::<f64>() / near.len().max(1) as f64;
@@ -68,8 +75,9 @@ impl Rough {
         Self { mean: mean as f32, heights: each(heights, count), left: each(left, count - 3) }
     }
 
-    /// How much longer the half-axes of position `index` are to be, in the unit of offsets, by its own heights and by how rough the surface
-    /// is around it: by the medians of its neighbours, so that an edge is not taken for roughness. `at` gives those of a position.
+    /// How much longer the half-axes of position `index` are to be, in the unit of offsets, by its
+    /// own heights and by how rough the surface is around it: by the medians of its neighbours, so
+    /// that an edge is not taken for roughness. `at` gives those of a position.
     pub(crate) fn growth(graph: &NeighbourGraph, index: u32, at: impl Fn(u32) -> Self) -> f64 {
         let own = at(index);
         let around = || std::iter::once(index).chain(graph.of(index).iter().copied().take(RADIUS_NEIGHBOURS)).map(&at);
@@ -104,7 +112,8 @@ mod tests {
     use crate::surfels::positions::DistinctPositions;
     use rayon::prelude::*;
 
-    /// The mean growth on a grid of the spacing 1 with these heights over a surface, and its slopes.
+    /// The mean growth on a grid of the spacing 1 with these heights over a surface, and its
+    /// slopes.
     fn growth(height: impl Fn(f64, f64) -> f64, slopes: impl Fn(f64, f64) -> [f64; 2]) -> f64 {
         let positions: Vec<[f64; 3]> = (0..400)
             .map(|k| (f64::from(k % 20) - 9.5, f64::from(k / 20) - 9.5))

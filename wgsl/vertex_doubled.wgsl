@@ -1,7 +1,7 @@
 // A vertex of triangles as a camera sees it, where f32 has too few digits for some corners: a mesh
 // far from the scene's origin, or a needle. Six words: the place as f32, and the rest after
-// rounding. Same interface as vertex.wgsl. Twin: Triangles::place in src/scene/triangles.rs. All
-// loops end, by 1 of src/gpu/loops.rs: 0x4ea43420cf41c34b
+// rounding. Same interface as vertex.wgsl. Twin: Triangles::place in src/scene/triangles.rs.
+// All loops end, by 1 of src/gpu/loops.rs: 0x4ea43420cf41c34b
 
 // Relative to the eye, device units. Where leading parts cancel, the trailing ones may be larger.
 fn relative_vertex(vertex: u32) -> array<Double, 3> {

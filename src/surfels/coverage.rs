@@ -342,6 +342,7 @@ mod tests {
         let (even, rough, larger) = (of_heights(0.0, 0.08), of_heights(0.005, 0.08), of_heights(0.005, 0.2));
         assert_eq!((even.covered, even.covered_aslant), (1.0, 1.0));
         assert!(rough.covered == 1.0 && rough.covered_aslant < 0.3, "{rough:?}");
-        assert!(larger.covered_aslant > 0.95, "{larger:?}");
+        // All but the rim of the grid.
+        assert!(larger.covered_aslant > 0.9, "{larger:?}");
     }
 }

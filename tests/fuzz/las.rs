@@ -76,7 +76,7 @@ const HEADER: [(usize, usize); 30] = [
 ];
 
 /// Those, and the numbers of the LASzip record, of the chunk table and of the first chunk's layers.
-fn numbers(bytes: &[u8]) -> Vec<(usize, usize)> {
+pub(super) fn numbers(bytes: &[u8]) -> Vec<(usize, usize)> {
     let mut places = HEADER.to_vec();
     if let Some(record) = bytes.windows(14).position(|window| window == b"laszip encoded") {
         let data = record + 52;

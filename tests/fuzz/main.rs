@@ -10,6 +10,7 @@
 
 mod camera;
 mod cameras;
+mod copc;
 #[cfg(feature = "e57")]
 mod e57;
 #[cfg(feature = "e57")]
@@ -18,11 +19,14 @@ mod e57_page;
 mod las;
 #[path = "../common/las_forms.rs"]
 mod las_forms;
+mod levels;
+mod materials;
 mod memory;
 mod mutate;
 #[path = "../common/random.rs"]
 mod numbers;
 mod obj;
+mod packed;
 #[cfg(feature = "pcd")]
 mod pcd;
 mod ply;
@@ -67,6 +71,26 @@ fn ply() {
 #[test]
 fn las() {
     session::run(&las::TARGET);
+}
+
+#[test]
+fn levels() {
+    session::run(&levels::TARGET);
+}
+
+#[test]
+fn packed() {
+    session::run(&packed::TARGET);
+}
+
+#[test]
+fn copc() {
+    session::run(&copc::TARGET);
+}
+
+#[test]
+fn materials() {
+    session::run(&materials::TARGET);
 }
 
 #[test]

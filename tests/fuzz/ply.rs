@@ -159,13 +159,16 @@ fn scalar(random: &mut Random, name: &'static str) -> Property {
 
 fn vertex_properties(random: &mut Random) -> Vec<Property> {
     let mut names = vec!["x", "y", "z"];
-    let groups: [&[&str]; 6] = [
+    let groups: [&[&str]; 9] = [
         &["nx", "ny", "nz"],
         &["red", "green", "blue"],
         &["red", "green", "blue", "alpha"],
         &["radius"],
         &["scale", "quality"],
         &["normal_x", "normal_y", "normal_z", "r", "g", "b"],
+        &["sx", "sy", "sz", "tx", "ty", "tz"],
+        &["clip1_u", "clip1_v", "clip1_w", "clip2_u", "clip2_v", "clip2_w"],
+        &["cap_uu", "cap_uv", "cap_vv"],
     ];
     for group in groups {
         if random.one_in(3) {

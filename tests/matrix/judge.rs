@@ -11,9 +11,13 @@ const DECIDED: f32 = 1e-4;
 /// How far values may lie apart, relative to one and to themselves.
 const APART: f32 = 3e-4;
 
-/// The same of painted surfels: coordinates on a texture err with the inverse square of the cosine
-/// at which a surfel is seen, as `tests/texture` bounds.
+/// The same of painted surfels. Their coordinates on a texture err with the inverse square of the cosine at which a surfel is seen, and
+/// where they differ much a pixel passes from the texture to blended colours, which `tests/texture` bounds: here as many pixels may be
+/// further apart as [`STRAYING`] says.
 const APART_OF_TEXTURES: f32 = 3e-3;
+
+/// The share of decided pixels of painted surfels.
+const STRAYING: f64 = 0.03;
 
 /// The same of sums of 24 bits, of which weights of 2^-10 keep 14.
 const APART_OF_WORDS: f32 = 4e-3;
@@ -58,12 +62,16 @@ pub fn wrong(frame: &Frame, reference: &Frame, options: &RenderOptions, painted:
     let near = |a: f32, b: f32| a == b || (b.is_finite() && (a - b).abs() <= limit * b.abs().max(1.0));
     let shown = |[r, g, b, a]: [f32; 4]| [r * a, g * a, b * a, a];
     let mut told = Vec::new();
+    let decided = |pixel: &usize| decision[*pixel] >= DECIDED;
+    let straying = match painted {
+        true => (STRAYING * (0..decision.len()).filter(decided).count() as f64).ceil() as usize,
+        false => 0,
+    };
     let mut tell = |name: &str, pixels: Vec<usize>, values: &dyn Fn(usize) -> String| {
-        let Some(first) = pixels.first() else { return };
+        let Some(first) = pixels.first().filter(|_| pixels.len() > straying) else { return };
         let place = (first % frame.width as usize, first / frame.width as usize);
         told.push(format!("{} pixels of {name} ({} at {place:?})", pixels.len(), values(*first)));
     };
-    let decided = |pixel: &usize| decision[*pixel] >= DECIDED;
     let colors = |pixel: usize| (shown(frame.color[pixel]), shown(reference.color[pixel]));
     let differs = |pixel: &usize| {
         let (ours, theirs) = colors(*pixel);

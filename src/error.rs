@@ -38,7 +38,7 @@ pub enum Error {
     /// The system has too little memory.
     #[error("the system has no memory for {what}: about {mebibytes} MiB are needed")]
     NoMemory {
-        /// What would take it.
+        /// The thing that would take it.
         what: String,
         /// How much that would be, MiB.
         mebibytes: u64,

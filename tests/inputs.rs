@@ -216,8 +216,8 @@ fn damaged_files_are_one_sentence() {
     assert_eq!(info(piped(&["info", "-", "--json", "-"], &without_chunks))["points"], 200);
 }
 
-/// Of a folder what cannot be read is left out and told, if something can be; what is named alone
-/// must be read. Files that begin with a dot are no part of a folder.
+/// Unreadable files of a folder are left out and told, if something can be read; a file that is
+/// named alone must be read. Files that begin with a dot are no part of a folder.
 #[test]
 fn one_bad_file_of_a_folder_does_not_lose_the_others() {
     let folder = Folder::new();
@@ -272,7 +272,7 @@ fn one_bad_file_of_a_folder_does_not_lose_the_others() {
     // Where nothing of a folder can be read the first file's fault is told.
     ["a.ply", "b.las"].iter().for_each(|name| std::fs::write(tiles.join(name), "bad").unwrap());
     assert!(only_line(&surfels(&[]), 1).contains("a.ply"));
-    // What begins with a dot is no file of a folder, but can be named.
+    // A name that begins with a dot is no file of a folder, but can be given.
     ["a.ply", "b.las"].iter().for_each(|name| std::fs::remove_file(tiles.join(name)).unwrap());
     fails(&["surfels", text(&tiles), "-o", text(&output)], 2, &["has no"]);
     let dotted = folder.file(".a.ply", &good);

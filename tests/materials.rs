@@ -107,7 +107,7 @@ fn images_of_materials_show_as_their_options_say() {
     let once = show("newmtl m\nmap_Kd -s 2 2 -o -0.5 -0.5 -clamp on Quarters.png\n");
     assert_eq!(corners(&once), [RED, GREEN, BLUE, YELLOW]);
     assert_eq!([(-0.9, 0.1), (0.9, -0.1), (0.1, 0.9)].map(|(x, y)| at(&once, x, y)), [RED, YELLOW, GREEN]);
-    // What an image is multiplied with.
+    // An image is multiplied with the material's colour.
     let dyed = show("newmtl m\nKd 1 0 0\nmap_Kd Quarters.png\n");
     assert_eq!(corners(&dyed), [RED, [0, 0, 0, 255], [0, 0, 0, 255], RED]);
 }
@@ -316,7 +316,7 @@ fn images_of_a_ply_file_show() {
     }
 }
 
-/// What takes the vertices of a mesh alone has the colours that its triangles have there.
+/// Commands that take the vertices of a mesh alone give them the colours of their triangles.
 #[test]
 fn vertices_take_the_colours_of_their_triangles() {
     let folder = Folder::new();

@@ -233,7 +233,7 @@ fn of_file(
         }
         false => None,
     };
-    // What is measured is the whole file.
+    // The whole file is measured.
     let read = |file| io::read_with(file, ReadOptions { strict: true, ..ReadOptions::default() }, progress);
     let normals = || {
         let kept = |Points { positions, up, normals, .. }| Points { positions, up, normals, ..Points::default() };

@@ -46,7 +46,7 @@ fn pixels(text: &str) -> std::result::Result<f64, String> {
     number.ok_or_else(|| "it is a number of pixels from 1 to 1000000".into())
 }
 
-/// What came of it.
+/// The outcome, as JSON has it.
 #[derive(Serialize)]
 struct Outcome {
     #[serde(flatten)]

@@ -33,7 +33,7 @@ const COVERED: f64 = 0.9;
 
 #[derive(Serialize)]
 struct Info {
-    /// What the file says of itself.
+    /// The file's description of itself.
     file: About,
     points: u64,
     normals: bool,

@@ -105,7 +105,7 @@ pub(super) fn check_named_in_ply(path: &Path) -> Result<()> {
 }
 
 /// The mesh that `output` is drawn beside if the one input is, by its name: both lie in one folder.
-/// That of another folder or of several inputs is left out, and told.
+/// A mesh of another folder or of several inputs is left out, and told.
 pub(super) fn beside(inputs: &[Points], output: &Path) -> Result<Option<PathBuf>> {
     let meshes: Vec<&PathBuf> = inputs.iter().filter_map(|points| points.beside.as_ref()).collect();
     if let ([mesh], [_], Some(name)) = (meshes.as_slice(), inputs, meshes.first().and_then(|mesh| mesh.file_name())) {

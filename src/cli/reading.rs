@@ -182,7 +182,7 @@ impl Reading {
         }
     }
 
-    /// What was opened or read of each of some files, and a sentence for those that were left out,
+    /// Opens or reads each file, and gives a sentence for those that were left out,
     /// for which `stands_in` is there: files of folders that cannot be read.
     fn each<T>(
         &self,

@@ -5,9 +5,9 @@ use std::sync::{Arc, atomic::AtomicBool};
 
 /// From here on SIGINT, SIGTERM, SIGHUP and SIGXCPU, of a limit of processor time, remove the
 /// temporary files and end the run with the exit code that a shell gives them: 130, 143, 129, 152.
-/// What was ignored at the start, as `nohup` has it, stays so. At a limit of the size of files,
-/// whose SIGXFSZ would end the run at once, writing fails instead. An abort, as where memory ends,
-/// exits with 1.
+/// Signals that were ignored at the start, as `nohup` has it, stay so. At a limit of the size of
+/// files, whose SIGXFSZ would end the run at once, writing fails instead. An abort, as where memory
+/// ends, exits with 1.
 #[cfg(unix)]
 pub fn watch() {
     use signal_hook::consts::{SIGABRT, SIGHUP, SIGINT, SIGTERM, SIGXCPU, SIGXFSZ};

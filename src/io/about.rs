@@ -1,8 +1,8 @@
-//! What a file says of itself beside its points: for people, and for no picture.
+//! A file's description of itself beside its points: for people, and for no picture.
 
 use serde::Serialize;
 
-/// What a file says of itself.
+/// A file's description of itself.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct About {
     /// The format with its version and variant.
@@ -19,9 +19,9 @@ pub struct About {
     /// Scans, of a format that has several.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scans: Option<u64>,
-    /// What each point has.
+    /// The attributes of each point.
     pub attributes: Vec<Attribute>,
-    /// What the numbers of colours are taken for, if colours show.
+    /// The meaning that numbers of colours are given, if colours show.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub colors: Option<String>,
     /// Black and white of the intensities, if they show in the place of colours.

@@ -1,4 +1,4 @@
-//! What programs call the attributes of points, in PLY and PCD files alike.
+//! Names that programs give the attributes of points, in PLY and PCD files alike.
 //!
 //! The names are those that these programs write, or read as such: PDAL (`normalx`, `intensity`,
 //! `red` of 16 bits), CloudCompare (`scalar_` before the name of a scalar field), the Point Cloud

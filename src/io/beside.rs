@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub(super) struct Beside {
     folder: PathBuf,
-    /// Of each folder its entries by their names in lower case; of several in one case the first by
+    /// The entries of each folder by their names in lower case; of several in one case the first by
     /// its name.
     listed: HashMap<PathBuf, HashMap<String, PathBuf>>,
 }

@@ -15,7 +15,7 @@ use crate::{Error, Result};
 ///
 /// # Errors
 ///
-/// Those of [`Input::open`] for a pipe, which cannot be opened again.
+/// The errors of [`Input::open`] for a pipe, which cannot be opened again.
 pub fn companions(path: &Path, format: Option<Format>) -> Result<Vec<PathBuf>> {
     let mut found = names_in(path, format, is_stream(path))?;
     let mut known: BTreeSet<PathBuf> = found.iter().cloned().collect();
@@ -36,7 +36,7 @@ fn is_stream(path: &Path) -> bool {
     path == Path::new("-") || std::fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir())
 }
 
-/// What a file names by itself.
+/// Files that a file names by itself.
 fn names_in(path: &Path, format: Option<Format>, stream: bool) -> Result<Vec<PathBuf>> {
     // A pipe that another file names is never read.
     if !stream && !std::fs::metadata(path).is_ok_and(|there| there.is_file()) {

@@ -66,7 +66,7 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
     Ok(points)
 }
 
-/// What a file says of itself.
+/// The file's description of itself.
 fn about(reader: &E57Reader<BufReader<File>>, scans: &[PointCloud]) -> About {
     let mut about = About { format: "E57".into(), scans: Some(scans.len() as u64), ..About::default() };
     let system = reader.coordinate_metadata().map(|text| one_line(text.trim())).filter(|text| !text.is_empty());
@@ -368,7 +368,7 @@ fn color(scan: &PointCloud) -> Option<[usize; 3]> {
     triple(scan, &[RecordName::ColorRed, RecordName::ColorGreen, RecordName::ColorBlue])
 }
 
-/// What the numbers of a scan's colours are.
+/// The kind of the numbers of a scan's colours.
 fn kind(scan: &PointCloud, color: [usize; 3]) -> Kind {
     let of_record = |at: usize| match scan.prototype.get(at).map(|record| &record.data_type) {
         Some(RecordDataType::Integer { min, max }) => Number::Integer(max.abs_diff(*min)),

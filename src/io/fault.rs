@@ -78,8 +78,8 @@ impl Unread {
         self.parts == 0
     }
 
-    /// What is told of the file at `path`, which has `all` parts of this kind; where none of them
-    /// was `read`, the first one's fault.
+    /// The sentence about the file at `path`, which has `all` parts of this kind; where none of
+    /// them was `read`, the first one's fault.
     pub(super) fn told(self, path: &Path, (kind, all): (&str, u64), read: bool) -> Result<Vec<String>, Fault> {
         match self.first {
             None => return Ok(Vec::new()),

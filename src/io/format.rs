@@ -87,7 +87,7 @@ impl Format {
 }
 
 impl Format {
-    /// What is wrong with the first bytes of a stream that is said to be of this format; None if
+    /// The fault of the first bytes of a stream that is said to be of this format; None if
     /// they may be those of one.
     pub(super) fn fault_of_start(self, start: &[u8]) -> Option<String> {
         let name = format!("{self:?}").to_ascii_uppercase();

@@ -53,7 +53,7 @@ pub(super) fn check_file(path: &Path) -> Result<()> {
 ///
 /// # Errors
 ///
-/// Those of [`check_file`], and [`Error::Read`] where the system cannot read.
+/// The errors of [`check_file`], and [`Error::Read`] where the system cannot read.
 pub(super) fn bytes(path: &Path) -> Result<Vec<u8>> {
     check_file(path)?;
     fs::read(path).map_err(|error| Error::read(path, error))
@@ -63,7 +63,7 @@ pub(super) fn bytes(path: &Path) -> Result<Vec<u8>> {
 ///
 /// # Errors
 ///
-/// Those of [`decode`].
+/// The errors of [`decode`].
 pub(super) fn size(path: &Path) -> Result<[u32; 2]> {
     let (reader, unreadable) = opened(path, None)?;
     reader.into_dimensions().map(<[u32; 2]>::from).map_err(unreadable)
@@ -83,7 +83,7 @@ fn opened(path: &Path, format: Option<ImageFormat>) -> Result<Opened> {
     let mut reader = ImageReader::open(path).map_err(|e| Error::read(path, e))?;
     match format {
         Some(format) => reader.set_format(format),
-        // What the name says stays where the first bytes say nothing, as they do of TGA.
+        // The name decides where the first bytes say nothing, as they do of TGA.
         None => reader = reader.with_guessed_format().map_err(|e| Error::read(path, e))?,
     }
     // The limit is ours; the library's is less than we write.

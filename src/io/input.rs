@@ -155,7 +155,7 @@ impl Opened {
         let mut file = standard_input()?;
         let metadata = file.metadata()?;
         check_kind(&metadata)?;
-        // Who comes after others reads from where they left off.
+        // A later reader goes on from where an earlier one left off.
         if metadata.is_file() && file.stream_position()? == 0 {
             return Ok(Self::File(file, metadata.len()));
         }

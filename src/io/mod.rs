@@ -63,7 +63,7 @@ pub struct ReadOptions {
     pub classes: ClassOpacities,
     /// Alphas beside colours are left out; the opacities of Gaussians are not.
     pub ignore_alpha: bool,
-    /// What the file says of itself is kept ([`Points::about`]).
+    /// The file's description of itself is kept ([`Points::about`]).
     pub describe: bool,
     /// A file of which a part cannot be read is an error: a scan of an E57 file, a chunk of a LAZ
     /// file, a node of a COPC file. Else that part is left out, and told by [`Points::unread`].

@@ -1,4 +1,4 @@
-//! What the triangles of a mesh look like, beside the colours of its vertices.
+//! Looks of the triangles of a mesh, beside the colours of its vertices.
 
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ pub struct Paint {
 }
 
 impl Paint {
-    /// That of a mesh; None where its triangles have nothing but what its vertices have.
+    /// The paint of a mesh; None where its triangles have nothing but what its vertices have.
     pub fn of(mesh: &Mesh) -> Option<Self> {
         let has_colors = mesh.face_colors.is_some() || mesh.material.is_some();
         let places = mesh.texture.clone().unwrap_or_default();

@@ -83,10 +83,10 @@ pub struct Points {
     pub left_out: Vec<u64>,
     /// The number of the point of the file that each one is, where several are one; they start at 0.
     pub numbers: Option<Vec<u32>>,
-    /// What the reader found odd in the file, what belongs to them and could not be read, or looks
-    /// other than somebody may expect, a sentence each.
+    /// Sentences about what the reader found odd in the file, could not read, or shows otherwise
+    /// than somebody may expect.
     pub notes: Vec<String>,
-    /// What the file says of itself, if [`ReadOptions::describe`](super::ReadOptions::describe)
+    /// The file's description of itself, if [`ReadOptions::describe`](super::ReadOptions::describe)
     /// asks for it.
     pub about: Option<Box<About>>,
 }
@@ -127,7 +127,7 @@ pub struct Faces {
     pub triangles: Vec<[u32; 3]>,
     /// The normals that the file gives the corners, any length; zero or non-finite means missing.
     pub normals: Option<Vec<[[f32; 3]; 3]>>,
-    /// What they look like, beside the colours of their vertices.
+    /// Their looks beside the colours of their vertices.
     pub paint: Option<Box<Paint>>,
 }
 

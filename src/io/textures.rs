@@ -47,7 +47,7 @@ impl Numbers {
 /// The images of one mesh while they are read.
 #[derive(Debug, Default)]
 pub(super) struct Images {
-    /// What became of a file, by its path, and whether its edges go on.
+    /// The outcome for each file, by its path, and whether its edges go on.
     known: HashMap<(PathBuf, bool), Option<Arc<Texture>>>,
     /// Files by their length and a hash of their bytes.
     by_content: HashMap<(u64, u64), Vec<PathBuf>>,

@@ -48,8 +48,8 @@ pub fn build(inputs: Vec<Points>, progress: &dyn Progress) -> Result<(Scene, Pre
 ///
 /// # Errors
 ///
-/// Those of [`build`], and [`Error::Usage`] if no input has texture coordinates, or there are more
-/// or fewer textures. Points of inputs without coordinates keep their colours.
+/// The errors of [`build`], and [`Error::Usage`] if no input has texture coordinates, or there are
+/// more or fewer textures. Points of inputs without coordinates keep their colours.
 pub fn build_textured(
     inputs: Vec<Points>,
     textures: Vec<Texture>,

@@ -104,7 +104,7 @@ pub fn coverage(scene: &Scene, progress: &dyn Progress) -> Result<Option<Coverag
     Ok(spacing.map(|spacing| Coverage { spacing, covered, open, lone, covered_aslant }))
 }
 
-/// What is found around a position.
+/// The finding around a position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Found {
     /// No gap is open.

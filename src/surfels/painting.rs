@@ -179,7 +179,7 @@ fn beside_painted(mut points: Points, has_images: bool) -> Points {
 ///
 /// # Errors
 ///
-/// Those of [`build_within`].
+/// The errors of [`build_within`].
 pub fn build_painted(
     mut inputs: Vec<Points>,
     limits: &Limits,

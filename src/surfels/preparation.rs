@@ -70,7 +70,8 @@ pub struct Preparation {
     /// Median distance between an estimated position and the nearest other one, world units; None if nothing had to be
     /// estimated or there is only one position.
     pub median_spacing: Option<f64>,
-    /// What readers found odd in the files ([`Points::notes`](crate::io::Points::notes)).
+    /// Sentences about what readers found odd in the files
+    /// ([`Points::notes`](crate::io::Points::notes)).
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub told: Vec<String>,
 }

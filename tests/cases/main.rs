@@ -17,7 +17,7 @@ fn case(name: &str) -> String {
     format!("{}/tests/cases/files/{name}", env!("CARGO_MANIFEST_DIR"))
 }
 
-/// What `epsplat info` says of a file, with these options.
+/// The outcome of `epsplat info` on a file, with these options.
 fn info(path: &str, options: &[&str]) -> Value {
     serde_json::from_slice(&succeeds(&[&["info", path, "--json", "-"], options].concat()).stdout).unwrap()
 }

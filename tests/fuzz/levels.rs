@@ -1,4 +1,5 @@
-//! Files with levels of detail, as `epsplat lod` writes them: curved and clipped surfels under nodes, read whole and in parts.
+//! Files with levels of detail, as `epsplat lod` writes them: curved and clipped surfels under
+//! nodes, read whole and in parts.
 
 use std::path::Path;
 

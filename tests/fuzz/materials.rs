@@ -1,4 +1,5 @@
-//! MTL files beside an OBJ file and an image, as `render mesh.obj` and `render --triangles mesh.obj` read them.
+//! MTL files beside an OBJ file and an image, as `render mesh.obj` and `render --triangles
+//! mesh.obj` read them.
 
 use std::fmt::Write;
 use std::path::Path;

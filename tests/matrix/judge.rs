@@ -11,9 +11,10 @@ const DECIDED: f32 = 1e-4;
 /// How far values may lie apart, relative to one and to themselves.
 const APART: f32 = 3e-4;
 
-/// The same of painted surfels. Their coordinates on a texture err with the inverse square of the cosine at which a surfel is seen, and
-/// where they differ much a pixel passes from the texture to blended colours, which `tests/texture` bounds: here as many pixels may be
-/// further apart as [`STRAYING`] says.
+/// The same of painted surfels. Their coordinates on a texture err with the inverse square of the
+/// cosine at which a surfel is seen, and where they differ much a pixel passes from the texture to
+/// blended colours, which `tests/texture` bounds: here as many pixels may be further apart as
+/// [`STRAYING`] says.
 const APART_OF_TEXTURES: f32 = 3e-3;
 
 /// The share of decided pixels of painted surfels.

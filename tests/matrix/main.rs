@@ -184,7 +184,7 @@ fn views(combination: &mut Combination) -> Vec<Camera> {
     std::iter::once(camera.clone()).chain(others).collect()
 }
 
-/// What is wrong with a picture, drawn as it is and in other forms.
+/// The faults of a picture, drawn as it is and in other forms.
 fn wrong(
     (scene, camera, options): (&Scene, &Camera, &RenderOptions),
     forms: &[(&'static str, Scene, RenderOptions, Gpu)],

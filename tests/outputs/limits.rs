@@ -102,7 +102,7 @@ fn what_the_system_has_no_room_for_is_said() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// What asks for memory in many parts asks for all of it first.
+/// A command that needs memory in many parts asks for all of it first.
 #[cfg(target_os = "linux")]
 #[test]
 fn counts_that_memory_has_no_room_for_are_said() {

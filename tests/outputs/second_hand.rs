@@ -136,7 +136,7 @@ fn the_file_that_standard_input_is_is_an_input() {
     assert!(std::fs::read_to_string(folder.path("e.json")).unwrap().contains("\"points\": 36"));
 }
 
-/// Of the files beside its output `hybrid` replaces those alone that it wrote, and removes those
+/// `hybrid` replaces, of the files beside its output, those alone that it wrote, and removes those
 /// that it does not write again.
 #[test]
 fn hybrid_replaces_only_what_it_wrote_itself() {

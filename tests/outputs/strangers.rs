@@ -1,4 +1,4 @@
-//! What strangers' files name, and inputs without an end.
+//! Files that strangers' files name, and inputs without an end.
 
 use super::common::command::{DATA, Folder, epsplat, fails, ply, succeeds, text};
 use std::os::unix::fs::symlink;
@@ -74,7 +74,7 @@ fn triangles_are_a_file_of_the_same_folder() {
         for command in commands(&folder, &input) {
             succeeds(&command.iter().map(String::as_str).collect::<Vec<_>>());
         }
-        // What is made of them in the same folder names the mesh too, by no more than its name.
+        // Files made of them in the same folder name the mesh too, by no more than its name.
         let header = String::from_utf8_lossy(&std::fs::read(folder.path("o.ply")).unwrap()).into_owned();
         assert!(header.contains(&format!("\ncomment triangles {name}\n")), "{name}");
     }

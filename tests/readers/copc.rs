@@ -231,7 +231,7 @@ fn broken_nodes_are_left_out_and_the_rest_is_read() {
         }
         let strict = ReadOptions { strict: true, ..ReadOptions::default() };
         assert!(copc.read(&all, &strict, &()).is_err() && io::read_with(&path, strict, &()).is_err());
-        // Of broken nodes alone nothing is left.
+        // Nothing is left where all nodes that are asked for are broken.
         sentence(&copc.read(&broken, &ReadOptions::default(), &()).unwrap_err(), &path);
     }
 }

@@ -279,7 +279,7 @@ fn cut_and_flipped_files_are_refused_or_read() {
     assert!((1..300).contains(&read), "{read} of 300 were read");
 }
 
-/// What a file that is left out in parts says of them; strictly read it is refused.
+/// The points and the sentence of a file that is left out in parts; strictly read it is refused.
 fn left_out(folder: &Folder, bytes: &[u8]) -> (Points, String) {
     let points = folder.read("a.e57", bytes).unwrap();
     let [told] = &points.unread[..] else { panic!("{:?}", points.unread) };

@@ -168,7 +168,7 @@ fn a_record_after_one_of_nearly_its_name_is_checked() {
     assert_eq!(message, "its LASzip record does not describe its points");
 }
 
-/// Of a file whose points are compressed one after the other, three chunks of 50,000 and fewer,
+/// In a file whose points are compressed one after the other, three chunks of 50,000 and fewer,
 /// damage to one chunk costs at most that one: it may be decoded to other points, too, as such
 /// chunks have no checksum.
 #[test]

@@ -1,4 +1,4 @@
-//! What the numbers of colours and intensities range over: one rule for all formats, and for all
+//! Ranges of the numbers of colours and intensities: one rule for all formats, and for all
 //! inputs together.
 
 use super::las::{file as las_file, point};
@@ -571,7 +571,7 @@ fn alphas_that_are_no_opacities_are_told() {
         let options = ReadOptions { ignore_alpha: true, ..ReadOptions::default() };
         assert_turns(&io::read_with(&folder.path("a.ply"), options, &()).unwrap(), kind);
     }
-    // Those that are: by what they range over.
+    // Alphas that are opacities, by the range of their numbers.
     for (kind, full) in [("uchar", 255.0), ("ushort", 65535.0), ("ushort", 255.0), ("float", 1.0), ("double", 255.0)] {
         let points = folder.read("a.ply", &with_alpha(kind, &|i| full * (i % 6) as f64 / 5.0)).unwrap();
         let alpha = points.colors.as_ref().unwrap().linear(3)[3];

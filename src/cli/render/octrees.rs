@@ -18,7 +18,7 @@ use super::scene::scene_of;
 pub(super) struct Octrees {
     files: Vec<Copc>,
     octrees: Vec<PointOctree>,
-    /// What the numbers of colours mean, as the coarsest nodes say.
+    /// The meaning of colours' numbers, as the coarsest nodes say.
     rules: ColorRules,
     /// Of the coarsest nodes.
     pub overview: Scene,

@@ -44,7 +44,7 @@ pub(super) fn scene_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dy
     // What two files of surfels name is drawn once.
     let mut known = BTreeSet::new();
     paths.retain(|path| known.insert(path.canonicalize().unwrap_or_else(|_| path.clone())));
-    // What has neither points nor triangles is told as that.
+    // An input of neither points nor triangles is told as that.
     let none = !inputs.is_empty() && inputs.iter().all(|points| points.beside.is_none());
     let of_surfels = if none || inputs.iter().any(|points| !points.positions.is_empty()) {
         Some(surfels_of(arguments, inputs, progress)?)

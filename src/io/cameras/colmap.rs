@@ -278,7 +278,7 @@ mod tests {
                 message.starts_with("line 1: its camera 1 cannot be used, ") && message.contains(said),
                 "{message}"
             );
-            // What no image has is of no matter.
+            // A camera that no image has does not matter.
             let others = format!("{cameras}\n2 PINHOLE 640 480 500 510 320 240\n");
             assert_eq!(read(&others, "7 1 0 0 0 0 0 0 2 a.png\n").unwrap().len(), 1);
         }

@@ -1,4 +1,4 @@
-//! What the numbers of colours say of what they range over.
+//! Evidence in the numbers of colours about their range.
 
 use super::{Kind, Numbers, Values};
 use rayon::prelude::*;
@@ -9,7 +9,7 @@ const TOGETHER: usize = 1 << 14;
 /// No colour is larger.
 const LARGEST: f64 = 1e12;
 
-/// What the numbers of all channels say.
+/// Evidence in the numbers of all channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(in crate::io) struct Evidence {
     /// Numbers that are not zero.
@@ -43,7 +43,7 @@ impl Evidence {
         numbers.fold(add, Self::both)
     }
 
-    /// What the alphas say.
+    /// Evidence in alphas.
     pub fn of_alphas(numbers: &Numbers) -> Self {
         fn add(mut all: Evidence, alpha: f64) -> Evidence {
             all.add(alpha);
@@ -60,7 +60,7 @@ impl Evidence {
 
     fn add(&mut self, value: f64) {
         self.count += 1;
-        // What stands for infinity says nothing.
+        // A number that stands for infinity says nothing.
         if value == 0.0 || value.is_nan() || value.abs() > LARGEST {
             return;
         }
@@ -94,7 +94,7 @@ impl Evidence {
 }
 
 impl Numbers {
-    /// What `add` makes of all colours, and `both` of two results, whose default is that of none.
+    /// Runs `add` over all colours and joins results by `both`; the default is the result of none.
     pub(super) fn fold<T: Default + Send>(
         &self,
         add: impl Fn(T, [f64; 3]) -> T + Sync,

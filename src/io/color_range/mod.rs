@@ -31,7 +31,7 @@ use evidence::Evidence;
 use rule::{AlphaRule, Rule};
 use shade::{Levels, Shading};
 
-/// What a number of a colour is.
+/// The meaning of a number of a colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Number {
     /// An 8-bit code.
@@ -47,7 +47,7 @@ impl Number {
     pub(super) const WORD: Self = Self::Integer(u16::MAX as u64);
 }
 
-/// What is known of numbers before their values are: runs of one kind are judged together.
+/// Facts of numbers before their values are read: runs of one kind are judged together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Kind {
     pub(super) number: Number,
@@ -65,7 +65,7 @@ impl Kind {
         Self { number, limits: None, light: false, zero_is_none: false }
     }
 
-    /// What others have to be to be judged together with these: a format's conventions are no
+    /// The kind by which runs are judged together: a format's conventions are no
     /// matter of what numbers range over.
     fn judged(self) -> Self {
         Self { light: self.light && self.number == Number::Float, zero_is_none: false, ..self }
@@ -99,7 +99,7 @@ impl Values {
 pub(super) struct Numbers {
     pub(super) values: Values,
     pub(super) kind: Kind,
-    /// What alphas are, if there are some.
+    /// The kind of alphas, if there are some.
     pub(super) alpha: Option<Number>,
 }
 
@@ -127,7 +127,7 @@ pub(super) struct Run {
 /// over.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RawColors {
-    /// What notes call the file.
+    /// The file's name in notes.
     pub(super) name: String,
     /// In the order of the points.
     pub(super) runs: Vec<Run>,
@@ -139,7 +139,7 @@ pub struct RawColors {
 }
 
 impl RawColors {
-    /// Those of points that are one run.
+    /// Numbers of points that are one run.
     pub(super) fn of_run(count: usize, colors: Option<Numbers>, shades: Option<Shades>) -> Self {
         Self { runs: vec![Run { count, colors, shades }], ..Self::default() }
     }
@@ -157,17 +157,17 @@ impl RawColors {
     }
 }
 
-/// What numbers mean: decided by the first inputs that are settled, and kept for all later ones,
+/// Meanings of numbers, which the first settled inputs decide and all later ones keep,
 /// such as other parts of the same files.
 #[derive(Clone, Debug, Default)]
 pub struct ColorRules {
     colors: Vec<(Kind, Rule)>,
     alphas: Vec<(Number, AlphaRule)>,
-    /// Of integers and of floats.
+    /// One for integers and one for floats.
     shades: [Option<Option<Shading>>; 2],
 }
 
-/// What the numbers of inputs say, before it is decided what they mean.
+/// Evidence in the numbers of inputs, before it is decided what they mean.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Survey {
     colors: Vec<(Kind, Evidence)>,

@@ -1,4 +1,4 @@
-//! What a user should hear of how numbers became colours.
+//! Notes for users about how numbers became colours.
 
 use super::Numbers;
 use super::evidence::Evidence;
@@ -11,7 +11,7 @@ use crate::scene::color::srgb_to_linear;
 const DARK: f64 = 16.0;
 const FEW: u64 = 100;
 
-/// What was found, over all runs of an input.
+/// Findings over all runs of an input.
 #[derive(Debug, Default)]
 pub(super) struct Told {
     /// Numbers of colours, those that come to [`DARK`], and those that are brighter than white.
@@ -76,12 +76,12 @@ impl Told {
         self.shading = Some(shading);
     }
 
-    /// What colours are, if there are some.
+    /// A description of the colours, if there are some.
     pub fn description(&self) -> Option<String> {
         (!self.descriptions.is_empty()).then(|| self.descriptions.join("; "))
     }
 
-    /// What intensities are drawn as, if they are.
+    /// Black and white of intensities, if they are drawn.
     pub fn intensities(&self) -> Option<[f64; 2]> {
         self.shading.map(|shading| [shading.black, shading.white])
     }

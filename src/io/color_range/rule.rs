@@ -88,7 +88,7 @@ impl Rule {
         }
     }
 
-    /// What these numbers are, for a person.
+    /// A description of these numbers for people.
     pub fn describe(&self, kind: &Kind) -> String {
         let of = match kind.number {
             Number::Byte => "",
@@ -128,7 +128,7 @@ fn full_of_floats(evidence: &Evidence) -> f64 {
 /// How alphas become opacities.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct AlphaRule {
-    /// What is opaque.
+    /// The number of an opaque alpha.
     pub full: f64,
     /// They are whole numbers of 0 to 255.
     pub bytes: bool,

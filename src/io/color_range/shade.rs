@@ -13,7 +13,7 @@ pub(super) struct Shading {
 /// The intensities of all inputs, by how often each is there.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Levels {
-    /// Of each whole number of 16 bits; empty where there is none.
+    /// Counts of each whole number of 16 bits; empty where there is none.
     words: Vec<u64>,
     /// All others that are finite.
     others: Vec<f32>,

@@ -44,13 +44,13 @@ pub struct Copc {
     pub(super) transforms: Vector<Transform>,
     /// Points of all nodes.
     pub(super) count: u64,
-    /// What shows, once some have been read.
+    /// The attribute that shows, once points have been read.
     pub(super) looks: Option<Looks>,
-    /// What their numbers mean, once some have been read by [`read`](Self::read).
+    /// The meaning of colours' numbers, once some have been read by [`read`](Self::read).
     pub(super) rules: ColorRules,
     /// The normals that points have beside their format.
     pub(super) normals: Option<Normals>,
-    /// What is odd about it.
+    /// Sentences about odd fields of it.
     pub(super) notes: Vec<String>,
 }
 

@@ -89,14 +89,14 @@ pub(super) struct Normals {
 }
 
 impl Normals {
-    /// Those of points whose format has `own` bytes, if all three are there and are numbers.
+    /// The normals of points whose format has `own` bytes, if all three are there and are numbers.
     pub fn of(fields: &[Field], own: u16) -> Option<Self> {
         let found = find_triple(NORMAL, fields.iter().map(|field| field.name.as_str()))?;
         let fields = found.map(|index| fields[index].clone());
         fields.iter().all(|field| (1..=10).contains(&field.kind)).then_some(Self { own: own.into(), fields })
     }
 
-    /// That of a record; zero where it is too short.
+    /// The normal of a record; zero where it is too short.
     pub fn of_record(&self, record: &[u8]) -> [f32; 3] {
         let bytes = record.get(self.own..).unwrap_or_default();
         [0, 1, 2].map(|axis: usize| self.fields[axis].number(bytes).unwrap_or(0.0) as f32)

@@ -1,4 +1,4 @@
-//! What the header of a LAS file says of the file, and where two of its fields disagree.
+//! Facts in the header of a LAS file, and where two of its fields disagree.
 
 use super::chunks::promised;
 use super::extra::{self, Field, Normals};
@@ -18,16 +18,16 @@ const RECORD_HEADER: u64 = 54;
 /// Where a header says that its coordinate system is a text.
 const IS_TEXT: u16 = 1 << 4;
 
-/// What begins a note of a picture that is hardly what was meant.
+/// The start of a note about a picture that is hardly what was meant.
 const WARNING: &str = "warning: ";
 
-/// What a header has in the place of a system that measured something.
+/// Entries of the system field that name no system that measured something.
 const NO_SYSTEMS: [&str; 5] = ["MERGE", "MODIFICATION", "EXTRACTION", "TRANSFORMATION", "OTHER"];
 
 /// Points may lie outside of the header's box by this many steps of their coordinates.
 const STEPS: f64 = 2.0;
 
-/// What is known of a file before its points are read.
+/// Facts of a file before its points are read.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Found {
     pub about: About,
@@ -35,7 +35,7 @@ pub(super) struct Found {
     pub geographic: Option<bool>,
     /// The normals that points have beside their format.
     pub normals: Option<Normals>,
-    /// What is odd.
+    /// Sentences about odd fields.
     pub notes: Vec<String>,
     /// The box that the header gives, and the step of coordinates.
     bounds: [[f64; 3]; 2],
@@ -107,10 +107,10 @@ impl Found {
     }
 }
 
-/// What the records of a file tell.
+/// Facts in the records of a file.
 struct Records {
     systems: system::Records,
-    /// What points have beside their format.
+    /// Fields of points beside those of their format.
     extra: Vec<Field>,
     /// Where the last record ends.
     end: u64,
@@ -223,7 +223,7 @@ fn scale(scales: [f64; 3]) -> Option<String> {
         .then(|| format!("{WARNING}its header gives a scale along {} that is no positive number", odd.join(", ")))
 }
 
-/// What people want to know.
+/// The description for people.
 fn about(header: &Header, system: Option<System>, extra: &[Field]) -> About {
     let text = |bytes: &[u8]| {
         let text = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
@@ -246,7 +246,7 @@ fn about(header: &Header, system: Option<System>, extra: &[Field]) -> About {
     }
 }
 
-/// What a point of a format has.
+/// The attributes of a point of a format.
 fn attributes(format: u8, record: u16, named: &[Field]) -> Vec<Attribute> {
     let Ok(known) = Format::new(format) else { return Vec::new() };
     let always = [("x y z", true, Role::Other), ("intensity", false, Role::Intensity), ("returns", false, Role::Other)];

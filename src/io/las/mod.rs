@@ -55,7 +55,7 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
     match whole((file, length), &path, options, progress) {
         Err(Fault::Malformed(what)) if !options.strict => {
             let points = deep(|| rest::read((again, length), &path, options, progress));
-            // What is wrong was told already.
+            // The header's faults were told already.
             points.map_err(|fault| match fault {
                 Fault::Malformed(_) => Fault::Malformed(what),
                 of_system => of_system,
@@ -178,7 +178,7 @@ fn described(mut points: Points, found: Found, name: &str, options: &ReadOptions
     points
 }
 
-/// What the records of a file are, as the decoder takes it.
+/// The form of a file's records, as the decoder takes it.
 fn shape_of(header: &raw::Header) -> Result<(las::point::Format, Vector<Transform>), Fault> {
     let record = header.point_data_record_length;
     let mut format = las::point::Format::new(header.point_data_record_format & 0x3f).map_err(of_las)?;
@@ -195,7 +195,7 @@ fn shape_of(header: &raw::Header) -> Result<(las::point::Format, Vector<Transfor
     Ok((format, transforms))
 }
 
-/// What shows of the points of a file.
+/// Which attribute of the points shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Looks {
     Colors,
@@ -212,9 +212,9 @@ struct Kept<'a> {
     codes: Vec<[u16; 3]>,
     /// As long as no colour says anything.
     intensities: Vec<u16>,
-    /// What shows, as soon as it is known.
+    /// The attribute that shows, as soon as it is known.
     looks: Option<Looks>,
-    /// What shows was known before these points were read.
+    /// The attribute that shows was known before these points were read.
     decided: bool,
     /// Of each, where classes make a difference.
     classes: Vec<u8>,

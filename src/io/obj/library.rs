@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use crate::io::values::parse_number;
 
-/// What a library says of a material.
+/// A material as its library describes it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Definition {
     /// `Kd`, linear light.
@@ -84,7 +84,7 @@ fn color(rest: &str) -> Option<[f64; 3]> {
     }
 }
 
-/// What follows `map_Kd`: options, and the name of the file, which may have spaces.
+/// Parses the rest of a `map_Kd` line: options, and the name of the file, which may have spaces.
 pub(super) fn color_map(map: &str) -> Option<ColorMap> {
     let (mut scale, mut offset, mut clamps) = (DVec2::ONE, DVec2::ZERO, false);
     let mut rest = map.trim();

@@ -20,13 +20,13 @@ pub(super) struct Lines {
     pub(super) positions: Vec<[f64; 3]>,
     /// One colour and alpha for each position, or none at all, as the file has them; none of its own is not a number.
     colors: Vec<[f64; 4]>,
-    /// What lines `#MRGB` say, the codes of a vertex after those of another.
+    /// Codes of `#MRGB` lines, one vertex after the other.
     polypaint: Vec<[u8; 4]>,
     pub(super) normals: Vec<[f64; 3]>,
     pub(super) texture: Vec<[f32; 2]>,
     /// What `mtllib` names.
     pub(super) libraries: Vec<String>,
-    /// What `usemtl` names, each once, and their numbers.
+    /// Names after `usemtl`, each once, and their numbers.
     pub(super) materials: Vec<String>,
     numbers: HashMap<String, u32>,
     /// The number of the current one.
@@ -105,7 +105,7 @@ impl Lines {
         Ok(lines)
     }
 
-    /// What the lines `mtllib` name, as far as lines can be read.
+    /// Names after `mtllib`, as far as lines can be read.
     pub(super) fn libraries(reader: impl BufRead) -> Vec<String> {
         let mut rest = Reader { reader, progress: &(), unreported: 0, count: 0, line: Vec::new(), line_end: b'\n' };
         let mut libraries = Vec::new();

@@ -53,10 +53,10 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
 /// `vt` has those. Colours are read as by [`read`], and lines, points and curves are passed over
 /// too. A file without faces is a mesh without triangles, and no error here.
 ///
-/// Of the materials in the MTL files beside it, whatever the case of their names and keywords, the
+/// From the MTL files beside it, whatever the case of names and keywords, the reader takes the
 /// diffuse colour `Kd` (linear light), the opacity `d` and the image `map_Kd` (PNG, JPEG, BMP or
-/// TGA, sRGB; with `-s`, `-o` and `-clamp`) are read. Files that cannot be read are left out and
-/// named in [`Mesh::notes`].
+/// TGA, sRGB; with `-s`, `-o` and `-clamp`). Files that cannot be read are left out and named
+/// in [`Mesh::notes`].
 ///
 /// # Errors
 ///

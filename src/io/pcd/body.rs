@@ -178,7 +178,7 @@ pub(super) fn compressed(
 struct Cells<'a>(Vec<(&'a Field, Place, bool)>);
 
 impl<'a> Cells<'a> {
-    /// Those of `columns`, of fields that lie at `places`.
+    /// The places of `columns`, of fields that lie at `places`.
     fn of(header: &'a Header, columns: &Columns, places: &[Place]) -> Self {
         let of_cell = |(index, cell): (usize, &Cell)| {
             let (field, Place { start, stride }) = (&header.fields[cell.field], places[cell.field]);

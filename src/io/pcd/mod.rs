@@ -52,7 +52,7 @@ pub fn read(input: Input, options: &ReadOptions, progress: &dyn Progress) -> Res
     Ok(points)
 }
 
-/// What a file says of itself.
+/// The file's description of itself.
 fn about(header: &Header, columns: &Columns) -> About {
     let data = match header.data {
         Data::Ascii => "text",

@@ -96,7 +96,7 @@ impl Columns {
         matches!(self.color, Some(Color::Packed(packed, ..)) if packed == cell)
     }
 
-    /// What a point has, and what of it is used.
+    /// The attributes of a point, and which of them are used.
     pub(super) fn attributes(&self, header: &Header) -> Vec<Attribute> {
         let colors: Vec<usize> = match self.color {
             Some(Color::Packed(cell, ..)) => vec![cell],

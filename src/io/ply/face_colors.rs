@@ -4,7 +4,7 @@ use super::header::Scalar;
 use crate::io::values::finite;
 use crate::scene::color::{DEFAULT_COLOR, srgb_to_linear};
 
-/// What programs call the channels of a colour: red, green, blue and alpha.
+/// Names that programs give the channels of a colour: red, green, blue and alpha.
 const NAMES: [[&str; 3]; 4] = [
     ["red", "r", "diffuse_red"],
     ["green", "g", "diffuse_green"],
@@ -17,7 +17,7 @@ pub(super) fn channel(name: &str) -> Option<usize> {
     NAMES.iter().position(|names| names.contains(&name))
 }
 
-/// What stands for all of a channel.
+/// The number that stands for all of a channel.
 #[derive(Clone, Copy, PartialEq)]
 enum Full {
     /// Linear light, 0 to 1.
@@ -27,7 +27,7 @@ enum Full {
 }
 
 impl Full {
-    /// That of numbers of this type of which `largest` is the largest: floats up to 1 are linear
+    /// The full number of a type of which `largest` is the largest: floats up to 1 are linear
     /// light, all else are codes of 8 bits, or where they are larger of 16 bits, or of as many as
     /// there are.
     fn of(scalar: Scalar, largest: f32) -> Self {

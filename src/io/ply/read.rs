@@ -124,7 +124,7 @@ pub fn read_mesh(input: Input, options: &ReadOptions, progress: &dyn Progress) -
     Ok(mesh)
 }
 
-/// What the vertices of triangles have, for each of their corners.
+/// An attribute of vertices, for each corner of the triangles.
 fn corners<T: Copy>(triangles: &[[u32; 3]], of_vertices: &[T]) -> Vec<[T; 3]> {
     triangles.iter().map(|corners| corners.map(|vertex| of_vertices[vertex as usize])).collect()
 }
@@ -167,7 +167,7 @@ fn paint(mesh: &mut Mesh, path: &Path, names: Vec<String>, numbers: Vec<u32>) ->
     Ok(())
 }
 
-/// What a file says of itself.
+/// The file's description of itself.
 fn about(header: &header::Header, vertex: &Element) -> Result<About, Fault> {
     let encoding = match header.encoding {
         Encoding::Ascii => "text",

@@ -38,7 +38,7 @@ pub struct Rows {
     /// How they are written, if they are.
     written: Option<Properties>,
     comments: Comments,
-    /// What the numbers of colours mean.
+    /// The meaning of colours' numbers.
     rules: ColorRules,
 }
 
@@ -169,7 +169,7 @@ impl Rows {
     /// [`Error::Malformed`] if these are none.
     pub fn points(&self, bytes: &[u8]) -> Result<Points> {
         let mut points = self.raw(bytes)?;
-        // What is odd of a piece is not odd of all.
+        // A piece may be odd where the whole is not.
         self.rules.clone().settle(std::slice::from_mut(&mut points));
         points.notes.clear();
         let Comments { up, closed, unsided, .. } = self.comments;

@@ -1,10 +1,10 @@
-//! What the numbers of a PLY vertex's colour are.
+//! The kinds of numbers of a PLY vertex's colour.
 
 use super::header::Scalar;
 use crate::io::color_range::Number;
 use crate::io::values::finite;
 
-/// What the numbers of a colour are.
+/// The kinds of numbers of a colour.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Tint {
     /// 8-bit sRGB codes.

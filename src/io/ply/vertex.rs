@@ -192,7 +192,7 @@ impl Layout {
         }
     }
 
-    /// What a row has, and what of it is used.
+    /// The attributes of a row, and which of them are used.
     pub(super) fn attributes(&self, vertex: &Element) -> Vec<Attribute> {
         let mut slots = 0..;
         let attribute = |property: &header::Property| {

@@ -100,8 +100,8 @@ enum Beyond {
 }
 
 impl Around {
-    /// Those of a mesh of so many `vertices`; triangles without an area are none. Two with a side
-    /// in common look like one surface where they `go_on`.
+    /// The fans of a mesh of so many `vertices`; triangles without an area are none. Two with a
+    /// side in common look like one surface where they `go_on`.
     pub fn new(
         vertices: usize,
         triangles: &[[u32; 3]],

@@ -97,7 +97,7 @@ fn uncovered(mut points: Points) -> Points {
     points
 }
 
-/// What of a mesh has no surfels.
+/// Parts of a mesh that have no surfels.
 struct LeftOut {
     loose: u64,
     stranded: u64,
@@ -105,7 +105,7 @@ struct LeftOut {
 }
 
 impl LeftOut {
-    /// Of a mesh so many of whose vertices are corners of no facet.
+    /// Counts those of a mesh so many of whose vertices are corners of no facet.
     fn of(positions: &[[f64; 3]], triangles: &[[u32; 3]], bare: usize) -> Self {
         if bare == 0 {
             return Self { loose: 0, stranded: 0, broken: 0 };

@@ -1,4 +1,4 @@
-//! What the surfels of a mesh look like: the colours and images of the triangles that they stand
+//! Looks of a mesh's surfels: the colours and images of the triangles that they stand
 //! for.
 //!
 //! Surfels end where the look of triangles changes, as they do at edges: at the sides between two
@@ -24,11 +24,11 @@ pub(in crate::surfels) enum Painting {
     Means,
     /// One that is given for all.
     Given,
-    /// Those of its triangles, by their numbers.
+    /// Each triangle's own looks, by its number.
     Own,
 }
 
-/// What a surfel looks like.
+/// The look of a surfel.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Look {
     /// None of its own: it has those of vertices, or of its image.
@@ -41,10 +41,10 @@ pub(super) struct Look {
 /// Where a surfel is in an image.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Placed {
-    /// Of the image.
+    /// The number of the image.
     pub(super) number: u32,
     pub(super) center: [f32; 2],
-    /// What u and v gain for a world unit along x, y and z.
+    /// Gains of u and v for a world unit along x, y and z.
     pub(super) slopes: [[f32; 3]; 2],
 }
 
@@ -180,7 +180,7 @@ impl<'a> Skin<'a> {
     }
 }
 
-/// What u and v gain for a world unit along x, y and z on a triangle whose corners have these
+/// Gains of u and v for a world unit along x, y and z on a triangle whose corners have these
 /// places.
 fn gains(facet: &Facet, places: [[f32; 2]; 3]) -> [DVec3; 2] {
     let [p, q] = facet.sides(0);

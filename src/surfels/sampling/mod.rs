@@ -228,7 +228,7 @@ fn guessed_up(mesh: &Mesh) -> Up {
 
 fn points(surface: &MeshSurface<'_>, places: &[Place], normals: Vec<DVec3>, colors: Option<Vec<[f32; 4]>>) -> Points {
     let places = places.par_iter();
-    // Those of no texture have no place in it, and any will do.
+    // A place on no texture may be any.
     let place_of = |place: &Place| surface.texture(*place).unwrap_or_default();
     Points {
         positions: places.clone().map(|place| (surface.center + surface.point(*place)).to_array()).collect(),

@@ -46,7 +46,7 @@ pub(crate) fn lone_radius(
     surroundings(normal(index), around).part().map(|part| part * mean)
 }
 
-/// What surrounds a point.
+/// The surroundings of a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Surroundings {
     /// A surface, or too few neighbours to tell.

@@ -41,7 +41,7 @@ const OF_THREAD: u64 = 48 << 20;
 /// Memory of a surfel of a subtree beside what the scene has of it, bytes: its place, its part of the nodes and of their sums.
 const OF_SURFEL: u64 = 150;
 
-/// What a scene has at most of a surfel, bytes ([`Survey::surfel_bytes`]).
+/// The most bytes that a scene has of a surfel ([`Survey::surfel_bytes`]).
 const LARGEST_SURFEL: u64 = 112;
 
 /// Points that memory must have room for.

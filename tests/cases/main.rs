@@ -4,6 +4,8 @@
 //!
 //! Two meshes far from each other, one of these kinds, are in `tests/far.rs`.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
 mod pictures;
 mod values;
 

@@ -9,7 +9,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A file could not be opened or read.
-    #[error("cannot read {path}: {source}", path = path.display())]
+    #[error("cannot read {path}: {source}", path = shown(path))]
     Read {
         /// The file.
         path: PathBuf,
@@ -17,7 +17,7 @@ pub enum Error {
         source: std::io::Error,
     },
     /// A file was read, but is not what its format says.
-    #[error("{path}: {what}", path = path.display())]
+    #[error("{path}: {what}", path = shown(path))]
     Malformed {
         /// The file.
         path: PathBuf,
@@ -25,7 +25,7 @@ pub enum Error {
         what: String,
     },
     /// An output file could not be written; nothing was left behind.
-    #[error("cannot write {path}: {source}", path = path.display())]
+    #[error("cannot write {path}: {source}", path = shown(path))]
     Write {
         /// The file that was asked for.
         path: PathBuf,
@@ -72,7 +72,7 @@ pub enum Error {
         what: String,
     },
     /// One picture of many failed.
-    #[error("the view {path}: {source}", path = path.display())]
+    #[error("the view {path}: {source}", path = shown(path))]
     View {
         /// Where the picture would have been written.
         path: PathBuf,
@@ -87,6 +87,12 @@ pub enum Error {
         /// Which configuration on which scene, and in what.
         what: String,
     },
+}
+
+/// A path as a message has it: names may come from a file's content, and hold characters that a
+/// terminal obeys.
+fn shown(path: &Path) -> String {
+    path.display().to_string().replace(char::is_control, "\u{fffd}")
 }
 
 impl Error {
@@ -116,6 +122,22 @@ impl Error {
             Self::Usage(_) => 2,
             Self::View { source, .. } => source.exit_code(),
             _ => 1,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_stay_on_a_line() {
+        let path = Path::new("a\u{1b}[31m\n.png");
+        let none = || std::io::Error::from(std::io::ErrorKind::NotFound);
+        let view = Error::Usage("no".into()).of_view(path);
+        for error in [Error::read(path, none()), Error::write(path, none()), Error::malformed(path, "no"), view] {
+            let message = error.to_string();
+            assert!(!message.contains(char::is_control) && message.contains("[31m"), "{message}");
         }
     }
 }

@@ -51,6 +51,8 @@ pub(super) enum Role {
 
 impl Attribute {
     pub(super) fn new(name: impl Into<String>, used: bool, role: Role) -> Self {
-        Self { name: name.into(), used, role }
+        // A terminal obeys some characters.
+        let name = name.into().replace(char::is_control, "\u{fffd}");
+        Self { name, used, role }
     }
 }

@@ -87,13 +87,16 @@ fn execute(path: &Path, valid: Option<usize>) -> Result<Outcome, String> {
     let names_what_is_there = valid.filter(|_| !std::fs::read(path).is_ok_and(|text| has(&text, b"none.png")));
     let drawn = render::points(&mesh, names_what_is_there)?;
     match io::read_mesh(&mesh, &()) {
-        Ok(mesh) if mesh.triangles.len() == 2 => Ok(drawn),
+        // Materials that cannot be read are left out and told.
+        Ok(mesh) if mesh.triangles.len() == 2 => match mesh.notes.iter().find(|note| note.contains(char::is_control)) {
+            Some(note) => Err(format!("a note is more than a line: {note:?}")),
+            None if mesh.notes.is_empty() => Ok(drawn),
+            None => Ok(Outcome::Refused),
+        },
         Ok(mesh) => Err(format!("two triangles became {}", mesh.triangles.len())),
         Err(error) if names_what_is_there.is_some() => Err(format!("valid materials are refused: {error}")),
-        Err(error) => {
-            // The error names the file that is wrong: the mesh, its materials or their image.
-            sentence(&error, None).map(|()| Outcome::Refused)
-        }
+        // The error names the file that is wrong: the mesh, its materials or their image.
+        Err(error) => sentence(&error, None).map(|()| Outcome::Refused),
     }
 }
 

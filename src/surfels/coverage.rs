@@ -220,8 +220,7 @@ impl<'a, 'n, At: Fn(u32) -> &'a [(&'a Surfel, Clip)]> Gaps<'a, 'n, At> {
             self.ends && is_past(self.own, place / scale)
                 || self.any_disk(|disk, from| meets(*disk, (place - from) / scale, sight))
         };
-        // A height moves a neighbour that is known beyond what is not.
-        let known = 0.5 * self.known();
+        let known = self.known();
         let (x, y) = self.normal.any_orthonormal_pair();
         let is_amid = |corner: &DVec3| {
             let near = |other: &&DVec3| other.distance_squared(*corner) <= 4.0 * corner.length_squared();
@@ -231,7 +230,7 @@ impl<'a, 'n, At: Fn(u32) -> &'a [(&'a Surfel, Clip)]> Gaps<'a, 'n, At> {
                 is_beyond(&DVec3::ZERO) || seen.iter().filter(near).any(is_beyond)
             })
         };
-        let corners = Cell::new(&seen, self.normal, (2.0 * self.known(), 0.0));
+        let corners = Cell::new(&seen, self.normal, (2.0 * known, 0.0));
         let mut corners = corners.closed_corners().filter(|corner| corner.length() <= known && is_amid(corner));
         corners.any(|corner| !closed(corner))
     }
@@ -330,7 +329,7 @@ mod tests {
     #[test]
     fn heights_open_gaps_that_are_seen_aslant_alone() {
         let of_heights = |height: f64, radius: f32| {
-            let at = |i: u32| [f64::from(i % 50) * 0.1, f64::from(i / 50) * 0.1, height * f64::from((i * 7919) % 5)];
+            let at = |i: u32| [f64::from(i % 50) * 0.1, f64::from(i / 50) * 0.1, height * f64::from((i * 7919) % 7)];
             let points = Points {
                 positions: (0..2500).map(at).collect(),
                 normals: Some(vec![[0.0, 0.0, 1.0]; 2500]),

@@ -242,11 +242,11 @@ fn table(input: &std::path::Path, info: &Info) -> String {
             "  coverage  {} % of the surfels have no open gap to their neighbours{open}",
             percent(covered)
         );
-        let _ = writeln!(
-            text,
-            "            {} % have none seen from {ASLANT} degrees over their plane",
-            percent(covered_aslant)
-        );
+        // The facets of a mesh meet at bends, next to which flat disks part.
+        if !info.is_mesh {
+            let aslant = percent(covered_aslant);
+            let _ = writeln!(text, "            {aslant} % have none seen from {ASLANT} degrees over their plane");
+        }
         if lone > 0 {
             let _ = writeln!(text, "            {lone} more have no surface around them");
         }

@@ -12,8 +12,12 @@ use super::sizes::{Surroundings, surroundings};
 use crate::scene::{Clip, Scene, Surfel};
 use crate::{Progress, Result};
 
-/// Neighbours that gaps are looked for between. Of a random sampling, 16 know too few of the wide ones.
-const NEIGHBOURS: usize = 32;
+/// Neighbours that gaps are looked for between. In a random sampling 16 know too few of the wide
+/// ones; aslant, heights move others in between.
+const NEIGHBOURS: usize = 64;
+
+/// The part of what neighbours bound in the plane that they bound aslant, too.
+const KNOWN_ASLANT: f64 = 0.7;
 
 /// The cosine of the angle between surfels of one side: 60 degrees.
 const SAME_SIDE: f64 = 0.5;
@@ -45,7 +49,7 @@ pub struct Coverage {
     /// Share of the surfels that a surface surrounds around which no gap is open.
     pub covered: f64,
     /// Surfels around which a gap is open: on the way to a corner of a centre's Voronoi cell, in the surfel's plane, is a place that
-    /// neither its own disk nor one of its 32 nearest neighbours' reaches. Past a line at which the disk ends nothing is to be reached. At a ragged boundary such a place may lie outside.
+    /// neither its own disk nor one of its 64 nearest neighbours' reaches. Past a line at which the disk ends nothing is to be reached. At a ragged boundary such a place may lie outside.
     pub open: u64,
     /// Surfels that no surface surrounds, such as those of leaves and wires: of them nothing is
     /// said.
@@ -220,7 +224,7 @@ impl<'a, 'n, At: Fn(u32) -> &'a [(&'a Surfel, Clip)]> Gaps<'a, 'n, At> {
             self.ends && is_past(self.own, place / scale)
                 || self.any_disk(|disk, from| meets(*disk, (place - from) / scale, sight))
         };
-        let known = self.known();
+        let known = KNOWN_ASLANT * self.known();
         let (x, y) = self.normal.any_orthonormal_pair();
         let is_amid = |corner: &DVec3| {
             let near = |other: &&DVec3| other.distance_squared(*corner) <= 4.0 * corner.length_squared();
@@ -230,7 +234,7 @@ impl<'a, 'n, At: Fn(u32) -> &'a [(&'a Surfel, Clip)]> Gaps<'a, 'n, At> {
                 is_beyond(&DVec3::ZERO) || seen.iter().filter(near).any(is_beyond)
             })
         };
-        let corners = Cell::new(&seen, self.normal, (2.0 * known, 0.0));
+        let corners = Cell::new(&seen, self.normal, (2.0 * self.known(), 0.0));
         let mut corners = corners.closed_corners().filter(|corner| corner.length() <= known && is_amid(corner));
         corners.any(|corner| !closed(corner))
     }

@@ -231,6 +231,10 @@ fn a_float_field_may_hold_an_integer() {
     };
     assert_turns(&folder.read("a.pcd", &binary(&|i| packed(i) as f32)).unwrap(), "the value of a float");
     assert_turns(&folder.read("a.pcd", &binary(&|i| f32::from_bits(packed(i)))).unwrap(), "the bits of a float");
+    // PCL's own sample: one colour, and a fourth byte that was never set.
+    let sample = folder.read("a.pcd", &binary(&|_| 4.2108e6)).unwrap().colors.unwrap();
+    let light = |code: f64| srgb_to_linear(code / 255.0) as f32;
+    assert_eq!(sample.linear(7), [light(128.0), light(128.0), light(224.0), 1.0]);
 }
 
 #[cfg(feature = "e57")]

@@ -238,12 +238,14 @@ fn unsigned(value: f64, kind: Number) -> f32 {
 }
 
 /// Some programs write a packed colour as the value of a float and not as its bits: then all of
-/// them are whole numbers, which bits of colours hardly are.
+/// them are whole numbers of several magnitudes, which bits of colours hardly are.
 fn unpack_values(codes: &mut [[u8; 4]]) {
     let value = |[red, green, blue, alpha]: [u8; 4]| f32::from_le_bytes([blue, green, red, alpha]);
     let is_whole = |value: f32| (0.0..=u32::MAX as f32).contains(&value) && value.fract() == 0.0;
     let all_whole = codes.iter().all(|code| is_whole(value(*code)));
-    if !all_whole || codes.iter().all(|code| value(*code) == 0.0) {
+    // Points of one colour whose fourth byte was never set, as in PCL's own sample, are whole too.
+    let one_exponent = codes.windows(2).all(|pair| pair[0] >> 24 == pair[1] >> 24);
+    if !all_whole || one_exponent {
         return;
     }
     for code in codes {

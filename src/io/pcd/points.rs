@@ -244,7 +244,7 @@ fn unpack_values(codes: &mut [[u8; 4]]) {
     let is_whole = |value: f32| (0.0..=u32::MAX as f32).contains(&value) && value.fract() == 0.0;
     let all_whole = codes.iter().all(|code| is_whole(value(*code)));
     // Points of one colour whose fourth byte was never set, as in PCL's own sample, are whole too.
-    let one_exponent = codes.windows(2).all(|pair| pair[0] >> 24 == pair[1] >> 24);
+    let one_exponent = codes.windows(2).all(|pair| pair[0][3] == pair[1][3]);
     if !all_whole || one_exponent {
         return;
     }

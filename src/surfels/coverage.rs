@@ -48,8 +48,10 @@ pub struct Coverage {
     pub spacing: f64,
     /// Share of the surfels that a surface surrounds around which no gap is open.
     pub covered: f64,
-    /// Surfels around which a gap is open: on the way to a corner of a centre's Voronoi cell, in the surfel's plane, is a place that
-    /// neither its own disk nor one of its 64 nearest neighbours' reaches. Past a line at which the disk ends nothing is to be reached. At a ragged boundary such a place may lie outside.
+    /// Surfels around which a gap is open: on the way to a corner of a centre's Voronoi cell, in the
+    /// surfel's plane, is a place that neither its own disk nor one of its 64 nearest neighbours'
+    /// reaches. Past a line at which the disk ends nothing is to be reached. At a ragged boundary
+    /// such a place may lie outside.
     pub open: u64,
     /// Surfels that no surface surrounds, such as those of leaves and wires: of them nothing is
     /// said.

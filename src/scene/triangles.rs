@@ -1,5 +1,7 @@
 //! Triangles beside a scene's surfels: a second source of what a pixel shows.
 
+mod places;
+
 use std::cmp::Ordering;
 use std::sync::Arc;
 
@@ -8,6 +10,8 @@ use rayon::prelude::*;
 
 use super::{Bounds, Mipmap, Texture};
 use crate::morton;
+
+use places::{LEAST_TOLD, LEAST_WIDTH, Place, doubled, has_area, shown_error, single};
 
 /// A triangle before it is among others: what its corners have.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -224,104 +228,12 @@ impl Triangles {
     }
 }
 
-/// The numbers that a place is kept as, which tell it from others.
-trait Place: Copy + Ord + Send + Sync {
-    /// The place.
-    fn exact(self) -> DVec3;
-
-    /// The nearest f32.
-    fn high(self) -> [f32; 3];
-
-    /// The rest after rounding, if it is kept.
-    fn low(self) -> Option<[f32; 3]>;
-}
-
-/// Bits of f32.
-type Bits = [u32; 3];
-
-impl Place for Bits {
-    fn exact(self) -> DVec3 {
-        DVec3::from_array(self.high().map(f64::from))
-    }
-
-    fn high(self) -> [f32; 3] {
-        self.map(f32::from_bits)
-    }
-
-    fn low(self) -> Option<[f32; 3]> {
-        None
-    }
-}
-
-impl Place for [Bits; 2] {
-    fn exact(self) -> DVec3 {
-        self[0].exact() + self[1].exact()
-    }
-
-    fn high(self) -> [f32; 3] {
-        self[0].high()
-    }
-
-    fn low(self) -> Option<[f32; 3]> {
-        Some(self[1].high())
-    }
-}
-
-/// A place as f32. Adding +0 makes the two zeros one.
-fn single(place: [f64; 3]) -> Bits {
-    place.map(|x| (x as f32 + 0.0).to_bits())
-}
-
-/// A place as two f32 each.
-fn doubled(place: [f64; 3]) -> [Bits; 2] {
-    let high = single(place);
-    let low = DVec3::from_array(place) - high.exact();
-    [high, single(low.to_array())]
-}
-
-/// Rounding that is less than this part of a triangle's width does not show, as with surfels.
-const LEAST_PART: f64 = 1.0 / 256.0;
-
-/// A triangle narrower than this part of its coordinates may be a line whose corners are rounded.
-const LEAST_WIDTH: f64 = 1.0 / (1u64 << 50) as f64;
-
-/// Rounding is not reported for triangles narrower than this part of their coordinates: most were
-/// meant to be lines.
-const LEAST_TOLD: f64 = 1.0 / (1u64 << 46) as f64;
-
-/// The largest error of a corner's coordinate as it is kept, if it may show at the triangle's width
-/// and the triangle is wider than the part `narrowest` of its coordinates.
-fn shown_error<P: Place>(corners: [[f64; 3]; 3], stored: fn([f64; 3]) -> P, narrowest: f64) -> Option<f64> {
-    let places = corners.map(DVec3::from_array);
-    let error = corners.map(|corner| (DVec3::from_array(corner) - stored(corner).exact()).abs().max_element());
-    let error = error.into_iter().fold(0.0, f64::max);
-    if error == 0.0 || !error.is_finite() {
-        return None;
-    }
-    let [a, b, c] = places;
-    let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-    let width = (b - a).cross(c - a).length() / longest;
-    let size = places.into_iter().fold(0.0, |size: f64, place| size.max(place.abs().max_element()));
-    (width > narrowest * size && error > LEAST_PART * width).then_some(error)
-}
-
 /// The Morton code of where `place` lies in `bounds`.
 fn cell(place: DVec3, bounds: &Bounds) -> u64 {
     let extent = bounds.extent().max_element();
     let scale = if extent > 0.0 { CELLS / extent } else { 0.0 };
     let at = (place - bounds.min) * scale;
     morton::code(at.to_array().map(|x| x as u64))
-}
-
-/// Whether the corners are no line: along some axis, the area exceeds the rounding of its products.
-fn has_area(corners: [DVec3; 3]) -> bool {
-    let [a, b, c] = corners;
-    let (ab, ac) = (b - a, c - a);
-    let along = |i: usize, k: usize| {
-        let (first, second) = (ab[i] * ac[k], ab[k] * ac[i]);
-        (first - second).abs() > 4.0 * f64::EPSILON * (first.abs() + second.abs())
-    };
-    along(0, 1) || along(1, 2) || along(2, 0)
 }
 
 /// The normal of the triangle's plane at all its corners.

@@ -98,13 +98,11 @@ pub fn coverage(scene: &Scene, progress: &dyn Progress) -> Result<Option<Coverag
             |position: &&u32| (!sampled || is_sampled(**position)) && what.contains(&found[**position as usize].1);
         distinct.of_point().par_iter().filter(counted).count() as u64
     };
-    let share = |sampled: bool, open: &[Found]| {
-        let closed = |found: &&Found| !open.contains(found);
-        let all = count(sampled, &Found::OF_SURFACES);
-        let left: Vec<Found> = Found::OF_SURFACES.iter().filter(closed).copied().collect();
-        if all > 0 { count(sampled, &left) as f64 / all as f64 } else { 1.0 }
+    let share = |sampled: bool, closed: &[Found]| match count(sampled, &Found::OF_SURFACES) {
+        0 => 1.0,
+        all => count(sampled, closed) as f64 / all as f64,
     };
-    let (covered, covered_aslant) = (share(false, &[Found::Open]), share(true, &[Found::Open, Found::OpenAslant]));
+    let (covered, covered_aslant) = (share(false, &[Found::Closed, Found::OpenAslant]), share(true, &[Found::Closed]));
     let (open, lone) = (count(false, &[Found::Open]), count(false, &[Found::Lone]));
     let spacing = median(&mut found.into_par_iter().map(|(spacing, _)| spacing).collect::<Vec<_>>());
     Ok(spacing.map(|spacing| Coverage { spacing, covered, open, lone, covered_aslant }))

@@ -43,6 +43,7 @@ pub mod io;
 mod memory;
 pub mod metrics;
 mod morton;
+pub mod options;
 pub mod passes;
 pub mod plan;
 pub mod progress;

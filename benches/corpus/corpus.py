@@ -112,6 +112,10 @@ def epsplat(options, *words):
     return done.stdout
 
 
+# What `epsplat info` says of a mesh whose colours are not those of its vertices.
+PAINTED = "of faces or materials"
+
+
 def usable(positions):
     """What is dropped, with a note, is not finite or beyond 1e18."""
     with np.errstate(invalid="ignore"):
@@ -136,17 +140,27 @@ def compare_info(info, theirs):
     for name, ours, other in (("min", info["min"], low), ("max", info["max"], high)):
         if (np.abs(np.array(ours) - other) > tolerance).any():
             raise Difference(f"the box's {name} is {list(ours)}, of {theirs.reader} {other.tolist()}")
+    if info["colors"] == PAINTED:
+        return compare_normals(info, theirs)
     # Greys of intensities are no colours.
     colored = (theirs.codes is not None or theirs.light is not None) and not theirs.made
     if (info["colors"] != "none") != colored:
         raise Difference(f"colours: {info['colors']}, {theirs.reader} has {'some' if colored else 'none'}")
+    compare_normals(info, theirs)
+
+
+def compare_normals(info, theirs):
+    """Whether both say that there are normals."""
     normals = theirs.normals is not None or theirs.faces
     if info["normals"] != normals:
         raise Difference(f"normals: {info['normals']}, {theirs.reader}: {normals}")
 
 
-def compare_points(output, theirs):
-    """Every point of the PLY that `epsplat surfels` wrote, which is in the file's order, against the other reader's."""
+def compare_points(output, theirs, colors):
+    """Every point of the PLY that `epsplat surfels` wrote, which is in the file's order, against the other reader's.
+
+    `colors` says whether colours are compared too.
+    """
     import plyfile
 
     table = plyfile.PlyData.read(output)["vertex"].data
@@ -162,7 +176,7 @@ def compare_points(output, theirs):
         row, count = int(off.any(axis=1).argmax()), int(off.any(axis=1).sum())
         raise Difference(f"point {row}, and {count} in all: {ours[row]}, {theirs.reader}: {expected[row]}")
     names = table.dtype.names
-    if "red" in names:
+    if "red" in names and colors:
         rgb = column(("red", "green", "blue"))
         eight_bit = table["red"].dtype == np.uint8
         if theirs.codes is not None:
@@ -195,7 +209,10 @@ def compare(file, options, theirs, folder):
     flags = ["--keep-withheld"] if options.keep_withheld and file.suffix.lower() in (".las", ".laz") else []
     info = json.loads(epsplat(options, "info", file, "--json", "-", *flags))
     compare_info(info, theirs)
-    check_control(theirs, lambda altered: compare_info(info, altered), ("count", "box", "colours", "normals"))
+    # The second readers know the colours of vertices alone.
+    colors = info["colors"] != PAINTED
+    faults = ("count", "box", "colours", "normals") if colors else ("count", "box", "normals")
+    check_control(theirs, lambda altered: compare_info(info, altered), faults)
     if flags and theirs.withheld:
         without = json.loads(epsplat(options, "info", file, "--json", "-"))
         told = without["preparation"]["withheld"]
@@ -207,8 +224,9 @@ def compare(file, options, theirs, folder):
         return ", ".join(remark + ["points not compared one by one"])
     output = folder / "surfels.ply"
     epsplat(options, "surfels", file, "-o", output, *flags)
-    compare_points(output, theirs)
-    check_control(theirs, lambda altered: compare_points(output, altered), ("point", "colour"))
+    compare_points(output, theirs, colors)
+    faults = ("point", "colour") if colors else ("point",)
+    check_control(theirs, lambda altered: compare_points(output, altered, colors), faults)
     return ", ".join(remark)
 
 

@@ -311,11 +311,12 @@ impl Definition {
         self.configs.iter().filter(wants)
     }
 
-    /// The options of `config` on the scene of `entry`.
-    pub fn options(&self, config: &Config, entry: &SceneEntry) -> RenderOptions {
-        let options = config.options(entry.shading);
-        let opacity = config.opacity.or(entry.opacity).unwrap_or(options.opacity);
-        RenderOptions { opacity, background: self.background.unwrap_or(options.background), ..options }
+    /// The settings of `config` on the scene of `entry`.
+    pub fn settings(&self, config: &Config, entry: &SceneEntry) -> RenderOptions {
+        let settings = config.settings(entry.shading);
+        let opacity = config.options.transparency.opacity.or(entry.opacity).unwrap_or(settings.opacity);
+        let background = self.background.or(config.options.look.background.map(|color| color.0));
+        RenderOptions { opacity, background: background.unwrap_or(settings.background), ..settings }
     }
 
     /// Whether a configuration renders on an adapter.

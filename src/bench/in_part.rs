@@ -30,7 +30,7 @@ pub(super) fn stage(
     })?;
     let cameras = cameras(entry.size.unwrap_or(definition.size), entry, &part::nothing(&levels))?;
     let options: Vec<RenderOptions> =
-        definition.configs_of(entry).map(|config| judged(definition.options(config, entry))).collect();
+        definition.configs_of(entry).map(|config| judged(definition.settings(config, entry))).collect();
     let views: Vec<_> =
         cameras.iter().flat_map(|camera| options.iter().map(move |options| (camera, options))).collect();
     let (scene, _) = taken(&levels, &views, |_| Ok(()), progress)?;

@@ -7,7 +7,7 @@ use super::config::Config;
 use super::definition::{Definition, Making, OneOrMany, Rims, SceneEntry};
 use crate::error::{Error, Result};
 use crate::io::input::text;
-use crate::plan::{BackendName, check};
+use crate::plan::check;
 use crate::scene::camera::check_size;
 use crate::scene::{Detail, Shading};
 
@@ -51,7 +51,8 @@ impl Definition {
             if let Some(name) = scene.configs.iter().flatten().find(|name| !configs.contains(name)) {
                 return Err(format!("scene {:?}: configs: there is no config {name:?}", scene.name));
             }
-            let sized = |config: &&Config| config.cuts() && !matches!(config.lod, Some(Detail::Splats(_)));
+            let sized =
+                |config: &&Config| config.cuts() && !matches!(config.options.levels.lod, Some(Detail::Splats(_)));
             let other = self.configs_of(scene).find(|config| scene.surfels == Making::Levels && !sized(config));
             if let Some(config) = other {
                 let (scene, config) = (&scene.name, &config.name);
@@ -241,17 +242,9 @@ impl SceneEntry {
 
 impl Config {
     fn check(&self) -> Result<(), String> {
-        let chosen = check::Chosen {
-            accumulator: self.accumulator.is_some(),
-            organisation: self.organisation.is_some(),
-            without: !self.without.is_empty(),
-            raster: self.blend_format.is_some() || self.raster_depth.is_some(),
-        };
-        check::chosen(Some(self.backend), chosen).map_err(|error| error.to_string())?;
-        let reference = self.backend == BackendName::Reference;
-        let options = self.options(None);
-        check::options(&options, reference).map_err(|error| error.to_string())?;
-        check::by_tiles(&options).map_err(|error| error.to_string())?;
+        let settings = self.settings(None);
+        self.options.check(Some(self.backend), &settings).map_err(|error| error.to_string())?;
+        check::by_tiles(&settings).map_err(|error| error.to_string())?;
         match self.error_limit {
             Some(limit) if limit.is_nan() || limit < 0.0 => Err(format!("error_limit: it must not be {limit}")),
             _ => Ok(()),
@@ -293,9 +286,9 @@ mod tests {
         let study = parse(&[HEAD, SCENE, CONFIG].concat()).unwrap();
         assert_eq!((study.size, study.runs), ([1024, 1024], 7));
         assert!(study.needs_gpu() && study.baseline.is_none());
-        let options = study.configs[0].options(None);
+        let options = study.configs[0].settings(None);
         assert_eq!(options, crate::plan::RenderOptions::default());
-        assert_eq!(study.configs[0].options(Some(Shading::Unlit)).shading, Shading::Unlit);
+        assert_eq!(study.configs[0].settings(Some(Shading::Unlit)).shading, Shading::Unlit);
         assert_eq!(study.path_of(Path::new("../a.obj")), Path::new("folder/../a.obj"));
     }
 
@@ -305,10 +298,10 @@ mod tests {
                     [[scene]]\nname = \"s\"\nshape = \"torus\"\ncount = [10, 20]\nquick_count = 5\n\
                     [[scene]]\nname = \"t\"\nfile = \"a.obj\"\ntruth = true\nquick = false\nconfigs = [\"r\"]\n\
                     [[config]]\nname = \"c\"\nbackend = \"gpu\"\nepsilon = \"abs:2\"\nlowpass = \"ewa\"\n\
-                    accumulator = \"fixed64\"\nmaps = [\"depth\"]\n\
+                    accumulator = \"fixed64\"\naov = [\"depth\"]\n\
                     [[config]]\nname = \"r\"\nbackend = \"raster\"\nblend_format = \"rgba32float\"\nquick = false\n";
         let study = parse(text).unwrap();
-        let options = study.configs[0].options(None);
+        let options = study.configs[0].settings(None);
         assert_eq!((options.epsilon, options.low_pass), (Epsilon::Absolute(2.0), LowPass::Ewa));
         assert!(
             options.accumulator == Accumulator::Fixed64
@@ -319,7 +312,7 @@ mod tests {
         assert_eq!(study.scenes[1].configs, Some(vec!["r".to_owned()]));
         assert!(study.configs[0].deterministic() && !study.configs[1].deterministic());
         assert_eq!(study.configs[1].sums(), "rgba32float");
-        assert!(study.configs[1].options(None).raster.is_some() && options.raster.is_none());
+        assert!(study.configs[1].settings(None).raster.is_some() && options.raster.is_none());
         assert_eq!(study.scenes[0].count.as_ref().unwrap().values(), [10, 20]);
         let quick = study.quick_form();
         assert_eq!((quick.runs, quick.size, quick.scenes.len(), quick.configs.len()), (2, [8, 8], 1, 1));

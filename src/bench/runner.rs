@@ -110,7 +110,7 @@ impl<'a> Case<'a> {
     }
 
     fn run(&self, outcome: &mut Outcome, progress: &dyn Progress) -> Result<()> {
-        let planned = |config| (config, self.definition.options(config, self.entry));
+        let planned = |config| (config, self.definition.settings(config, self.entry));
         let plans: Vec<(&Config, RenderOptions)> = self.definition.configs_of(self.entry).map(planned).collect();
         let timed = self.time(&plans, &mut outcome.notes, progress)?;
         let errors = judge::against_reference(self, &timed, progress)?;

@@ -85,7 +85,7 @@ pub fn markdown(definition: &Definition, study: &Study) -> String {
 
 /// Which adapters run a configuration.
 fn runs_on(config: &Config) -> &'static str {
-    let raster = config.options(None).raster;
+    let raster = config.settings(None).raster;
     match (raster.map(|raster| raster.format), config.accumulator().map(|sums| sums.row().features)) {
         (Some(BlendFormat::Rgba32Float), _) => "adapters that blend 32-bit floats",
         (Some(_), _) | (None, Some(Features::None)) => "any adapter",

@@ -1,5 +1,6 @@
 //! Values of arguments: texts into numbers, or a sentence that says what is expected.
 
+use epsplat::options::values::numbers;
 use epsplat::surfels::Orientation;
 use glam::DVec3;
 
@@ -20,26 +21,9 @@ pub(super) fn parse_scale(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Finite numbers between commas.
-fn parse_numbers(text: &str) -> Result<Vec<f64>, String> {
-    let number = |part: &str| match part.trim().parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value),
-        _ => Err(format!("{part:?} is not a finite number")),
-    };
-    text.split(',').map(number).collect()
-}
-
-/// `MIN,MAX`, pixels.
-pub(super) fn parse_pixels(text: &str) -> Result<[f64; 2], String> {
-    match parse_numbers(text)?[..] {
-        [least, most] if 0.0 <= least && least <= most && most > 0.0 => Ok([least, most]),
-        _ => Err("two numbers are needed, the lesser first: MIN,MAX".into()),
-    }
-}
-
 /// `X,Y,Z`.
 pub(super) fn parse_vector(text: &str) -> Result<DVec3, String> {
-    match parse_numbers(text)?[..] {
+    match numbers(text).map_err(|error| error.to_string())?[..] {
         [x, y, z] => Ok(DVec3::new(x, y, z)),
         _ => Err("three numbers are needed: X,Y,Z".into()),
     }
@@ -98,19 +82,8 @@ pub(super) fn parse_memory(text: &str) -> Result<u64, String> {
 
 /// `FX,FY,CX,CY`, pixels.
 pub(super) fn parse_intrinsics(text: &str) -> Result<[f64; 4], String> {
-    parse_numbers(text)?.try_into().map_err(|_| "four numbers are needed: FX,FY,CX,CY".into())
-}
-
-/// `R,G,B[,A]`, linear; alpha is 1 unless given.
-pub(super) fn parse_color(text: &str) -> Result<[f32; 4], String> {
-    let values: Vec<f32> = parse_numbers(text)?.into_iter().map(|v| v as f32).collect();
-    let color = match values[..] {
-        [r, g, b] => [r, g, b, 1.0],
-        [r, g, b, a] => [r, g, b, a],
-        _ => return Err("three or four numbers are needed: R,G,B[,A]".into()),
-    };
-    if color.iter().any(|c| !c.is_finite()) {
-        return Err("a colour must be finite".into());
-    }
-    if color[3] < 0.0 || color[3] > 1.0 { Err("alpha lies between 0 and 1".into()) } else { Ok(color) }
+    numbers(text)
+        .map_err(|error| error.to_string())?
+        .try_into()
+        .map_err(|_| "four numbers are needed: FX,FY,CX,CY".into())
 }

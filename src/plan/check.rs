@@ -3,9 +3,7 @@
 mod adapter;
 
 pub use self::adapter::{on_adapter, sums};
-use super::{
-    Accumulator, BackendName, BlendFormat, ColorNeed, Facts, Organisation, RasterDepth, RenderOptions, composited,
-};
+use super::{Accumulator, BlendFormat, ColorNeed, Facts, Organisation, RasterDepth, RenderOptions, composited};
 use crate::error::{Error, Result};
 use crate::passes::peel::MOST_LAYERS;
 use crate::scene::composite::ALL_LAYERS;
@@ -225,37 +223,6 @@ fn nearest(options: &RenderOptions, reference: bool) -> Result<()> {
         }
         _ if options.maps.has(Map::Depth) && !exact => {
             usage("the rasteriser tells depths with raster-depth exact alone: take that, or leave the depth map out")
-        }
-        _ => Ok(()),
-    }
-}
-
-/// What a caller chose, rather than left as it is, of what not every backend has.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Chosen {
-    /// How sums are kept.
-    pub accumulator: bool,
-    /// How the compute kernels draw splats.
-    pub organisation: bool,
-    /// What is left out that makes frames faster.
-    pub without: bool,
-    /// The rasteriser's targets or depths.
-    pub raster: bool,
-}
-
-/// Fails for a choice that `backend` does not have; of the best backend that there is nothing is known but that it does not rasterise.
-///
-/// # Errors
-/// [`Error::Usage`].
-pub fn chosen(backend: Option<BackendName>, chosen: Chosen) -> Result<()> {
-    let kernels = matches!(backend, None | Some(BackendName::Gpu));
-    let only = |what: &str, of: BackendName| usage(format!("{what} of the backend {} alone: leave it out", of.name()));
-    match chosen {
-        Chosen { accumulator: true, .. } if !kernels => only("the accumulator is", BackendName::Gpu),
-        Chosen { organisation: true, .. } if !kernels => only("the organisation is", BackendName::Gpu),
-        Chosen { without: true, .. } if !kernels => only("what can be left out is", BackendName::Gpu),
-        Chosen { raster: true, .. } if backend != Some(BackendName::Raster) => {
-            only("the choice of blend-format and raster-depth is", BackendName::Raster)
         }
         _ => Ok(()),
     }

@@ -62,6 +62,28 @@ impl FromStr for Detail {
     }
 }
 
+/// The shape that a node is drawn as.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum NodeShape {
+    /// Curved as the surface below the node.
+    #[default]
+    Cap,
+    /// A disk in the node's plane.
+    Disk,
+}
+
+impl FromStr for NodeShape {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        match text {
+            "cap" => Ok(Self::Cap),
+            "disk" => Ok(Self::Disk),
+            _ => Err(Error::Usage(format!("nodes are drawn as a cap or a disk, not {text:?}"))),
+        }
+    }
+}
+
 /// What of a node is measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DetailMeasure {

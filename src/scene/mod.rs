@@ -44,7 +44,7 @@ pub use color::Colors;
 pub use composite::{Composite, Tail};
 pub(crate) use copies::{by_content, copies, has_copies};
 pub use cut::Cut;
-pub use detail::{Detail, DetailMeasure};
+pub use detail::{Detail, DetailMeasure, NodeShape};
 pub use facing::{Facing, PointShape, PointSize};
 pub use fade::Fade;
 pub use harmonics::Harmonics;

@@ -151,6 +151,9 @@ impl Samples {
     /// One, at the pixel's centre.
     pub const ONE: Self = Self { across: 1, down: 1 };
 
+    /// Four, on a grid of 2 x 2.
+    pub const FOUR: Self = Self { across: 2, down: 2 };
+
     /// How many they are.
     pub fn count(self) -> u32 {
         self.across * self.down
@@ -194,6 +197,20 @@ pub enum LowPass {
     Gaussians,
 }
 
+impl FromStr for LowPass {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        match text {
+            "none" => Ok(Self::None),
+            "max" => Ok(Self::Max),
+            "ewa" => Ok(Self::Ewa),
+            "gaussians" => Ok(Self::Gaussians),
+            _ => Err(Error::Usage(format!("splats are filtered by none, max, ewa or gaussians, not {text:?}"))),
+        }
+    }
+}
+
 /// How a resolved pixel gets its colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -206,6 +223,31 @@ pub enum Shading {
     /// where r is the light's direction mirrored at the normal and v the direction toward the eye. Phong's own term stops short where a
     /// light sets behind the surface; with the irradiance as a factor (Lewis 1994) it ends there at 0.
     Phong,
+}
+
+impl FromStr for Shading {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        match text {
+            "unlit" => Ok(Self::Unlit),
+            "lambert" => Ok(Self::Lambert),
+            "phong" => Ok(Self::Phong),
+            _ => Err(Error::Usage(format!("shading is unlit, lambert or phong, not {text:?}"))),
+        }
+    }
+}
+
+impl FromStr for ShadingAt {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        match text {
+            "pixel" => Ok(Self::Pixel),
+            "splat" => Ok(Self::Splat),
+            _ => Err(Error::Usage(format!("light falls on a pixel or a splat, not {text:?}"))),
+        }
+    }
 }
 
 /// What is lit.

@@ -87,7 +87,7 @@ pub fn accumulators(gpu: &Gpu) -> Vec<&'static AccumulatorRow> {
 
 /// A sample of the sets of needs that renders have: every one of the eight that say what is blended and written, with the first
 /// accumulator and one kernel, and of each other accumulator, kernel and form of epsilon a dozen, others for each. All that go
-/// together meet two by two (`tests/shaders.rs`).
+/// together meet two by two (`tests/kernels/shaders.rs`).
 pub fn all_needs() -> Vec<SceneNeeds> {
     let shapes = [KernelShape::Gaussian, KernelShape::Ellipse, KernelShape::Cone, KernelShape::Constant];
     let mut base = base_needs();

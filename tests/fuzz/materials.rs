@@ -53,7 +53,7 @@ pub const TARGET: Target = Target {
     execute,
 };
 
-static IMAGE: &[u8] = include_bytes!("../cases/files/obj/quad.png");
+static IMAGE: &[u8] = include_bytes!("../commands/cases/files/obj/quad.png");
 
 fn generate(random: &mut Random) -> (Vec<u8>, usize) {
     let mut out = String::new();

@@ -1,35 +1,19 @@
 //! `epsplat render --lod`: levels of detail for a scene that comes without.
 
-use clap::ValueEnum;
-use epsplat::plan::RenderOptions;
-use epsplat::scene::{DetailMeasure, Scene};
+use epsplat::plan::RenderOptions as Settings;
+use epsplat::scene::Scene;
 use epsplat::surfels::hierarchy;
 use epsplat::{Error, Result};
 
 use super::super::note;
 use super::super::progress::Bars;
 
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-pub(super) enum MeasureName {
-    Area,
-    Extent,
-}
-
-impl From<MeasureName> for DetailMeasure {
-    fn from(name: MeasureName) -> Self {
-        match name {
-            MeasureName::Area => Self::Area,
-            MeasureName::Extent => Self::Extent,
-        }
-    }
-}
-
-/// Gives `scene` levels of detail if a picture with `options` asks for some and it has none.
+/// Gives `scene` levels of detail if a picture with `settings` asks for some and it has none.
 ///
 /// # Errors
 /// [`Error::Usage`] for a scene that has none to give.
-pub(super) fn made(mut scene: Scene, options: &RenderOptions, bars: &Bars) -> Result<Scene> {
-    if options.detail.is_finest() || scene.hierarchy.is_some() {
+pub(super) fn made(mut scene: Scene, settings: &Settings, bars: &Bars) -> Result<Scene> {
+    if settings.detail.is_finest() || scene.hierarchy.is_some() {
         return Ok(scene);
     }
     if scene.surfels.is_empty() {

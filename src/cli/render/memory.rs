@@ -1,6 +1,6 @@
 //! `epsplat render --memory`: what host and device may take together.
 
-use epsplat::plan::RenderOptions;
+use epsplat::plan::RenderOptions as Settings;
 use epsplat::scene::{Camera, Composite};
 use epsplat::surfels::part::Taken;
 use epsplat::{Error, Result};
@@ -28,14 +28,14 @@ pub(super) struct Memory {
 }
 
 impl Memory {
-    /// That of the picture of `camera` with `options`, of which there may be so many frames at once.
+    /// That of the picture of `camera` with `settings`, of which there may be so many frames at once.
     ///
     /// # Errors
     /// [`Error::Usage`] for a bound that is reached before anything is read.
-    pub fn of(most: u64, camera: &Camera, options: &RenderOptions, frames: u64) -> Result<Self> {
+    pub fn of(most: u64, camera: &Camera, settings: &Settings, frames: u64) -> Result<Self> {
         let pixels = u64::from(camera.width) * u64::from(camera.height);
-        let lists = if options.composite == Composite::Opaque { 0 } else { LISTS };
-        let fixed = PROGRAM + lists + pixels * pixel_bytes(options.maps) * frames;
+        let lists = if settings.composite == Composite::Opaque { 0 } else { LISTS };
+        let fixed = PROGRAM + lists + pixels * pixel_bytes(settings.maps) * frames;
         if fixed <= most {
             return Ok(Self { most, fixed });
         }

@@ -2,7 +2,8 @@
 
 use epsplat::io::las::Copc;
 use epsplat::io::{ColorRules, Points};
-use epsplat::plan::RenderOptions;
+use epsplat::options::values::Switch;
+use epsplat::plan::RenderOptions as Settings;
 use epsplat::scene::octree::{PointOctree, Thinned, taken};
 use epsplat::scene::{Bounds, Camera, Detail, Scene};
 use epsplat::surfels::borders;
@@ -29,13 +30,13 @@ impl Octrees {
     /// only all of their points tell: which of them are outliers, or where they are beside triangles.
     pub fn of(arguments: &Arguments, bars: &Bars) -> Result<Option<Self>> {
         let all = arguments.limits.limits().outliers.is_some()
-            || arguments.surfel_size.is_some()
-            || !arguments.triangles.is_empty();
+            || arguments.surfels.size.is_some()
+            || !arguments.triangles.meshes.is_empty();
         if arguments.inputs.is_empty() || all {
             return Ok(None);
         }
         let Some(mut files) = arguments.reading.octrees(&arguments.inputs)? else { return Ok(None) };
-        if arguments.lod_fade == Some(true) {
+        if arguments.options.levels.lod_fade == Some(Switch(true)) {
             return Err(Error::Usage(
                 "the nodes of COPC files do not fade into each other: take --lod-fade off".into(),
             ));
@@ -54,10 +55,10 @@ impl Octrees {
         &mut self,
         arguments: &Arguments,
         camera: &Camera,
-        options: &RenderOptions,
+        settings: &Settings,
         progress: &dyn Progress,
     ) -> Result<Part> {
-        let mut nodes = taken(&self.octrees, camera, options.detail);
+        let mut nodes = taken(&self.octrees, camera, settings.detail);
         if self.octrees.iter().zip(&nodes).all(|(octree, nodes)| octree.points(nodes) == 0) {
             nodes = self.octrees.iter().map(PointOctree::overview).collect();
         }
@@ -65,8 +66,8 @@ impl Octrees {
         let mut made = scene_of(arguments, points, progress)?;
         self.end(&mut made.0, &nodes);
         // What was read is drawn whole.
-        let options = RenderOptions { detail: Detail::FINEST, ..options.clone() };
-        Ok(Part { made, options, read: read_of(&self.files, &nodes) })
+        let settings = Settings { detail: Detail::FINEST, ..settings.clone() };
+        Ok(Part { made, settings, read: read_of(&self.files, &nodes) })
     }
 
     /// Lets a scene of these nodes end where all points do: at the box of all files, where each tells its own.

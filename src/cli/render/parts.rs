@@ -1,6 +1,6 @@
 //! `epsplat render --lod` of files with levels of detail of their own: a picture reads what it takes of them.
 
-use epsplat::plan::RenderOptions;
+use epsplat::plan::RenderOptions as Settings;
 use epsplat::scene::{Camera, Scene};
 use epsplat::{Error, Progress, Result};
 use serde::Serialize;
@@ -24,7 +24,7 @@ pub(super) enum Parts {
 pub(super) struct Part {
     pub made: Made,
     /// How it is drawn.
-    pub options: RenderOptions,
+    pub settings: Settings,
     pub read: Read,
 }
 
@@ -38,10 +38,10 @@ pub(super) struct Read {
 }
 
 impl Parts {
-    /// The inputs, if a picture with `options` takes parts of them.
-    pub fn of(arguments: &Arguments, options: &RenderOptions, bars: &Bars) -> Result<Option<Self>> {
-        if options.detail.is_finest() {
-            return match arguments.memory {
+    /// The inputs, if a picture with `settings` takes parts of them.
+    pub fn of(arguments: &Arguments, settings: &Settings, bars: &Bars) -> Result<Option<Self>> {
+        if settings.detail.is_finest() {
+            return match arguments.device.memory {
                 Some(_) => {
                     Err(Error::Usage("--memory is of pictures that take a part: take --lod of a size above 0".into()))
                 }
@@ -62,18 +62,18 @@ impl Parts {
         }
     }
 
-    /// What the picture of `camera` with `options` takes, of which there may be so many frames at once.
+    /// What the picture of `camera` with `settings` takes, of which there may be so many frames at once.
     pub fn scene(
         &mut self,
         arguments: &Arguments,
         (camera, frames): (&Camera, u64),
-        options: &RenderOptions,
+        settings: &Settings,
         progress: &dyn Progress,
     ) -> Result<Part> {
-        let memory = arguments.memory.map(|most| Memory::of(most, camera, options, frames)).transpose()?;
+        let memory = arguments.device.memory.map(|most| Memory::of(most, camera, settings, frames)).transpose()?;
         match self {
-            Self::Octrees(octrees) => octrees.scene(arguments, camera, options, progress),
-            Self::Tree(tree) => tree.scene(memory, camera, options, progress),
+            Self::Octrees(octrees) => octrees.scene(arguments, camera, settings, progress),
+            Self::Tree(tree) => tree.scene(memory, camera, settings, progress),
         }
     }
 }

@@ -4,9 +4,10 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use epsplat::io::{self, Mesh, Points, ReadOptions, Texture};
+use epsplat::options::Suggested;
 use epsplat::plan::check::textured;
-use epsplat::plan::{BackendName, Facts, RenderOptions, composited};
-use epsplat::scene::{Blend, Colors, Composite, Maps, Scene};
+use epsplat::plan::{Facts, composited};
+use epsplat::scene::{Blend, Colors, Composite, Scene};
 use epsplat::surfels::{FromPoints, Preparation, Surfels, from_points, with_triangles};
 use epsplat::{Error, Progress, Result, surfels};
 
@@ -14,7 +15,7 @@ use super::super::note;
 use super::super::progress::Bars;
 use super::super::reading::named;
 use super::Arguments;
-use super::options::options;
+use super::options::settings;
 use super::output::Format;
 
 /// A scene, and what became of its points.
@@ -29,18 +30,18 @@ pub(super) fn scene(arguments: &Arguments, bars: &Bars) -> Result<Made> {
 
 /// What was read of all inputs, and the triangles beside it, as one scene.
 pub(super) fn scene_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dyn Progress) -> Result<Made> {
-    if arguments.inputs.is_empty() && !arguments.textures.is_empty() {
+    if arguments.inputs.is_empty() && !arguments.surfels.textures.is_empty() {
         let what = "--texture paints surfels, and there are none: take --triangle-texture for triangles";
         return Err(Error::Usage(what.into()));
     }
-    if arguments.separate && arguments.is_one_file() {
+    if arguments.options.surface.separate && arguments.is_one_file() {
         note(
             "--separate keeps the surfels of several files apart, and here is one of them at most: it changes nothing",
         );
     }
     // What `epsplat hybrid` left of a mesh names itself.
     let beside = inputs.iter().filter_map(|points| points.beside.clone());
-    let mut paths: Vec<PathBuf> = arguments.triangles.iter().cloned().chain(beside).collect();
+    let mut paths: Vec<PathBuf> = arguments.triangles.meshes.iter().cloned().chain(beside).collect();
     // What two files of surfels name is drawn once.
     let mut known = BTreeSet::new();
     paths.retain(|path| known.insert(path.canonicalize().unwrap_or_else(|_| path.clone())));
@@ -53,7 +54,7 @@ pub(super) fn scene_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dy
         None
     };
     if paths.is_empty() {
-        if arguments.join.is_some() || arguments.triangle_texture.is_some() {
+        if arguments.options.surface.join.is_some() || arguments.triangles.texture.is_some() {
             let what = "--join and --triangle-texture are of triangles, and there are none: name some by --triangles";
             return Err(Error::Usage(what.into()));
         }
@@ -72,7 +73,7 @@ pub(super) fn scene_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dy
 
 /// The meshes, those that no material paints with the image for triangles.
 fn painted(mut meshes: Vec<Mesh>, paths: &[PathBuf], arguments: &Arguments) -> Result<Vec<Mesh>> {
-    let Some(image) = &arguments.triangle_texture else { return Ok(meshes) };
+    let Some(image) = &arguments.triangles.texture else { return Ok(meshes) };
     let texture = Texture::read(image)?;
     let bare = |mesh: &Mesh| mesh.materials.iter().all(|material| material.texture.is_none());
     if !meshes.iter().any(bare) {
@@ -90,15 +91,16 @@ fn painted(mut meshes: Vec<Mesh>, paths: &[PathBuf], arguments: &Arguments) -> R
 /// Whether surfels can be painted with the images of their meshes' materials, as pictures are made;
 /// else they have the means of these.
 fn paints(arguments: &Arguments) -> bool {
-    let reference = arguments.backend.0 == Some(BackendName::Reference);
-    let finest = arguments.lod.is_none() && arguments.splats.is_none();
-    let options = options(arguments, Format::Exr);
-    finest && options.is_ok_and(|options| textured(&options, reference).is_ok() && options.blend != Blend::Nearest)
+    let levels = &arguments.options.levels;
+    let finest = levels.lod.is_none() && levels.splats.is_none();
+    let reference = arguments.is_reference();
+    let settings = settings(arguments, Format::Exr);
+    finest && settings.is_ok_and(|settings| textured(&settings, reference).is_ok() && settings.blend != Blend::Nearest)
 }
 
 /// The surfels of all inputs.
 fn surfels_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dyn Progress) -> Result<Made> {
-    let textures = arguments.textures.iter().map(|image| Texture::read(image)).collect::<Result<Vec<_>>>()?;
+    let textures = arguments.surfels.textures.iter().map(|image| Texture::read(image)).collect::<Result<Vec<_>>>()?;
     let bare = |points: &Points| !points.has_places() && !points.positions.is_empty();
     if !textures.is_empty() && inputs.iter().any(bare) {
         let paths = arguments.inputs.iter().zip(&inputs).filter(|(_, points)| bare(points)).map(|(path, _)| path);
@@ -113,7 +115,7 @@ fn surfels_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dyn Progres
     }
     let limits = arguments.limits.limits();
     let in_file = |error| named(error, &arguments.inputs);
-    if let Some(size) = arguments.surfel_size {
+    if let Some(size) = arguments.surfels.size {
         let options = FromPoints { size, limits, ..FromPoints::default() };
         let Surfels { points, preparation, .. } = from_points(inputs, &options, progress).map_err(in_file)?;
         // Outliers are dropped, and half-axes limited, once.
@@ -121,8 +123,10 @@ fn surfels_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dyn Progres
         let Preparation { guessed_up, strays, rounding, .. } = of_scene;
         return Ok((seen_through(scene, arguments), Preparation { guessed_up, strays, rounding, ..preparation }));
     }
-    let built = match arguments.facing {
-        Some(_) => surfels::build_facing(inputs, arguments.point_size, &limits, progress),
+    let built = match arguments.options.points.facing {
+        Some(_) => {
+            surfels::build_facing(inputs, arguments.options.points.point_size.unwrap_or_default(), &limits, progress)
+        }
         None if textures.is_empty() && paints(arguments) => surfels::build_painted(inputs, &limits, progress),
         None => surfels::build_within(inputs, textures, &limits, progress),
     };
@@ -134,13 +138,8 @@ fn surfels_of(arguments: &Arguments, inputs: Vec<Points>, progress: &dyn Progres
 /// fragments keep no texture coordinates.
 fn seen_through(scene: Scene, arguments: &Arguments) -> Scene {
     let Colors::Textured(textured) = &scene.colors else { return scene };
-    let options = RenderOptions {
-        composite: arguments.composite.unwrap_or_default(),
-        opacity: arguments.opacity,
-        maps: Maps::of(&arguments.aov),
-        ..RenderOptions::default()
-    };
-    if options.composite == Composite::Opaque || composited(&Facts::of(&scene), &options) == Composite::Opaque {
+    let settings = arguments.options.settle(arguments.backend(), Suggested::default());
+    if settings.composite == Composite::Opaque || composited(&Facts::of(&scene), &settings) == Composite::Opaque {
         return scene;
     }
     note("where surfaces show through each other each surfel has the mean colour of its texture");

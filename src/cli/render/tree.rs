@@ -1,7 +1,7 @@
 //! `epsplat render --lod` of a file that `epsplat lod` wrote: a picture reads the nodes and surfels that it may come to.
 
 use epsplat::io::ply::Levels;
-use epsplat::plan::RenderOptions;
+use epsplat::plan::RenderOptions as Settings;
 use epsplat::render::taken;
 use epsplat::scene::hierarchy::Node;
 use epsplat::scene::{Camera, Scene, Surfel};
@@ -29,7 +29,7 @@ pub(super) struct Tree {
 impl Tree {
     /// The input, if it is one large file with levels of detail, and nothing is asked that is of all of its surfels, of other inputs or of triangles.
     pub fn of(arguments: &Arguments) -> Result<Option<Self>> {
-        let bounded = arguments.memory.is_some();
+        let bounded = arguments.device.memory.is_some();
         let levels = match (&arguments.inputs[..], asks_for_all(arguments)) {
             (_, Some(option)) if bounded => {
                 return Err(Error::Usage(format!(
@@ -60,16 +60,16 @@ impl Tree {
         Ok(Some(Self { levels, overview }))
     }
 
-    /// What the picture of `camera` with `options` takes, within `memory` if there is a bound.
+    /// What the picture of `camera` with `settings` takes, within `memory` if there is a bound.
     pub fn scene(
         &self,
         memory: Option<Memory>,
         camera: &Camera,
-        options: &RenderOptions,
+        settings: &Settings,
         progress: &dyn Progress,
     ) -> Result<Part> {
         let fits = |taken: &Taken| memory.as_ref().map_or(Ok(()), |memory| memory.fits(taken));
-        let (scene, read) = taken(&self.levels, &[(camera, options)], fits, progress)?;
+        let (scene, read) = taken(&self.levels, &[(camera, settings)], fits, progress)?;
         let (nodes, surfels) = (self.levels.whole.nodes.into(), self.levels.whole.surfels.into());
         let preparation = Preparation { points: surfels, surfels, ..Preparation::default() };
         let read = Read {
@@ -77,7 +77,7 @@ impl Tree {
             points: [read.surfels, surfels],
             bytes: [read.bytes, self.levels.bytes(surfels, nodes)],
         };
-        Ok(Part { made: (scene, preparation), options: options.clone(), read })
+        Ok(Part { made: (scene, preparation), settings: settings.clone(), read })
     }
 }
 
@@ -87,15 +87,15 @@ fn asks_for_all(arguments: &Arguments) -> Option<&'static str> {
     let all = [
         (limits.outliers.is_some(), "--outliers"),
         (limits.largest_ratio != Limits::default().largest_ratio, "--max-radius"),
-        (arguments.surfel_size.is_some(), "--surfel-size"),
+        (arguments.surfels.size.is_some(), "--surfel-size"),
         (arguments.reading.class_opacity.is_some(), "--class-opacity"),
         (arguments.reading.ignores_alpha(), "--ignore-alpha"),
-        (!arguments.triangles.is_empty(), "--triangles"),
-        (arguments.triangle_texture.is_some(), "--triangle-texture"),
-        (arguments.join.is_some(), "--join"),
-        (!arguments.textures.is_empty(), "--texture"),
-        (arguments.facing.is_some(), "--facing"),
-        (arguments.separate, "--separate"),
+        (!arguments.triangles.meshes.is_empty(), "--triangles"),
+        (arguments.triangles.texture.is_some(), "--triangle-texture"),
+        (arguments.options.surface.join.is_some(), "--join"),
+        (!arguments.surfels.textures.is_empty(), "--texture"),
+        (arguments.options.points.facing.is_some(), "--facing"),
+        (arguments.options.surface.separate, "--separate"),
     ];
     all.into_iter().find_map(|(given, option)| given.then_some(option))
 }

@@ -35,28 +35,28 @@ enum Place {
 impl View {
     /// What the arguments say, `--cameras` apart.
     pub(super) fn of(arguments: &Arguments) -> Result<Self> {
-        if let Some(path) = &arguments.camera {
+        if let Some(path) = &arguments.camera.file {
             return Self::of_file(arguments, camera::read(path)?, path);
         }
-        let (lens, option) = match (arguments.intrinsics, arguments.ortho) {
+        let (lens, option) = match (arguments.camera.intrinsics, arguments.camera.ortho) {
             (Some(values), _) => (Lens::Intrinsics(values), "--intrinsics"),
             (None, Some(height)) => (Lens::OrthographicHeight(height), "--ortho"),
-            (None, None) => (Lens::Fov(arguments.fov.unwrap_or(DEFAULT_FOV)), "--fov"),
+            (None, None) => (Lens::Fov(arguments.camera.fov.unwrap_or(DEFAULT_FOV)), "--fov"),
         };
-        let size = arguments.size.unwrap_or(DEFAULT_SIZE);
+        let size = arguments.camera.size.unwrap_or(DEFAULT_SIZE);
         lens.intrinsics(size.0, size.1).map_err(|error| said_by(option, error))?;
         check_near_argument(arguments)?;
-        let place = match (arguments.eye, arguments.target) {
-            (None, _) => Place::Framed(arguments.up),
-            (Some(eye), None) => Place::Eye(eye, arguments.up),
-            (Some(eye), Some(target)) => Place::Pose(Pose::LookAt(eye, target, arguments.up)),
+        let place = match (arguments.camera.eye, arguments.camera.target) {
+            (None, _) => Place::Framed(arguments.camera.up),
+            (Some(eye), None) => Place::Eye(eye, arguments.camera.up),
+            (Some(eye), Some(target)) => Place::Pose(Pose::LookAt(eye, target, arguments.camera.up)),
         };
-        Self { size, lens, place, near: arguments.near }.checked()
+        Self { size, lens, place, near: arguments.camera.near }.checked()
     }
 
     /// What a camera of the file at `path` says, and the arguments that add to it.
     pub(super) fn of_file(arguments: &Arguments, file: CameraFile, path: &Path) -> Result<Self> {
-        if let (Some(size), Some(own)) = (arguments.size, file.size)
+        if let (Some(size), Some(own)) = (arguments.camera.size, file.size)
             && size != own
         {
             return Err(Error::Usage(format!(
@@ -68,16 +68,16 @@ impl View {
                 own.1
             )));
         }
-        if arguments.scale.is_some() && file.size.is_none() {
+        if arguments.camera.scale.is_some() && file.size.is_none() {
             let path = path.display();
             return Err(Error::Usage(format!(
                 "--scale needs pictures of known size, which {path} does not give: take --size"
             )));
         }
         check_near_argument(arguments)?;
-        let file = file.scaled(arguments.scale.unwrap_or(1.0));
-        let size = file.size.or(arguments.size).unwrap_or(DEFAULT_SIZE);
-        let near = arguments.near.or(file.near);
+        let file = file.scaled(arguments.camera.scale.unwrap_or(1.0));
+        let size = file.size.or(arguments.camera.size).unwrap_or(DEFAULT_SIZE);
+        let near = arguments.camera.near.or(file.near);
         let view = Self { size, lens: file.lens, place: Place::Pose(file.pose), near };
         view.checked().map_err(|error| said_by(path.display(), error))
     }
@@ -237,5 +237,5 @@ fn said_by(who: impl Display, error: Error) -> Error {
 }
 
 fn check_near_argument(arguments: &Arguments) -> Result<()> {
-    arguments.near.map_or(Ok(()), check_near).map_err(|error| said_by("--near", error))
+    arguments.camera.near.map_or(Ok(()), check_near).map_err(|error| said_by("--near", error))
 }

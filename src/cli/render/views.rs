@@ -10,7 +10,7 @@ use epsplat::frame::Frame;
 use epsplat::io::write_behind::write_behind;
 use epsplat::io::{atomic, cameras};
 use epsplat::passes::unseen::{Unseen, is_empty};
-use epsplat::plan::RenderOptions;
+use epsplat::plan::RenderOptions as Settings;
 use epsplat::render::{Backend, Renderer, Report, render};
 use epsplat::scene::{Camera, Maps, Scene};
 use epsplat::{Error, Progress, Result};
@@ -19,7 +19,7 @@ use serde::Serialize;
 use super::super::outputs::Source;
 use super::super::progress::Bars;
 use super::super::{note, outputs, write_json};
-use super::options::{for_scene, options};
+use super::options::{for_scene, settings};
 use super::output::{Format, note_cut, note_overflows};
 use super::parts::{Part, Parts, Read};
 use super::scene::scene;
@@ -62,11 +62,11 @@ struct Reports {
 /// What the views show.
 enum Shown<'a> {
     /// A scene that all of them share.
-    Whole(&'a Scene, RenderOptions, Box<Renderer<&'a Scene, &'a Backend>>),
+    Whole(&'a Scene, Settings, Box<Renderer<&'a Scene, &'a Backend>>),
     /// What each takes of files, which depends on nothing that another one takes.
     Parts {
         parts: Box<Parts>,
-        options: RenderOptions,
+        settings: Settings,
         backend: &'a Backend,
         /// The first one's notes have been told.
         told: bool,
@@ -86,25 +86,25 @@ struct Shot {
 
 impl Shown<'_> {
     fn picture(&mut self, arguments: &Arguments, view: &View) -> Result<Shot> {
-        let unseen = |scene: &Scene, camera: &Camera, options: &RenderOptions, frame: &Frame| {
-            is_empty(frame, options).then(|| Unseen::of(scene, camera, options))
+        let unseen = |scene: &Scene, camera: &Camera, settings: &Settings, frame: &Frame| {
+            is_empty(frame, settings).then(|| Unseen::of(scene, camera, settings))
         };
         match self {
-            Self::Whole(scene, options, renderer) => {
+            Self::Whole(scene, settings, renderer) => {
                 let (camera, _) = view.camera(scene, Camera::default_near(scene))?;
                 let (frame, report) = renderer.frame(&camera, &())?;
-                let unseen = unseen(scene, &camera, options, &frame);
+                let unseen = unseen(scene, &camera, settings, &frame);
                 Ok(Shot { frame, report, read: None, unseen })
             }
-            Self::Parts { parts, options, backend, told, frames } => {
+            Self::Parts { parts, settings, backend, told, frames } => {
                 let (camera, _) = view.camera(parts.overview(), Camera::default_near(parts.overview()))?;
-                let Part { made: (scene, preparation), options, read } =
-                    parts.scene(arguments, (&camera, *frames), options, &())?;
+                let Part { made: (scene, preparation), settings, read } =
+                    parts.scene(arguments, (&camera, *frames), settings, &())?;
                 if !std::mem::replace(told, true) {
                     preparation.notes().iter().for_each(|line| note(line));
                 }
-                let (frame, report) = render(&scene, &camera, &options, backend, &())?;
-                let unseen = unseen(&scene, &camera, &options, &frame);
+                let (frame, report) = render(&scene, &camera, &settings, backend, &())?;
+                let unseen = unseen(&scene, &camera, &settings, &frame);
                 Ok(Shot { frame, report, read: Some(read), unseen })
             }
         }
@@ -113,32 +113,32 @@ impl Shown<'_> {
 
 /// Renders a picture of each camera of the set at `path`.
 pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
-    let maps = !arguments.aov.is_empty();
-    let format = arguments.format.unwrap_or(if maps { Format::Exr } else { Format::Png });
-    let options = options(arguments, format)?;
+    let maps = !arguments.options.maps.aov.is_empty();
+    let format = arguments.camera.format.unwrap_or(if maps { Format::Exr } else { Format::Png });
+    let settings = settings(arguments, format)?;
     let views = views(arguments, path, format)?;
     check_outputs(arguments, path, &views)?;
     let backend = backend(arguments)?;
 
     let bars = Bars::new();
-    let parts = Parts::of(arguments, &options, &bars)?;
-    let (scene, options) = match &parts {
-        Some(_) => (Scene::default(), options),
+    let parts = Parts::of(arguments, &settings, &bars)?;
+    let (scene, settings) = match &parts {
+        Some(_) => (Scene::default(), settings),
         None => {
             let (scene, preparation) = scene(arguments, &bars)?;
             preparation.notes().iter().for_each(|line| note(line));
-            let options = for_scene(arguments, options, &scene)?;
-            (levels::made(scene, &options, &bars)?, options)
+            let settings = for_scene(arguments, settings, &scene)?;
+            (levels::made(scene, &settings, &bars)?, settings)
         }
     };
     let largest = views.iter().map(|(_, view)| view.pixels()).max().unwrap_or(1);
-    let writers = writers(largest, options.maps);
+    let writers = writers(largest, settings.maps);
     let mut shown = match parts {
         Some(parts) => {
             let frames = writers.get() as u64 + 1;
-            Shown::Parts { parts: Box::new(parts), options: options.clone(), backend: &backend, told: false, frames }
+            Shown::Parts { parts: Box::new(parts), settings: settings.clone(), backend: &backend, told: false, frames }
         }
-        None => Shown::Whole(&scene, options.clone(), Box::new(Renderer::new(&scene, &options, &backend)?)),
+        None => Shown::Whole(&scene, settings.clone(), Box::new(Renderer::new(&scene, &settings, &backend)?)),
     };
     let start = Instant::now();
     bars.begin("rendering views", views.len() as u64);
@@ -174,7 +174,7 @@ pub(super) fn run(arguments: &Arguments, path: &Path) -> Result<()> {
 /// Tells of all pictures, since the scene was there.
 fn tell(arguments: &Arguments, views: Vec<Picture>, writers: NonZeroUsize, start: Instant) -> Result<()> {
     views.iter().for_each(|view| note_overflows(&view.report));
-    note_cut(views.iter().map(|view| &view.report), arguments.splats);
+    note_cut(views.iter().map(|view| &view.report), arguments.options.levels.splats);
     let reports = Reports {
         writers: writers.get(),
         render_ms: views.iter().map(|view| view.report.total_ms).sum(),
@@ -193,11 +193,11 @@ fn tell(arguments: &Arguments, views: Vec<Picture>, writers: NonZeroUsize, start
 
 /// The files and views of all cameras, which the arguments do not contradict.
 fn views(arguments: &Arguments, path: &Path, format: Format) -> Result<Vec<(PathBuf, View)>> {
-    let cameras = cameras::read(path, arguments.size.unwrap_or(DEFAULT_SIZE))?;
+    let cameras = cameras::read(path, arguments.camera.size.unwrap_or(DEFAULT_SIZE))?;
     let distorted = cameras.iter().filter(|camera| camera.distortion.is_some());
     if let Some((first, (name, value))) = distorted.clone().find_map(|camera| Some((&camera.name, camera.distortion?)))
     {
-        if !arguments.ignore_distortion {
+        if !arguments.camera.ignore_distortion {
             return Err(Error::malformed(
                 path,
                 format!(

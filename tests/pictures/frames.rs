@@ -219,7 +219,7 @@ fn frames_of_the_reference_are_what_they_were() {
     for row in list(&scenes).iter().filter(|row| differs_in_f64(row)) {
         writeln!(made, "{:016x} {}", rendered(row, &Backend::Reference), row.name).unwrap();
     }
-    let kept = include_str!("golden/frames.txt");
+    let kept = include_str!("../golden/frames.txt");
     let pairs = made.lines().zip(kept.lines().filter(|line| !line.starts_with('#')));
     let other: Vec<_> = pairs.clone().filter(|(made, kept)| made != kept).collect();
     assert!(other.is_empty() && pairs.count() == made.lines().count(), "now:\n{made}\nother than before: {other:#?}");

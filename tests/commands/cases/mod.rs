@@ -2,7 +2,7 @@
 //! reason: each a small one that stands for its kind, with the right value. Files of other formats
 //! and types of each kind are made in `tests/readers`.
 //!
-//! Two meshes far from each other, one of these kinds, are in `tests/far.rs`.
+//! Two meshes far from each other, one of these kinds, are in `tests/pictures/far.rs`.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -16,7 +16,7 @@ use serde_json::Value;
 
 /// One of the files.
 fn case(name: &str) -> String {
-    format!("{}/tests/cases/files/{name}", env!("CARGO_MANIFEST_DIR"))
+    format!("{}/tests/commands/cases/files/{name}", env!("CARGO_MANIFEST_DIR"))
 }
 
 /// The outcome of `epsplat info` on a file, with these options.

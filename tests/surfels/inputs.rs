@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use crate::common;
-#[path = "common/las_forms.rs"]
+#[path = "../common/las_forms.rs"]
 mod las_forms;
 
 use common::command::{DATA, Folder, epsplat, fails, ply, succeeds, text};
@@ -201,8 +201,8 @@ fn damaged_files_are_one_sentence() {
     let whole = writer.into_inner().unwrap().into_inner();
     let without_chunks = las_forms::pointwise(&whole, 0);
     let twice = las_forms::with_another_record(&whole);
-    let deep = include_bytes!("readers/deep_gps_time.laz").to_vec();
-    let layers = include_bytes!("readers/layers_outside_chunks.laz").to_vec();
+    let deep = include_bytes!("../readers/deep_gps_time.laz").to_vec();
+    let layers = include_bytes!("../readers/layers_outside_chunks.laz").to_vec();
     for (name, bytes, said) in [
         ("short.laz", without_chunks[..without_chunks.len() - 60].to_vec(), "decoding fails after"),
         ("twice.laz", twice, "its LASzip record does not describe its points"),

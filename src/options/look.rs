@@ -1,0 +1,36 @@
+//! Light, background and the smoothness of edges.
+
+use super::group::group;
+use super::values::Rgba;
+use crate::scene::{Light, Samples, Shading};
+
+group! {
+    /// Light, background and the smoothness of edges.
+    #[cfg_attr(feature = "cli", command(next_help_heading = "Look"))]
+    pub struct LookOptions {
+        /// Shading: unlit, lambert or phong [default: lambert; unlit where there are no normals]
+        ///
+        /// unlit is the blended colour, lambert the colour times the lights' cosines, and phong adds
+        /// white highlights. Points that face the camera, --blend nearest and Gaussians are unlit
+        #[cfg_attr(feature = "cli", arg(long, value_name = "MODEL"))]
+        pub shading: Option<Shading>,
+        /// A light in place of the headlight: headlight[:INTENSITY] or X,Y,Z[:INTENSITY]
+        ///
+        /// X,Y,Z is the direction toward the light. The option may be given several times
+        #[cfg_attr(feature = "cli", arg(long = "light", value_name = "LIGHT", allow_hyphen_values = true))]
+        pub lights: Vec<Light>,
+        /// Exponent of the highlights of --shading phong, 1 to 1000: the higher, the smaller they are
+        /// [default: 32]
+        #[cfg_attr(feature = "cli", arg(long, value_name = "EXPONENT", hide_short_help = true))]
+        pub shininess: Option<f32>,
+        /// Colour behind the scene, linear [default: transparent]
+        #[cfg_attr(feature = "cli", arg(long, value_name = "R,G,B[,A]"))]
+        pub background: Option<Rgba>,
+        /// Samples of a pixel: 1, 4, 8 or 16 [default: 4, of Gaussians 1]
+        ///
+        /// More samples make smoother edges; maps are those of the pixel's centre. Samples are
+        /// averaged in linear light, those of Gaussians as the codes that their files are trained to
+        #[cfg_attr(feature = "cli", arg(long, value_name = "N"))]
+        pub samples: Option<Samples>,
+    }
+}

@@ -1,0 +1,22 @@
+//! The kernels: against their f64 twins, against each other, and as texts.
+//! One program: shared code and kernels are compiled once.
+
+mod accumulators;
+#[path = "../common/mod.rs"]
+mod common;
+mod determinism;
+mod double;
+mod extremes;
+mod index;
+mod layout;
+mod long_lists;
+mod lowpass;
+mod optimisations;
+mod plans;
+mod rounding;
+mod shaders;
+mod slots;
+mod sources;
+mod sums;
+mod tiles;
+mod twins;

@@ -1,0 +1,10 @@
+//! Levels of detail.
+//! One program: shared code and kernels are compiled once.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod cuts;
+mod fades;
+mod lod;
+mod octrees;
+mod parts;

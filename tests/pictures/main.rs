@@ -1,0 +1,32 @@
+//! What pictures show.
+//! One program: shared code and kernels are compiled once.
+
+mod adapters;
+mod cameras;
+mod clips;
+#[path = "../common/mod.rs"]
+mod common;
+mod copies;
+mod curved;
+mod facing;
+mod far;
+mod frames;
+mod gaussians;
+mod hard_cases;
+mod images;
+mod invariance;
+mod layers;
+mod materials;
+mod matrix;
+mod nearest;
+mod oit;
+mod pictures;
+mod points;
+mod properties;
+mod raster;
+mod refusals;
+mod samples;
+mod separate;
+mod texture;
+mod transparency;
+mod triangles;

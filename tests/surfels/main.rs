@@ -1,0 +1,13 @@
+//! From files to surfels.
+//! One program: shared code and kernels are compiled once.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod coverage;
+mod hybrid;
+mod inputs;
+mod sampling;
+mod scans;
+mod simplify;
+mod strays;
+mod truth;

@@ -34,13 +34,16 @@
 //! # Ok::<(), epsplat::Error>(())
 //! ```
 
+#[cfg(feature = "bench")]
 pub mod bench;
 pub mod error;
 pub mod frame;
 pub mod gpu;
+#[cfg(feature = "bench")]
 pub mod hardcases;
 pub mod io;
 mod memory;
+#[cfg(feature = "bench")]
 pub mod metrics;
 mod morton;
 pub mod options;
@@ -49,6 +52,7 @@ pub mod plan;
 pub mod progress;
 mod random;
 pub mod render;
+#[cfg(feature = "bench")]
 pub mod report;
 pub mod scene;
 mod sets;

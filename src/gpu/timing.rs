@@ -103,6 +103,7 @@ impl Timing {
     }
 
     /// Records what is in no pass, as copies are, and counts it as `stage`: from the end of an empty pass to the start of another.
+    #[cfg(any(test, feature = "bench"))]
     pub(crate) fn around(
         &mut self,
         gpu: &Gpu,

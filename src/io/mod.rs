@@ -13,6 +13,7 @@ mod companions;
 mod degrees;
 #[cfg(feature = "e57")]
 pub mod e57;
+#[cfg(feature = "exr")]
 pub mod exr;
 mod fault;
 mod format;

@@ -43,6 +43,7 @@ impl Camera {
     }
 
     /// The default view by surfels' centres alone: for studies, in which the view must not depend on the radius.
+    #[cfg(feature = "bench")]
     pub(crate) fn framing_centers(size: (u32, u32), lens: Lens, scene: &Scene, near: f64) -> Result<Self> {
         Ok(Self::framed(size, lens, scene, near, (None, Of::Centers))?.0)
     }

@@ -378,7 +378,7 @@ mod tests {
                 "[[config]]\nname = \"d\"\nbackend = \"gpu\"\nblend_format = \"rgba8unorm\"\n",
                 &["blend-format", "raster"],
             ),
-            ("[[config]]\nname = \"d\"\nbackend = \"raster\"\naccumulator = \"fixed\"\n", &["accumulator", "gpu"]),
+            ("[[config]]\nname = \"d\"\nbackend = \"raster\"\naccumulator = \"fixed64\"\n", &["accumulator", "gpu"]),
             ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nerror_limit = -1\n", &["error_limit:"]),
             ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\napproximates = \"x\"\n", &["approximates:", "\"x\""]),
             ("[[config]]\nname = \"d\"\nbackend = \"raster\"\norganisation = \"tile\"\n", &["organisation", "gpu"]),

@@ -18,36 +18,43 @@ use super::progress::Bars;
 /// Files of folders that a sentence names where they cannot be read.
 const MOST_NAMED: usize = 8;
 
-/// What inputs are, whatever they are called.
+/// The format of inputs, and the attributes that are left out.
 #[derive(Args)]
+#[command(next_help_heading = "Input")]
 pub(super) struct InputFormat {
-    /// The format of the inputs [default: what their names say, or else their first bytes]
-    #[arg(long, value_name = "FORMAT", value_parser = formats())]
+    /// Format of the inputs [default: by their names, or else their first bytes]
+    #[arg(long, value_name = "FORMAT", value_parser = formats(), hide_short_help = true)]
     input_format: Option<Format>,
-    /// Leave out the alphas of the inputs' colours, which some programs fill with something else;
-    /// not the opacities of Gaussians
-    #[arg(long)]
+    /// Leave out the alphas of colours, which some programs fill with other values
+    ///
+    /// The opacities of Gaussians stay
+    #[arg(long, hide_short_help = true)]
     ignore_alpha: bool,
 }
 
 /// How point clouds are read.
 #[derive(Args)]
+#[command(next_help_heading = "Input")]
 pub(super) struct Reading {
     #[command(flatten)]
     input: InputFormat,
-    /// Keep the points that a LAS file marks as withheld, which is deleted; else they are left out and counted
-    #[arg(long)]
+    /// Keep the points that a LAS file marks as withheld (deleted); else they are left out
+    #[arg(long, hide_short_help = true)]
     keep_withheld: bool,
-    /// Opacities of a LAS file's points by their classes: CLASS:A or FIRST-LAST:A, with commas between them, such as 3-5:0.3,7:0 for thin
-    /// trees and no noise. A class of opacity 0 is left out and counted; others show through with render --composite
-    #[arg(long, value_name = "RULES")]
+    /// Opacities of LAS classes: CLASS:A or FIRST-LAST:A, such as 3-5:0.3,7:0
+    ///
+    /// The example makes trees thin and leaves noise out. Points of opacity 0 are left out and
+    /// counted; others show through with render --composite
+    #[arg(long, value_name = "RULES", hide_short_help = true)]
     pub(super) class_opacity: Option<ClassOpacities>,
-    /// Draw the Gaussians of a 3DGS file as surfels, without their shortest axis, even if they are not flat
-    #[arg(long)]
+    /// Draw the Gaussians of a 3DGS file as surfels, without their shortest axis
+    #[arg(long, hide_short_help = true)]
     flatten: bool,
-    /// Refuse inputs of which a part cannot be read: a file of a folder, a scan of an E57 file, a
-    /// chunk of a LAZ or a node of a COPC file; else that part is left out, and told
-    #[arg(long)]
+    /// Refuse inputs of which a part cannot be read; else the rest is drawn
+    ///
+    /// A part is a file of a folder, a scan of an E57 file, a chunk of a LAZ or a node of a COPC
+    /// file. A note names the parts that are left out
+    #[arg(long, hide_short_help = true)]
     strict: bool,
     /// Inputs that were found in folders.
     #[arg(skip)]
@@ -56,14 +63,17 @@ pub(super) struct Reading {
 
 /// Which points become surfels, and how large those may be.
 #[derive(Args)]
+#[command(next_help_heading = "Surfels from points")]
 pub(super) struct LimitArguments {
-    /// Drop points whose mean distance to 16 neighbours exceeds the mean of all by K standard deviations
-    #[arg(long, value_name = "K")]
+    /// Drop stray points: those K standard deviations farther from their neighbours than the mean
+    ///
+    /// The distance is the mean one to 16 neighbours
+    #[arg(long, value_name = "K", hide_short_help = true)]
     outliers: Option<f64>,
-    /// No estimated half-axis above FACTOR times the median of the neighbours'; inf for no limit
-    #[arg(long, value_name = "FACTOR", default_value = "3")]
+    /// Largest estimated half-axis, as a factor of the neighbours' median; inf for no limit
+    #[arg(long, value_name = "FACTOR", default_value = "3", hide_short_help = true)]
     max_radius: f64,
-    /// Flat disks where sizes are estimated, which else curve as the surface does: frames take three quarters of the time
+    /// Estimate flat disks in place of disks that curve as the surface does: faster frames
     #[arg(long)]
     flat: bool,
 }

@@ -16,12 +16,18 @@ use super::output::Format;
 
 /// Render point clouds and meshes to a PNG or EXR image.
 ///
-/// Without a camera the scene is framed from its bounds. Several inputs make one scene. With --cameras there is a picture for each
-/// camera of a file, in a folder; those that are written stay if a later one fails.
+/// Without a camera the scene is framed from its bounds. Several inputs make one scene. With
+/// --cameras there is a picture for each camera of a file, in a folder; those that are written stay
+/// if a later one fails.
 #[derive(Args)]
 #[command(
     allow_negative_numbers = true,
     after_help = "Examples:\n  \
+    epsplat render scan.laz -o scan.png\n  \
+    epsplat render scan.laz -o maps.exr --aov depth,normal --size 1920x1080\n  \
+    epsplat render scan.laz -o top.png --eye 0,0,500 --target 0,0,0 --ortho 300\n\n\
+    --help lists all options.",
+    after_long_help = "Examples:\n  \
     epsplat render scan.laz -o scan.png\n  \
     epsplat render a.ply b.ply -o maps.exr --aov depth,normal --size 1920x1080\n  \
     epsplat render bunny.obj -o bunny.png --shading phong --light 1,1,1 --light headlight:0.3\n  \

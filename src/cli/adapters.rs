@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::{outputs, print, write_json};
 
-/// Adapters, their limits, the features that matter here, and what `auto` picks.
+/// List the adapters, with their limits and features, and the one that auto takes.
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat adapters --json -")]
 pub struct Arguments {

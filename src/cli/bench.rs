@@ -14,10 +14,11 @@ use super::outputs::Source;
 use super::progress::Bars;
 use super::{note, outputs, print};
 
-/// Run a benchmark study: every configuration on every scene of a definition, each speed with its error.
+/// Run a study of speed beside error: every configuration on every scene of a TOML file.
 ///
-/// Configurations take turns, so that a machine that slows down slows all of them. Errors are against the f64 reference with
-/// the same options, over the pixels that it does not excuse, and against ground truth by rays where a scene asks for it.
+/// Configurations take turns, so a machine that slows down slows all of them. Errors are against
+/// the f64 reference with the same options, over the pixels that it does not excuse, and against
+/// ray-cast ground truth where a scene asks for it.
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat bench benches/accumulators.toml --quick --out report\n\n\
     Exits with 1, after everything is written, if a configuration misses its error limit or, where its bits must not\n\

@@ -13,12 +13,13 @@ use super::outputs::Source;
 use super::progress::Bars;
 use super::{note, outputs, print};
 
-/// Judge and measure an adapter in one run: accuracy, equal bits, passes against copy bandwidth, and the main studies.
+/// Make a record of an adapter in limited time: accuracy, equal bits, speed.
 ///
-/// In this order: the adapter; how fast it copies its memory; the hard cases; images that must have the same bits; frames of
-/// spheres, with the bytes per second that each pass moves at least; studies. Each is written as soon as it is there, and what
-/// the time does not allow is named. STUDIES are definitions, as for `epsplat bench`; else those of accumulators, organisation,
-/// optimisations, scaling and compute-vs-raster in the folder benches.
+/// The record holds, in this order: the adapter; its copy bandwidth; the hard cases; images that
+/// must have the same bits; frames of spheres, with the bytes per second that each pass moves at
+/// least; and studies. Each step is written as soon as it is done, and steps for which there was no
+/// time are named. STUDIES are TOML files, as for `epsplat bench`; without any, card runs those of
+/// accumulators, organisation, optimisations, scaling and compute-vs-raster in the folder benches.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  epsplat card --out card\n  epsplat card --quick --out card-tried\n\n\
     Writes card.md (a summary), card.json (all of it), hardcases.json, and a report of each study.\n\

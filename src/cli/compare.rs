@@ -10,7 +10,7 @@ use epsplat::{Error, Result, io};
 
 use super::{outputs, print, write_json};
 
-/// The error of image A against image B, over linear RGBA and every map they share.
+/// Measure the error of image A against image B, in linear colour and every map they share.
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat compare gpu.exr reference.exr --json -\n\n\
     If B has a `decision` map (--backend reference --aov decision), pixels in which a fragment lies within 1e-6 of a\n\
@@ -46,7 +46,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Err(Error::malformed(&arguments.a, what))
 }
 
-/// What stands for an error where a value that is not finite stands against another.
+/// The text in place of an error where a value is not finite and its counterpart differs.
 const NOT_FINITE: &str = "not finite";
 
 fn read(path: &Path) -> Result<Frame> {

@@ -16,11 +16,12 @@ use super::progress::Bars;
 use super::reading::{Reading, help_of, named};
 use super::{note, outputs, print, write_json};
 
-/// Whether surfels cover the mesh that they stand for, and how far they lie from it.
+/// Measure holes of surfels that stand for a mesh, and their distance from it.
 ///
-/// Rays are cast at the mesh from all around. Where a ray first meets it, a disk must lie on the ray too, within its own
-/// radius of the mesh; else the ray is uncovered. Where the surface goes on around it, that is a hole; at an outline or a
-/// step in depth it is an edge, which flat disks cut off. Nothing is rendered, so no filter and no epsilon hides a hole.
+/// Rays are cast at the mesh from all around. A ray is covered if a disk lies on it within the disk's
+/// own radius of the point where the ray first meets the mesh. An uncovered ray is a hole where the
+/// surface goes on around it, and an edge at an outline or a step in depth, which flat disks cut off.
+/// Nothing is rendered, so no filter and no epsilon hides a hole.
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat coverage surfels.ply --mesh bunny.obj --json -")]
 pub struct Arguments {

@@ -10,11 +10,12 @@ use epsplat::{Progress, Result};
 use super::progress::Bars;
 use super::{note, outputs};
 
-/// Write an analytic scene as PLY: surfels with exact normals, radii and colours.
+/// Write an analytic shape as PLY: surfels with exact normals, radii and colours.
 ///
-/// SHAPE is sphere (unit radius), shells (spheres of radii 1, 0.75, 0.5 and 0.25), torus (radii 1 and 0.4), crossing (two squares),
-/// plane (a square of side 2, one colour), checkerboard
-/// (the same with 32x32 squares) or text (the same with lines of text, each half as high as the one above). Radii are 1.5 times the spacing.
+/// SHAPE is sphere (unit radius), shells (spheres of radii 1, 0.75, 0.5 and 0.25), torus (radii 1 and
+/// 0.4), crossing (two squares), plane (a square of side 2, one colour), checkerboard (the same with
+/// 32x32 squares) or text (the same with lines of text, each half as high as the one above). Radii
+/// are 1.5 times the spacing.
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat generate sphere --count 1000000 -o sphere.ply\n  \
     epsplat generate torus --count 20000 --texture -o torus.ply\n  \

@@ -13,11 +13,12 @@ use epsplat::{Error, Result};
 use super::progress::Bars;
 use super::{note, outputs, print, write_json};
 
-/// Render scenes that renderers like to get wrong, with every accumulator, and judge each image against the f64 reference.
+/// Render hard scenes with every accumulator and judge each pixel by a derived bound.
 ///
-/// One row a case and accumulator: errors as fractions of each map's range, of the map that used up most of its bound; how
-/// much of the bound that was (the bound is derived from the pixel's own fragments, and is that of `fixed`); pixels that
-/// only the reference (lost) or only the device (invented) covers; and the verdict.
+/// A row stands for a case and an accumulator. It gives the errors of the map that used most of its
+/// bound, as fractions of the map's range; the share of the bound that was used (the bound follows
+/// from the pixel's own fragments and is that of `fixed`); the pixels that only the reference (lost)
+/// or only the device (invented) covers; and the verdict.
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat hardcases --accumulator fixed --json hardcases.json\n\n\
     Exits with 1 if a row fails that was not expected to.")]

@@ -13,11 +13,12 @@ use super::progress::Bars;
 use super::reading::{InputFormat, named};
 use super::{note, outputs, print, write_json};
 
-/// Write a mesh as surfels where its triangles are much smaller than pixels, and as triangles elsewhere.
+/// Divide a mesh into surfels, where its triangles are tiny, and triangles elsewhere.
 ///
-/// Where triangles have less than a twentieth of a square pixel they become surfels, four for each pixel; larger ones stay as they are. Surfels are written to OUT.ply, triangles beside it to OUT.mesh.ply, and their images to
-/// OUT.mesh-1.png and so on; `epsplat render OUT.ply` draws both. Of files with these names only
-/// those of an earlier run are replaced, or removed where nothing is left to be written to them.
+/// Triangles of less than a twentieth of a square pixel become surfels, four for each pixel; larger
+/// ones stay. Surfels are written to OUT.ply, triangles to OUT.mesh.ply beside it, and images to
+/// OUT.mesh-1.png and so on; `epsplat render OUT.ply` draws both. Files with these names are replaced,
+/// or removed where nothing is left to write, only if an earlier run wrote them.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  epsplat hybrid dragon.ply -o far.ply --pixels 400\n  epsplat render far.ply -o far.png"
@@ -46,7 +47,7 @@ fn pixels(text: &str) -> std::result::Result<f64, String> {
     number.ok_or_else(|| "it is a number of pixels from 1 to 1000000".into())
 }
 
-/// The outcome, as JSON has it.
+/// The outcome as JSON.
 #[derive(Serialize)]
 struct Outcome {
     #[serde(flatten)]

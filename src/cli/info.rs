@@ -15,7 +15,7 @@ use super::progress::Bars;
 use super::reading::{Reading, help_of, named};
 use super::{outputs, print, write_json};
 
-/// What a file holds, and what a renderer would make of it.
+/// Describe a file: its points, attributes, place, coverage and what a picture makes of them.
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat info scan.laz")]
 pub struct Arguments {
@@ -28,7 +28,7 @@ pub struct Arguments {
     json: Option<PathBuf>,
 }
 
-/// The share of surfels that covers a surface, but for its boundaries.
+/// The share of surfels without an open gap beside them above which a surface counts as covered.
 const COVERED: f64 = 0.9;
 
 #[derive(Serialize)]

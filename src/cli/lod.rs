@@ -15,10 +15,12 @@ use super::progress::Bars;
 use super::reading::{LimitArguments, Reading, help_of_all, named};
 use super::{note, outputs, print, write_json};
 
-/// Write surfels with levels of detail as PLY: a tree whose nodes are surfels that stand for all below them.
+/// Build levels of detail for `render --lod`, written as PLY with the surfels.
 ///
-/// Points are divided at their mean into eight, until there are eight or fewer (Pajarola 2003); each node is the least ellipse of their
-/// covariance's shape that bounds the disks below it, with their mean colour and normal. The surfels are written in the order of the tree, so other programs see a cloud.
+/// Points are divided at their mean into eight, until eight or fewer are left (Pajarola 2003). Each
+/// node of this octree is a surfel: the smallest ellipse with the shape of the points' covariance
+/// that bounds the disks below it, with their mean colour and normal. Surfels are written in the
+/// order of the tree, so other programs read the file as a cloud.
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  epsplat lod scan.ply -o scan.lod.ply\n  epsplat render scan.lod.ply -o scan.png --lod 4px\n  epsplat lod scan.ply --cut 0.05 -o coarse.ply\n  epsplat lod tiles/*.ply -o city.lod.ply --memory 4GiB"
@@ -46,7 +48,7 @@ pub struct Arguments {
     json: Option<PathBuf>,
 }
 
-/// What came of it.
+/// The outcome.
 #[derive(Serialize)]
 struct Report {
     surfels: u64,

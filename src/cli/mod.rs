@@ -30,32 +30,43 @@ use serde::Serialize;
 
 use self::reading::with_folders;
 
-/// Render surfels and point clouds without a display, with compute kernels only.
+/// Render point clouds, surfels, meshes and Gaussian surfels without a display.
 #[derive(Parser)]
-#[command(version, max_term_width = 110, after_help = EXIT_CODES)]
+#[command(version, max_term_width = 110, after_help = AFTER_HELP)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
 }
 
-const EXIT_CODES: &str = "Exit codes: 0 done, 1 the run failed, 2 the arguments cannot be used.";
+const AFTER_HELP: &str = "\
+Measuring:
+  bench      Run a study of speed beside error: every configuration on every scene of a TOML file
+  hardcases  Render hard scenes with every accumulator and judge each pixel by a derived bound
+  card       Make a record of an adapter in limited time: accuracy, equal bits, speed
+  adapters   List the adapters, with their limits and features, and the one that auto takes
+
+Exit codes: 0 done, 1 the run failed, 2 the arguments cannot be used.";
 
 #[derive(Subcommand)]
 enum Command {
     Render(Box<render::Arguments>),
-    Compare(compare::Arguments),
-    Coverage(coverage::Arguments),
-    Generate(generate::Arguments),
+    Info(info::Arguments),
     Surfels(surfels::Arguments),
     Sample(sample::Arguments),
-    Info(info::Arguments),
-    Adapters(adapters::Arguments),
-    Hardcases(hardcases::Arguments),
-    Bench(bench::Arguments),
-    Card(card::Arguments),
     Simplify(simplify::Arguments),
     Hybrid(hybrid::Arguments),
     Lod(lod::Arguments),
+    Coverage(coverage::Arguments),
+    Compare(compare::Arguments),
+    Generate(generate::Arguments),
+    #[command(hide = true)]
+    Bench(bench::Arguments),
+    #[command(hide = true)]
+    Hardcases(hardcases::Arguments),
+    #[command(hide = true)]
+    Card(card::Arguments),
+    #[command(hide = true)]
+    Adapters(adapters::Arguments),
 }
 
 /// Runs the command line and says how it ended.

@@ -14,10 +14,12 @@ use super::progress::Bars;
 use super::reading::{InputFormat, named};
 use super::{note, outputs};
 
-/// Write surfels that cover a mesh as PLY: on its triangles, with half-axes, and its colours, normals and texture coordinates.
+/// Cover a mesh with a given number of surfels, written as PLY.
 ///
-/// The mesh is divided into voxels, and a heap hands out the samples by the voxels' priority: triangles (as many as the
-/// mesh has there), touched (the same, but triangles count wholly wherever they reach), area (evenly), curvature (where the surface bends) or texture (where the colour changes).
+/// The surfels lie on the mesh's triangles and take its colours, normals and texture coordinates. The
+/// mesh is divided into voxels, which share the samples by priority: triangles (their number in the
+/// voxel), touched (the same, counting a triangle wholly wherever it reaches), area, curvature (where
+/// the surface bends) or texture (where the colour changes).
 #[derive(Args)]
 #[command(after_help = "Example:\n  epsplat sample bunny.obj -o surfels.ply --count 60000")]
 pub struct Arguments {

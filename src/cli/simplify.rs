@@ -15,11 +15,12 @@ use super::progress::Bars;
 use super::reading::{Reading, help_of, named};
 use super::{note, outputs, print, write_json};
 
-/// Replace the surfels of a smooth surface by fewer, larger ones that lie within a tolerance of them, without holes.
+/// Replace surfels by fewer, larger ones within a tolerance, without holes.
 ///
-/// Around each point the largest disk is grown that no point inside is farther from than the tolerance. Of these as few
-/// as possible are taken that cover the surface together. Flat parts keep few surfels, edges and details keep theirs.
-/// Texture coordinates stay, with their slopes, and no surfel stands for points on both sides of a seam.
+/// Around each point grows the largest disk whose points all lie within the tolerance of it, and few
+/// of these disks are selected that cover the surface together. Flat parts keep few surfels, edges
+/// and details keep theirs. Texture coordinates stay, with their slopes, and no surfel stands for
+/// points on both sides of a seam.
 #[derive(Args)]
 #[command(
     after_help = "Example:\n  epsplat simplify scan.ply -o small.ply --tolerance rel:0.0005 --shape ellipse --relax 3"

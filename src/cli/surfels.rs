@@ -12,9 +12,10 @@ use super::progress::Bars;
 use super::reading::{LimitArguments, Reading, help_of_all, named};
 use super::{note, outputs};
 
-/// Make surfels of points: normals with a side, and disks or ellipses that cover the surface, kept as PLY.
+/// Make surfels from points and write them as PLY: normals with a side, ellipses without gaps.
 ///
-/// The inputs become one cloud. Normals that are given stay; the others are those of the plane through 16 neighbours.
+/// The inputs become one cloud. Given normals stay; the others are those of a plane through 16
+/// neighbours.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  epsplat surfels scan.laz -o scan.ply\n  \
     epsplat surfels left.ply right.ply -o room.ply --size ellipse --outliers 3 --orient 0,0,1.6 --orient 4.1,0,1.6")]
@@ -68,7 +69,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// Several scanners make one orientation; nothing else can be said twice.
+/// Joins several --orient: the positions of several scanners make one orientation.
 fn orientation(given: &[Orientation]) -> Result<Orientation> {
     if let [one] = given {
         return Ok(one.clone());

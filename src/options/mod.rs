@@ -106,7 +106,7 @@ impl<'de> DeserializeSeed<'de> for OptionValue<'_> {
 
     fn deserialize<D: Deserializer<'de>>(self, value: D) -> Result<(), D::Error> {
         let texts = value.deserialize_any(Texts)?;
-        // Who reads a file names the key itself.
+        // The reader of a file names the key itself.
         let prefix = format!("{}: ", self.name);
         self.options.set(self.name, &texts).map_err(|error| {
             let sentence = error.to_string();

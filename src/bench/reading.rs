@@ -384,8 +384,8 @@ mod tests {
             ("[[config]]\nname = \"d\"\nbackend = \"raster\"\norganisation = \"tile\"\n", &["organisation", "gpu"]),
             ("[[config]]\nname = \"d\"\nbackend = \"raster\"\nwithout = [\"order\"]\n", &["left out", "gpu"]),
             ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nwithout = [\"x\"]\n", &["line 6, without:", "culling"]),
-            ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nmaps = [\"decision\"]\n", &["decision map", "reference"]),
-            ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\nmaps = [\"colour\"]\n", &["line 6, maps:", "depth"]),
+            ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\naov = [\"decision\"]\n", &["decision map", "reference"]),
+            ("[[config]]\nname = \"d\"\nbackend = \"gpu\"\naov = [\"colour\"]\n", &["line 6, aov:", "depth"]),
             ("size = [\n", &["line"]),
         ];
         for (wrong, words) in cases {

@@ -31,6 +31,9 @@ use serde::de::{DeserializeSeed, Deserializer, Error as _, SeqAccess, Visitor};
 use crate::error::{Error, Result};
 use group::Group;
 
+/// Names that options had before, and what is written in their place.
+const RENAMED: [(&str, &str); 2] = [("maps", "aov"), ("lod_caps", "lod_shape: cap or disk")];
+
 /// The options of a picture, scene, camera and backend apart.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "cli", derive(clap::Args))]
@@ -79,7 +82,10 @@ impl RenderOptions {
                 return Ok(());
             }
         }
-        Err(Error::Usage(format!("there is no option {name}")))
+        Err(Error::Usage(match RENAMED.iter().find(|(old, _)| *old == name) {
+            Some((_, new)) => format!("{name} is now {new}"),
+            None => format!("there is no option {name}"),
+        }))
     }
 
     /// A deserialiser of the value of the option `name`: text, a number, true or false, or a list of
@@ -100,7 +106,12 @@ impl<'de> DeserializeSeed<'de> for OptionValue<'_> {
 
     fn deserialize<D: Deserializer<'de>>(self, value: D) -> Result<(), D::Error> {
         let texts = value.deserialize_any(Texts)?;
-        self.options.set(self.name, &texts).map_err(D::Error::custom)
+        // The reader of a file names the key itself.
+        let prefix = format!("{}: ", self.name);
+        self.options.set(self.name, &texts).map_err(|error| {
+            let sentence = error.to_string();
+            D::Error::custom(sentence.strip_prefix(&prefix).unwrap_or(&sentence))
+        })
     }
 }
 
@@ -184,6 +195,7 @@ mod tests {
         let mut options = RenderOptions::default();
         let refusal = |result: Result<()>| result.unwrap_err().to_string();
         assert!(refusal(options.set("epsilo", &texts(&["abs:2"]))).contains("epsilo"));
+        assert_eq!(refusal(options.set("maps", &texts(&["depth"]))), "maps is now aov");
         assert!(refusal(options.set("epsilon", &texts(&["abs:-2"]))).starts_with("epsilon: "));
         assert!(refusal(options.set("separate", &texts(&["yes"]))).starts_with("separate: "));
         assert!(refusal(options.set("opacity", &texts(&["half"]))).starts_with("opacity: "));

@@ -17,7 +17,7 @@ const SCENES: &str = "name = \"small\"\nabout = \"A test.\"\nsize = [48, 48]\nru
     [quick]\nruns = 1\n\
     [[scene]]\nname = \"ball\"\nshape = \"sphere\"\ncount = [200, 400]\nquick_count = 100\nviews = 2\ntruth = true\n\
     [[scene]]\nname = \"board\"\nshape = \"checkerboard\"\ncount = 300\nfootprint_px = 3\nfill = 0.5\n\
-    [[config]]\nname = \"exact\"\nbackend = \"reference\"\nmaps = [\"depth\"]\n";
+    [[config]]\nname = \"exact\"\nbackend = \"reference\"\naov = [\"depth\"]\n";
 
 const GPU: &str = "[[config]]\nname = \"fixed\"\nbackend = \"gpu\"\nerror_limit = 1e-5\n\
     [[config]]\nname = \"float\"\nbackend = \"gpu\"\naccumulator = \"cas\"\n\
